@@ -1,5 +1,5 @@
 # Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
-.PHONY: help demo test quick setup browser page lint docs wheel clean
+.PHONY: help demo test quick setup browser page lint docs wheels clean
 PYTHON ?=
 OUT ?= out/demo
 SEED ?=
@@ -13,7 +13,7 @@ help:
 	@echo 'make docs    the documentation site, in site/; warnings are errors'
 	@echo 'make browser install Chromium and Caddy (Debian), without which the tests of `embodied serve` in them are skipped'
 	@echo 'make page    build the page of `embodied serve` from web/ with Node'
-	@echo 'make wheel   build the wheel into dist/'
+	@echo 'make wheels  build embodied-houses and embodied-houses-furniture into dist/'
 
 setup:
 	@PYTHON='$(PYTHON)' ./setup.sh
@@ -22,7 +22,7 @@ demo: setup
 	@.venv/bin/embodied demo --out '$(OUT)' $(if $(SEED),--seed $(SEED))
 
 test: setup
-	@.venv/bin/python -m pytest -q -n 2 --dist loadfile
+	@.venv/bin/python -m pytest -q -n 2 --dist worksteal
 
 lint: setup
 	@.venv/bin/ruff check .
@@ -31,7 +31,7 @@ lint: setup
 	@.venv/bin/mypy
 
 quick: setup
-	@.venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist loadfile
+	@.venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist worksteal
 
 docs: setup
 	@.venv/bin/python -c 'import material, mkdocstrings' 2>/dev/null || .venv/bin/python -m pip install -q -c constraints.txt -e '.[docs]'
@@ -47,8 +47,9 @@ browser:
 page:
 	@cd web && npm ci --no-audit --no-fund && npm run build
 
-wheel: setup
-	@.venv/bin/python -m pip wheel -q --no-deps -w dist .
+wheels: setup
+	@.venv/bin/python packaging/furniture/collect.py
+	@.venv/bin/python -m pip wheel -q --no-deps -w dist . ./packaging/furniture
 	@.venv/bin/python -c 'import twine' 2>/dev/null || .venv/bin/python -m pip install -q -c constraints.txt twine
 	@.venv/bin/twine check --strict dist/*.whl
 

@@ -28,16 +28,43 @@ directory (another compression, encrypted, another name), in its content, or in 
 
 
 def default_cache() -> Path:
-    """EMBODIED_CACHE if set, else the user's cache folder, else, for somebody without a home, one in the folder for
-    temporary files; only command lines call this."""
-    chosen = os.environ.get("EMBODIED_CACHE")
-    if not chosen:
-        base = os.environ.get("XDG_CACHE_HOME")
-        chosen = f"{base}/embodied" if base else "~/.cache/embodied"
+    """The cache folder: EMBODIED_CACHE if set, else the user's, else, for somebody without a home, one in the folder
+    for temporary files; only command lines call this.
+
+    EMBODIED_CACHE may be a list, as PATH is one: what the later folders hold is read from there, and all is written
+    to the first.
+    """
+    first, *others = (os.environ.get("EMBODIED_CACHE") or _users_cache()).split(os.pathsep)
     try:
-        return Path(chosen).expanduser()
+        cache = Path(first).expanduser()
     except RuntimeError:  # neither HOME nor an entry in the list of users
-        return Path(tempfile.gettempdir()) / f"embodied-{os.getuid()}"
+        cache = Path(tempfile.gettempdir()) / f"embodied-{os.getuid()}"
+    for other in filter(None, others):
+        link(Path(other).expanduser(), cache)
+    return cache
+
+
+def _users_cache() -> str:
+    base = os.environ.get("XDG_CACHE_HOME")
+    return f"{base}/embodied" if base else "~/.cache/embodied"
+
+
+def link(shared: Path, cache: Path) -> None:
+    """Let `cache` hold symbolic links to those files of `shared` that it lacks; hidden files are left out.
+
+    Raises:
+      OSError: `shared` cannot be read, or `cache` not be written.
+    """
+    with os.scandir(shared) as entries:
+        inside = [e for e in entries if not e.name.startswith(".")]
+    if inside:
+        cache.mkdir(parents=True, exist_ok=True)
+    for entry in inside:
+        if entry.is_dir():
+            link(Path(entry.path), cache / entry.name)
+        elif not os.path.lexists(cache / entry.name):
+            with contextlib.suppress(FileExistsError):  # another process links, too
+                os.symlink(os.path.abspath(entry.path), cache / entry.name)
 
 
 def digest(*parts: object) -> str:

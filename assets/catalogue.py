@@ -18,7 +18,7 @@ from types import MappingProxyType
 from tqdm import tqdm
 
 from assets import materials
-from assets.built import MAKERS
+from assets.built import BASICS, MAKERS
 from assets.cache import default_cache
 from assets.importing.importer import import_model, scaled
 from assets.importing.own import OwnModel, import_own, read_own, source_digest
@@ -88,6 +88,14 @@ class Catalogue:
         kept = {key: self._asset(key) for key in keys}
         return Catalogue(kept, self._recipes, self.cache, self.packs, self._own)
 
+    @functools.cached_property
+    def furnishing(self) -> Catalogue:
+        """What new houses are furnished with: everything but the simple furniture of `assets.built.basics`; where no
+        furniture models are installed, only what code builds, the simple furniture included."""
+        if self._recipes.keys() <= self._own.keys() or find_packs(self.packs):
+            return self.only(self.assets.keys() - BASICS) if BASICS & self.assets.keys() else self
+        return self.only(key for key in self.assets if key not in self._recipes or key in self._own)
+
     def mesh(
         self, key: str, size: tuple[float, float, float] | None = None, params: Params = ()
     ) -> tuple[MeshPart, ...]:
@@ -117,6 +125,11 @@ class Catalogue:
           MeshError, PackError: a file is gone since the catalogue was read.
         """
         return {key: source_digest(self._own[key]) for key in sorted(set(keys)) if key in self._own}
+
+    @property
+    def models(self) -> frozenset[str]:
+        """The models of furniture libraries that are used, by the keys they have there."""
+        return frozenset(self._recipes[k].model or k for k in self._recipes if k not in self._own)
 
     def missing(self) -> tuple[str, ...]:
         """Models that no furniture library holds, sorted; those in the cache can be used all the same."""
@@ -165,18 +178,18 @@ def load_catalogue(
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
     """
-    packs, own = ((p,) if isinstance(p, (str, Path)) else p for p in (packs, own))  # one folder is a folder
+    packs_given, own_given = ((Path(p),) if isinstance(p, (str, Path)) else p for p in (packs, own))
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
     assets |= {key: maker.asset for key, maker in MAKERS.items()}
     models: dict[str, OwnModel] = {}
-    for folder in own:
+    for folder in own_given:
         more, more_recipes, more_models = read_own(Path(folder), classes)
         if twice := sorted(set(more) & set(assets)):
             raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
-    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs, models)
+    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs_given, models)
     for name in catalogue.own_classes:
         if why := _placed_nowhere(catalogue.of_class(name)):
             log.warning("class %r is placed in no house: %s", name, why)

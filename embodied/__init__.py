@@ -3,7 +3,7 @@
     import embodied
 
     house = embodied.generate_house(7)                        # the same on every machine
-    with embodied.open_world(house, quality="fast") as world: # lit once, then drawn in milliseconds
+    with embodied.open_world(house, pictures="fast") as world: # lit once, then drawn in milliseconds
         view = world.camera((2.0, 3.0, 1.5), yaw=0.5)         # rgb, depth and ids from anywhere
         panorama = world.panorama(0)                          # or from a viewpoint of its navigation graph
         print({world.classes[i] for i in set(view.ids.flat)})
@@ -28,8 +28,8 @@ Other
     default_cache                  where expensive products are kept
     stream                         named random generators of one seed
 
-Each name is imported when it is first used. Environments: embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0 and
-Drive-v0, registered by `import embodied`.
+Each name is imported when it is first used. Environments: embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0,
+Ask-v0 and Drive-v0, registered by `import embodied`.
 """
 
 from __future__ import annotations

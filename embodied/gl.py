@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from embodied import software
 from embodied.errors import UnableError
 
 BACKENDS = ("egl", "osmesa")
@@ -42,7 +43,7 @@ ELSEWHERE = (
 """Values of MUJOCO_GL that mujoco can be imported with, though nothing is drawn off-screen through them."""
 REMEDY = (
     "Install EGL and Mesa's software OpenGL (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri libopengl0), "
-    "or OSMesa (apt-get install libosmesa6) and set MUJOCO_GL=osmesa"
+    "or, without root on Linux x86-64, run: embodied doctor --fix"
 )
 SOFTWARE = ("llvmpipe", "softpipe", "swrast", "software")
 """Words by which a device name tells that no graphics hardware is used."""
@@ -84,7 +85,18 @@ def choose() -> str:
     backend = asked or _first_available()
     os.environ["MUJOCO_GL"] = backend
     os.environ["PYOPENGL_PLATFORM"] = backend
+    if backend == "osmesa":
+        software.bind_osmesa()
     return backend
+
+
+def available() -> bool:
+    """Whether some off-screen OpenGL is here."""
+    try:
+        choose()
+    except GLError:
+        return False
+    return True
 
 
 def prepare() -> None:
@@ -103,7 +115,7 @@ def prepare() -> None:
 def _first_available() -> str:
     if _egl_works():
         return "egl"
-    if ctypes.util.find_library("OSMesa"):
+    if ctypes.util.find_library("OSMesa") or software.bundled("OSMesa"):
         return "osmesa"
     raise GLError(f"neither EGL nor OSMesa works here. {REMEDY}")
 

@@ -25,7 +25,7 @@ from embodied.render.camera import View
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
-from embodied.render.pictures import TRACED, PictureSettings
+from embodied.render.pictures import PictureSettings
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
 from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
@@ -116,13 +116,7 @@ class World:
     @functools.cached_property
     def _made_of(self) -> dict[str, object]:
         """All that the panoramas depend on but what draws them."""
-        return (
-            self._origin
-            | {k: v for k, v in dataclasses.asdict(self.pictures).items() if k not in ("look", "rays")}
-            | ({"look": "gloss"} if self.pictures.shown_with == "gloss" else {})  # matte ones are older than the word
-            | ({} if self.pictures.rays is None else {"rays": self.pictures.rays})
-            | {"light": self.pictures.lit_by, "code": code_digest(*makers(self.pictures))}
-        )
+        return self._origin | self.pictures.stored() | {"code": code_digest(*makers(self.pictures))}
 
     @functools.cached_property
     def fingerprint(self) -> dict[str, object]:
@@ -161,12 +155,12 @@ class World:
           ValueError: the world was opened without pictures.
         """
         if self._renderer is None:
-            if self.pictures.quality == "none":
-                raise ValueError(f"world {self.name!r} was opened without pictures; open it with another quality")
+            if self.pictures.kind == "none":
+                raise ValueError(f"world {self.name!r} was opened without pictures; open it with pictures='unlit'")
             painter = overlay = None
-            if self.pictures.shown_with == "gloss":
+            if self.pictures.gloss:
                 overlay = gloss_of(self._baked())
-            if self.lit is not None and self.pictures.backend == "filament":
+            if self.lit is not None and self.pictures.filament:
                 from embodied.render.filament import FilamentPainter  # late: loads Vulkan
 
                 painter = FilamentPainter(self.house, self.catalogue, self.lit)
@@ -193,13 +187,14 @@ class World:
         """What draws the panoramas; what it needs is made first, with progress bars if wanted."""
         if self.pictures.lit:
             self._baked(progress)
-        if self.pictures.quality not in TRACED:
+        if not self.pictures.traced:
             return self.renderer
         if self._tracer is None:
             from embodied.light.reference import Tracer  # late: loads the path tracer
 
             p = self.pictures
-            self._tracer = Tracer(self._baked(), self.house, quality=p.quality, size=p.size, rays=p.rays)
+            quality = "glossy" if p.kind == "traced" else p.kind
+            self._tracer = Tracer(self._baked(), self.house, quality=quality, size=p.size, rays=p.rays)
         return self._tracer
 
     def panorama(self, node: int) -> Panorama:
@@ -307,7 +302,7 @@ def open_world(
     house: House,
     catalogue: Catalogue | None = None,
     cache: Path | None = None,
-    pictures: PictureSettings = PictureSettings(),
+    pictures: PictureSettings | str = PictureSettings(),
     *,
     graph: NavGraph | None = None,
     **changes: Any,
@@ -317,19 +312,20 @@ def open_world(
     Args:
       catalogue: where meshes and materials come from; the shipped one where not given.
       cache: folder for what is expensive, which may be deleted at any time; the user's cache folder where not given.
-      pictures: how the house is drawn.
+      pictures: how the house is drawn: "unlit", "fast", "normal", "fast-matte", ..., one of
+        embodied.render.pictures.KINDS, or settings.
       graph: the navigation graph; built when not given.
-      changes: fields of PictureSettings, instead of those of `pictures`: size=512, quality="normal".
+      changes: fields of PictureSettings, instead of those of `pictures`: size=512.
     """
     graph, cache = graph or build_graph(house), cache or default_cache()
-    return World(house, catalogue or load_catalogue(cache), graph, cache, dataclasses.replace(pictures, **changes))
+    return World(house, catalogue or load_catalogue(cache), graph, cache, PictureSettings.of(pictures, **changes))
 
 
 def open_folder(
     folder: Path,
     catalogue: Catalogue | None = None,
     cache: Path | None = None,
-    pictures: PictureSettings = PictureSettings(),
+    pictures: PictureSettings | str = PictureSettings(),
     **changes: Any,
 ) -> World:
     """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there.
@@ -342,7 +338,7 @@ def open_folder(
     if not (folder / "house.json").exists():
         raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
     house = load_house(folder / "house.json", catalogue)
-    graph, pictures = build_graph(house), dataclasses.replace(pictures, **changes)
+    graph, pictures = build_graph(house), PictureSettings.of(pictures, **changes)
     file = folder / "panoramas.pano"
     return World(house, catalogue, graph, cache, pictures, file=file, may_differ=("renderer",))
 
@@ -404,10 +400,10 @@ def makers(pictures: PictureSettings) -> tuple[str, ...]:
     modules = ["assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
     if pictures.lit:
         modules.append("embodied.light.baking")
-    if pictures.shown_with == "gloss":
+    if pictures.gloss:
         modules += ["embodied.render.gloss", "embodied.light.rays"]
-    if pictures.backend == "filament":
+    if pictures.filament:
         modules.append("embodied.render.filament")
-    if pictures.quality in TRACED:
+    if pictures.traced:
         modules.append("embodied.light.reference")
     return tuple(modules)

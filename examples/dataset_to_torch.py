@@ -4,7 +4,7 @@
 
 Every viewpoint of a flat is seen in 36 views; from the colours of each the network tells its mean distance, and is
 judged in a house it has never seen, beside whoever always says the same. Without --data a data set of small flats is
-built and drawn first, which takes about a minute; with `--quality fast` they are lit, too. Object classes, instance
+built and drawn first, which takes about a minute; with `--pictures fast` they are lit, too. Object classes, instance
 ids, poses and rooms are in the same batches (agents/vision/pictures.py).
 """
 
@@ -26,13 +26,13 @@ from embodied.render.pictures import PictureSettings
 VIEW = ViewSettings("view", 24, 32)
 
 
-def flats(folder: Path, quality: str) -> Dataset:
+def flats(folder: Path, kind: str) -> Dataset:
     """The data set in `folder`, built and drawn where it is not."""
     if not (folder / "dataset.json").exists():
         build_dataset(DatasetConfig("find", "tiny", area=(45.0, 60.0)), folder, default_cache())
     data = Dataset(folder)
     if data.pictures is None:
-        draw_panoramas(data.config, folder, default_cache(), pictures=PictureSettings(64, quality))
+        draw_panoramas(data.config, folder, default_cache(), pictures=PictureSettings(64, kind))
     return data
 
 
@@ -52,13 +52,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=Path("data/find_flats"))
     parser.add_argument(
-        "--quality", choices=("unlit", "fast"), default="unlit", help="of pictures that are drawn first"
+        "--pictures", choices=("unlit", "fast"), default="unlit", help="of pictures that are drawn first"
     )
     parser.add_argument("--epochs", type=int, default=10)
     args = parser.parse_args()
     torch.manual_seed(0)
 
-    data = flats(args.data, args.quality)
+    data = flats(args.data, args.pictures)
     train, test = (
         ViewpointPictures(data, split, view=VIEW, channels=("rgb", "depth")) for split in ("train", "test_unseen")
     )

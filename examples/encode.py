@@ -61,7 +61,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--network", help="of torchvision, such as resnet18 (default: the shipped encoder)")
     parser.add_argument("--weights", help="its weights, a .pth file")
-    parser.add_argument("--quality", default="fast", choices=("unlit", "fast", "normal"))
+    parser.add_argument("--pictures", default="fast", choices=("unlit", "fast", "normal"))
     parser.add_argument("--steps", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
@@ -74,7 +74,7 @@ def main() -> None:
         seed=args.seed,
         sees="rgb",
         view=ViewSettings("view", 128, 128),
-        pictures=PictureSettings(128, args.quality),
+        pictures=PictureSettings(128, args.pictures),
     )
     rng, features, rooms = np.random.default_rng(args.seed), [], []
     observation, _ = env.reset(seed=args.seed)

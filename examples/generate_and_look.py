@@ -2,7 +2,7 @@
 
     python examples/generate_and_look.py --seed 7 --out out/look
 
-With `--quality normal` the flat is lit first, which takes a few minutes once.
+With `--pictures normal` the flat is lit first, which takes a few minutes once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--out", type=Path, default=Path("out/look"))
-    parser.add_argument("--quality", default="unlit", choices=("unlit", "fast", "normal"))
+    parser.add_argument("--pictures", default="unlit", choices=("unlit", "fast", "normal"))
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
 
@@ -29,7 +29,7 @@ def main() -> None:
     house.save(args.out / "house.json")
     print(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects, digest {house.digest[:12]}")
 
-    with embodied.open_world(house, catalogue, embodied.default_cache(), size=256, quality=args.quality) as world:
+    with embodied.open_world(house, catalogue, embodied.default_cache(), size=256, pictures=args.pictures) as world:
         save_plan(house, args.out / "plan.png", graph=world.graph)
         node = len(world.graph.ids) // 2
         panorama = world.panorama(node)

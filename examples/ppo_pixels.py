@@ -182,7 +182,7 @@ def arena(args: argparse.Namespace, numbers: Sequence[int], goals: Sequence[str]
     catalogue, worlds, tasks = load_catalogue(default_cache()), {}, []
     for n in numbers:
         house, graph = make_dataset_house(args.seed, f"flat_{n}", HouseConfig(area=AREA), catalogue)
-        drawn = PictureSettings(128, args.quality)
+        drawn = PictureSettings(128, args.pictures)
         world = worlds[house.name] = open_world(house, catalogue, default_cache(), drawn, graph=graph)
         world.render_all()
         tasks += point_tasks(world, args.seed) if args.task == "point" else find_tasks(world, args.seed)
@@ -299,7 +299,7 @@ def main() -> None:
     parser.add_argument("--envs", type=int, default=16)
     parser.add_argument("--rollout", type=int, default=128, help="steps of each environment between updates")
     parser.add_argument("--judge", type=int, default=300, help="episodes")
-    parser.add_argument("--quality", default="fast", choices=("unlit", "fast", "normal"))
+    parser.add_argument("--pictures", default="fast", choices=("unlit", "fast", "normal"))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/ppo"))

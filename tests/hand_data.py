@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import shutil
+import tempfile
+from pathlib import Path
 
 import numpy as np
 from hand_worlds import grid_world, thing
@@ -37,6 +41,20 @@ def build(folder, cache, kind="hanna", workers=1, size="tiny", make_house=hand_h
     return Dataset(folder)
 
 
+@functools.cache
+def _whole(kind, size, make_house, options):
+    folder = tempfile.TemporaryDirectory()
+    home = Path(folder.name)
+    build(home / "data", home / "cache", kind, size=size, make_house=make_house, **dict(options))
+    return folder
+
+
+def built(folder, kind="hanna", size="tiny", make_house=hand_house, **options):
+    """What `build` makes, copied into `folder` if this process has built it before."""
+    whole = _whole(kind, size, make_house, tuple(options.items()))
+    return Dataset(shutil.copytree(Path(whole.name, "data"), folder))
+
+
 def content(folder):
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
@@ -56,5 +74,5 @@ def paint(data, pictures, names=None):
         place = data.place(name)
         many = len(owners(place.house))
         nodes = [painted_panorama(k, many, pictures.size) for k in range(len(place.graph.ids))]
-        meta = {"house": place.house.digest, **dataclasses.asdict(pictures), "look": pictures.shown_with}
+        meta = {"house": place.house.digest, **pictures.stored()}
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import os
 import signal
@@ -34,7 +33,7 @@ def make_data(folder: Path, cache: Path, kind: str = "hanna"):
     pictures = PictureSettings(size=64)
     for name in {n for s in data.splits for n in data.names(s)}:
         place = data.place(name)
-        meta = {"house": place.house.digest, **dataclasses.asdict(pictures), "look": pictures.shown_with}
+        meta = {"house": place.house.digest, **pictures.stored()}
         nodes = [gradient(k) for k in range(len(place.graph.ids))]
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)
     return data

@@ -18,7 +18,7 @@ from agents.ask.foresight import CHOICES, Foresight
 from agents.ask.learned import LearnedAsker, facts, train
 from embodied.assistants.ask import in_view, understood
 from embodied.cli import main as start
-from embodied.envs.ask import AskRules, Prices
+from embodied.envs.ask import AskSettings, Prices
 from embodied.envs.make import ask_environment_maker, look_of
 from embodied.evaluation import tables
 from embodied.evaluation.ask import acted, ask_row, observed, read_seeds, submitted
@@ -27,7 +27,7 @@ from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv, layout_of
 from embodied.gym.eyes import Closed
 from embodied.interface import Ask, Intention, Move, Pose, Stop
-from embodied.policies.ask import RULES, Asker, Trail, baselines
+from embodied.policies.ask import RULES, Asker, Mind, baselines
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AskConfig, ask_pool, ask_tasks
 
@@ -146,7 +146,7 @@ def test_nothing_of_the_goal_is_seen_before_it_is_asked_for(world, tasks, make_e
 
 
 def test_without_grounding_answers_come_in_words_alone(world, tasks):
-    env = ask_environment_maker({"grid": world}, look, AskRules(grounded=False))()
+    env = ask_environment_maker({"grid": world}, look, AskSettings(grounded=False))()
     for t in tasks[:6]:
         first = env.reset(t)
         o = env.step(Ask(Intention.ROUTE))
@@ -289,13 +289,13 @@ def test_thinking_ahead_changes_nothing_in_the_episode(tasks, make_env):
     env = make_env()
     env.reset(tasks[0])
     before = (len(env._steps), env.time, env.pose, env._fitting, set(env._denied))
-    Foresight(make_env)._value(env, env.observation, Trail(), Intention.APPEARANCE, np.random.default_rng(0))
+    Foresight(make_env)._value(env, env.observation, Mind(), Intention.APPEARANCE, np.random.default_rng(0))
     assert (len(env._steps), env.time, env.pose, env._fitting, set(env._denied)) == before
 
 
 def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks, make_env):
     """It is taught to ask for the way at once, and does so."""
-    shown = [(o := make_env().reset(t), facts(o, Trail()))[1] for t in tasks]
+    shown = [(o := make_env().reset(t), facts(o, Mind()))[1] for t in tasks]
     labels = np.full(len(shown), CHOICES.index(Intention.ROUTE))
     net = train(np.stack(shown), labels, seed=0)
     episodes = play(make_env, LearnedAsker(net), tasks[:4], seed=0)

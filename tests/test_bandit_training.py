@@ -14,7 +14,7 @@ import torch
 
 from agents.bandit import corpus, libreoffice
 from agents.bandit.config import BanditConfig
-from agents.bandit.corpus import CorpusError, Pair, Sizes, pairs_of
+from agents.bandit.corpus import CorpusError, Pair, Sizes
 from agents.bandit.network import Critic, EncoderDecoder, Translator, begin
 from agents.bandit.ratings import Rater
 from agents.bandit.store import load_translator
@@ -28,6 +28,8 @@ from agents.common.session import Session
 from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.errors import UnableError
+from embodied.identity import read_finished
+from embodied.locks import LockedError, locked
 from embodied.seeds import stream
 
 pytestmark = pytest.mark.slow
@@ -184,9 +186,11 @@ def test_a_missing_or_damaged_package_is_named(tmp_path):
     with pytest.raises(CorpusError, match="lacks package libreoffice-help-de .*apt-get download"):
         libreoffice.read(tmp_path)
     root = libreoffice_folder(tmp_path / "whole")
-    (root / libreoffice.MENUS / "sw.mo").write_bytes(b"no catalogue")
-    with pytest.raises(CorpusError, match="sw.mo: damaged"):
-        libreoffice.read(root)
+    whole = (root / libreoffice.MENUS / "sw.mo").read_bytes()
+    for damaged in (b"no catalogue", b"", whole[:10], whole[:30], whole[:-20]):
+        (root / libreoffice.MENUS / "sw.mo").write_bytes(damaged)
+        with pytest.raises(CorpusError, match="sw.mo: damaged"):
+            libreoffice.read(root)
     (tmp_path / "libreoffice-help-de_1_all.deb").write_bytes(b"!<arch>\ncut")
     with pytest.raises((CorpusError, UnableError), match="damaged|dpkg-deb is needed"):
         libreoffice.read(tmp_path)
@@ -380,13 +384,42 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
         and rows["reference"]["perplexity"]["mean"] > 1
     )
     assert rows["Δ NED-A2C"]["entropy"]["half_width"] >= 0
+    text = run_study(study, ["rates"], tmp_path, rows=["0.0001, Δ NED-A2C"], note=silent)["rates"].read_text()
+    assert "| 0.0001, Δ NED-A2C |" in text
+    (of_text, _) = tmp_path.glob("runs/*bandit_rate_0.0001*/trained.json")
+    assert read_finished(of_text)[0]["settings"]["bandit_rate"] == 1e-4
 
 
-@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"splits": {"dev": 3}}', '{"splits": {"dev": {"documents": 3}}}'])
+@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"digests": {"dev": 3}}', '{"digests": [1]}'])
 def test_a_damaged_corpus_file_is_named(tmp_path, text):
     (tmp_path / "corpus.json").write_text(text)
     with pytest.raises(CorpusError, match="corpus.json.*make the corpus again"):
-        pairs_of(tmp_path)
+        corpus.refuse_mixed(tmp_path, ["dev"])
+
+
+def test_a_corpus_that_was_stopped_in_between_is_not_believed(tmp_path, monkeypatch):
+    sizes = Sizes(supervised=40, bandit=20, dev=8, test=8)
+    make = lambda seed: corpus.make_corpus(toy_pairs(200), tmp_path, sizes, seed=seed, note=silent)
+    make(0)
+    assert corpus.load(tmp_path, ["dev"])
+    write, written = corpus.write_bytes, []
+
+    def stopped(path, data):
+        if len(written) == 3:
+            raise KeyboardInterrupt
+        written.append(path)
+        write(path, data)
+
+    before = (tmp_path / "corpus.json").read_bytes()
+    monkeypatch.setattr(corpus, "write_bytes", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        make(1)
+    assert not (tmp_path / "corpus.json").exists(), "nothing vouches for the mix"
+    (tmp_path / "corpus.json").write_bytes(before)
+    with pytest.raises(CorpusError, match="supervised are not the splits that corpus.json tells of"):
+        corpus.load(tmp_path, ["supervised", "test"])
+    with locked(tmp_path), pytest.raises(LockedError):
+        make(0)
 
 
 def test_pieces_leave_no_word_unknown_and_come_back_whole():

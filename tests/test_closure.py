@@ -43,7 +43,7 @@ def key(root: Path, *modules: str, without: tuple[str, ...] = ()) -> str:
 
 @pytest.mark.slow
 def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
-    lit = makers(PictureSettings(quality="normal", backend="filament"))
+    lit = makers(PictureSettings(kind="normal-filament"))
     before = key(tree, *lit)
     edit(tree / "embodied/cli/demo.py", "import argparse", "import argparse\nEXTRA = 1")
     edit(tree / "embodied/render/filament.py", "PROBE = 64", "PROBE = 64  # texels")
@@ -131,10 +131,10 @@ def test_data_beside_the_code_is_in_the_key(tree):
 
 
 def test_pictures_depend_on_what_draws_them():
-    unlit, lit = (set(closure(*makers(PictureSettings(quality=q))).modules) for q in ("unlit", "normal"))
+    unlit, lit = (set(closure(*makers(PictureSettings(kind=q))).modules) for q in ("unlit", "normal"))
     assert "embodied.light.baking" in lit and not any(m.startswith("embodied.light") for m in unlit)
     assert "embodied.house.house" in unlit and not any(m.startswith("embodied.generate") for m in lit)
-    assert "embodied.light.reference" in closure(*makers(PictureSettings(quality="glossy"))).modules
+    assert "embodied.light.reference" in closure(*makers(PictureSettings(kind="traced"))).modules
 
 
 def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):

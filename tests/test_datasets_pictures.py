@@ -15,7 +15,7 @@ from test_cluster import FakeRay
 
 from agents.vision import drawn
 from agents.vision import run as vision
-from agents.vision.config import PLAIN, WAYS
+from agents.vision.config import PLAIN, RENDER_PRESETS
 from agents.vision.encoder import random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features
 from agents.vision.resnet import ARCHITECTURES
@@ -33,17 +33,13 @@ SMALL = PictureSettings(size=16)
 def test_houses_are_drawn_lit_unless_the_kind_needs_words_only_or_pictures_are_there():
     assert chosen_pictures("hanna", None, None, None) == PictureSettings(256, "fast")
     assert chosen_pictures("find", None, 128, None) == PictureSettings(128, "fast")
-    assert chosen_pictures("hari", None, None, None).quality == "none"
-    assert chosen_pictures("hari", "unlit", None, None).quality == "unlit"
+    assert chosen_pictures("hari", None, None, None).kind == "none"
+    assert chosen_pictures("hari", "unlit", None, None).kind == "unlit"
     held = PictureSettings(192, "normal")
     assert chosen_pictures("hanna", None, None, held) == held, "not drawn again in another way that nobody asked for"
     assert chosen_pictures("hanna", None, 64, held) == PictureSettings(64, "normal")
     assert chosen_pictures("hanna", "fast", None, held) == PictureSettings(256, "fast")
-    assert chosen_pictures("hanna", "none", None, held).quality == "none"
-    matte = PictureSettings(256, "fast", look="matte")
-    assert all(chosen_pictures("hanna", q, None, matte) == matte for q in (None, "fast")), "nor with gloss"
-    assert chosen_pictures("hanna", "fast", None, matte, "gloss").shown_with == "gloss"
-    assert chosen_pictures("hanna", "normal", None, matte).shown_with == "gloss", "drawn anew anyway"
+    assert chosen_pictures("hanna", "none", None, held).kind == "none"
 
 
 @pytest.fixture(scope="module")
@@ -144,17 +140,17 @@ def test_what_a_data_set_holds_is_read_under_other_drivers_and_later_versions_an
 @pytest.mark.gl
 def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     """An unlit run must not pass for a lit one."""
-    monkeypatch.setitem(WAYS, "unlit", SMALL)
+    monkeypatch.setitem(RENDER_PRESETS, "unlit", SMALL)
     tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
     encoder = random_encoder(seed=0)
     names = [u.name for u in building.units(data.scale)]
     lit = PictureSettings(16, "fast")
 
-    def features(quality: str | None, ray: str | None = None, houses: int | None = None, lights: int = 1) -> str:
+    def features(kind: str | None, ray: str | None = None, houses: int | None = None, lights: int = 1) -> str:
         lines: list[str] = []
         vision.make_features(
-            data.folder, encoder, data.folder / "cache", quality=quality, ray=ray, first=houses, lights=lights,
+            data.folder, encoder, data.folder / "cache", picture_kind=kind, ray=ray, first=houses, lights=lights,
             note=lines.append,
         )  # fmt: skip
         return lines[-1]
@@ -170,7 +166,7 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_gloss_16")
     assert features("fast").startswith("0 of 3 houses made")
     assert features("unlit").startswith("0 of 3 houses made"), "they are still there"
-    with pytest.raises(ValueError, match="2 lightings want pictures with light, not 'unlit': say --quality fast"):
+    with pytest.raises(ValueError, match="2 lightings want pictures with light, not 'unlit': say --pictures fast"):
         features("unlit", lights=2)
     name = names[0]
     path = feature_path(data.folder / "features", encoder.digest, name, lit)

@@ -10,7 +10,7 @@ import pytest
 from hand_data import build, small_house
 
 from agents.studies.engine import run_study
-from agents.vision.config import WAYS, VisionConfig, drawing, lit_name
+from agents.vision.config import RENDER_PRESETS, VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource
 from agents.vision.encoder import random_encoder, save_encoder
 from agents.vision.labels import HouseStrips
@@ -43,7 +43,7 @@ def coloured(path, n: int, *, seed: int) -> None:
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("encoders")
-    return build(folder / "data", folder / "cache", make_house=small_house)
+    return build(folder / "data", folder / "cache", "find", size="1x4", make_house=small_house)
 
 
 @pytest.fixture
@@ -52,8 +52,8 @@ def setting(data, tmp_path, monkeypatch):
     for name in (*data.names("train"), *data.names("val_unseen")):
         nodes = len(data.place(name).graph.positions)
         for k in range(2):
-            coloured(tmp_path / "strips" / drawing(WAYS["fast"]) / f"{lit_name(name, k)}.npz", nodes, seed=k)
-        coloured(tmp_path / "strips" / drawing(WAYS["unlit"]) / f"{name}.npz", nodes, seed=5)
+            coloured(tmp_path / "strips" / drawing(RENDER_PRESETS["fast"]) / f"{lit_name(name, k)}.npz", nodes, seed=k)
+        coloured(tmp_path / "strips" / drawing(RENDER_PRESETS["unlit"]) / f"{name}.npz", nodes, seed=5)
     small = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", small)
     files = [tmp_path / f"{k}.safetensors" for k in range(3)]

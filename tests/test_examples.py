@@ -64,7 +64,7 @@ def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path, flats):
 @pytest.mark.gl
 @pytest.mark.slow
 def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(tmp_path):
-    said = run("encode.py", tmp_path, "--quality", "unlit", "--steps", "40")
+    said = run("encode.py", tmp_path, "--pictures", "unlit", "--steps", "40")
     assert "40 looks of 192 numbers" in said
     one, two = map(float, re.search(r"one room (\S+), from two rooms (\S+)\n", said).groups())
     assert one > two
@@ -74,7 +74,7 @@ def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(tm
 @pytest.mark.slow
 def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(tmp_path):
     pytest.importorskip("stable_baselines3")
-    short = ("--quality", "unlit", "--steps", "256", "--envs", "2", "--rollout", "64", "--judge", "3", "--flats", "1")
+    short = ("--pictures", "unlit", "--steps", "256", "--envs", "2", "--rollout", "64", "--judge", "3", "--flats", "1")
     said = run("ppo_pixels.py", tmp_path, *short, "--out", "ppo")
     for where in ("flats it learned in", "flats it never saw"):
         assert re.search(where + r": succeeds in \d+ % \(\d+ to \d+\) of 3 episodes, random walk \d+ %", said)

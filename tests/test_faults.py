@@ -122,8 +122,8 @@ def test_two_files_of_episodes_that_would_become_one_table_are_refused(here, pla
 @pytest.mark.parametrize(
     "order",
     [
-        ["dataset", "vln", "--houses", "1", "--tasks", "4", "--panoramas", "none", "--workers", "1"],
-        ["eval", "vln", "--agent", "shortest", "--split", "val_seen"],
+        ["dataset", "vln", "--houses", "1", "--tasks", "4", "--pictures", "none", "--workers", "1"],
+        ["evaluate", "vln", "--agent", "shortest", "--split", "val_seen"],
         ["export", "parquet"],
         ["export", "r2r"],
         ["export", "lerobot", "--split", "val_seen", "--size", "16"],
@@ -153,6 +153,7 @@ DELETES = {"rmtree", "unlink", "rmdir", "remove"}
 REVIEWED = {
     "assets/cache.py": "drafts, which are marked",
     "embodied/locks.py": "its own lock",
+    "embodied/bench/serve.py": "what people did in a study that it has just written",
     "embodied/bench/freeze.py": "a folder that holds what it made",
     "embodied/datasets/lerobot.py": "an empty folder",
     "embodied/light/baking.py": "a bake in the cache",
@@ -247,12 +248,12 @@ VIEWPOINT = {"image_id": "a", "pose": [1.0] * 16, "included": True, "unobstructe
     [
         ("[" * 100_000, "recursion"),
         ("[" * 60 + "]" * 60, "nested more than 40 deep"),
-        ("{}", "should be a list"),
-        ("[3]", "viewpoint 0 should have"),
-        (json.dumps([VIEWPOINT | {"included": {}}]), "viewpoint 0 should have"),
+        ("{}", "should hold a list"),
+        ("[3]", "viewpoint 0 .*should have"),
+        (json.dumps([VIEWPOINT | {"included": {}}]), "viewpoint 0 .*should have"),
         (json.dumps([VIEWPOINT | {"pose": [float("nan")] * 16}]), "NaN is no JSON"),
-        (json.dumps([VIEWPOINT | {"pose": [1e300] * 16}]), "viewpoint 0 should have"),
-        (json.dumps([{k: v for k, v in VIEWPOINT.items() if k != "image_id"}]), "viewpoint 0 should have"),
+        (json.dumps([VIEWPOINT | {"pose": [1e300] * 16}]), "viewpoint 0 .*should have"),
+        (json.dumps([{k: v for k, v in VIEWPOINT.items() if k != "image_id"}]), "viewpoint 0 .*should have"),
         (json.dumps([VIEWPOINT])[:-2] + ', "included": false}]', "'included' stands there twice"),
     ],
 )

@@ -12,7 +12,6 @@ from handmade import HandCatalogue, furnished, painted
 from embodied.render import filament
 from embodied.render.classic import Renderer
 from embodied.render.filament import FilamentPainter
-from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import owners
 
 pytestmark = pytest.mark.gl
@@ -84,11 +83,6 @@ def test_a_glossy_floor_mirrors_the_room_and_a_matte_one_does_not(house, lit):
 
 def test_the_camera_is_in_the_room_around_it_and_in_none_outdoors(house):
     assert filament.room_at(house, EYE) == "living_room_1" and filament.room_at(house, (-30.0, 0.0, 1.0)) is None
-
-
-def test_unlit_is_left_to_the_classic_back_end():
-    with pytest.raises(ValueError, match="unlit.*classic"):
-        PictureSettings(backend="filament")
 
 
 def test_no_vulkan_gives_the_remedy(monkeypatch):

@@ -17,7 +17,7 @@ from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
 from embodied.render.gloss import Gloss, Shine, interleaved, schlick
 from embodied.render.mirrored import Mirrored
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import KINDS, PictureSettings
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.world import open_world
 
@@ -219,16 +219,13 @@ def test_rays_meet_what_geometry_says(among):
     assert [len(x) for x in among(corners)(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32))] == [0] * 4
 
 
-def test_gloss_goes_with_baked_pages_of_the_classic_renderer_and_is_what_they_are_shown_with():
-    assert PictureSettings(64, "fast", look="gloss").look == "gloss"
-    for wrong in (("unlit", "classic"), ("glossy", "classic"), ("normal", "filament")):
-        with pytest.raises(ValueError, match="look 'gloss'"):
-            PictureSettings(64, *wrong, look="gloss")
-    with pytest.raises(ValueError, match="look 'shiny' is unknown"):
-        PictureSettings(64, "fast", look="shiny")
-    ways = [("fast",), ("normal",), ("normal", "filament"), ("unlit",), ("none",), ("glossy",), ("reference",)]
-    assert [PictureSettings(64, *way).shown_with for way in ways] == ["gloss"] * 2 + ["matte"] * 5
-    assert PictureSettings(64, "fast", look="matte").shown_with == "matte"
+def test_gloss_is_laid_over_baked_light_unless_pictures_are_matte():
+    assert [k for k in KINDS if PictureSettings(64, k).gloss] == ["fast", "normal"]
+    assert (
+        PictureSettings(64, "fast").matte
+        == PictureSettings(64, "fast-matte")
+        == PictureSettings(64, "fast-matte").matte
+    )
 
 
 class Polished(HandCatalogue):
@@ -243,7 +240,7 @@ class Polished(HandCatalogue):
 def test_a_world_with_gloss_shows_the_same_things_at_the_same_places_in_another_light(tmp_path):
     pytest.importorskip("embreex")
     house = furnished(two_rooms())
-    matte, gloss = (open_world(house, Polished(), tmp_path, size=48, quality="fast", look=k) for k in ("matte", None))
+    matte, gloss = (open_world(house, Polished(), tmp_path, size=48, pictures=k) for k in ("fast-matte", "fast"))
     with matte, gloss:
         a, b = matte.panorama(0), gloss.panorama(0)
         assert np.array_equal(a.depth, b.depth) and np.array_equal(a.ids, b.ids)

@@ -14,7 +14,6 @@ from embodied.gym import drive, suite
 from embodied.gym.drive import DriveEnv, make
 from embodied.gym.driving import DriveSettings, Driving, guided
 from embodied.navigation.floor_ways import FloorWays
-from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
 
 SMALL = {"height": 32, "width": 32, "farthest": 5.0}
@@ -129,15 +128,13 @@ def test_arriving_ends_a_dm_env_episode_and_the_next_step_begins_another(world):
     assert env.step(np.zeros(2)).first() and env.control_timestep() == 0.1
 
 
-@pytest.mark.parametrize("named", [None, "matte", "gloss"])
-def test_live_pictures_are_matte_unless_gloss_is_named(named, tmp_path, monkeypatch):
+@pytest.mark.parametrize("named", [None, "fast", "normal-matte"])
+def test_live_pictures_are_without_reflections_unless_they_are_named(named, tmp_path, monkeypatch):
     house = furnished(two_rooms())
     monkeypatch.setattr(drive, "make_dataset_house", lambda *_: (house, None))
     monkeypatch.setattr(drive, "load_catalogue", lambda *_: HandCatalogue())
-    (flat,) = drive.flat_worlds(0, tmp_path, named and PictureSettings(quality="fast", look=named)).values()
-    assert flat.pictures.quality == "fast" and flat.pictures.shown_with == (named or "matte")
-    (lit,) = drive.flat_worlds(0, tmp_path, PictureSettings(quality="normal")).values()
-    assert lit.pictures.shown_with == "matte"
+    (flat,) = drive.flat_worlds(0, tmp_path, named).values()
+    assert flat.pictures.kind == (named or "fast-matte")
 
 
 def test_wishes_that_cannot_be_had_are_refused(world):

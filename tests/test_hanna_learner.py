@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import itertools
 import json
 import math
@@ -20,10 +21,10 @@ import torch
 import torch.distributed as dist
 from hand_worlds import grid_world
 
-from agents.common.checkpoint import CheckpointError
+from agents.common.checkpoint import CheckpointError, restore
 from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
 from agents.common.lessons import Split
-from agents.common.session import Clock, DivergedError, as_good, falling_rate, metrics_of, tasks_of_update
+from agents.common.session import Clock, DivergedError, Session, as_good, falling_rate, metrics_of, tasks_of_update
 from agents.common.spine import ADDED, NUMBERS
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
@@ -49,7 +50,7 @@ from embodied.envs.hanna import HannaEnv
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import identity_of
-from embodied.interface import Ask, Move, Observation, Sight, Stop
+from embodied.interface import Ask, Move, Observation, Sight, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.locks import LockedError, locked
 from embodied.tasks.hanna import hanna_pool, hanna_task
@@ -77,14 +78,21 @@ TINY = dataclasses.replace(
 JUDGED = dataclasses.replace(EVALUATIONS["mini"], evaluation_steps=12)
 
 
-def setting(side: int = 6, houses: int = 1) -> Split:
-    """Grids with people and routes, and features that tell the nodes apart."""
+@functools.cache
+def ground(side: int, houses: int):
+    """Grids with people, their routes, and tasks in them."""
     worlds = {f"grid{i}": grid_world(side, name=f"grid{i}") for i in range(houses)}
     routes = {n: build_routes(w, seed=3, language=PlainLanguage(), house_split="test") for n, w in worlds.items()}
-    tasks = []
+    tasks: list[Task] = []
     for world in worlds.values():
         pool = hanna_pool(world, seed=3)
         tasks += [hanna_task(pool, i, seed=3, language=PlainLanguage()) for i in range(min(30, len(pool)))]
+    return worlds, routes, tasks
+
+
+def setting(side: int = 6, houses: int = 1) -> Split:
+    """Grids with people and routes, and features that tell the nodes apart."""
+    worlds, routes, tasks = ground(side, houses)
     anna = Anna({n: w.graph for n, w in worlds.items()}, routes, split="test")
     moves = PanoramicMoves()
     rng = np.random.default_rng(0)
@@ -93,8 +101,7 @@ def setting(side: int = 6, houses: int = 1) -> Split:
 
 
 def agent_for(split: Split, config: TrainingConfig = TINY, evaluation=JUDGED):
-    world = next(iter(split.worlds.values()))
-    routes = build_routes(world, seed=3, language=PlainLanguage(), house_split="test")
+    routes = ground(6, 1)[1]["grid0"]
     words = build_vocabulary([t.request for t in split.tasks] + [r.instruction for r in routes])
     return new_agent(config, words, split.bank.digest, split.bank.size, evaluation)
 
@@ -410,9 +417,10 @@ def test_of_agents_as_good_as_each_other_the_later_is_kept():
 @pytest.mark.slow
 def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
     run(tmp_path)
-    before = (tmp_path / "checkpoint.pt").read_bytes()
+    before, settings = (tmp_path / "checkpoint.pt").read_bytes(), (tmp_path / "settings.json").read_bytes()
     with pytest.raises(CheckpointError, match="batch 6 -> 5"):
         run(tmp_path, dataclasses.replace(TINY, batch=5))
+    assert (tmp_path / "settings.json").read_bytes() == settings, "who is refused writes nothing"
     other = setting()
     worlds = {n: other.bank._table.numpy() for n in other.worlds}
     with pytest.raises(CheckpointError, match="encoder 'tests' -> 'another encoder'"):
@@ -435,6 +443,32 @@ def test_a_changed_byte_of_a_checkpoint_or_of_weights_is_noticed(tmp_path):
         (tmp_path / name).write_bytes(body)
         with pytest.raises(ValueError, match="checksum"):
             read(tmp_path / name)
+
+
+def test_a_checkpoint_that_cannot_be_gone_on_with_is_refused(tmp_path):
+    def parts(size=3):
+        network = torch.nn.Linear(size, 1)
+        return {"network": network, "adam": torch.optim.Adam(network.parameters())}
+
+    def save(folder, kept):
+        with Session(folder, {"settings": {}}, kept, 2, note=str) as session:
+            session.save()
+        return folder / "checkpoint.pt"
+
+    bad = parts()
+    bad["network"].weight.data.fill_(math.nan)
+    with pytest.raises(CheckpointError, match="not finite"):
+        restore(save(tmp_path / "nan", bad), {"settings": {}}, parts())
+    path = save(tmp_path / "whole", parts())
+    with pytest.raises(CheckpointError, match="network is another's"):
+        restore(path, {"settings": {}}, parts(4))
+    with pytest.raises(CheckpointError, match=r"holds \['adam', 'network'\], this run has \['network'\]"):
+        restore(path, {"settings": {}}, {"network": parts()["network"]})
+    body = torch.load(path, weights_only=True)
+    del body["parts"]["adam"]["param_groups"]
+    torch.save(body, path)
+    with pytest.raises(CheckpointError, match="do not fit its digest"):
+        restore(path, {"settings": {}}, parts())
 
 
 def test_a_second_training_in_the_same_folder_is_refused(tmp_path):

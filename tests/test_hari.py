@@ -33,7 +33,7 @@ def line_env(**options) -> HariEnv:
 
 def grid_setup(assistant=lambda say: HariAssistant(say)):
     world = grid_world()
-    say = Describer(frequent_classes([world], 3))
+    say = Describer(frequent_classes([world], 0.5))
     pool = hari_pool(world, seed=0)
     tasks = [hari_task(pool, i, seed=0, language=PlainLanguage()) for i in range(30)]
     return world, tasks, lambda: HariEnv({"grid": world}, assistant(say), say)
@@ -121,8 +121,27 @@ def test_a_sub_goal_is_given_up_after_three_times_its_distance():
     env.step(Ask(SUB))
     for i in range(6):
         assert len(env.situation.goals) == 2
-        env.step(Move(env.situation.candidate_nodes.index((i + 1) % 2)))
-    assert env.situation.goals == (3,)
+        env.step(Move(env.situation.candidate_nodes.index(1 - env.pose.node)) if i % 2 else Ask(CUR))
+    assert env.situation.goals == (3,), "time steps count, not moves (Table E.2)"
+
+
+def test_an_agent_that_stands_on_its_goal_at_the_horizon_without_done_has_not_succeeded():
+    env = line_env()
+    env.reset(dataclasses.replace(TASK, start=Pose(3), horizon=2))
+    env.step(Ask(CUR))
+    assert env.step(Ask(CUR)) is None
+    assert env.episode().ended == "limit" and metrics.success(env.episode(), line_world().graph) == 0
+    env.reset(dataclasses.replace(TASK, start=Pose(3), horizon=2))
+    env.step(Stop())
+    assert metrics.success(env.episode(), line_world().graph) == 1
+
+
+def test_sparse_descriptions_keep_a_tenth_of_the_classes():
+    world = line_world()
+    things = tuple(thing(f"c{k}", i, "hall_1", 1, 1) for k in range(20) for i in range(1, 22 - k))
+    many = dataclasses.replace(world, house=dataclasses.replace(world.house, placements=things))
+    assert frequent_classes([many]) == ("c0", "c1")
+    assert len(frequent_classes([many], 0.5)) == 10
 
 
 def test_a_stack_of_one_never_offers_sub_goals():

@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 import pytest
 import torch
+from hand_data import built
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
@@ -16,7 +17,7 @@ from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
-from agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
+from agents.hari.policy import DO, DONE, Belief, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from agents.hari.pretraining import (
     Curriculum,
     _begin,
@@ -28,7 +29,9 @@ from agents.hari.pretraining import (
 )
 from agents.hari.pretraining import learn_once as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
+from agents.hari.study import HariStudy
 from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, padded, percept
+from agents.studies.engine import run_study
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
@@ -38,6 +41,7 @@ from embodied.house.house import House, Opening, Storey
 from embodied.identity import identity_of
 from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
+from embodied.records import read_json
 from embodied.tasks.hari import HariConfig, hari_pool, hari_task
 
 SMALL = ExecutionConfig(
@@ -83,7 +87,7 @@ def grid_lessons() -> tuple[HandWorld, Curriculum]:
     config = HariConfig(fewest_nodes=1)
     pool = hari_pool(world, seed=0, config=config)
     tasks = [hari_task(pool, i, seed=0, language=PlainLanguage(), config=config) for i in range(48)]
-    return world, Curriculum({"grid": world}, Describer(frequent_classes([world], 3)), tasks, tasks[:24])
+    return world, Curriculum({"grid": world}, Describer(frequent_classes([world], 0.5)), tasks, tasks[:24])
 
 
 def words_of(world: HandWorld) -> FeatureWords:
@@ -232,16 +236,29 @@ def test_random_with_budgets_begins_with_the_goal_spends_no_more_and_keeps_its_m
     for budget in budgets[:50]:
         taken = np.zeros(5, dtype=int)
         order = []
-        while DONE not in order or taken[DONE] <= taken[SUB]:
-            choice = rule.choose(moment(taken=taken, would_stop=True, budget=budget), rng)
-            order.append(choice)
-            taken[choice] += 1
-            if choice == DONE and taken[DONE] > taken[SUB]:
-                break
-        assert order[0] == GOAL and (taken[:4] <= budget[:4]).all()
+        while DONE not in order:
+            order.append(rule.choose(moment(taken=taken, would_stop=False, budget=budget), rng))
+            taken[order[-1]] += 1
+        assert order[0] == GOAL and (taken[:4] == budget[:4]).all(), "where nothing is left, it is done"
     assert rule.choose(moment(taken=(0, 1, 0, 0, 0), would_stop=True, budget=(0, 1, 1, 0, 9)), rng) == SUB, (
         "not DONE first"
     )
+
+
+def test_the_execution_policy_forces_done_upon_random_with_budgets():
+    """Table 4.7: "when to call DONE is decided by the execution policy"; no more often than SUB while SUB is left."""
+    rule, rng = RandomWithBudgets({"cur": 9.0, "goal": 1.0, "sub": 2.0, "do": 9.0}), np.random.default_rng(0)
+    choose = lambda taken: rule.choose(moment(taken=taken, would_stop=True, budget=(9, 1, 2, 9, 9)), rng)
+    assert {choose((0, 1, 2, 0, 0)) for _ in range(30)} == {DONE}, "SUB's budget is spent"
+    assert {choose((0, 1, 1, 0, 0)) for _ in range(30)} == {DONE}, "on a sub-goal"
+    assert DONE not in {choose((0, 1, 1, 0, 1)) for _ in range(30)}, "it would end too early"
+
+
+def test_sub_whenever_possible_still_ends():
+    rule, rng = RULES["SUB whenever possible"], np.random.default_rng(0)
+    assert rule.choose(moment(), rng) == SUB
+    assert rule.choose(moment(possible=(True, True, False, True, True)), rng) == DO
+    assert rule.choose(moment(would_stop=True), rng) == DONE
 
 
 # Moves ------------------------------------------------------------------------------------------
@@ -258,6 +275,38 @@ def test_do_takes_the_likeliest_move_or_draws_it_and_never_stops():
     assert colder == pytest.approx([4 / 13, 9 / 13, 0.0], abs=0.04), "squares of the probabilities"
     with pytest.raises(ValueError, match="above 0"):
         dataclasses.replace(QUICK, move_temperature=0.0)
+
+
+class Certain:
+    """An actor that always does."""
+
+    def begin(self, batch):
+        return torch.zeros(batch, 1), torch.zeros(batch, 1)
+
+    def __call__(self, belief, shown, last, depth, memory):
+        return torch.nn.functional.one_hot(torch.full((len(belief),), DO), 5) * 100.0, memory
+
+
+def test_do_stops_where_the_execution_policy_most_wants_to_and_the_belief_advances_at_every_step():
+    world, lessons = grid_lessons()
+    executor = new_executor(SMALL, words_of(world))
+    executor.network.eval()
+    env = HariEnv({"grid": world}, HariAssistant(lessons.describer), lessons.describer)
+    first = env.reset(lessons.training[1])
+    stay = consider(Reader(executor), [first], None)[0]
+    for column, kind in ((0, Move), (len(stay.log_moves[0]) - 1, Stop)):
+        wanted = torch.full_like(stay.log_moves, -9.0).index_fill(1, torch.tensor([column]), 0.0)
+        policy = HariPolicy(executor, Certain())
+        (action,), _ = policy._choose(
+            [first], dataclasses.replace(stay, log_moves=wanted), {}, Belief(stay.belief * 0, (1,)), None,
+            [np.random.default_rng(0)],
+        )  # fmt: skip
+        assert isinstance(action, kind)
+    reader = Reader(executor)
+    considered, belief = consider(reader, [first], None)
+    asked = env.step(Ask(Intention.CUR))
+    after = consider(reader, [asked], carry(considered, belief))[1]
+    torch.testing.assert_close(after.carried[0], considered.belief[0])
 
 
 # What is shared ---------------------------------------------------------------------------------
@@ -335,7 +384,7 @@ def test_a_belief_begins_anew_with_another_goal_only_if_it_is_to(afresh):
     first = env.reset(lessons.training[1])
     reader = Reader(executor)
     considered, belief = consider(reader, [first], None)
-    belief = carry(considered, [Move(0)], belief)
+    belief = carry(considered, belief)
     torch.testing.assert_close(belief.carried[0], considered.belief[0])
     same = consider(reader, [first], belief)[1]
     torch.testing.assert_close(same.carried[0], considered.belief[0])
@@ -351,7 +400,7 @@ def test_a_belief_begins_anew_with_another_goal_only_if_it_is_to(afresh):
 @pytest.fixture(scope="module")
 def fork_executor():
     """An execution policy that has learned both ways of the fork."""
-    config = dataclasses.replace(SMALL, iterations=60, batch=16, validate_every=60)
+    config = dataclasses.replace(SMALL, afresh=True, iterations=60, batch=16, validate_every=60)
     executor = new_executor(config, words_of(fork_world()))
     lessons = fork_lessons()
     optimizer = torch.optim.Adam(executor.network.parameters(), config.learning_rate)
@@ -511,3 +560,22 @@ def test_the_skyline_needs_no_execution_policy_on_sub_goals(fork_executor):
             if isinstance(action, Move):
                 observation = env.step(action)
         assert env.pose.node == goal
+
+
+@pytest.mark.slow
+def test_the_tables_are_made_from_a_data_set(tmp_path):
+    """Agents that were hardly trained, beside a rule, and an execution policy alone."""
+    data = built(tmp_path / "data", "hari")
+    walking = dataclasses.replace(SMALL, hidden_size=16, iterations=1, validate_every=1, validation_tasks=2)
+    asking = dataclasses.replace(QUICK, hidden_size=8, iterations=1, batch=4, validation_tasks=3, horizon=6)
+    study = HariStudy(data.folder, (0,), 2, (0,), execution=walking, intention=asking)
+    rows = ["learned", "random + rules", "no assistance, d^s of nothing"]
+    tables = ["4.7", "figure 4.5b", "sight"]
+    run_study(study, tables, tmp_path / "out", rows=rows, note=silent)
+    body, times, sight = (read_json(tmp_path / "out" / f"hari-{n.replace(' ', '-')}.json") for n in tables)
+    assert [r["label"] for r in body["rows"]] == ["random + rules", "learned"]
+    assert [c["key"] for c in body["columns"]][-4:] == ["CUR", "GOAL", "SUB", "DO"]
+    assert body["rows"][1]["printed"]["success_test_unseen_env"] == 19.8 and len(sight["rows"]) == 1
+    shares = [times["rows"][0]["values"][f"{name}_at_1_val_unseen_env"]["mean"] for name in INTENTIONS]
+    assert sum(shares) == pytest.approx(1), "every running episode chooses one intention"
+    assert (tmp_path / "out" / "hari-figure-4.5b.png").exists()

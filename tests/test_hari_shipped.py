@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 import torch
 from hand_worlds import grid_world
 
-from agents.common.shipped import SHIPPED_HARI
+from agents.common.shipped import SHIPPED_HARI, WEIGHTS
+from agents.common.weights import origin_of
 from agents.hari.agent import HariAgent, load_agent
 from agents.hari.policy import policy_of
 from embodied.envs.hari import HariRules
@@ -16,6 +19,14 @@ from embodied.evaluation.rollout import play
 from embodied.interface import Episode
 from embodied.language.plain import PlainLanguage
 from embodied.tasks.hari import hari_pool, hari_task
+
+
+@pytest.mark.parametrize("path", sorted(WEIGHTS.glob("*.safetensors")), ids=lambda p: p.stem)
+def test_shipped_weights_name_what_they_were_trained_with_or_say_that_it_is_lost(path):
+    origin = origin_of(path)
+    assert origin is not None and origin["settings"]
+    for part in ("data", "pictures", "code"):
+        assert re.fullmatch(r"[0-9a-f]{12,}|(lost|none): .+", origin[part]), f"{part}: {origin[part]}"
 
 
 @pytest.fixture(scope="module")

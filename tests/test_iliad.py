@@ -14,7 +14,7 @@ from agents.common.checkpoint import CheckpointError
 from agents.common.session import Session
 from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.describing import by_the_program, by_the_text, kept
-from agents.iliad.learners import RunningMean, adel, adel_loss, dagger, reinforce, reinforce_loss
+from agents.iliad.learners import RunningMean, adel, adel_loss, dagger, mixture, reinforce, reinforce_loss
 from agents.iliad.protocol import NOTHING, ExecutionScores
 from agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from embodied.seeds import stream
@@ -162,6 +162,28 @@ def test_dagger_shows_the_best_action_in_states_that_the_student_came_to():
     assert student.table.weight[0, 0] > math.log(0.1)
 
 
+class Button2:
+    """P_omega that knows one button only."""
+
+    def draw(self, tasks, *, rng: np.random.Generator) -> list[int]:
+        return [2] * len(tasks)
+
+
+@pytest.mark.parametrize(("mixing", "least", "most"), [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.25, 0.2, 0.3)])
+def test_the_mixture_executes_the_marginal_as_often_as_lambda_says(mixing, least, most):
+    """Eq 3.14: the student here always presses 0, the marginal 2; what is described as it is, is learned as it is."""
+    student = flat([1 - 3e-9, 1e-9, 1e-9, 1e-9])
+    before = student.table.weight.detach().clone()
+    optimizer = torch.optim.SGD(student.table.parameters(), 1.0)
+    some = [Wish(0)] * 1000
+    lesson = mixture(
+        some, ["0"] * 1000, Watcher(), Button2(), student, optimizer, mixing, 9.0, rng=stream(0, "mixture")
+    )
+    assert least <= sum(e == 2 for e in lesson.executions) / 1000 <= most
+    assert list(lesson.descriptions) == [str(e) for e in lesson.executions]
+    assert bool((student.table.weight[2] != before[2]).any()) == (mixing > 0), "learned under what was said"
+
+
 # Eq 3.15 and 3.16 ----------------------------------------------------------------------------------
 
 
@@ -200,7 +222,13 @@ QUICK = LearnerConfig(iterations=60, batch=8, learning_rate=0.1, validate_every=
 
 
 @pytest.mark.parametrize(
-    ("settings", "least"), [({}, 1.0), ({"learner": "dagger"}, 1.0), ({"learner": "binary", "learning_rate": 1.0}, 0.5)]
+    ("settings", "least"),
+    [
+        ({}, 1.0),
+        ({"learner": "mixture"}, 1.0),
+        ({"learner": "dagger"}, 1.0),
+        ({"learner": "binary", "learning_rate": 1.0}, 0.5),
+    ],
 )
 def test_each_learner_learns_the_buttons(tmp_path, settings, least):
     config = LearnerConfig(**{**vars(QUICK), **settings})

@@ -311,7 +311,7 @@ class Scripted(LearnedTeacher):
     """Says what it is told to say; its executor understands every description that is a rule."""
 
     def __init__(self, greedy: str, sampled: list[str], pragmatics: str) -> None:
-        self.greedy, self.sampled, self.candidates, self.pragmatics = greedy, sampled, len(sampled), pragmatics
+        self.greedy, self.sampled, self.candidates, self.pragmatics = greedy, sampled, 1 + len(sampled), pragmatics
 
     def candidates_of(self, tasks, executions, uniforms=None):
         return [[self.greedy] if uniforms is None else list(self.sampled) for _ in tasks]
@@ -527,16 +527,22 @@ def test_an_episode_is_told_from_request_to_what_was_learned(grounds):
 @pytest.mark.slow
 def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
     config = dataclasses.replace(SMALL, teacher="grammar")
-    study = IliadStudy(RegexStudyWorld(config), QUICK, (0, 1))
+    study = IliadStudy(RegexStudyWorld(config), QUICK, (0,))
     pages = run_study(study, ["3.5", "C.1"], tmp_path, note=silent)
     text = pages["3.5"].read_text()
     assert "| λ = 0.5 | " in text and "(55.7)" in text and "Not run" not in text
     runs = list((tmp_path / "runs").iterdir())
-    assert len(runs) == 2 * 4, "some runs are the same"
+    assert len(runs) == 5, "both tables have the run that is as it is"
     assert "Not run: DAgger" in run_study(study, ["3.4"], tmp_path, report=True, note=silent)["3.4"].read_text()
     other = dataclasses.replace(study, config=dataclasses.replace(QUICK, learning_rate=0.5))
     text = run_study(other, ["3.5"], tmp_path, report=True, note=silent)["3.5"].read_text()
     assert "Not run: λ = 0, λ = 1, λ = 0.5." in text and "learning rate 0.5" in text, "never old numbers, new caption"
+
+
+@pytest.mark.parametrize("wrong", ["--learner=nope", "--mixing=nan", "--threshold=nan", "--entropy=nan"])
+def test_what_cannot_be_learned_is_refused_before_data_are_made(wrong, tmp_path, capsys):
+    assert main(["train", "iliad", "regex", "--out", str(tmp_path / "run"), wrong]) == 2
+    assert wrong[2:].partition("=")[0] in capsys.readouterr().err and not (tmp_path / "run").exists()
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hand_chat import ChatServer, Parrot, first_allowed, said
-from hand_worlds import grid_world
+from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
 from assets.catalogue import load_catalogue
@@ -24,7 +24,7 @@ from embodied.evaluation import metrics, tables
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import Closed
-from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Step, Subtask, Usage
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Sighting, Step, Subtask, Usage
 from embodied.language import PlainLanguage
 from embodied.records import from_json, to_json
 from embodied.render.panorama import Panorama
@@ -43,6 +43,7 @@ from agents.language_models.messages import Messages
 from agents.language_models.paraphrase import paraphrased
 from agents.language_models.prompts import read_prompt
 from agents.language_models.telling import Teller
+from agents.language_models.words import SeenNames
 
 ONE = object_schema(word={"type": "string", "enum": ["yes", "no"]})
 ASKED = [{"role": "user", "content": "say it"}]
@@ -153,14 +154,14 @@ def test_a_server_that_drips_is_given_up(answers):
         client_of(server, answers, timeout=0.2, tries=2).ask(ASKED, ONE)
 
 
-@pytest.mark.parametrize("form", ["schema", "tools", "text"])
-def test_three_ways_to_ask_for_json(form, answers):
+@pytest.mark.parametrize("form", ["schema", "object", "tools", "text"])
+def test_four_ways_to_ask_for_json(form, answers):
     call = said(None, tool_calls=[{"id": "1", "function": {"name": "answer", "arguments": '{"word": "yes"}'}}])
     text = said('Sure!\n```json\n{"word": "yes"}\n```')
-    with ChatServer(lambda r: {"schema": said('{"word": "yes"}'), "tools": call, "text": text}[form]) as server:
+    with ChatServer(lambda r: {"tools": call, "text": text}.get(form, said('{"word": "yes"}'))) as server:
         assert client_of(server, answers, form=form).ask(ASKED, ONE).value == {"word": "yes"}
         (request,) = server.requests
-        assert ("tools" in request, "response_format" in request) == (form == "tools", form == "schema")
+        assert ("tools" in request, "response_format" in request) == (form == "tools", form in ("schema", "object"))
 
 
 def test_another_file_is_not_taken_for_answers(tmp_path):
@@ -240,6 +241,17 @@ def test_no_message_names_a_place(answers):
         play(find_env, LanguageModelAgent(client_of(server, answers)), find_tasks(2), seed=0)
         told = json.dumps([r["messages"] for r in server.requests])
     assert "grid" not in told and "_node" not in told and "n0" not in told
+
+
+def test_a_model_is_told_the_names_of_what_is_seen_and_where():
+    class Furnished(HandWorld):
+        def sightings(self, node: int) -> tuple:
+            return (Sighting("sofa_1", "sofa", 0.5236, 0.0, 2.2, 900), Sighting("key_1", "key", 0.0, 0.0, 3.0, 3))
+
+    world = Furnished(grid_world().house, grid_world().graph)
+    o = find_env().reset(dataclasses.replace(find_tasks(1)[0], start=Pose(0, 0)))
+    text = Teller(SeenNames({"grid": world})).text(o)
+    assert "sofa (30 degrees to the left, 2 m)" in text and "key" not in text
 
 
 # The assistant ----------------------------------------------------------------------------------

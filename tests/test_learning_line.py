@@ -23,7 +23,7 @@ from agents.hanna.run import train_agent, vocabulary_of
 from agents.hanna.study import HannaStudy
 from agents.hanna.training_config import EVALUATIONS, SCALES
 from agents.studies.engine import run_study
-from agents.vision.config import PLAIN, WAYS
+from agents.vision.config import PLAIN, RENDER_PRESETS
 from agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
 from agents.vision.run import encoder_of
@@ -95,7 +95,20 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert "continuing after update 2" in capsys.readouterr().err
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2, 3]
     best, out = tmp_path / "best.safetensors", tmp_path / "table"
-    judge = ("judge", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 4, "--threads", 1)
+    judge = (
+        "evaluate",
+        "hanna",
+        "--data",
+        data.folder,
+        "--agent",
+        best,
+        "--network",
+        "random",
+        "--tasks",
+        4,
+        "--threads",
+        1,
+    )
     assert run(*judge, "--out", out) == 0
     table = (out / "table.md").read_text()
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
@@ -179,11 +192,25 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
         note.startswith("+ language instruction less Target image only, success, test_unseen") for note in body["notes"]
     )
     assert "(45.43)" in (out / "hanna-4.4.md").read_text()
+    assert "success_test_unseen_as_shipped" in body["rows"][0]["values"]
+    assert "success_test_unseen_as_shipped" not in body["rows"][0]["printed"]
     weights, judged = times(out, "best.safetensors"), times(out, "judged/*")
     run_study(learner, ["4.4", "D.1"], out, rows=["Learned", "Target image only"], note=print)
     assert times(out, "best.safetensors") == weights, "rows that tables share are trained once"
     assert judged.items() <= times(out, "judged/*").items(), "what was played is not played again"
     assert "lost_accuracy_test_unseen" in read_json(out / "hanna-d.1.json")["rows"][0]["values"]
+
+
+def test_the_papers_columns_take_the_likeliest_action_and_ours_stand_apart(study):
+    learner, out = study
+    row = learner.tables()["4.4"].rows[0]
+    agent = learner.load(next(iter(times(out, "best.safetensors"))))
+    plain, shipped = (learner.policies(agent, row.judge, s) for s in ("test_unseen", "test_unseen as shipped"))
+    draws = [np.random.default_rng(k) for k in range(50)]
+    assert {plain.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {1} and not plain.by_image
+    assert {shipped.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {0, 1} and shipped.by_image
+    assert plain.again == 1 and shipped.again < 1
+    assert plain.ask_rule(0.6, None, -1, rng=draws[0]) and not plain.ask_rule(0.4, None, -1, rng=draws[0])
 
 
 def test_what_was_judged_under_other_settings_is_not_shown_under_new_ones(study, tmp_path):
@@ -214,17 +241,17 @@ def test_agents_are_judged_in_houses_drawn_in_other_ways(study, data, tmp_path):
     through = dataclasses.replace(random_encoder(seed=2), like=load_encoder(learner.encoder).digest)
     save_encoder(through, tmp_path / "alike.safetensors")
     arms = {"all": files[:2], "alike": files[2:3]}
-    ways, encoders = ("unlit", "matte"), {"alike": [tmp_path / "alike.safetensors"]}
+    ways, encoders = ("unlit", "fast-matte"), {"alike": [tmp_path / "alike.safetensors"]}
     realism = RealismStudy(data.folder, (0,), 3, arms=arms, pictures=ways, encoders=encoders)
     with pytest.raises(FileNotFoundError, match="embodied features"):
         run_study(realism, ["realism"], tmp_path / "out", note=print)
     for encoder in (through, load_encoder(learner.encoder)):
-        for way in ("unlit", "matte"):
-            give_features(data, data.names("test_unseen"), encoder, WAYS[way], seed=1)
+        for way in ("unlit", "fast-matte"):
+            give_features(data, data.names("test_unseen"), encoder, RENDER_PRESETS[way], seed=1)
     run_study(realism, ["realism"], tmp_path / "out", note=print)
     body = read_json(tmp_path / "out" / "realism-realism.json")
-    assert [r["label"] for r in body["rows"]] == ["all", "alike"] and "success_matte" in body["rows"][0]["values"]
-    assert ranks(body, ("unlit", "matte")) == [], "two kinds of agents cannot be ranked"
+    assert [r["label"] for r in body["rows"]] == ["all", "alike"] and "success_fast-matte" in body["rows"][0]["values"]
+    assert ranks(body, ("unlit", "fast-matte")) == [], "two kinds of agents cannot be ranked"
     with pytest.raises(ValueError, match="encoders are given for"):
         dataclasses.replace(realism, encoders={"b": files})
     with pytest.raises(ValueError, match="'all' has 2 agents and 3 encoders"):

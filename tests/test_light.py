@@ -277,7 +277,7 @@ def test_the_newest_llvm_that_can_be_used_is_found(tmp_path, monkeypatch):
 def test_cuda_goes_before_llvm_and_without_both_the_scalar_variant_does_with_a_warning():
     assert variant_of(lambda name: True) == "cuda_ad_rgb"
     assert variant_of(lambda name: name == "LLVM") == "llvm_ad_rgb"
-    with pytest.warns(RuntimeWarning, match="scalar.*slower.*libllvm19.*quality='unlit'"):
+    with pytest.warns(RuntimeWarning, match="scalar.*slower.*libllvm19.*pictures='unlit'"):
         assert variant_of(lambda name: False) == "scalar_rgb"
 
 

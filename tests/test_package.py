@@ -111,10 +111,14 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
     names = set(wheel.namelist())
     wanted = {f"{p}/py.typed" for p in PACKAGES} | {
         "agents/weights/encoder.safetensors",
+        "embodied/serve/static/index.html",
+        "embodied/serve/static/app.js",
+        "embodied/serve/static/app.css",
         "agents/weights/hanna_mini.safetensors",
         "agents/weights/hari_mini.safetensors",
         "agents/weights/iliad_nav_tiny.safetensors",
         "agents/weights/iliad_regex_tiny.safetensors",
+        "agents/studies/data/printed.json",
     }
     assert not wanted - names
     assert any(n.startswith("assets/data/") and n.endswith(".json") for n in names)

@@ -18,7 +18,7 @@ from embodied.render import visibility
 from embodied.render.camera import camera_at, face_cameras
 from embodied.render.classic import NEAR, Renderer, depth_of_reversed_z, two_thirds
 from embodied.render.panorama import face_rays, ray_stretch
-from embodied.render.pictures import QUALITIES, PictureSettings
+from embodied.render.pictures import KINDS, PictureSettings
 from embodied.scene.house_meshes import owners
 from embodied.scene.model import VISUAL, compile_scene
 
@@ -254,13 +254,12 @@ def test_two_houses_can_be_open_at_once_and_a_closed_one_says_so(house):
 @pytest.mark.parametrize(
     ("wrong", "match"),
     [
-        ({"quality": "photo"}, "photo"),
-        ({"backend": "metal"}, "metal"),
+        ({"kind": "photo"}, "photo"),
+        ({"kind": "unlit-filament"}, "use one of .*fast-filament"),
         ({"size": 0}, "size"),
         ({"size": -5}, "size"),
-        ({"backend": "filament"}, "unlit"),
-        ({"backend": "filament", "quality": "glossy"}, "glossy"),
         ({"light": "high"}, "unlit"),
+        ({"kind": "fast", "rays": 4}, "traced or reference"),
     ],
 )
 def test_bad_settings_are_refused(wrong, match):
@@ -273,9 +272,24 @@ def test_a_renderer_refuses_impossible_sizes(house):
         Renderer(house, HandCatalogue(), size=0)
 
 
-def test_a_quality_says_by_which_light():
-    assert [PictureSettings(quality=q).lit_by for q in QUALITIES] == [None, None, "fast", "normal", "normal", "normal"]
-    assert PictureSettings(quality="normal", light="high").lit_by == "high"
+def test_a_kind_of_pictures_says_by_which_light():
+    lights = {k: PictureSettings(kind=k).lit_by for k in KINDS}
+    assert all(
+        light == (None if k in ("none", "unlit") else "fast" if "fast" in k else "normal")
+        for k, light in lights.items()
+    )
+    assert PictureSettings(kind="normal", light="high").lit_by == "high"
+
+
+def test_pictures_are_known_again_from_what_files_record_of_them():
+    rays = [PictureSettings(96, k, light="fast", rays=4) for k in ("traced", "reference")]
+    for pictures in [*(PictureSettings(64, k) for k in KINDS), PictureSettings(64, "normal", light="high"), *rays]:
+        assert PictureSettings.from_stored(pictures.stored()) == pictures
+    assert PictureSettings(8, "fast").stored() == {
+        "size": 8, "quality": "fast", "backend": "classic", "light": "fast", "look": "gloss"
+    }  # fmt: skip
+    with pytest.raises(ValueError, match="unknown; draw them again"):
+        PictureSettings.from_stored({"size": 8, "quality": "fast", "backend": "metal"})
 
 
 def _draw(queue) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from embodied.interface import Ask, Episode
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import PeoplesWords
 from embodied.records import load_lines, parse, to_json
-from embodied.serve.game import set_table
+from embodied.serve.game import Game, set_table
 from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
 from embodied.serve.results import JUDGEMENTS, Judgement, Writer, agreement, part_summary, summary
 from embodied.serve.screens import screen_of
@@ -25,6 +26,8 @@ from embodied.serve.store import Event
 from embodied.serve.study import Part, Question, StudyError, load_study
 from embodied.serve.talk import spoken_reply
 from embodied.teachers.vnla import VnlaTeacher
+
+ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +104,11 @@ def test_a_mistake_in_a_study_is_told_with_its_place(tmp_path):
     ):
         with pytest.raises(StudyError, match=said):
             load_study(write_study(tmp_path, parts))
+
+
+def test_the_example_is_a_study_with_every_role():
+    study = load_study(ROOT / "examples" / "study.toml")
+    assert {r for p in study.parts for r in p.roles} == {"agent", "assistant", "rater", "describer"}
 
 
 def test_two_people_play_and_the_episode_holds_questions_answers_and_seconds(data, tmp_path):
@@ -216,7 +224,7 @@ def test_who_waits_too_long_is_thanked_and_gets_a_code(data):
     assert play.screen("ann")["screen"] == "wait"
     play.time += play.study.wait_seconds + 1
     play.ready("ann")
-    assert play.screen("ann")["screen"] == "done"
+    assert (play.screen("ann")["screen"], play.screen("ann")["code"]) == ("done", "CODE")
 
 
 def test_practice_comes_first_and_does_not_count(data):
@@ -269,8 +277,8 @@ class Helpful:
 
         return (Intention.HELP,)
 
-    def answer_text(self, situation, question, *, rng):
-        return spoken_reply(situation, f"you asked {question!r}", None, 1)
+    def answer(self, situation, question, *, rng):
+        return spoken_reply(situation, f"you asked {situation.question!r}", None, 1)
 
 
 def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
@@ -284,6 +292,26 @@ def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
     assert play.screen("ann")["said"][-1]["text"] == "you asked 'Where is it?'"
     with pytest.raises(ValueError, match="module:Class"):
         set_table(Part("p", assistant="nowhere:Nobody"), data)
+
+
+def test_an_assistant_by_name_is_given_the_simulated_one_to_reword(data):
+    """So a language model comes in: it words what the data set's own assistant knows."""
+
+    class Loud:
+        def __init__(self, base):
+            self.base, self.intentions = base, base.intentions
+
+        def answer(self, situation, question, *, rng):
+            reply = self.base.answer(situation, question, rng=rng)
+            return dataclasses.replace(reply, text=f"{reply.text} ({situation.question})".upper())
+
+    table = set_table(Part("p", assistant="loud", tasks=9), data, assistants={"loud": Loud})
+    games = [Game("g", table, {"agent": "ann"}, False, 0.0, task, 0) for task in table.tasks.values()]
+    game = next(g for g in games if g.observation.can_ask)
+    game.apply(Event("asked", 1.0, body={"question": "where?"}))
+    kind, body = game.think()
+    game.apply(Event(kind, 2.0, body=body))
+    assert game.said[-1]["text"].endswith("(WHERE?)") and game.situation.subtask.start == game.situation.pose
 
 
 def test_a_machine_goes_on_after_a_restart_where_it_was(data):

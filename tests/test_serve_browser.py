@@ -221,7 +221,7 @@ def test_the_page_shows_what_the_panorama_shows(two, server, without_webgl):
     view.focus()
     for key in ("ArrowLeft", "ArrowLeft", "ArrowUp", "ArrowUp", "ArrowUp"):
         view.press(key)
-    agent.page.wait_for_function("!document.querySelector('.panorama[aria-busy]')")
+    agent.page.locator(".panorama:not([aria-busy])").wait_for()
     agent.page.wait_for_timeout(400)
     shown = cv2.imdecode(np.frombuffer(view.screenshot(), np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
     start = next(t.start for t in server.tasks if t.id == server.begun()[-1]["task"])

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from hand_vnla import TINY as VNLA
 from hand_vnla import lesson
-from test_imitation import TINY as HANNA
-from test_imitation import agent_for, setting
+from test_hanna_learner import agent_for, setting
 
 from agents.common.lessons import Split
 from agents.hanna.evaluation import sight_policies
@@ -28,8 +27,8 @@ from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is
 from embodied.render.panorama import Panorama, face_rays
 
 ROOT = Path(__file__).resolve().parent.parent
-SEEING = {"agents/vision/bank.py", "agents/vision/live.py"}
-"""Modules of agents/ that turn sights into features: they alone may ask where one is from."""
+SEEING = {"agents/language_models/words.py", "agents/vision/bank.py", "agents/vision/live.py"}
+"""Modules of agents/ that turn sights into features or names: they alone may ask where one is from."""
 
 
 def test_sights_can_neither_be_compared_nor_hashed_and_every_step_has_new_ones():
@@ -93,7 +92,7 @@ def both(split: Split, copies: int = 5) -> tuple[FeatureBank, np.ndarray]:
 
 def test_an_agent_behaves_the_same_whatever_its_sights_are_called():
     hanna = setting()
-    agent = agent_for(hanna, dataclasses.replace(HANNA, by_image=True, again=0.5, search=0.2))
+    agent = agent_for(hanna)
     vnla, _, walked = lesson(VNLA)
     agent.network.eval(), vnla.network.eval()
     for split, player in (
@@ -114,7 +113,7 @@ def test_an_agent_behaves_the_same_whatever_its_sights_are_called():
 def test_with_black_pictures_the_rules_of_an_agent_are_worth_nothing():
     """The rules stop at what the helper's picture shows: who sees black finds it no more often than by chance."""
     split = setting()
-    agent = agent_for(split, dataclasses.replace(HANNA, by_image=True, again=0.5, search=0.2))
+    agent = agent_for(split)
     policies = sight_policies(agent, split.bank)
     tasks = [dataclasses.replace(t, horizon=60) for t in split.tasks]
 

@@ -18,21 +18,21 @@ import torch
 from hand_data import build, small_house
 
 from agents.common.weights import load_weights, save_weights
-from agents.studies.engine import Figure, StudyRow, Table, check, run_study
+from agents.studies.engine import Figure, StudyRow, StudyTable, check, run_study
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.locks import LockedError, locked
 
 FAR, NEAR = StudyRow("far", {"aim": 3.0}, x=3.0), StudyRow("near", {"aim": 1.0}, x=1.0)
 NOBODY = StudyRow("nobody", None)
-TABLE = Table(
+TABLE = StudyTable(
     "How near it comes",
     (NOBODY, NEAR, FAR, dataclasses.replace(FAR, label="far less near", minus=NEAR, x=None)),
     ("success", "error"),
     ("easy", "hard"),
-    ("tries",),
     ((FAR, NEAR),),
     Figure(("error",), "aim", "error"),
+    ("tries",),
 )
 
 
@@ -52,7 +52,7 @@ class Archer:
     threads = 1
     judges = ("embodied.evaluation.tables",)
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         return {"1": TABLE, "all": dataclasses.replace(TABLE, columns=(), pooled=(), rows=(NEAR,), figure=None)}
 
     def seeds(self, row: StudyRow):

@@ -18,7 +18,7 @@ from agents.common.checkpoint import CheckpointError
 from agents.common.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
-from agents.vision.config import IMAGENET, NETWORKS, PLAIN, WAYS, VisionConfig, drawing, lit_name, way_of
+from agents.vision.config import IMAGENET, NETWORKS, PLAIN, RENDER_PRESETS, VisionConfig, drawing, lit_name
 from agents.vision.designs import DESIGNS, begin_as_imagenet, body_of, build
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
@@ -439,7 +439,7 @@ def test_features_name_their_encoder_and_their_house(tmp_path):
         load_features(path, source="another house")
     with pytest.raises(FileNotFoundError, match="embodied features"):
         load_features(tmp_path / "nothing.safetensors")
-    with pytest.raises(ValueError, match="made from drawing unlit_192, expected normal_gloss; .*--quality normal"):
+    with pytest.raises(ValueError, match="made from drawing unlit_192, expected normal_gloss; .*--pictures normal"):
         load_features(path, pictures=PictureSettings(192, "normal"))
     body = bytearray(path.read_bytes())
     body[-9] ^= 0x10
@@ -506,12 +506,14 @@ def test_encoder_moves_between_settings_without_changing_features():
 
 
 def test_every_way_of_drawing_has_its_own_features():
-    ways = [("unlit",), ("fast",), ("normal",), ("normal", "classic", "fast"), ("glossy",), ("normal", "filament")]
+    ways = [("unlit",), ("fast",), ("fast-matte",), ("normal",), ("normal", "fast"), ("traced",), ("normal-filament",)]
     paths = {feature_path(Path("f"), "d" * 64, "house", PictureSettings(192, *way)) for way in ways}
     assert len(paths) == len(ways) and feature_path(Path("f"), "d" * 64, "house", PLAIN) in paths
     assert drawing(PLAIN) == "unlit_192" != drawing(PictureSettings(256, "unlit"))
-    assert len({drawing(p) for p in WAYS.values()}) == len(WAYS) and all(way_of(p) == k for k, p in WAYS.items())
-    assert drawing(WAYS["reference"]) == "reference_fast_96_8rays"
+    assert len({drawing(p) for p in RENDER_PRESETS.values()}) == len(RENDER_PRESETS) and all(
+        p.kind == k for k, p in RENDER_PRESETS.items()
+    )
+    assert drawing(RENDER_PRESETS["reference"]) == "reference_fast_96_8rays"
 
 
 def test_the_settings_name_the_networks_that_there_are():

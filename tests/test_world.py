@@ -134,7 +134,7 @@ def test_unknown_nodes_and_folders_are_refused(world, tmp_path):
 
 
 def test_a_world_without_pictures_says_so(house, tmp_path):
-    with make(house, tmp_path, quality="none") as w:
+    with make(house, tmp_path, pictures="none") as w:
         assert w.sightings(0), "what can be seen is known without pictures"
         with pytest.raises(ValueError, match="without pictures"):
             w.panorama(0)
@@ -145,9 +145,9 @@ def test_a_misspelt_setting_is_refused(house, tmp_path):
         make(house, tmp_path, qualitty="unlit")
 
 
-def test_unknown_quality_is_refused_at_once(house, tmp_path):
+def test_unknown_pictures_are_refused_at_once(house, tmp_path):
     with pytest.raises(ValueError, match="pretty"):
-        make(house, tmp_path, quality="pretty")
+        make(house, tmp_path, pictures="pretty")
 
 
 def test_every_instance_id_has_a_class_walls_and_doors_too(world):

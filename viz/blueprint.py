@@ -10,7 +10,7 @@ from embodied.house.house import House
 from embodied.interface import Ask, Episode
 from embodied.render.pictures import PictureSettings
 
-LIGHT = {"unlit": "without light", "fast": "lit, fast", "normal": "lit", "glossy": "lit, with reflections"}
+LIGHT = {"unlit": "without light", "fast": "lit, fast", "normal": "lit", "traced": "lit, ray-traced"}
 """How a house is drawn, for people."""
 
 
@@ -18,7 +18,7 @@ def sees_title(seen: PictureSettings | None) -> str:
     """Name of the picture along the agent's gaze: how it is drawn, or that the agent looks at none."""
     if seen is None:
         return "Ahead of the agent, which looks at no pictures"
-    return f"What the agent sees: {LIGHT.get(seen.quality, seen.quality)}"
+    return f"What the agent sees: {LIGHT.get(seen.kind, seen.kind)}"
 
 
 def blueprint_of(

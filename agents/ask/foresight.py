@@ -1,24 +1,40 @@
 """The oracle of asking: it plays every question to the end in its head, and asks what pays most.
 
-It is privileged: it knows the true answers. It does not know the way: between questions it explores like the baselines.
+It is privileged: it knows where everything is, and its own luck. It does not know the way: between questions it
+explores like the baselines. One that doubts does not know which thing is meant and weighs all that fit what was said:
+what it does can be imitated.
 """
 
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from embodied.assistants.ask import NEAR, in_view
 from embodied.envs.ask import AskEnv
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.metrics import weighted_success
-from embodied.interface import Action, Actions, Ask, Intention, Observation, Observations, Situations, Stop
-from embodied.policies.ask import Asker, Trail, confirm_on_sight, onward, reached
+from embodied.interface import (
+    Action,
+    Actions,
+    Ask,
+    FindDescribed,
+    Intention,
+    Observation,
+    Observations,
+    Situations,
+    Stop,
+)
+from embodied.policies.ask import Asker, Mind, confirm_on_sight, onward, reached
 
 EVERY = 4
 """Steps between two moments at which it thinks about asking; it also does whenever a thing was reached."""
+IMAGINED = 3
+"""Things that one who doubts weighs at a time."""
 SLOW = 0.003
 """What a step is worth: of two ways that succeed alike, the shorter one."""
 Choice = Intention | str
@@ -34,7 +50,7 @@ CHOICES: tuple[Choice, ...] = (
 )
 
 
-def thinks(o: Observation, trail: Trail) -> bool:
+def thinks(o: Observation, trail: Mind) -> bool:
     """Whether this is a moment to decide; between them, and on a route, one goes on."""
     return o.advised is None and (reached(o) is not None or o.time % EVERY == 0)
 
@@ -43,14 +59,18 @@ class Foresight:
     """Asks what pays most in the end, if afterwards one only confirms on sight."""
 
     def __init__(
-        self, make_env: Callable[[], HelpEnv], note: Callable[[Observation, Trail, int], None] | None = None
+        self,
+        make_env: Callable[[], HelpEnv],
+        note: Callable[[Observation, Mind, int], None] | None = None,
+        doubts: bool = False,
     ) -> None:
         """
         Args:
           make_env: of the same houses and rules, to play in the head.
+          doubts: whether which thing is meant is not known.
           note: is told every decision, as an index into CHOICES.
         """
-        self._make_env, self._note = make_env, note
+        self._make_env, self._note, self._doubts = make_env, note, doubts
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
@@ -61,7 +81,7 @@ class Foresight:
                 assert s is not None, "episodes of a batch begin together"
                 env = self._make_env()
                 env.reset(s.task)
-                memory.append((env, Trail()))
+                memory.append((env, Mind()))
         actions: Actions = [None] * len(observations)
         for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
             if o is not None and s is not None:
@@ -70,16 +90,18 @@ class Foresight:
                 env.step(actions[i])
         return actions, memory
 
-    def _one(self, env: HelpEnv, o: Observation, trail: Trail, rng: np.random.Generator) -> Action:
+    def _one(self, env: HelpEnv, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
         choice = 0
         if thinks(o, trail):
             can = [k for k, c in enumerate(CHOICES) if isinstance(c, str) or c in o.can_ask]
-            choice = max(can, key=lambda k: (self._value(env, o, trail, CHOICES[k], rng), -k))
+            minds = imagined(env, rng) if self._doubts else [env]
+            value = {k: sum(self._value(e, o, trail, CHOICES[k], rng) for e in minds) for k in can}
+            choice = max(can, key=lambda k: (value[k], -k))
             if self._note:
                 self._note(o, trail, choice)
         return carried_out(CHOICES[choice], env, o, trail, rng)
 
-    def _value(self, env: HelpEnv, o: Observation, trail: Trail, choice: Choice, rng: np.random.Generator) -> float:
+    def _value(self, env: HelpEnv, o: Observation, trail: Mind, choice: Choice, rng: np.random.Generator) -> float:
         """Weighted success in the end, after this choice, with the draws that will come."""
         ahead, mind, rng = _copy(env), copy.deepcopy(trail), copy.deepcopy(rng)
         seen = ahead.step(carried_out(choice, ahead, o, mind, rng))
@@ -90,7 +112,28 @@ class Foresight:
         return weighted_success(episode, env.world.graph) - SLOW * len(episode.steps)
 
 
-def carried_out(choice: Choice, env: HelpEnv, o: Observation, trail: Trail, rng: np.random.Generator) -> Action:
+def imagined(env: HelpEnv, rng: np.random.Generator) -> list[HelpEnv]:
+    """The same moment in tasks in which other things that fit what was said are meant; at most IMAGINED of them."""
+    task, world = env.task, env.world
+    assert isinstance(task.goal, FindDescribed), "Ask-v0"
+    possible = sorted(env.situation.possible)
+    chosen = copy.deepcopy(rng).permutation(len(possible))[:IMAGINED]
+    minds = []
+    for placement in (possible[i] for i in sorted(chosen)):
+        near = ((node, in_view(world, node, task.goal)[:1]) for node in range(len(world.graph.positions)))
+        nodes = tuple(v for v, seen in near if seen and seen[0][0] == placement and seen[0][2] <= NEAR)
+        if not nodes:
+            continue
+        other = _copy(env)
+        goal = dataclasses.replace(task.goal, placement=placement)
+        other.task = dataclasses.replace(task, goal=goal, goal_nodes=nodes)
+        other.targets = nodes
+        other.situation = dataclasses.replace(env.situation, task=other.task, targets=nodes)
+        minds.append(other)
+    return minds or [env]
+
+
+def carried_out(choice: Choice, env: HelpEnv, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
     """The action of a choice; notes it in the trail."""
     if choice == "stop":
         return Stop()

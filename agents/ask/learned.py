@@ -11,13 +11,13 @@ from torch import nn
 
 from agents.ask.foresight import CHOICES, thinks
 from embodied.interface import Action, Actions, Ask, Intention, Observation, Observations, Situations, Stop
-from embodied.policies.ask import Trail, onward, reached
+from embodied.policies.ask import Mind, onward, reached
 
 HIDDEN, EPOCHS, RATE, DECAY = 32, 300, 1e-2, 1e-3
 QUESTIONS = tuple(c for c in CHOICES if isinstance(c, Intention))
 
 
-def facts(o: Observation, trail: Trail) -> np.ndarray:
+def facts(o: Observation, trail: Mind) -> np.ndarray:
     """(22,) float32: time, what is seen, what was reached, what was asked. Nothing of it names a place."""
     scores = [d.score for d in o.detections][:3]
     scores += [0.0] * (3 - len(scores))
@@ -60,7 +60,7 @@ class LearnedAsker:
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Any]:
-        trails = memory or [Trail() for _ in observations]
+        trails = memory or [Mind() for _ in observations]
         actions: Actions = [None] * len(observations)
         for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
             if o is None or s is None:
@@ -72,7 +72,7 @@ class LearnedAsker:
             actions[i] = action
         return actions, trails
 
-    def _decided(self, o: Observation, trail: Trail) -> Action | None:
+    def _decided(self, o: Observation, trail: Mind) -> Action | None:
         if not thinks(o, trail):
             return None
         with torch.no_grad():

@@ -23,11 +23,12 @@ from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.make import ask_environment_maker, look_of
 from embodied.evaluation.ask import COLUMNS, ask_row, ask_split
+from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, as_json, markdown
 from embodied.generate import HouseConfig
 from embodied.interface import Action, Agent, Ask, Detection, Episode, Intention, Observation, Task
-from embodied.policies.ask import Asker, AskRule, Trail, baselines, between, first
+from embodied.policies.ask import Asker, AskRule, Mind, baselines, between, first
 from embodied.tasks.ask import Look
 
 AREA = (90.0, 140.0)
@@ -37,22 +38,22 @@ SEEDS = (0, 1, 2)
 
 
 @dataclass(frozen=True)
-class Plan:
+class StudySize:
     """How large the study is."""
 
     train_houses: int = 8
-    train_tasks: int = 12
+    train_tasks: int = 8
     """Per house."""
     test_houses: int = 8
     test_tasks: int = 15
     foresight: int = 40
-    """Tasks of the test that the oracle of asking plays."""
+    """Tasks of the test that the oracle of asking plays: every house's first five, of which three are ambiguous."""
 
 
 def after(steps: int, rule: AskRule) -> AskRule:
     """Asks for the way once so many steps have passed, and again when it has been walked; before, another rule."""
 
-    def late(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+    def late(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
         return Ask(Intention.ROUTE) if o.advised is None and o.time >= steps else rule(o, thing, trail)
 
     return late
@@ -80,16 +81,16 @@ def lessons(places: dict[str, StoredPlace], look: Look, tasks: Sequence[Task]) -
     known: list[np.ndarray] = []
     chosen: list[int] = []
 
-    def note(o: Observation, trail: Trail, choice: int) -> None:
+    def note(o: Observation, trail: Mind, choice: int) -> None:
         known.append(facts(o, trail))
         chosen.append(choice)
 
     make_env = ask_environment_maker(places, look)
-    play(make_env, Foresight(make_env, note), tasks, seed=0)
+    play(make_env, Foresight(make_env, note, doubts=True), tasks, seed=0)
     return np.stack(known), np.array(chosen, dtype=np.int64)
 
 
-def run(out: Path, plan: Plan, cache: Path) -> None:
+def run(out: Path, plan: StudySize, cache: Path) -> None:
     """Everything: lessons, training, judging, table and figure."""
     catalogue = load_catalogue(cache)
     look = look_of(catalogue)
@@ -111,7 +112,7 @@ def run(out: Path, plan: Plan, cache: Path) -> None:
         for name, agent in baselines().items():
             rows.append(judged(name, [agent]))
         rows.append(judged("learned asker (3 seeds)", [LearnedAsker(n) for n in nets]))
-        rows.append(judged("oracle of asking", [Foresight(make_env)], tasks[:: max(1, len(tasks) // plan.foresight)]))
+        rows.append(judged("oracle of asking", [Foresight(make_env)], spread(tasks, plan.foresight)))
         if not unseen:
             for name, agents in families().items():
                 curves[name] = [_point(judged(name, [a])) for a in agents]
@@ -158,7 +159,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--draw", action="store_true", help="only draw the figure again")
     parser.add_argument("--small", action="store_true", help="two houses of each kind, to see that it runs")
     args = parser.parse_args(words)
-    plan = Plan(2, 4, 2, 5, 4) if args.small else Plan()
+    plan = StudySize(2, 4, 2, 5, 4) if args.small else StudySize()
     draw(args.out) if args.draw else run(args.out, plan, default_cache())
 
 

@@ -14,12 +14,13 @@ from pathlib import Path
 
 from agents.bandit.sizes import Sizes
 from assets.cache import digest, write_bytes, write_json
+from embodied.locks import locked
 from embodied.records import RecordError, from_plain, read_json
 from embodied.seeds import stream
 
 SOURCE, TARGET = "de", "en"
 SPLITS = ("supervised", "bandit_overlap", "bandit_disjoint", "dev", "test")
-FORMAT = "embodied-corpus-1"
+FORMAT, MADE = "embodied-corpus-2", "corpus.json"
 _TOKEN = re.compile(r"\w+(?:[-'’]\w+)*|[^\w\s]")
 
 
@@ -102,46 +103,59 @@ def split(pairs: Sequence[Pair], sizes: Sizes, *, seed: int) -> dict[str, list[P
 
 
 def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) -> None:
-    """Write the splits in Moses format, and corpus.json last, so that a folder with it is whole."""
-    folder = Path(folder)
-    counts = {}
-    for name, pairs in splits.items():
-        for language, text in ((SOURCE, "source"), (TARGET, "target")):
-            write_bytes(folder / f"{name}.{language}", "".join(f"{getattr(p, text)}\n" for p in pairs).encode())
-        words = [len(p.target.split()) for p in pairs]
-        counts[name] = {
-            "pairs": len(pairs),
-            "documents": len({p.document for p in pairs}),
-            "target words per sentence": round(sum(words) / len(words), 2),
-        }
-    write_json(folder / "corpus.json", {"format": FORMAT, **facts, "splits": counts}, indent=1)
-
-
-def pairs_of(folder: Path) -> dict[str, int]:
-    """How many pairs each split has, as corpus.json says; nothing where there is none (files of one's own).
+    """Write the splits in Moses format, and corpus.json last, so that a folder with it is whole: while splits are
+    written there is none, and it names what each split holds.
 
     Raises:
-      CorpusError: corpus.json is damaged.
+      LockedError: another process writes a corpus there.
     """
-    path = Path(folder) / "corpus.json"
+    folder = Path(folder)
+    counts = {}
+    with locked(folder):
+        (folder / MADE).unlink(missing_ok=True)
+        for name, pairs in splits.items():
+            for language, text in ((SOURCE, "source"), (TARGET, "target")):
+                write_bytes(folder / f"{name}.{language}", "".join(f"{getattr(p, text)}\n" for p in pairs).encode())
+            words = [len(p.target.split()) for p in pairs]
+            counts[name] = {
+                "pairs": len(pairs),
+                "documents": len({p.document for p in pairs}),
+                "target words per sentence": round(sum(words) / len(words), 2),
+            }
+        digests = {name: corpus_digest(folder, (name,)) for name in splits}
+        write_json(folder / MADE, {"format": FORMAT, **facts, "splits": counts, "digests": digests}, indent=1)
+
+
+def refuse_mixed(folder: Path, names: Sequence[str]) -> None:
+    """Refuse a folder of `embodied corpus` whose files are not those that it made; own files need no corpus.json.
+
+    Raises:
+      CorpusError: corpus.json is damaged, or a split is another's.
+    """
+    path = Path(folder) / MADE
     if not path.exists():
-        return {}
+        return
     try:
-        splits = from_plain(dict[str, dict[str, float]], read_json(path).get("splits"), f"{path}: splits")
-        return {name: int(counts["pairs"]) for name, counts in splits.items()}
+        digests = from_plain(dict[str, str], read_json(path).get("digests"), f"{path}: digests")
     except RecordError as e:
         raise CorpusError(f"{e}; make the corpus again with `embodied corpus`") from e
-    except KeyError as e:
-        raise CorpusError(f"{path}: a split says no {e}; make the corpus again with `embodied corpus`") from e
+    if mixed := [n for n in names if digests.get(n) != corpus_digest(folder, (n,))]:
+        raise CorpusError(
+            f"{folder}: {', '.join(mixed)} are not the splits that {path.name} tells of; make the corpus again with "
+            "`embodied corpus`, or delete that file if these are your own"
+        )
 
 
 def load(folder: Path, names: Sequence[str], *, longest: int = 50) -> Corpus:
     """The splits in `names`; sentences of more than `longest` words on either side are left out (3.1.5).
 
     Raises:
-      CorpusError: a file is missing, empty, not UTF-8, or its two sides differ in length; or a side of a pair is empty.
+      CorpusError: the folder mixes two corpora; a file is missing, empty, not UTF-8, or its two sides differ in length;
+        or a side of a pair is empty.
     """
-    return {name: _load(Path(folder), name, longest) for name in names}
+    found = {name: _load(Path(folder), name, longest) for name in names}
+    refuse_mixed(folder, names)
+    return found
 
 
 def _load(folder: Path, name: str, longest: int) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gettext
 import re
 import shutil
+import struct
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -143,7 +144,7 @@ def _menus(folder: Path) -> Iterator[Pair]:
         try:
             with open(path, "rb") as f:
                 messages = vars(gettext.GNUTranslations(f))["_catalog"]  # the only way to all of them
-        except (OSError, UnicodeDecodeError, ValueError) as e:
+        except (OSError, ValueError, struct.error, LookupError) as e:  # empty, cut short, or of another encoding
             raise CorpusError(f"{path}: damaged ({e}); fetch package {PACKAGES[2]} again") from e
         for key, german in messages.items():
             if isinstance(key, str) and "\x04" in key:

@@ -21,7 +21,7 @@ from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.asking import RULES
 from agents.hanna.policy import for_training
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation import metrics
@@ -67,7 +67,7 @@ class StarsStudy(EpisodeStudy):
     """Whose houses and tasks are rated in."""
     decisions: str = "drawn"
     """Judged with moves and questions 'drawn' from the networks, as they are while they are rated, or with the
-    'usual' ones of `embodied judge`, which asks where that is likelier than not."""
+    'usual' ones of `embodied evaluate`, which asks where that is likelier than not."""
 
     name = "stars"
     makers = ("agents.bandit.navigation",)
@@ -77,10 +77,12 @@ class StarsStudy(EpisodeStudy):
         if self.decisions not in DECISIONS:
             raise ValueError(f"decisions must be one of {DECISIONS}, got {self.decisions!r}")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         figure = Figure(("success",), "strength of the perturbation", "Δ success (points)", log=True)
         title = "Navigation from ratings: gain in houses that were not rated"
-        return {"stars": Table(title, _rows(), ("success", "SDTW", "requests", RISE), (self.split,), figure=figure)}
+        return {
+            "stars": StudyTable(title, _rows(), ("success", "SDTW", "requests", RISE), (self.split,), figure=figure)
+        }
 
     def settings(self, train: Mapping[str, Any], seed: int) -> RatingConfig:
         return dataclasses.replace(self.config, seed=seed)

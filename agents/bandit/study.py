@@ -20,11 +20,12 @@ from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import NumberedCorpus, bandit, material, pretrain, teach_critic
 from agents.common.checkpoint import read_checkpoint
 from agents.common.session import Note
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 
 SENTENCE, HELD_OUT = "per-sentence BLEU", "held-out BLEU"
+RATE = "bandit_rate"
 PASSES = 5
 """Of Figure 3.4."""
 SWEEPS: Mapping[str, Sequence[float]] = {
@@ -33,6 +34,8 @@ SWEEPS: Mapping[str, Sequence[float]] = {
     "skew": (0.25, 0.5, 0.67, 1.5, 2, 4),
 }
 """Figure 3.5's settings; a skew of 1 is the clean rater."""
+RATES = (1e-4, 3e-4, 1e-3)
+LEARNERS = {"Δ supervised": "supervised", "Δ NED-A2C": "a2c"}
 REFERENCES = {"full": "fully", "weak": "weakly"}
 
 
@@ -55,8 +58,8 @@ def _sweep() -> tuple[StudyRow, ...]:
     return tuple(rows)
 
 
-TABLES: Mapping[str, Table] = {
-    "3.2": Table(
+TABLES: Mapping[str, StudyTable] = {
+    "3.2": StudyTable(
         "Translation scores and their improvement by one round of ratings",
         tuple(
             row
@@ -69,7 +72,7 @@ TABLES: Mapping[str, Table] = {
         ),
         (SENTENCE, HELD_OUT),
     ),
-    "3.4": Table(
+    "3.4": StudyTable(
         "NED-A2C for five passes",
         tuple(
             dataclasses.replace(row, judge={"curve": True})
@@ -77,13 +80,18 @@ TABLES: Mapping[str, Table] = {
         ),
         figure=Figure((SENTENCE.replace(" ", "_"),), "pass over the rated sentences", SENTENCE),
     ),
-    "3.5": Table(
+    "3.5": StudyTable(
         "Gain by NED-A2C under imperfect ratings",
         _sweep(),
         (SENTENCE, HELD_OUT),
         figure=Figure((SENTENCE.replace(" ", "_"),), "strength of the perturbation", f"Δ {SENTENCE}", log=True),
     ),
-    "held-out": Table(
+    "rates": StudyTable(
+        "One round of ratings at other learning rates; 0.0001 is the text's (3.1.5.2)",
+        tuple(_gain(f"{rate:g}, {x}", k, bandit_rate=rate) for rate in RATES for x, k in LEARNERS.items()),
+        (SENTENCE, HELD_OUT),
+    ),
+    "held-out": StudyTable(
         "Held-out sentences: how learners translate them after one round of ratings",
         tuple(
             dataclasses.replace(
@@ -112,7 +120,7 @@ class BanditStudy:
     name = "bandit"
     judges = ("agents.bandit.behaviour",)
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         return TABLES
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
@@ -129,11 +137,11 @@ class BanditStudy:
             teach_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference, note=note)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
-        config = dataclasses.replace(self.config, seed=seed)
-        return identity_of("agents.bandit.training", settings=config, corpus=self._corpus(), run=dict(train))
+        config, run = self._settings(train, seed), {k: v for k, v in train.items() if k != RATE}
+        return identity_of("agents.bandit.training", settings=config, corpus=self._corpus(), run=run)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        begun, m = self._begun(seed, folder), self._material(seed)
+        begun, m = self._begun(seed, folder), _material(self.data, self._settings(train, seed))
         reference = begun / "pretrain" / f"{train['reference']}.safetensors"
         critic = begun / train["reference"] / "critic.safetensors"
         (off,) = [k for k in train if k in SWEEPS] or [""]
@@ -164,6 +172,9 @@ class BanditStudy:
             f"critic, learning rate {c.bandit_rate:g} with ratings. Seeds {seeds}, each with its own pre-training; "
             "differences are taken seed by seed."
         )
+
+    def _settings(self, train: Mapping[str, Any], seed: int) -> BanditConfig:
+        return dataclasses.replace(self.config, seed=seed, bandit_rate=train.get(RATE, self.config.bandit_rate))
 
     def _corpus(self) -> str:
         return _corpus(self.data, self.config.bandit_set)

@@ -33,7 +33,7 @@ class Lessons:
 
     data: Dataset
     encoder: Encoder
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that the features come from, as in agents.vision.run.pictures_of."""
     device: str = "cpu"
 
@@ -51,7 +51,9 @@ class Lessons:
         Args:
           lights: lightings of every house that the bank can show.
         """
-        return split_of(self.data, name, self.encoder.digest, self.device, limit, houses, self.quality, vnla, lights)
+        return split_of(
+            self.data, name, self.encoder.digest, self.device, limit, houses, self.picture_kind, vnla, lights
+        )
 
     def identity(self) -> dict[str, str]:
         """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""
@@ -59,12 +61,12 @@ class Lessons:
 
     def pictures(self, name: str) -> str:
         """How the pictures of a split's houses were drawn, as in `drawings`."""
-        return drawings(self.data, self.data.names(name), self.quality)
+        return drawings(self.data, self.data.names(name), self.picture_kind)
 
 
-def drawings(data: Dataset, houses: Iterable[str], quality: str | None) -> str:
+def drawings(data: Dataset, houses: Iterable[str], picture_kind: str | None) -> str:
     """How the pictures of some houses were drawn, in words: 'unlit_192', or several of them."""
-    return ", ".join(sorted({drawing(pictures_of(data, n, quality)) for n in houses}))
+    return ", ".join(sorted({drawing(pictures_of(data, n, picture_kind)) for n in houses}))
 
 
 def split_of(
@@ -74,7 +76,7 @@ def split_of(
     device: str = "cpu",
     limit: int | None = None,
     houses: int | None = None,
-    quality: str | None = None,
+    picture_kind: str | None = None,
     vnla: str = AS_PUBLISHED,
     lights: int = 1,
 ) -> Split:
@@ -82,7 +84,7 @@ def split_of(
 
     Args:
       encoder: its digest.
-      quality: of the pictures that the features come from, as in agents.vision.run.pictures_of.
+      picture_kind: of the pictures that the features come from, as in agents.vision.run.pictures_of.
       vnla: VNLA's rule of play, as in Dataset.split.
       lights: lightings of every house that the bank can show.
 
@@ -92,7 +94,7 @@ def split_of(
     if houses is not None and houses > (there := len(data.names(name))):
         raise ValueError(f"{houses} houses of {name!r} are wanted, {data.folder} has {there}; ask for fewer")
     split = data.split(name, houses=houses, vnla=vnla)
-    pictures = {n: pictures_of(data, n, quality) for n in split.worlds}
+    pictures = {n: pictures_of(data, n, picture_kind) for n in split.worlds}
     paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
     tasks = split.tasks if limit is None else spread(split.tasks, limit)
     bank = load_bank(paths, encoder, split.worlds, pictures, lights)

@@ -19,7 +19,7 @@ from agents.hanna.asking import RULES, HannaAskRule, ask_above, ask_every, ask_w
 from agents.hanna.config import HannaSizes
 from agents.hanna.network import Scores
 from agents.hanna.percept import Percept, slot_distribution
-from agents.hanna.policy import PerfectInterpretation
+from agents.hanna.policy import HannaPolicy, PerfectInterpretation
 from agents.vision.bank import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.tables import Samples, interval, measured
@@ -48,13 +48,22 @@ PLAINER: Mapping[str, Mapping[str, Any]] = {
 asks (docs/sources.md, S36, S161; S162 stays)."""
 
 
-def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+Judged = Callable[[HannaAgent, FeatureBank], HannaPolicy]
+"""How an agent acts when it is judged."""
+
+
+def as_shipped(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
+    """By its HannaEvaluation."""
+    return agent.policy(bank)
+
+
+def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
     """Variants of a learned agent by the names of Tables 4.3 to 4.5.
 
     'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
     authors train an agent for each rule (`embodied train hanna --ask-rule ...`; docs/sources.md, S39).
     """
-    learned = agent.policy(bank)
+    learned = of(agent, bank)
     return {
         "learned": learned,
         "learned, no ask": dataclasses.replace(learned, ask_rule=RULES["never"][1]),
@@ -65,14 +74,21 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     }
 
 
-def all_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+def by_the_text(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
+    """The agent as the text judges it: the likeliest move and decision to ask, without rules of ours (docs/sources.md,
+    S36, S161, S162)."""
+    plain = PLAINER["learned, likeliest move, without a trail"]
+    return dataclasses.replace(agent.policy(bank), **plain, ask_rule=RULES[agent.config.ask_rule][1])
+
+
+def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
     """Those of `hanna_policies` and `sight_policies`, and the agent with each rule of ASK_THRESHOLDS and in each way of
     PLAINER."""
-    learned = agent.policy(bank)
+    learned = of(agent, bank)
     rules = {name: rule for kind in ASK_THRESHOLDS.values() for name, rule in kind.items()}
     asking = {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
     plainer = {name: dataclasses.replace(learned, **changed) for name, changed in PLAINER.items()}
-    return {**hanna_policies(agent, bank), **asking, **plainer, **sight_policies(agent, bank)}
+    return {**hanna_policies(agent, bank, of), **asking, **plainer, **sight_policies(agent, bank)}
 
 
 UNWILLING = 20.0
@@ -107,17 +123,19 @@ class Forgetting:
 def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """What sight is worth, by name: the learned agent without it, and its rules with sight but without learning.
 
-    'blind' sees black with network and matcher alike; the last two draw moves evenly, stop by the picture alone and
-    ask every 5 steps.
+    'blind' sees black with network and matcher alike; 'rules only' draws moves evenly, stops by the picture alone and
+    asks every 5 steps, or every 10.
     """
     learned, blind = agent.policy(bank), agent.policy(bank.blind())
     every5 = RULES["every5"][1]
-    rules = dataclasses.replace(learned, network=Uniform(learned.network.config), ask_rule=every5)
+    nothing: Any = Uniform(learned.network.config)
+    rules = dataclasses.replace(learned, network=nothing, ask_rule=every5)
     return {
         "blind": blind,
         "blind, not by image": dataclasses.replace(blind, by_image=False),
         "blind, ask every 5": dataclasses.replace(blind, ask_rule=every5),
         "rules only": rules,
+        "rules only, ask every 10": dataclasses.replace(rules, ask_rule=ask_every(10)),
         "rules only, blind": dataclasses.replace(rules, bank=blind.bank),
     }
 

@@ -1,6 +1,6 @@
 """How well pictures are recognised that were taken at another time: precision, recall and AUC in houses never seen.
 
-    python -m agents.hanna.places --validation VAL --data TEST --quality matte --out docs/results/data
+    python -m agents.hanna.places --validation VAL --data TEST --pictures fast-matte --out docs/results/data
 
 An agent has walked through a house; a helper shows a picture of one of its places. Which of the places that it saw is
 it, if any? Thresholds are those of the validation houses at which F1 is best.
@@ -143,12 +143,12 @@ def facts(asked: Sequence[Query], least: float) -> dict[str, dict[str, float | i
 Asked = Mapping[str, list[Query]]
 
 
-def ask(data: Dataset, splits: Sequence[str], quality: str | None) -> Asked:
+def ask(data: Dataset, splits: Sequence[str], picture_kind: str | None) -> Asked:
     """Queries by occasion, of all of OCCASIONS whose features are there for every house; 'again' are the agent's own
     panoramas through a camera, with their headings."""
     encoder, out = load_encoder(SHIPPED_ENCODER).digest, dict[str, list[Query]]()
     for name in dict.fromkeys(n for s in splits for n in data.names(s)):
-        drawn, graph = pictures_of(data, name, quality), data.place(name).graph
+        drawn, graph = pictures_of(data, name, picture_kind), data.place(name).graph
         own, _ = load_features(feature_path(data.folder / "features", encoder, name, drawn), encoder=encoder)
         for word, occasion in OCCASIONS.items():
             path = shown_path(data, name, occasion, encoder, drawn)
@@ -195,34 +195,36 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--validation", type=Path, required=True, help="data set whose unseen houses choose thresholds")
     parser.add_argument("--data", type=Path, help="data set in whose houses they are judged; without it none are")
-    parser.add_argument("--quality", help="how the pictures are drawn, as `embodied features --quality`")
+    parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
     parser.add_argument("--validation-splits", nargs="+", default=["val_unseen", "test_unseen"])
+    parser.add_argument("--table", default="sight-places", help="name of the table (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("docs/results/data"))
     args = parser.parse_args()
 
-    chosen = thresholds(ask(Dataset(args.validation), args.validation_splits, args.quality))
+    chosen = thresholds(ask(Dataset(args.validation), args.validation_splits, args.pictures))
     print(f"thresholds {chosen}")
     judged = args.data or args.validation
-    asked = ask(Dataset(judged), ["test_unseen"] if args.data else args.validation_splits, args.quality)
+    asked = ask(Dataset(judged), ["test_unseen"] if args.data else args.validation_splits, args.pictures)
     rows = [
         {"label": word, "values": facts(some, chosen[kind_of(word)]), "printed": {}} for word, some in asked.items()
     ]
     houses = len({q.house for some in asked.values() for q in some})
     table = {
-        "table": "sight-places",
+        "table": args.table,
         "title": "Recognising pictures that were taken at another time",
         "paper": None,
         "command": "python -m agents.hanna.places --validation VAL --data TEST --out docs/results/data",
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} lit houses, pictures {args.quality}; {WALKS} walks of {MOVES} moves in each",
+        "settings": f"{houses} houses that nothing learned from, pictures {args.pictures or 'of the data set'}; "
+        f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
         "rows": rows,
         "notes": ["'again': the agent's own panoramas through a robot's camera, compared without turning."],
     }
     for row in rows:
-        print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[index, attr-defined]
+        print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[attr-defined]
     if args.data:
-        write_json(args.out / "sight-places.json", table, indent=1)
+        write_json(args.out / f"{args.table}.json", table, indent=1)
 
 
 if __name__ == "__main__":

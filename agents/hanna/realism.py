@@ -1,7 +1,7 @@
 """Success against realism: agents that learned from one kind of pictures, judged in houses drawn in others (no
 counterpart in the dissertation).
 
-    embodied features --data DATA --encoder ENCODER --quality reference --split test_unseen --houses 8
+    embodied features --data DATA --encoder ENCODER --pictures reference --split test_unseen --houses 8
     embodied study realism --data DATA --out STUDY --houses 8 --agents unlit=A.safetensors lit=B.safetensors
 
 Each agent looks through the encoder it learned with, or through another that sees alike. Which way of drawing ranks
@@ -22,7 +22,7 @@ from agents.common.lessons import drawings, split_of
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.studies.engine import StudyRow, Table
+from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
 from embodied.datasets.store import SplitData, dataset_of
@@ -39,7 +39,7 @@ class RealismStudy(EpisodeStudy):
     arms: Mapping[str, Sequence[Path]]
     """Kind of agent to the files of its training seeds."""
     pictures: tuple[str, ...]
-    """Keys of agents.vision.config.WAYS; the last is what the others are ranked against."""
+    """Keys of agents.vision.config.RENDER_PRESETS; the last is what the others are ranked against."""
     split: str = "test_unseen"
     houses: int | None = None
     """The first so many houses of the split; None: all."""
@@ -64,10 +64,10 @@ class RealismStudy(EpisodeStudy):
         paths, through = self.arms[arm], self.encoders.get(arm, (None,))
         return [*zip(paths, through if len(through) > 1 else [*through] * len(paths), strict=True)]
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """One split per way of drawing, named by it."""
         rows = tuple(StudyRow(arm, {"arm": arm}) for arm in self.arms)
-        return {"realism": Table("Success against realism", rows, ("success", "requests"), self.pictures)}
+        return {"realism": StudyTable("Success against realism", rows, ("success", "requests"), self.pictures)}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         return range(len(self.arms[(row.train or {})["arm"]]))
@@ -114,7 +114,7 @@ class RealismStudy(EpisodeStudy):
     def _bank(self, arm: str, seed: int, way: str) -> Any:
         agent, encoder = self.watched(arm)[seed]
         digest = load_encoder(encoder).digest if encoder else load_agent(agent).encoder_digest
-        return split_of(dataset_of(self.data, "hanna"), self.split, digest, houses=self.houses, quality=way).bank
+        return split_of(dataset_of(self.data, "hanna"), self.split, digest, houses=self.houses, picture_kind=way).bank
 
 
 def ranks(body: Mapping[str, Any], ways: Sequence[str]) -> list[str]:

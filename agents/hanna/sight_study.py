@@ -1,6 +1,6 @@
 """What sight is worth to HANNA: agents that see beside blind ones and beside their rules alone, by what helpers show.
 
-    python -m agents.hanna.sight_study --data TEST --quality matte --episodes STUDY --out docs/results/data
+    python -m agents.hanna.sight_study --data TEST --pictures fast-matte --episodes STUDY --out docs/results/data
 
 Every row's episodes are kept in STUDY and not played again; the table is written from them.
 """
@@ -24,7 +24,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
-from embodied.evaluation.tables import Row, row
+from embodied.evaluation.tables import Row, Samples, interval, less, measured, row
 from embodied.interface import Agent, Episode
 from embodied.locks import locked
 from embodied.records import episodes_file, load_lines, save_lines
@@ -38,6 +38,7 @@ ROWS = (
     "learned, random ask",
     "learned, perfect interpretation",
     "blind, not by image",
+    "rules only, ask every 10",
     "rules only, blind",
     "random walk",
 )
@@ -59,13 +60,14 @@ def main() -> None:
     parser.add_argument("--data", type=Path, required=True, help="data set with features of what is shown")
     parser.add_argument("--split", nargs="+", default=["test_unseen"], help="which tasks (default: test_unseen)")
     parser.add_argument("--agent", type=Path, default=SHIPPED_AGENT, help="a trained agent (default: shipped)")
-    parser.add_argument("--quality", help="how the pictures are drawn, as `embodied features --quality`")
+    parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
     parser.add_argument("--shown", nargs="+", choices=OCCASIONS, default=SHOWN, help="of which pictures")
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=ROWS, help="of the first kind of pictures")
     parser.add_argument("--tasks", type=int, help="at most so many, from all houses alike")
     parser.add_argument("--houses", type=int, help="of the first so many houses of each split (default: all)")
     parser.add_argument("--seed", type=int, default=0, help="of the judging (default: %(default)s)")
     parser.add_argument("--episodes", type=Path, required=True, help="folder of the episodes")
+    parser.add_argument("--table", default="sight-hanna", help="name of the table (default: %(default)s)")
     parser.add_argument("--out", type=Path, help="folder of the table; without it none is written")
     parser.add_argument("--cache", type=Path, default=default_cache())
     args = parser.parse_args()
@@ -73,20 +75,22 @@ def main() -> None:
     torch.set_num_threads(1)
     data = Dataset(args.data)
     args.episodes.mkdir(parents=True, exist_ok=True)
-    rows = []
+    rows, taken = [], dict[str, Samples]()
     with locked(args.episodes):
         for shown in args.shown:
             for name in args.rows if shown == args.shown[0] else [r for r in args.rows if r in EVERYWHERE]:
                 episodes = [e for split in args.split for e in episodes_of(data, split, shown, name, args)]
                 graphs = {e.task.world: data.place(e.task.world).graph for e in episodes}
+                if shown == args.shown[0]:
+                    taken[name] = measured(episodes, graphs)["success"]
                 values = numbers(row(name, args.split[0], episodes, graphs, seed=args.seed))
                 print(shown, name, {k: v["mean"] for k, v in values.items()}, flush=True)
                 rows.append({"label": f"{name} ({shown})", "values": values, "printed": {}})
     if args.out:
         write_json(
-            args.out / "sight-hanna.json",
+            args.out / f"{args.table}.json",
             {
-                "table": "sight-hanna",
+                "table": args.table,
                 "title": "HANNA with sight, without, and by its rules alone",
                 "paper": None,
                 "command": "python -m agents.hanna.sight_study --data TEST --episodes STUDY --out docs/results/data",
@@ -97,12 +101,13 @@ def main() -> None:
                     "seed": args.seed,
                 },
                 "settings": f"{len(episodes)} tasks in {len(graphs)} houses that nothing learned from, pictures "
-                f"{args.quality or 'of the data set'}; in brackets when the pictures were taken that helpers show",
+                f"{args.pictures or 'of the data set'}; in brackets when the pictures were taken that helpers show",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
                     "blind: all features zero, for the networks and for the matcher of pictures.",
                     "rules only: no learned network; moves are drawn evenly under the same rules, help every 5 steps.",
+                    *(lead(taken["learned"], taken[other], other) for other in taken if other != "learned"),
                 ],
             },
             indent=1,
@@ -114,8 +119,8 @@ def episodes_of(data: Dataset, name: str, shown: str, agent_name: str, args: arg
     path = args.episodes / shown / episodes_file(name, agent_name)
     if not path.exists():
         encoder, agent, split = load_encoder().digest, load_agent(args.agent), data.split(name, houses=args.houses)
-        bank = split_of(data, name, encoder, houses=args.houses, quality=args.quality).bank
-        bank = showing(bank, data, list(split.worlds), OCCASIONS[shown], encoder, args.cache, args.quality)
+        bank = split_of(data, name, encoder, houses=args.houses, picture_kind=args.pictures).bank
+        bank = showing(bank, data, list(split.worlds), OCCASIONS[shown], encoder, args.cache, args.pictures)
         judged: Mapping[str, Agent] = {
             **hanna_policies(agent, bank),
             **sight_policies(agent, bank),
@@ -124,6 +129,12 @@ def episodes_of(data: Dataset, name: str, shown: str, agent_name: str, args: arg
         tasks = spread(split.tasks, args.tasks)
         save_lines(path, play(split.make_env, judged[agent_name], tasks, seed=args.seed, batch=32, agent=agent_name))
     return list(load_lines(path, Episode))
+
+
+def lead(learned: Samples, other: Samples, name: str) -> str:
+    """How far the learned agent is ahead, task by task."""
+    ahead = interval([less(learned, other)])
+    return f"learned, less {name}: {100 * ahead.mean:.1f} ± {100 * ahead.half:.1f} points of success."
 
 
 def numbers(made: Row) -> dict[str, dict[str, float | int]]:

@@ -13,10 +13,10 @@ from agents.common.lessons import Lessons, drawings, split_of
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.evaluation import ASK_THRESHOLDS, PLAINER, all_policies, counted
+from agents.hanna.evaluation import ASK_THRESHOLDS, PLAINER, all_policies, as_shipped, by_the_text, counted
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
 from embodied.datasets.store import Dataset, SplitData, dataset_of
@@ -71,7 +71,7 @@ SHORTER = "equal_passes"
 """In a row's settings: trained on fewer houses for as many passes as the agent of all houses, not as many updates."""
 
 
-def _houses_table(every: int) -> Table:
+def _houses_table(every: int) -> StudyTable:
     """Success against training houses, of those numbers that are fewer than `every`."""
     counts = [n for n in HOUSES if n < every]
     updates = {n: learned(f"{n} houses", training_houses=n) for n in counts}
@@ -86,22 +86,22 @@ def _houses_table(every: int) -> Table:
         learned("all houses, without a trail", "learned, without a trail"),
     ]
     steps = [(updates[b], updates[a]) for a, b in itertools.pairwise(counts)]
-    return Table(
+    return StudyTable(
         "Success and the number of training houses (no counterpart in the dissertation)",
         tuple(rows), FULL, TEST, (*steps, *((every_house, r) for r in updates.values())),
         Figure(("success",), "training houses", "success (%)", log=True),
     )  # fmt: skip
 
 
-def _requests_table() -> Table:
+def _requests_table() -> StudyTable:
     asked = [learned(name.removeprefix("learned, "), name) for kind in ASK_THRESHOLDS.values() for name in kind]
     priced = [learned(f"trained at price {p:g}", ask_price=p) for p in (0.25, 4.0)]
     title = "Success and the number of requests (no counterpart in the dissertation)"
-    return Table(title, (*asked, *priced), ("success", "spl", "requests"), ("test_unseen",))
+    return StudyTable(title, (*asked, *priced), ("success", "spl", "requests"), ("test_unseen",))
 
 
-TABLES: Mapping[str, Table] = {
-    "4.3": Table(
+TABLES: Mapping[str, StudyTable] = {
+    "4.3": StudyTable(
         "Results on the test splits",
         (
             without("Random walk", "random walk"),
@@ -110,41 +110,43 @@ TABLES: Mapping[str, Table] = {
             learned("Learn to interpret assistance"),
             without("Shortest", "shortest"),
             learned("Perfect assistance interpretation", "learned, perfect interpretation"),
+            learned("Blind", "blind"),
+            learned("Rules only", "rules only"),
         ),
         FULL,
         TEST,
     ),
-    "4.4": Table("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
-    "4.5": Table(
+    "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
+    "4.5": StudyTable(
         "Help-request policies",
         (NO_ASK, RANDOM_ASK, EVERY_5, LEARNED),
         ("success", "requests"),
         TEST,
         ((HALF, NO_ASK), (HALF, RANDOM_ASK), (HALF, EVERY_5)),
     ),
-    "4.6": Table(
+    "4.6": StudyTable(
         "Model and curiosity",
         (LSTM, NO_CURIOSITY, OURS),
         ("success", "mistake repeat", "request repeat"),
         ("test_unseen",),
         ((PLAIN_OURS, LSTM), (OURS, NO_CURIOSITY)),
     ),
-    "D.1": Table("When and why it asks", (LEARNED,), ("request share", *REASONS), ("test_unseen",)),
-    "D.2": Table(
+    "D.1": StudyTable("When and why it asks", (LEARNED,), ("request share", *REASONS), ("test_unseen",)),
+    "D.2": StudyTable(
         "Ablations",
         (learned("Final agent"), *(learned(name, **off) for name, off in ABLATIONS.items())),
         FULL,
         VALIDATION,
         tuple((learned("Final agent"), learned(name, **off)) for name, off in ABLATIONS.items()),
     ),
-    "lights": Table(
+    "lights": StudyTable(
         "Success and the number of lightings of each training house (no counterpart in the dissertation)",
         (learned("1 lighting"), learned("3 lightings", lights=3)),
         FULL,
         TEST,
         ((learned("3 lightings", lights=3), learned("1 lighting")),),
     ),
-    "departures": Table(
+    "departures": StudyTable(
         "What mini does otherwise than Table D.1, one thing less at a time (no counterpart in the dissertation)",
         (
             learned("as mini is"),
@@ -162,6 +164,23 @@ TABLES: Mapping[str, Table] = {
 thing: half curiosity is learned asking with the alpha of heuristic askers (Table D.1, note)."""
 
 
+PRINTED = ("4.3", "4.4", "4.5", "4.6", "D.2")
+"""Tables whose numbers the dissertation prints: judged as the text has it, and in columns of their own as we do."""
+TEXT, SHIPPED = "by the text", " as shipped"
+"""In a row's `judge`, and at the end of a split's name."""
+
+
+def in_both_ways(table: StudyTable) -> StudyTable:
+    """The table with columns of the text's way of judging, then of ours; comparisons are of both."""
+    text = lambda row: dataclasses.replace(row, judge={**row.judge, TEXT: True})
+    return dataclasses.replace(
+        table,
+        rows=tuple(text(row) for row in table.rows),
+        splits=(*table.splits, *(s + SHIPPED for s in table.splits)),
+        compared=tuple((text(a), text(b)) for a, b in table.compared),
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(EpisodeStudy):
     """Tables 4.3 to 4.6 and D.2, and success against houses, lightings and requests."""
@@ -171,7 +190,7 @@ class HannaStudy(EpisodeStudy):
     """Where the rows start from."""
     evaluation: HannaEvaluation
     device: str = "cpu"
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
     begin: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
@@ -182,14 +201,17 @@ class HannaStudy(EpisodeStudy):
     makers = ("agents.hanna.run",)
     judges = (*JUDGES, "agents.hanna.evaluation")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
         every = len(self._lessons().data.names("train"))
         ood = Dataset(self.elsewhere or self.data).ood
         found = {}
         for name, table in {**TABLES, "houses": _houses_table(every)}.items():
             splits = [s for s in table.splits if self.elsewhere is None or not s.endswith("_seen")]
-            found[name] = dataclasses.replace(table, splits=(*splits, *(ood if table.splits == TEST else ())))
+            splits += ood if table.splits == TEST else ()
+            found[name] = dataclasses.replace(table, splits=tuple(splits))
+            if name in PRINTED:
+                found[name] = in_both_ways(found[name])
         return found
 
     def settings(self, train: Mapping[str, Any], seed: int) -> TrainingConfig:
@@ -203,15 +225,15 @@ class HannaStudy(EpisodeStudy):
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         data = dataset_of(self.data, "hanna")
-        drawn = drawings(data, data.names("train"), self.quality)
+        drawn = drawings(data, data.names("train"), self.picture_kind)
         begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
         return {"data": data.digest, "encoder": weights_digest(self.encoder), "pictures": drawn, **begun}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
         judged, encoder = self.judged_in({}), load_encoder(self.encoder).digest
-        for split in splits:
-            split_of(judged, split, encoder, quality=self.quality)
+        for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
+            split_of(judged, split, encoder, picture_kind=self.picture_kind)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self._lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
@@ -225,14 +247,19 @@ class HannaStudy(EpisodeStudy):
         if agent is None:
             return agent_without_learning("hanna", played)
         data, encoder = self.judged_in(judge), load_encoder(self.encoder).digest
-        return all_policies(agent, split_of(data, split, encoder, quality=self.quality).bank)[played]
+        bank = split_of(data, split.removesuffix(SHIPPED), encoder, picture_kind=self.picture_kind).bank
+        by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
+        return all_policies(agent, bank, by_the_text if by_text else as_shipped)[played]
+
+    def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
+        return super().where(agent, judge, split.removesuffix(SHIPPED))
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return dataset_of(self.elsewhere or self.data, "hanna")
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         data = self.judged_in(row.judge)
-        drawn = drawings(data, data.names(split), self.quality)
+        drawn = drawings(data, data.names(split.removesuffix(SHIPPED)), self.picture_kind)
         return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn}
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
@@ -246,8 +273,10 @@ class HannaStudy(EpisodeStudy):
         )
         return (
             f"{told}{judged} Pictures: {self.depends({})['pictures']}. {c.iterations} updates of {c.batch} "
-            f"episodes{begun}; judged at temperature {self.evaluation.evaluation_temperature:g}."
+            f"episodes{begun}; judged at temperature {self.evaluation.evaluation_temperature:g} and by the rules of "
+            f"docs/sources.md, S36, S161, S162; in {', '.join(PRINTED)} so in the columns 'as shipped' alone, in the "
+            "others, beside the printed numbers, the likeliest action is taken."
         )
 
     def _lessons(self) -> Lessons:
-        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.quality, self.device)
+        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.picture_kind, self.device)

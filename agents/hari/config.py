@@ -103,6 +103,8 @@ class IntentionConfig(ValidatedRunSettings):
     """False: the assistant answers another question than was asked (Table 4.7)."""
     states: str = "sparse"
     """How the agent's own place is described without asking: 'none', 'sparse' (as in the dissertation) or 'dense'."""
+    kept: float = 0.1
+    """Share of the object classes that sparse descriptions keep (docs/sources.md, S170)."""
     perfect: bool = False
     """True: sub-goals are reached perfectly, whatever the execution policy would do (the skyline of Table 4.7)."""
     validate_every: int = 250
@@ -115,6 +117,7 @@ class IntentionConfig(ValidatedRunSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "stack", "longest", "horizon")
         require(self, POSITIVE, "clip")
         require(self, NOT_NEGATIVE, "critic_iterations", "cost", "entropy")
+        require(self, SHARE, "kept")
         require_word(self, "states", STATES)
         if self.move_temperature is not None and not 0 < self.move_temperature < float("inf"):
             raise ValueError(

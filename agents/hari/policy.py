@@ -1,7 +1,7 @@
 """HARI's agent at work: it thinks with its execution policy, and chooses among CUR, GOAL, SUB, DO and DONE (4.3.3.2).
 
-DO goes where the execution policy most wants to go; that one may not stop is what DONE is for. The
-belief b^s is carried on when the agent moves, as in pre-training, where nothing is asked in between.
+DO does what the execution policy most wants to do; where that is to stop, the goal on top of the stack ends as by DONE.
+The belief b^s advances at every time step (appendix E), so that what CUR answered is part of it.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Belief:
     """What the execution policy carries along for B agents."""
 
     carried: Tensor
-    """(B, h) b^s of the last move."""
+    """(B, h) b^s of the step before."""
     depths: tuple[int, ...]
     """Goals on each agent's stack when that was; 0 where none is left."""
 
@@ -124,12 +124,10 @@ def _afresh(memory: Belief, depths: tuple[int, ...], first: Tensor) -> Belief:
     return Belief(carried, depths)
 
 
-def carry(considered: Considered, actions: Actions, memory: Belief) -> Belief:
-    """The beliefs after `actions`: those of agents that moved are the new ones."""
+def carry(considered: Considered, memory: Belief) -> Belief:
+    """The beliefs after a step; those of agents that have ended stay."""
     carried = memory.carried.clone()
-    for k, i in enumerate(considered.rows):
-        if isinstance(actions[i], Move):
-            carried[i] = considered.belief[k]
+    carried[considered.rows] = considered.belief
     return Belief(carried, memory.depths)
 
 
@@ -138,15 +136,14 @@ def available(observation: Observation) -> np.ndarray:
     possible = np.ones(len(INTENTIONS), dtype=bool)
     for name, k in ASKS.items():
         possible[k] = Intention(name) in observation.can_ask
-    possible[DO] = bool(observation.candidates.allowed.any())
     return possible
 
 
-def action_of(intention: int, move: int, thought: Thought | None = None) -> Action:
-    """An intention as an action of the environment; DO goes to the candidate `move`."""
-    if intention == DO:
-        return Move(move, thought)
-    return Stop(thought) if intention == DONE else Ask(Intention(INTENTIONS[intention]), thought)
+def action_of(intention: int, move: int | None, thought: Thought | None = None) -> Action:
+    """An intention as an action of the environment; DO goes to the candidate `move`, or stops where that is None."""
+    if intention == DONE or (intention == DO and move is None):
+        return Stop(thought)
+    return Move(move, thought) if move is not None else Ask(Intention(INTENTIONS[intention]), thought)
 
 
 @dataclass
@@ -203,7 +200,7 @@ class HariPolicy:
         self,
         observations: Observations,
         considered: Considered,
-        led: Mapping[int, int],
+        led: Mapping[int, int | None],
         belief: Belief,
         memory: Mind | None,
         rngs: Sequence[np.random.Generator],
@@ -229,9 +226,17 @@ class HariPolicy:
             for k, i in enumerate(rows)
         ]
         actions: Actions = [None] * len(observations)
+        stops = considered.would_stop
         for k, i in enumerate(rows):
             thought = Thought(asks=dict(zip(INTENTIONS, p[k].tolist(), strict=True)))
-            move = led[k] if k in led else considered.move(k, self.temperature, rngs[i]) if drawn[k] == DO else 0
+            if drawn[k] != DO:
+                move = None
+            elif k in led:
+                move = led[k]
+            elif stops[k]:
+                move = None
+            else:
+                move = considered.move(k, self.temperature, rngs[i])
             actions[i] = action_of(drawn[k], move, thought)
         intentions = torch.tensor(drawn)
         if self.choices is not None:
@@ -239,12 +244,12 @@ class HariPolicy:
         index = torch.tensor(rows)
         actor = tuple(old.index_put((index,), new) for old, new in zip(mind.actor, after, strict=True))
         last = mind.last.index_put((index,), intentions + 1)
-        return actions, Mind(carry(considered, actions, belief), (actor[0], actor[1]), last)
+        return actions, Mind(carry(considered, belief), (actor[0], actor[1]), last)
 
 
 @dataclass(eq=False)
 class PerfectOnSubgoals(HariPolicy):
-    """The skyline of Table 4.7: on a sub-goal, DO walks the shortest path to it, one node each."""
+    """The skyline of Table 4.7: on a sub-goal, DO walks the shortest path to it, one node each, and stops there."""
 
     def act_privileged(
         self,
@@ -256,12 +261,12 @@ class PerfectOnSubgoals(HariPolicy):
     ) -> tuple[Actions, Mind]:
         """See embodied.interface.PrivilegedPolicy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)
-        led: dict[int, int] = {}
+        led: dict[int, int | None] = {}
         for k, i in enumerate(considered.rows):
             s = situations[i]
             if s is not None and len(s.goals) > 1:
                 action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
-                led |= {k: action.candidate} if isinstance(action, Move) else {}
+                led[k] = action.candidate if isinstance(action, Move) else None
         return self._choose(observations, considered, led, belief, memory, rngs)
 
 

@@ -78,9 +78,9 @@ class RandomWithBudgets:
     """ "Random + rules" of Table 4.7: GOAL first, then at random among what its budgets leave.
 
     An episode may take at most floor(X_a) + Bernoulli(X_a - floor(X_a)) intentions of kind a, where
-    X_a is the learned policy's mean on validation tasks. DONE is possible where the execution
-    policy would stop (the heading of the table's upper half), and no more often than SUB until
-    SUB's budget is spent. Where nothing else is left, it is done.
+    X_a is the learned policy's mean on validation tasks. The execution policy decides when it is done (the heading
+    of the table's upper half): where it would stop, DONE is all there is, but no more often than SUB until SUB's
+    budget is spent. Where nothing else is left, it is done.
     """
 
     means: Mapping[str, float]
@@ -98,17 +98,33 @@ class RandomWithBudgets:
             return GOAL
         free = moment.possible & (moment.taken < moment.budget)
         subs_spent = moment.taken[SUB] >= moment.budget[SUB]
-        free[DONE] = moment.would_stop and (subs_spent or moment.taken[DONE] < moment.taken[SUB])
+        if moment.would_stop and (subs_spent or moment.taken[DONE] < moment.taken[SUB]):
+            return DONE
+        free[DONE] = False
         return int(rng.choice(np.flatnonzero(free))) if free.any() else DONE
 
 
-RULES: Mapping[str, AskFirst] = {
+@dataclass(frozen=True)
+class AlwaysSub:
+    """Asks SUB whenever it may, does, and is done when the execution policy is; not in the dissertation."""
+
+    def budget(self, rng: np.random.Generator) -> np.ndarray:
+        return np.full(len(INTENTIONS), np.inf)
+
+    def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
+        if moment.would_stop:
+            return DONE
+        return SUB if moment.possible[SUB] else DO
+
+
+RULES: Mapping[str, Rule] = {
     "no assistance": AskFirst(),
     "dense goal": AskFirst(goal=True),
     "dense state": AskFirst(state=True),
     "dense goal and state": AskFirst(goal=True, state=True),
+    "SUB whenever possible": AlwaysSub(),
 }
-"""Rows 1 to 4 of Table 4.7."""
+"""Rows 1 to 4 of Table 4.7, and the strongest rule that we know of."""
 
 
 @dataclass
@@ -150,11 +166,11 @@ class RuleAgent:
             stop = bool(considered.would_stop[k])
             moment = RuleMoment(taken[i].copy(), bool(described[i]), stop, available(seen), mind.budgets[i])
             chosen = self.rule.choose(moment, rngs[i])
-            move = considered.move(k, self.temperature, rngs[i]) if chosen == DO else 0
+            move = considered.move(k, self.temperature, rngs[i]) if chosen == DO else None
             actions[i] = action_of(chosen, move)
             taken[i, chosen] += 1
             described[i] = chosen == CUR or (described[i] and chosen != DO)
-        return actions, RuleMemory(carry(considered, actions, belief), taken, described, mind.budgets)
+        return actions, RuleMemory(carry(considered, belief), taken, described, mind.budgets)
 
     def _begin(self, belief: Belief, rngs: Sequence[np.random.Generator]) -> RuleMemory:
         shape = (len(rngs), len(INTENTIONS))

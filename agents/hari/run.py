@@ -46,7 +46,9 @@ def lessons_of(data: Dataset) -> Curriculum:
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
     costs = Costs.alike(config.cost)
-    return HariRules(costs, config.stack, config.longest, config.cooperative, config.states, config.horizon)
+    return HariRules(
+        costs, config.stack, config.longest, config.cooperative, config.states, config.horizon, config.kept
+    )
 
 
 def ground_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:
@@ -69,15 +71,15 @@ def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[
     return made
 
 
-def with_eyes(executor: Executor, data: Dataset, quality: str | None = None) -> Executor:
+def with_eyes(executor: Executor, data: Dataset, picture_kind: str | None = None) -> Executor:
     """An execution policy with the features of a data set's houses, if it is one that sees.
 
     Args:
-      quality: of the pictures that they were made from, as in agents.vision.run.pictures_of.
+      picture_kind: of the pictures that they were made from, as in agents.vision.run.pictures_of.
     """
     if executor.seeing is None:
         return executor
-    return dataclasses.replace(executor, eyes=eyes_of(data, executor.seeing.encoder, quality=quality)[0])
+    return dataclasses.replace(executor, eyes=eyes_of(data, executor.seeing.encoder, picture_kind=picture_kind)[0])
 
 
 def train_execution(
@@ -86,7 +88,7 @@ def train_execution(
     folder: Path,
     *,
     encoder: str = "",
-    quality: str | None = None,
+    picture_kind: str | None = None,
     begin: Path | None = None,
     minutes: float | None = None,
     note: Note = print,
@@ -95,7 +97,7 @@ def train_execution(
 
     Args:
       encoder: digest of the one whose features a policy sees that does.
-      quality: of the pictures that these were made from, as in agents.vision.run.pictures_of.
+      picture_kind: of the pictures that these were made from, as in agents.vision.run.pictures_of.
       begin: with the words and weights of this execution policy, not with random ones; one that reads learns to see so.
     """
     lessons = lessons_of(data)
@@ -105,7 +107,7 @@ def train_execution(
     words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
     eyes, seeing = None, None
     if config.sees == "features":
-        eyes, seeing = eyes_of(data, encoder, splits=("pretrain", "pretrain_val"), quality=quality)
+        eyes, seeing = eyes_of(data, encoder, splits=("pretrain", "pretrain_val"), picture_kind=picture_kind)
         note(f"sees features of {seeing.size} numbers per view, pictures: {seeing.pictures}")
     executor = new_executor(config, words, seeing, eyes)
     if begin is not None:

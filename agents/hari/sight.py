@@ -75,19 +75,19 @@ def hidden_channels(size: int, share: float, rng: np.random.Generator) -> np.nda
 
 
 def eyes_of(
-    data: Dataset, encoder: str, *, splits: Sequence[str] = (), quality: str | None = None
+    data: Dataset, encoder: str, *, splits: Sequence[str] = (), picture_kind: str | None = None
 ) -> tuple[FeatureBank, Seeing]:
     """The features of the houses of some splits (none: of all), and what to call them.
 
     Args:
       encoder: digest.
-      quality: of the pictures that they were made from, as in agents.vision.run.pictures_of.
+      picture_kind: of the pictures that they were made from, as in agents.vision.run.pictures_of.
 
     Raises:
       FileNotFoundError, ValueError: there are none, or not of these houses; says how to make them.
     """
     names = sorted({n for split in splits or data.splits for n in data.names(split)})
-    pictures: Mapping[str, PictureSettings] = {n: pictures_of(data, n, quality) for n in names}
+    pictures: Mapping[str, PictureSettings] = {n: pictures_of(data, n, picture_kind) for n in names}
     places: Mapping[str, Place] = {n: data.place(n) for n in names}
     paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in names}
     bank = load_bank(paths, encoder, places, pictures)

@@ -18,7 +18,7 @@ from agents.hari.judging import RANDOM, TEST, policies, validation_means
 from agents.hari.networks import INTENTIONS
 from agents.hari.rules import RULES, RuleAgent
 from agents.hari.run import CONDITIONS, hari_data, rules_of, train_execution, train_intention, with_eyes
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.datasets.store import SplitData
 from embodied.evaluation.tables import Samples
@@ -27,7 +27,8 @@ from embodied.interface import Agent, Ask, Episode, Move, Sight
 
 VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
 ACTIONS = ("CUR", "GOAL", "SUB", "DO")
-RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", RANDOM)
+SUB_RULE = "SUB whenever possible"
+RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", SUB_RULE, RANDOM)
 EXECUTION, TIMES = "execution", "times"
 """In a row: what an execution policy alone is trained to know its place by; whether intentions are counted by time."""
 
@@ -56,8 +57,8 @@ def _costs() -> tuple[StudyRow, ...]:
     )
 
 
-TABLES: Mapping[str, Table] = {
-    "4.7": Table(
+TABLES: Mapping[str, StudyTable] = {
+    "4.7": StudyTable(
         "Asking by learning and by rules",
         (
             *(_learned(rule, rule) for rule in RULE_ROWS),
@@ -67,20 +68,20 @@ TABLES: Mapping[str, Table] = {
         ),
         ("success",),
         TEST,
-        ((_learned("learned"), _learned(RANDOM, RANDOM)),),
+        tuple((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
         pooled=ACTIONS,
     ),
-    "4.8": Table(
+    "4.8": StudyTable(
         "Goals on the stack",
         (_learned("stack 1", stack=1), _learned("stack 2"), _learned("stack 3", stack=3)),
         ("success",),
         VALIDATION,
         pooled=ACTIONS,
     ),
-    "moves": Table(
+    "moves": StudyTable(
         "Moves, likeliest or drawn (no counterpart in the dissertation)", _moves(), ("success",), TEST, pooled=ACTIONS
     ),
-    "sight": Table(
+    "sight": StudyTable(
         "What seeing is worth (no counterpart in the dissertation)",
         (
             _sight("no assistance, d^s of nothing", "words", "none"),
@@ -97,14 +98,14 @@ TABLES: Mapping[str, Table] = {
         TEST,
         pooled=("DO",),
     ),
-    "figure 4.5": Table("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION),
-    "figure 4.5b": Table(
+    "figure 4.5": StudyTable("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION),
+    "figure 4.5b": StudyTable(
         "Intentions by time step",
         (StudyRow("learned", {}, {"played": "learned", TIMES: True}),),
         splits=("val_unseen_env",),
         figure=Figure(tuple(f"{name}_at" for name in INTENTIONS), "time step", "share of running episodes"),
     ),
-    "figure 4.6": Table(
+    "figure 4.6": StudyTable(
         "What costs change",
         _costs(),
         ("success", *ACTIONS),
@@ -136,14 +137,14 @@ class HariStudy(EpisodeStudy):
     """A trained execution policy that stands for all of its kind; None trains one in the study's folder."""
     encoder: str = ""
     """Digest of the encoder whose features a policy sees."""
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that they come from, as in agents.vision.drawn.pictures_of."""
 
     name = "hari"
     makers = ("agents.hari.run",)
     judges = (*JUDGES, "agents.hari.judging")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution that there are come beside those of the tests."""
         ood = hari_data(self.data).ood
         extended = lambda t: dataclasses.replace(t, splits=(*t.splits, *ood)) if t.splits == TEST else t
@@ -156,7 +157,9 @@ class HariStudy(EpisodeStudy):
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         data = hari_data(self.data).digest
-        more: dict[str, object] = {"sight": [self.encoder, self.quality]} if train.get(EXECUTION) == "features" else {}
+        more: dict[str, object] = (
+            {"sight": [self.encoder, self.picture_kind]} if train.get(EXECUTION) == "features" else {}
+        )
         if EXECUTION not in train or self._given(train):
             walking = self._walking(folder)
             more["begin"] = weights_digest(walking) if walking.exists() else None
@@ -174,7 +177,7 @@ class HariStudy(EpisodeStudy):
         elif self.executor is not None and self._given(train):
             return self.executor
         else:
-            train_execution(data, config, home, encoder=self.encoder, quality=self.quality, note=note)
+            train_execution(data, config, home, encoder=self.encoder, picture_kind=self.picture_kind, note=note)
         return home / "best.safetensors"
 
     def load(self, weights: Path) -> Executor | HariAgent:
@@ -219,7 +222,7 @@ class HariStudy(EpisodeStudy):
         return folder / f"execution_{key_of(mine)}" / "best.safetensors"
 
     def _eyes(self, executor: Executor) -> Executor:
-        return with_eyes(executor, hari_data(self.data), self.quality)
+        return with_eyes(executor, hari_data(self.data), self.picture_kind)
 
 
 def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, Samples]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, SHARE, require, require_word
 
-LEARNERS = ("adel", "dagger", "binary", "continuous")
-"""ADEL (Algorithm 9), DAgger, and REINFORCE with a reward of success or of nearness (C.1, C.2)."""
+LEARNERS = ("adel", "mixture", "dagger", "binary", "continuous")
+"""ADEL (Algorithm 9), the mixture of Algorithm 5, DAgger, and REINFORCE with a reward of success or of nearness."""
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class LearnerConfig:
     """The defaults are those of the dissertation for REGEX."""
 
     learner: str = "adel"
-    """Who learns: adel, dagger, binary or continuous (REINFORCE with either reward)."""
+    """Who learns: adel, mixture, dagger, binary or continuous (REINFORCE with either reward)."""
     iterations: int = 30_000
     """Updates of the weights."""
     batch: int = 32
@@ -25,7 +25,7 @@ class LearnerConfig:
     learning_rate: float = 1e-3
     """Of Adam; REINFORCE takes a tenth of it, as in the dissertation."""
     mixing: float = 0.5
-    """Lambda, the weight of executions from the marginal (Algorithm 9)."""
+    """Lambda, the weight of executions from the marginal (Algorithm 9), or their share (Eq 3.14)."""
     anneal_every: int = 0
     """L, updates after which lambda is multiplied by `anneal_rate`; 0 for never (Table C.1)."""
     anneal_rate: float = 0.5
@@ -69,10 +69,10 @@ def mixing_at(config: LearnerConfig, update: int) -> float:
 
 def folder_name(learner: LearnerConfig) -> str:
     """The folder of a learner: its name and what is not as usual."""
-    if learner.learner != "adel":
+    if learner.learner not in ("adel", "mixture"):
         return learner.learner
     annealed = f"_anneal_{learner.anneal_every}" if learner.anneal_every else ""
-    return f"adel_{learner.mixing:g}{annealed}"
+    return f"{learner.learner}_{learner.mixing:g}{annealed}"
 
 
 def as_dict(config: object) -> Mapping[str, object]:

@@ -70,15 +70,48 @@ def adel_loss(
     own_tasks, own = [tasks[i] for i in heard], [done[i] for i in heard]
     descriptions = [d or NOTHING for d in said]
     own_descriptions = [descriptions[i] for i in heard]
-    loss = 0 * next(iter(student.network().parameters())).sum()  # there may be nothing to learn from
-    if heard:
-        loss = loss - student.scores(own_tasks, own_descriptions, own).log_probabilities.sum()  # -L(theta)
+    loss = described_loss(tasks, done, said, student)  # -L(theta)
     if heard and mixing < 1:
         tasks, descriptions, unlabeled = [*own_tasks, *tasks], [*own_descriptions, *descriptions], [*own, *unlabeled]
     if (heard and mixing < 1) or mixing > 0:  # -L(beta), both of its terms at once
         weights = torch.tensor([1 - mixing] * (len(tasks) - len(said)) + [mixing] * len(said))
         loss = loss - (weights @ explorer.scores(tasks, descriptions, unlabeled).log_probabilities).sum()
     return loss / len(said)
+
+
+def described_loss(tasks: Sequence[Q], done: Sequence[E], said: Sequence[str | None], student: Student[Q, E]) -> Tensor:
+    """-log pi_theta of the executions that were described, summed over actions; 0 where nothing was said."""
+    loss = 0 * next(iter(student.network().parameters())).sum()
+    heard = [i for i, d in enumerate(said) if d]
+    if heard:
+        some, executions = [tasks[i] for i in heard], [done[i] for i in heard]
+        loss = loss - student.scores(some, [said[i] or NOTHING for i in heard], executions).log_probabilities.sum()
+    return loss
+
+
+def mixture(
+    tasks: Sequence[Q],
+    requests: Sequence[str],
+    teacher: DescribingTeacher[Q, E],
+    marginal: Marginal[Q, E],
+    student: Student[Q, E],
+    optimizer: torch.optim.Optimizer,
+    mixing: float,
+    clip: float,
+    *,
+    rng: np.random.Generator,
+) -> IliadLesson[Q, E]:
+    """Algorithm 5: the execution of each task comes from the mixture of Eq 3.14, and the student learns what was said.
+
+    With `mixing` 1 this is Algorithm 4, with 0 Algorithm 8 whose epochs are one batch long. What was said is learned
+    from once, as it comes, not gathered in a buffer (docs/sources.md, S176).
+    """
+    own, unlabeled = student.sample(tasks, requests, rng=rng), marginal.draw(tasks, rng=rng)
+    done = [u if rng.random() < mixing else o for u, o in zip(unlabeled, own, strict=True)]
+    said = teacher.describe(tasks, done, rng=rng)
+    loss = described_loss(tasks, done, said, student) / len(tasks)
+    descend(loss, optimizer, "mixture", clip)
+    return IliadLesson(float(loss.detach()), done, said)
 
 
 def dagger(

@@ -26,7 +26,7 @@ from agents.iliad.regex.config import RegexConfig
 from agents.iliad.regex.language import MANNERS
 from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
-from agents.studies.engine import Figure, Measured, StudyRow, Table
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
@@ -42,38 +42,53 @@ LEARNERS = (
     StudyRow("REINFORCE, continuous", {"learner": "continuous"}),
     StudyRow("ADEL"),
 )
-TABLES: Mapping[str, Table] = {
-    "3.4": Table(
+TABLES: Mapping[str, StudyTable] = {
+    "3.4": StudyTable(
         "Learning from descriptions, demonstrations and rewards", LEARNERS, ("success",), ("test",), pooled=(NEEDED,)
     ),
-    "3.5": Table(
+    "3.5": StudyTable(
         "The mixing weight",
         (StudyRow("λ = 0", {"mixing": 0.0}), StudyRow("λ = 1", {"mixing": 1.0}), StudyRow("λ = 0.5")),
         ("success",),
         ("test",),
         pooled=(NEEDED,),
     ),
-    "C.1": Table(
+    "C.1": StudyTable(
         "Annealing the mixing weight",
         (StudyRow("every 2000", {"annealed": 2000}), StudyRow("every 5000", {"annealed": 5000}), StudyRow("never")),
         ("success",),
         ("test",),
         pooled=(NEEDED,),
     ),
-    "figure 3.7": Table(
+    "algorithms": StudyTable(
+        "The algorithms of the text (docs/sources.md, S176)",
+        (
+            StudyRow("Algorithm 4, executions of the marginal", {"learner": "mixture", "mixing": 1.0}),
+            StudyRow(
+                "Algorithm 5, mixture annealed to 0",
+                {"learner": "mixture", "mixing": 1.0, "annealed": 5000, "least_mixing": 0.0},
+            ),
+            StudyRow("Algorithm 8, own executions", {"learner": "mixture", "mixing": 0.0}),
+            StudyRow("Algorithm 9, ADEL"),
+        ),
+        ("success",),
+        ("test",),
+        pooled=(NEEDED,),
+    ),
+    "figure 3.7": StudyTable(
         "Success over the course of training",
         tuple(dataclasses.replace(row, judge={"curve": True}) for row in LEARNERS),
         splits=("validation",),
         figure=Figure(("success_at",), "training episodes", "success (share)"),
     ),
-    "describer": Table(
+    "describer": StudyTable(
         "How good must the describer be? (no counterpart in the dissertation)",
         tuple(StudyRow(f"{100 * w:g} % wrong", {"wrong": w}, x=100 * w) for w in WRONG),
         ("success",),
         ("test",),
         figure=Figure(("success",), "wrong descriptions (%)", "test success (%)"),
     ),
-    "speakers": Table(
+    "speakers": StudyTable(
         "Who heard three speakers, does it understand the fourth? (no counterpart in the dissertation)",
         tuple(StudyRow(f"without {name}", {"unheard": name}) for name in ("none", *MANNERS)),
         ("success",),
@@ -169,7 +184,7 @@ class NavStudyWorld:
 
     def source(self) -> Mapping[str, object]:
         data, where = Dataset(self.houses.folder), self.houses
-        return {"teacher": self.config, "data": data.digest, "encoder": where.encoder, "quality": where.quality}
+        return {"teacher": self.config, "data": data.digest, "encoder": where.encoder, "pictures": where.picture_kind}
 
     def changed(self, **teacher: Any) -> NavStudyWorld:
         if teacher:
@@ -212,7 +227,7 @@ class IliadStudy:
     def name(self) -> str:
         return f"iliad-{self.world.name}"
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept."""
         if self.world.name == "nav":
             return {name: table for name, table in TABLES.items() if name not in ONLY_REGEX}

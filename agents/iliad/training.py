@@ -12,7 +12,7 @@ import torch
 
 from agents.common.session import Note, Session, falling_rate, set_rate, tasks_of_update
 from agents.iliad.config import LearnerConfig, as_dict, mixing_at
-from agents.iliad.learners import IliadLesson, RewardsOf, RunningMean, adel, dagger, reinforce
+from agents.iliad.learners import IliadLesson, RewardsOf, RunningMean, adel, dagger, mixture, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
 from embodied.identity import Identity
 from embodied.seeds import stream
@@ -144,6 +144,9 @@ class _Learner(Generic[Q, E]):
             return adel(
                 tasks, requests, p.teacher, p.marginal, p.explorer, p.student, optimizer, mixing, c.clip, rng=rng
             )
+        if c.learner == "mixture":
+            mixing = mixing_at(c, update)
+            return mixture(tasks, requests, p.teacher, p.marginal, p.student, optimizer, mixing, c.clip, rng=rng)
         if c.learner == "dagger":
             return dagger(tasks, requests, p.world, p.student, optimizer, c.clip)
         return reinforce(tasks, requests, self.rewards, self.mean, p.student, optimizer, c.entropy, c.clip, rng=rng)

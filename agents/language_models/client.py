@@ -22,8 +22,8 @@ from embodied.errors import UnableError
 from embodied.interface import Usage
 from embodied.records import RecordError, from_json, parse, to_json
 
-FORMS = ("schema", "tools", "text")
-"""How an answer of a certain form is asked for: the server's structured output, a tool, or in words alone."""
+FORMS = ("schema", "object", "tools", "text")
+"""How JSON is asked for: structured output as OpenAI has it, as llama-cpp-python has it, a tool, or in words alone."""
 MOST_BYTES = 1_000_000
 """Of a response; more is not read."""
 MOST_TEXT = 20_000
@@ -154,6 +154,8 @@ class Client:
         if s.form == "schema":
             wanted = {"name": TOOL, "schema": dict(schema), "strict": True}
             body["response_format"] = {"type": "json_schema", "json_schema": wanted}
+        elif s.form == "object":
+            body["response_format"] = {"type": "json_object", "schema": dict(schema)}
         elif s.form == "tools":
             about = {"name": TOOL, "description": "Give the answer.", "parameters": dict(schema)}
             body["tools"] = [{"type": "function", "function": about}]
@@ -176,11 +178,10 @@ class Client:
                 with self._connection().chat.completions.with_streaming_response.create(**request) as response:
                     body = _body(response, time.monotonic() + s.timeout)
             except openai.APIStatusError as e:
+                problem = self._hidden(f"status {e.status_code}: {e}")
                 if e.status_code not in AGAIN:
-                    raise UnableError(
-                        self._hidden(f"{s.base_url} refuses the request ({e.status_code}): {e}")
-                    ) from None
-                problem, told = f"status {e.status_code}", _seconds(e.response.headers.get("retry-after"))
+                    raise UnableError(f"{s.base_url} refuses the request: {problem}") from None
+                told = _seconds(e.response.headers.get("retry-after"))
             except (openai.APIConnectionError, *_transport_errors()) as e:
                 problem = type(e).__name__
             else:

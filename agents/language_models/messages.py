@@ -43,7 +43,8 @@ class Messages(gym.Wrapper[str, str, dict[str, Any], Any]):
     def step(self, action: str) -> tuple[str, Any, bool, bool, dict[str, Any]]:
         before, layout = self._inner.observed, self._inner.layout
         chosen = actions_of(before).get(action)
-        _, reward, ended, cut, info = self.env.step(layout.actions if chosen is None else number(chosen, layout))
+        env: Any = self.env
+        _, reward, ended, cut, info = env.step(layout.actions if chosen is None else number(chosen, layout))
         if chosen is not None:
             self._said.append(told(before, chosen))
         return self._text(), reward, ended, cut, self._facts(info)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import STEP, Action, Ask, Description, Move, Observation, SeenPlace, Sight, Stop
+from embodied.interface import STEP, Action, Ask, Description, Move, Observation, SeenPlace, Sight, Stop, viewpoint
 
 MOST_NAMES = 12
 """Things that are named of one place."""
@@ -32,7 +32,8 @@ class SeenNames:
         self._worlds = worlds
 
     def names(self, sight: Sight) -> list[tuple[str, float, float]]:
-        seen = self._worlds[sight._world].sightings(sight._node)
+        here = viewpoint(sight)
+        seen = self._worlds[here.world].sightings(here.node)
         return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST][:MOST_NAMES]
 
 

@@ -76,7 +76,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Table:
+class StudyTable:
     """A table as data."""
 
     title: str
@@ -105,7 +105,7 @@ class StudyLearner(Protocol):
     def judges(self) -> tuple[str, ...]:
         """Modules that decide how it is judged."""
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """The tables by name, with the rows and splits that the data at hand allow."""
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
@@ -222,14 +222,14 @@ class _Job:
     judgings: dict[str, tuple[StudyRow, str]] = field(default_factory=dict)
 
 
-def _rows_of(table: Table, wanted: Sequence[str] | None) -> list[StudyRow]:
+def _rows_of(table: StudyTable, wanted: Sequence[str] | None) -> list[StudyRow]:
     """The wanted rows, and those that they are compared with or whose numbers are subtracted."""
     found = [r for r in table.rows if wanted is None or r.label in wanted]
     pairs = [r for pair in table.compared for r in pair] if wanted is None else []
     return [*found, *(r.minus for r in found if r.minus is not None), *pairs]
 
 
-def _judgings(table: Table, wanted: Sequence[str] | None) -> Iterator[tuple[StudyRow, str]]:
+def _judgings(table: StudyTable, wanted: Sequence[str] | None) -> Iterator[tuple[StudyRow, str]]:
     return ((row, split) for row in _rows_of(table, wanted) for split in table.splits)
 
 
@@ -315,7 +315,9 @@ def _storable(samples: Samples) -> Samples:
 # Tables ------------------------------------------------------------------------------------------
 
 
-def _write(learner: StudyLearner, name: str, table: Table, out: Path, rows: Sequence[str] | None, command: str) -> Path:
+def _write(
+    learner: StudyLearner, name: str, table: StudyTable, out: Path, rows: Sequence[str] | None, command: str
+) -> Path:
     """A table's files."""
     body = result(learner, name, table, out, rows, command)
     stem = out / str(body["table"])
@@ -328,7 +330,7 @@ def _write(learner: StudyLearner, name: str, table: Table, out: Path, rows: Sequ
 
 
 def result(
-    learner: StudyLearner, name: str, table: Table, out: Path, rows: Sequence[str] | None = None, command: str = ""
+    learner: StudyLearner, name: str, table: StudyTable, out: Path, rows: Sequence[str] | None = None, command: str = ""
 ) -> dict[str, Any]:
     """A table as it is stored, of all that was judged."""
     key = f"{learner.name}-{name}".lower().replace(" ", "-")
@@ -367,13 +369,13 @@ def result(
         "command": command,
         "identity": identity,
         "settings": learner.about(),
-        "columns": list(columns.values()),
+        "columns": sorted(columns.values(), key=lambda c: c["key"] in table.pooled),
         "rows": shown,
         "notes": notes,
     }
 
 
-def _found(learner: StudyLearner, table: Table, row: StudyRow, out: Path) -> dict[tuple[str, str], list[Samples]]:
+def _found(learner: StudyLearner, table: StudyTable, row: StudyRow, out: Path) -> dict[tuple[str, str], list[Samples]]:
     """What was counted of a row, by split and name, per training seed; nothing if some of it is missing."""
     found: dict[tuple[str, str], list[Samples]] = {}
     for split in table.splits:
@@ -419,7 +421,7 @@ def _samples(learner: StudyLearner, row: StudyRow, split: str, out: Path) -> lis
     return found
 
 
-def _comparisons(learner: StudyLearner, table: Table, out: Path, rows: Sequence[str] | None) -> list[str]:
+def _comparisons(learner: StudyLearner, table: StudyTable, out: Path, rows: Sequence[str] | None) -> list[str]:
     """The differences of a table's pairs, in words."""
     told = []
     for first, second in table.compared if rows is None else ():

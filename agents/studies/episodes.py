@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import torch
 
 from agents.common.session import Note
-from agents.studies.engine import Measured, StudyRow, Table
+from agents.studies.engine import Measured, StudyRow, StudyTable
 from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
-from embodied.evaluation.tables import Samples, measured
+from embodied.evaluation.tables import measured
 from embodied.identity import Identity, identity_of
 from embodied.interface import Agent, Episode
 from embodied.records import save_lines
@@ -50,7 +50,7 @@ class EpisodeStudy:
 
     # What a learner says ------------------------------------------------------------------------
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         raise NotImplementedError
 
     def settings(self, train: Mapping[str, Any], seed: int) -> object:
@@ -123,8 +123,3 @@ class EpisodeStudy:
             f"Data set {data.digest[:16]}, {len(data.names('train'))} training houses; training seeds {seeds}; {tasks} "
             f"tasks of a split, judged with seeds {', '.join(map(str, self.judging))}."
         )
-
-
-def mean_of(values: Sequence[float], groups: Sequence[str] = ()) -> Samples:
-    """Numbers of which the mean is shown."""
-    return Samples(tuple(map(float, values)), tuple(groups))

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Picture
 from assets.cache import atomic_path
 
 if TYPE_CHECKING:
-    from agents.studies.engine import Table
+    from agents.studies.engine import StudyTable
 
 
 def page(body: Mapping[str, Any], picture: str | None = None) -> str:
@@ -30,25 +30,27 @@ def page(body: Mapping[str, Any], picture: str | None = None) -> str:
     return "\n".join([*lines, "", *(f"- {note}" for note in body["notes"]), ""])
 
 
-def draw(table: Table, body: Mapping[str, Any], path: Path) -> None:
+def draw(table: StudyTable, body: Mapping[str, Any], path: Path) -> None:
     """The figure of a table, as PNG."""
     spec = table.figure
     assert spec is not None, "only tables with a figure are drawn"
     curves: dict[str, list[tuple[float, Mapping[str, float]]]] = {}
-    of = {row["label"]: row["values"] for row in body["rows"]}
-    for row in table.rows:
-        for k, (key, value) in enumerate(_wanted(of.get(row.label, {}), spec.columns)):
-            if row.x is not None:
-                curves.setdefault(" ".join(filter(None, (row.series, key))), []).append((row.x, value))
-            else:
-                curves.setdefault(f"{row.label} {key.partition('_at_')[0]}", []).append((_place(key, k), value))
     figure = Picture(figsize=(6, 3.6), layout="constrained")
     axes = figure.subplots()
+    of = {row["label"]: row["values"] for row in body["rows"]}
+    placed = any(row.x is not None for row in table.rows)
+    for row in table.rows:
+        for k, (key, value) in enumerate(_wanted(of.get(row.label, {}), spec.columns)):
+            what = key.partition("_at_")[0].replace("_", " ")
+            name = f"{row.series if row.x is not None else row.label} {what}".strip()
+            if placed and row.x is None:
+                axes.axhline(value["mean"], linestyle="--", linewidth=1, color="grey", label=name)
+            else:
+                x = _place(key, k) if row.x is None else row.x
+                curves.setdefault(name, []).append((x, value))
     for name, points in curves.items():
-        x, mean = [p for p, _ in points], [v["mean"] for _, v in points]
-        axes.errorbar(
-            x, mean, [v["half_width"] or 0.0 for _, v in points], marker="o", markersize=3, capsize=2, label=name
-        )
+        mean, half = [v["mean"] for _, v in points], [v["half_width"] or 0.0 for _, v in points]
+        axes.errorbar([x for x, _ in points], mean, half, marker="o", markersize=3, capsize=2, label=name)
     axes.set_xlabel(spec.xlabel)
     axes.set_ylabel(spec.ylabel)
     if spec.log:

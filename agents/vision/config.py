@@ -20,26 +20,28 @@ PLAIN = PictureSettings(size=192)
 """How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
 
 
-WAYS: Mapping[str, PictureSettings] = {
+RENDER_PRESETS: Mapping[str, PictureSettings] = {
     "unlit": PLAIN,
-    "matte": PictureSettings(192, "fast", look="matte"),
+    "fast-matte": PictureSettings(192, "fast-matte"),
     "fast": PictureSettings(192, "fast"),
+    "normal-matte": PictureSettings(192, "normal-matte"),
     "normal": PictureSettings(192, "normal"),
-    "glossy": PictureSettings(96, "glossy", light="fast", rays=4),
+    "traced": PictureSettings(96, "traced", light="fast", rays=4),
     "reference": PictureSettings(96, "reference", light="fast", rays=8),
 }
-"""Ways in which encoders and agents may be shown houses, besides as a data set holds them, by the names of --quality:
-those of pictures, and 'matte', which is 'fast' without reflections. Traced ones are coarse and of few rays, evened by
-the tracer, or a house would take hours; their exposure is that of 'fast' light."""
+"""How encoders and agents may be shown houses, besides as a data set holds them, by kinds of pictures. Traced ones are
+coarse and of few rays, denoised, or a house would take hours; their exposure is that of 'fast' light."""
 
 
 def drawing(pictures: PictureSettings) -> str:
     """How pictures were drawn as one word, for folders and files of features: 'unlit_192', 'glossy_normal_192'."""
-    lit = () if pictures.lit_by in (None, pictures.quality) else (pictures.lit_by,)
-    other = () if pictures.backend == "classic" else (pictures.backend,)
-    look = () if pictures.shown_with == "matte" else (pictures.shown_with,)
+    stored = pictures.stored()
+    quality, backend = str(stored["quality"]), str(stored["backend"])
+    lit = () if pictures.lit_by in (None, quality) else (pictures.lit_by,)
+    other = () if backend == "classic" else (backend,)
+    look = ("gloss",) if pictures.gloss else ()
     rays = () if pictures.rays is None else (f"{pictures.rays}rays",)
-    return "_".join([pictures.quality, *map(str, lit), *other, *look, str(pictures.size), *rays])
+    return "_".join([quality, *map(str, lit), *other, *look, str(pictures.size), *rays])
 
 
 def lit_name(house: str, lighting: int) -> str:
@@ -47,14 +49,9 @@ def lit_name(house: str, lighting: int) -> str:
     return f"{house}@{lighting}" if lighting else house
 
 
-def way_of(pictures: PictureSettings) -> str:
-    """The name in WAYS of what pictures are drawn like."""
-    return "matte" if pictures.quality == "fast" and pictures.shown_with == "matte" else pictures.quality
-
-
 @dataclass(frozen=True)
-class Looked:
-    """What the agents of a judgement looked at; part of its run.json."""
+class RenderedInputs:
+    """The pictures that the agents of an evaluation saw; part of its run.json."""
 
     looking: tuple[str, ...] = ()
     """Rows whose agents look at pictures."""

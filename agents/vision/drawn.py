@@ -8,7 +8,7 @@ from pathlib import Path
 
 import joblib
 
-from agents.vision.config import WAYS, drawing, lit_name, way_of
+from agents.vision.config import RENDER_PRESETS, drawing, lit_name
 from agents.vision.labels import HouseStrips, all_classes, look
 from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
@@ -23,15 +23,16 @@ def houses_of(data: Dataset, splits: Sequence[str], first: int | None = None) ->
     return list(dict.fromkeys(n for s in splits for n in data.names(s)[:first]))
 
 
-def pictures_of(data: Dataset, name: str, quality: str | None = None) -> PictureSettings:
+def pictures_of(data: Dataset, name: str, picture_kind: str | None = None) -> PictureSettings:
     """How the pictures of a house are drawn that features are made from.
 
     Args:
-      quality: one of WAYS; None takes the panoramas that the data set holds, and plain ones where it holds none.
+      picture_kind: one of RENDER_PRESETS; None takes the panoramas that the data set holds, and plain ones where it
+        holds none.
     """
     drawn = data.drawn_pictures(name)
-    if drawn is None or quality not in (None, drawn.quality, way_of(drawn)):
-        return WAYS[quality or "unlit"]
+    if drawn is None or picture_kind not in (None, drawn.kind):
+        return RENDER_PRESETS[picture_kind or "unlit"]
     return drawn
 
 
@@ -57,9 +58,7 @@ def baked_lightings(data: Dataset, name: str, count: int, cache: Path, pictures:
     lightings = lightings_of(data.place(name).house, count)
     if count > 1:
         if pictures.lit_by is None:
-            raise ValueError(
-                f"{count} lightings want pictures with light, not {pictures.quality!r}: say --quality fast"
-            )
+            raise ValueError(f"{count} lightings want pictures with light, not {pictures.kind!r}: say --pictures fast")
         drawn = pictures == data.drawn_pictures(name)
         bake_all(lightings[1:] if drawn else lightings, load_catalogue(cache), cache, pictures.lit_by)
     return lightings
@@ -73,7 +72,7 @@ class StripSource:
     """Folder of the data set."""
     folder: Path
     cache: Path
-    quality: str | None = None
+    picture_kind: str | None = None
     """As `pictures_of` takes it."""
     lights: int = 1
     """Lightings that every house is seen in; the first is its own."""
@@ -95,12 +94,12 @@ class StripSource:
 
     def _paths(self, data: Dataset, name: str) -> list[Path]:
         """Where the strips of a house are, in its own light and in others."""
-        folder = self.folder / drawing(pictures_of(data, name, self.quality))
+        folder = self.folder / drawing(pictures_of(data, name, self.picture_kind))
         return [folder / f"{lit_name(name, k)}.npz" for k in range(self.lights)]
 
     def _draw(self, name: str) -> str:
         data = Dataset(self.data)
-        pictures, classes = pictures_of(data, name, self.quality), all_classes(load_catalogue(self.cache))
+        pictures, classes = pictures_of(data, name, self.picture_kind), all_classes(load_catalogue(self.cache))
         lightings = baked_lightings(data, name, self.lights, self.cache, pictures)
         for lit, path in zip(lightings, self._paths(data, name), strict=True):
             if not path.exists():

@@ -15,7 +15,7 @@ import torch
 
 from agents.common.tensor_file import load_tensors, save_tensors
 from agents.vision.bank import FeatureBank
-from agents.vision.config import PLAIN, drawing, lit_name, way_of
+from agents.vision.config import PLAIN, drawing, lit_name
 from agents.vision.encoder import Encoder
 from agents.vision.strip import HEIGHT, VFOV
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
@@ -120,8 +120,8 @@ def load_features(
 
 
 def _command(pictures: PictureSettings | None, lights: int = 1) -> str:
-    quality = "" if pictures is None or pictures.quality == PLAIN.quality else f" --quality {way_of(pictures)}"
-    return f"embodied features{quality}" + (f" --lights {lights}" if lights > 1 else "")
+    picture_kind = "" if pictures is None or pictures.kind == PLAIN.kind else f" --pictures {pictures.kind}"
+    return f"embodied features{picture_kind}" + (f" --lights {lights}" if lights > 1 else "")
 
 
 def load_bank(

@@ -57,8 +57,8 @@ class Occasion:
     @property
     def name(self) -> str:
         """What its features are filed under, after the house."""
-        parts = (f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day))
-        parts += (self.camera * (self.camera != "ideal"), "view" * self.view)
+        parts = [f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day)]
+        parts += [self.camera * (self.camera != "ideal"), "view" * self.view]
         return "".join(f"+{p}" for p in parts if p)
 
 
@@ -153,7 +153,7 @@ def showing(
     occasion: Occasion,
     encoder: str,
     cache: Path,
-    quality: str | None = None,
+    picture_kind: str | None = None,
 ) -> FeatureBank:
     """The bank whose pictures were taken on an occasion.
 
@@ -164,7 +164,7 @@ def showing(
         return bank
     shown = {}
     for name in names:
-        pictures = pictures_of(data, name, quality)
+        pictures = pictures_of(data, name, picture_kind)
         path, source = shown_path(data, name, occasion, encoder, pictures), house_at(data, name, occasion, cache).digest
         shown[name], _ = load_features(path, encoder=encoder, source=source, pictures=pictures)
     return bank.showing(shown)

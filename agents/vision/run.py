@@ -27,7 +27,7 @@ from embodied.datasets.store import Dataset
 from embodied.house.house import House
 from embodied.light import lightings_of
 from embodied.locks import locked
-from embodied.render.pictures import TRACED, PictureSettings
+from embodied.render.pictures import PictureSettings
 
 
 def train_vision(
@@ -81,7 +81,7 @@ def example_of(
     encoder: Encoder, source: StripSource, names: Sequence[str], *, workers: int = 1, note: Note = print
 ) -> Example:
     """What an encoder sees in houses when they are drawn without light."""
-    plain = dataclasses.replace(source, quality="unlit", lights=1)
+    plain = dataclasses.replace(source, picture_kind="unlit", lights=1)
     return Example(encoder, {h.name: h for h in plain.strips(names, workers=workers, note=note)})
 
 
@@ -125,7 +125,7 @@ def make_features(
     encoder: Encoder,
     cache: Path,
     *,
-    quality: str | None = None,
+    picture_kind: str | None = None,
     splits: Sequence[str] = (),
     first: int | None = None,
     lights: int = 1,
@@ -139,7 +139,7 @@ def make_features(
     skipped.
 
     Args:
-      quality: as agents.vision.drawn.pictures_of takes it.
+      picture_kind: as agents.vision.drawn.pictures_of takes it.
       splits: of whose houses; none for all.
       first: so many houses of each split.
       ray: address of a Ray cluster to use instead of `workers`.
@@ -150,7 +150,7 @@ def make_features(
     """
     data = Dataset(folder)
     names = houses_of(data, splits or data.splits, first)
-    wanted = {n: pictures_of(data, n, quality) for n in names}
+    wanted = {n: pictures_of(data, n, picture_kind) for n in names}
     houses = {n: lightings_of(data.place(n).house, lights) for n in names}
     missing = [
         (n, pictures)
@@ -200,10 +200,10 @@ def _make_features(
         if _has_features(data, name, k, lit, encoder, pictures):
             continue
         with drawn_world(data, name, cache, pictures, lit) as world:
-            if pictures.quality in TRACED:
+            if pictures.traced:
                 world.render_all()  # kept for the next encoder: they cost minutes a house
             panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
             path = feature_path(data.folder / "features", encoder.digest, lit_name(name, k), pictures)
             save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
             nodes += len(world.graph.positions)
-    return f"{name}: {nodes} nodes, {pictures.quality} pictures of {pictures.size} pixels"
+    return f"{name}: {nodes} nodes, {pictures.kind} pictures of {pictures.size} pixels"

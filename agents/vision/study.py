@@ -21,8 +21,8 @@ from typing import Any
 
 from agents.common.session import Note
 from agents.common.weights import weights_digest
-from agents.studies.engine import Measured, StudyRow, Table
-from agents.vision.config import WAYS, VisionConfig
+from agents.studies.engine import Measured, StudyRow, StudyTable
+from agents.vision.config import RENDER_PRESETS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder
 from agents.vision.labels import HouseStrips
@@ -59,7 +59,7 @@ class EncoderStudy:
     repeats: tuple[int, ...]
     split: str = "val_unseen"
     """Whose houses they are judged on; choose on validation houses."""
-    pictures: tuple[str, ...] = tuple(WAYS)
+    pictures: tuple[str, ...] = tuple(RENDER_PRESETS)
     """What the table of pictures judges on."""
     threads: int = 1
     device: str = "cpu"
@@ -75,11 +75,11 @@ class EncoderStudy:
         if twice := sorted(self.ready.keys() & ENCODERS.keys()):
             raise ValueError(f"encoders of the names {twice} are trained by the study; give those of --encoders others")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         rows = (*(StudyRow(n, dict(c)) for n, c in ENCODERS.items()), *(StudyRow(n, {READY: n}) for n in self.ready))
         return {
-            "encoders": Table("Encoders: what linear readers make of them", rows, COLUMNS),
-            "pictures": Table("Encoders, judged on other pictures", rows, COLUMNS[:5], self.pictures),
+            "encoders": StudyTable("Encoders: what linear readers make of them", rows, COLUMNS),
+            "pictures": StudyTable("Encoders, judged on other pictures", rows, COLUMNS[:5], self.pictures),
         }
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
@@ -133,12 +133,12 @@ class EncoderStudy:
 
     def _drawn(self) -> dict[str, object]:
         return {
-            "data": Dataset(self.source.data).digest, "quality": self.source.quality, "lights": self.source.lights
+            "data": Dataset(self.source.data).digest, "pictures": self.source.picture_kind, "lights": self.source.lights
         }  # fmt: skip
 
     def _source(self, way: str) -> StripSource:
         """Pictures as they learned from, or drawn otherwise."""
-        return dataclasses.replace(self.source, quality=way, lights=1) if way else self.source
+        return dataclasses.replace(self.source, picture_kind=way, lights=1) if way else self.source
 
     def _seen(self) -> list[HouseStrips]:
         return self.source.strips(training_houses(Dataset(self.source.data), self.config), note=lambda line: None)

@@ -15,10 +15,9 @@ from typing import Any
 from agents.common.lessons import Lessons
 from agents.common.session import Note
 from agents.common.settings import EvaluationSettings
-from agents.common.weights import weights_digest
-from agents.studies.engine import StudyRow, Table
+from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
-from agents.vision.encoder import load_encoder
+from agents.vision.run import encoder_of
 from agents.vnla.agent import VnlaAgent, load_agent
 from agents.vnla.config import VnlaSettings
 from agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
@@ -38,11 +37,12 @@ def _row(label: str, played: str = LEARNED, rooms: bool = True, **train: Any) ->
     return StudyRow(label, train, {"played": played, ROOMS: rooms})
 
 
-def _table(title: str, *rows: StudyRow) -> Table:
-    return Table(title, rows, COLUMNS, SPLITS)
+def _table(title: str, *rows: StudyRow) -> StudyTable:
+    return StudyTable(title, rows, COLUMNS, SPLITS)
 
 
-TABLES: Mapping[str, Table] = {
+PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
+TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
         "Who decides when to ask",
         _row("none", asker="none"),
@@ -57,7 +57,7 @@ TABLES: Mapping[str, Table] = {
         _row("direct, in words", DIRECT),
         _row("indirect"),
     ),
-    "rooms": Table(
+    "rooms": StudyTable(
         "Requests that name no room",
         (
             StudyRow(
@@ -69,6 +69,18 @@ TABLES: Mapping[str, Table] = {
         COLUMNS,
         SPLITS,
     ),
+    "algorithm-6": StudyTable(
+        "Algorithm 6 as printed beside the program's rules of play (docs/sources.md, S43)",
+        (
+            _row("program's rules, asks at random", asker="random"),
+            PROGRAM,
+            _row("Algorithm 6, asks at random", asker="random", rules="algorithm-6"),
+            ALGORITHM_6,
+        ),
+        (*COLUMNS, "steps"),
+        SPLITS,
+        ((ALGORITHM_6, PROGRAM),),
+    ),
     "rules": _table(
         "Rules of the asking teacher",
         _row("a and e", ask_rules="a and e"),
@@ -76,7 +88,7 @@ TABLES: Mapping[str, Table] = {
         _row("all"),
     ),
 }
-"""The paper's Tables 2, 3, 4 and 7, in this order."""
+"""The paper's Tables 2, 3, 4 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +96,8 @@ class VnlaStudy(EpisodeStudy):
     """Tables 2, 3, 4 and 7 of VNLA's first paper."""
 
     encoder: Path
+    network: str | None = None
+    """Torchvision network of `encoder`, or 'random'; None for one of our own encoders."""
     config: VnlaSettings
     """Where the rows start from."""
     evaluation: EvaluationSettings
@@ -91,7 +105,7 @@ class VnlaStudy(EpisodeStudy):
     """A data set whose requests name no room, for the table 'rooms'."""
     others: int = 3
     """Agents of every row but that of the learned asker."""
-    quality: str | None = None
+    picture_kind: str | None = None
     """Of the pictures that features come from."""
     judging: tuple[int, ...] = EVALUATION_SEEDS
 
@@ -99,7 +113,7 @@ class VnlaStudy(EpisodeStudy):
     makers = ("agents.vnla.run",)
     judges = (*JUDGES, "agents.vnla.judging")
 
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution that there are come beside the others."""
         splits = (*SPLITS, *vnla_data(self.data).ood)
         return {name: dataclasses.replace(table, splits=splits) for name, table in TABLES.items()}
@@ -112,11 +126,7 @@ class VnlaStudy(EpisodeStudy):
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         lessons = self.lessons(train.get(ROOMS, True))
-        return {
-            "data": lessons.data.digest,
-            "encoder": weights_digest(self.encoder),
-            "pictures": lessons.pictures("train"),
-        }
+        return {"data": lessons.data.digest, "encoder": lessons.encoder.digest, "pictures": lessons.pictures("train")}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data sets that are missing are told before anything is trained."""
@@ -161,7 +171,7 @@ class VnlaStudy(EpisodeStudy):
             raise ValueError(
                 f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"
             )
-        return Lessons(data, load_encoder(self.encoder), self.quality)
+        return Lessons(data, encoder_of(self.encoder, self.network), self.picture_kind)
 
     def about(self) -> str:
         c, pictures = self.config, self.lessons(True).pictures("train")

@@ -14,7 +14,7 @@ from assets.built.maker import Maker
 from assets.built.table import read_makers, remade
 from assets.rows import DATA, check_classes, read_json, read_models
 
-__all__ = ["MAKERS", "Maker"]
+__all__ = ["BASICS", "MAKERS", "Maker"]
 
 
 def _remade() -> Mapping[str, Maker]:
@@ -22,6 +22,14 @@ def _remade() -> Mapping[str, Maker]:
     return remade("catalogue.json", rows, read_models("catalogue.json", rows, classes, {})[0])
 
 
-_ALL = {**read_makers("built.json", read_json(DATA / "built.json")), **_remade()}
+def _basic() -> Mapping[str, Maker]:
+    table, classes = read_json(DATA / "basics.json"), check_classes("classes.json", read_json(DATA / "classes.json"))
+    return read_makers("basics.json", table | {"groups": [classes[g["class"]] | g for g in table["groups"]]})
+
+
+_BASIC = _basic()
+BASICS = frozenset(_BASIC)
+"""Keys of the simple furniture that houses get only where no furniture models are installed."""
+_ALL = {**read_makers("built.json", read_json(DATA / "built.json")), **_BASIC, **_remade()}
 MAKERS: Mapping[str, Maker] = MappingProxyType(dict(sorted(_ALL.items())))
 """Every maker by key, keys sorted."""

@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from assets.built import (
     appliances,
+    basics,
     bath,
     decor,
     entry,
@@ -43,7 +44,7 @@ from assets.rows import (
 )
 
 MODULES = (
-    *(appliances, bath, decor, entry, everyday, fittings, kitchen),
+    *(appliances, basics, bath, decor, entry, everyday, fittings, kitchen),
     *(lamps, luggage, papers, plants, soft, storage, tableware),
 )
 BUILDS: Mapping[str, Build] = MappingProxyType(

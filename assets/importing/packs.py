@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib.util
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,16 +11,18 @@ from assets.importing.sh3f import Pack, PackError, open_pack
 
 SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
 """Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""
+WHEEL = "embodied_furniture"
+"""The package of `pip install embodied-houses[furniture]`: the models of those libraries that the catalogue uses."""
 
 
 def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
-    """The .sh3f files of `packs` (files or folders), or those of the system if none are given.
+    """The .sh3f files of `packs` (files or folders), or, if none are given, those of the system or of the wheel.
 
     Raises:
       PackError: a path in `packs` does not exist.
     """
     found: list[Path] = []
-    for path in packs or (SYSTEM_FOLDER,):
+    for path in packs or _installed():
         path = Path(path)
         if path.is_dir():
             found.extend(sorted(path.glob("*.sh3f")))
@@ -28,6 +31,13 @@ def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
         elif packs:
             raise PackError(f"furniture library {path} does not exist; name a .sh3f file or a folder of them")
     return tuple(found)
+
+
+def _installed() -> tuple[Path, ...]:
+    if SYSTEM_FOLDER.is_dir():
+        return (SYSTEM_FOLDER,)
+    spec = importlib.util.find_spec(WHEEL)
+    return tuple(Path(folder) for folder in (spec and spec.submodule_search_locations) or ())
 
 
 @functools.lru_cache(maxsize=16)
@@ -50,8 +60,8 @@ def pack_of(key: str, packs: Sequence[Path] = ()) -> Pack:
             return pack
     if not found:
         raise PackError(
-            f"no furniture library in {', '.join(map(str, packs)) or SYSTEM_FOLDER}, so {key!r} cannot be imported; "
-            "apt-get install sweethome3d-furniture, or name the .sh3f files with --pack"
+            f"no furniture models are installed, so {key!r} cannot be imported; pip install embodied-houses-furniture, "
+            "or apt-get install sweethome3d-furniture, or name .sh3f files with --pack"
         )
     raise PackError(
         f"no furniture library holds {key!r}, looked in {[p.name for p in found]}; "

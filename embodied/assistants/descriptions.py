@@ -13,6 +13,8 @@ from embodied.house.house import Placement
 from embodied.interface import STEP, TURNS, Description, Feature, Place
 from embodied.tasks.goals import NOT_OBJECTS
 
+KEPT = 0.1
+"""Share of the object classes that sparse descriptions keep: the text's 100 of about 1,000 (4.3.5)."""
 FARTHEST = 4
 """Largest distance bin: five values, metres rounded down (appendix E)."""
 
@@ -36,7 +38,7 @@ class Describer:
     """
 
     def __init__(self, frequent: Collection[str], config: DescriberConfig = DescriberConfig()) -> None:
-        """`frequent`: the object classes that sparse descriptions keep (the 100 most frequent)."""
+        """`frequent`: the object classes that sparse descriptions keep (the most frequent ones)."""
         self._frequent, self._config = frozenset(frequent), config
         self._objects: dict[tuple[str, int, float], Description] = {}
         self._said: dict[tuple[str, str, int, int], Description] = {}
@@ -130,10 +132,12 @@ def spoken_of(world: Place, node: int, description: Description) -> list[tuple[F
     return [(f, p) for f, p in near_placements(world, node, DescriberConfig().state_radius) if f in said]
 
 
-def frequent_classes(worlds: Iterable[Place], most: int = 100) -> tuple[str, ...]:
-    """The `most` most frequent object classes of some (training) houses, most frequent first."""
+def frequent_classes(worlds: Iterable[Place], share: float = KEPT) -> tuple[str, ...]:
+    """A share of the object classes of some (training) houses, the most frequent ones, most frequent first."""
     counts = Counter(p.object_class for w in worlds for p in w.house.placements if p.object_class not in NOT_OBJECTS)
-    return tuple(name for name, _ in sorted(counts.items(), key=lambda x: (-x[1], x[0]))[:most])
+    return tuple(
+        name for name, _ in sorted(counts.items(), key=lambda x: (-x[1], x[0]))[: math.ceil(share * len(counts))]
+    )
 
 
 def _bins(offset: np.ndarray) -> tuple[int, int, int]:

@@ -29,9 +29,9 @@ LINES = (("physics alone", ()), ("rgb, 128 x 128", ("rgb",)), ("rgb and depth, 1
 """What is seen at every command."""
 
 
-def drive(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: str) -> Iterator[Measure]:
+def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterator[Measure]:
     """Guided drives through one flat; whoever draws with the CPU has all of that counted."""
-    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, quality=quality, look=look) as world:
+    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, pictures=pictures) as world:
         driving = Driving({world.name: world}, DriveSettings(sees=()))
         commands, cameras = recorded(driving, seed)
         rate = functools.partial(measure, unit="1/s", per=STEPS, clock=time.process_time)

@@ -46,13 +46,13 @@ TOGETHER = 1.6
 """Times as many steps that a batch is to make on two cores as one environment on one."""
 
 
-def seen(catalogue: Catalogue, cache: Path, seed: int, quality: str) -> Iterator[Measure]:
+def seen(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
     """Random walks through one flat whose panoramas are in memory: on one core, and a batch that looks on all."""
     with one_core():
         house = generate_house(seed, FLAT, catalogue)
-        with open_world(house, catalogue, cache, quality=quality, look="matte") as world:
+        with open_world(house, catalogue, cache, pictures=kind) as world:
             yield from _measures(world, seed)
-        yield from _batches(seed, cache, quality)
+        yield from _batches(seed, cache, kind)
 
 
 def _measures(world: World, seed: int) -> Iterator[Measure]:
@@ -71,9 +71,9 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
     yield ratio("resampled against drawn", resampled, naive)
 
 
-def _batches(seed: int, cache: Path, quality: str) -> Iterator[Measure]:
+def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
     """One environment against batches of them, all in the flat that `make` generates from `seed`."""
-    drawn = PictureSettings(quality=quality, look="matte")
+    drawn = PictureSettings(kind=kind)
     asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": drawn}
     for world in flat_playground("find", seed, cache=cache, pictures=asked["pictures"], sees=("rgb",)).worlds.values():
         assert isinstance(world, World), "generated, so it can be drawn"

@@ -30,17 +30,20 @@ SHOWN = {"rgb": ("rgb",), "depth": ("depth",), "ids": ("ids",), "rgb, depth and 
 
 def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
     """Views per second of processor time of one viewpoint of a flat, on one core."""
-    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, size=SIZE, quality="unlit") as world:
+    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, size=SIZE, pictures="unlit") as world:
         panorama = world.renderer.panorama(world.graph.positions[0])
     with one_core(), tempfile.TemporaryDirectory() as folder:
         for (height, width), colours, everything in AIMS:
             size, name = (height, width), f"views of {width} x {height}"
             for shown, channels in SHOWN.items():
                 aim = {"rgb": colours, "rgb, depth and ids": everything}.get(shown)
-                yield _rate(f"{name}, {shown}", functools.partial(_look, panorama, channels, size, lambda k: k), aim)
+                yield _rate(
+                    f"{name}, {shown}",
+                    functools.partial(_look, panorama, channels, size, itertools.cycle(range(VIEWS))),
+                    aim,
+                )
             for shown in ("rgb", "rgb, depth and ids"):
-                fresh = itertools.count(VIEWS)
-                look = functools.partial(_look, panorama, SHOWN[shown], size, lambda k, fresh=fresh: next(fresh) + 0.5)
+                look = functools.partial(_look, panorama, SHOWN[shown], size, itertools.count(0.01, 1.01))
                 yield _rate(f"{name}, {shown}, new angles", look)
         write_skybox(panorama, "viewpoint", skybox_folder(folder, "scan"))
         for shown, depth in (("rgb", False), ("rgb and depth", True)):
@@ -51,10 +54,10 @@ def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Me
     return measure(name, body, "1/s", per=VIEWS, aim=aim, clock=time.process_time)
 
 
-def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], number: Callable[[int], float]) -> None:
-    """VIEWS level views; `number` turns how many there were into how many steps of 30 degrees one looks to the left."""
-    for k in range(VIEWS):
-        grid = perspective_grid(panorama.size, number(k) * math.pi / 6, 0.0, VFOV36, *size)
+def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], turns: Iterator[float]) -> None:
+    """VIEWS level views, so many `turns` of 30 degrees to the left."""
+    for turn in itertools.islice(turns, VIEWS):
+        grid = perspective_grid(panorama.size, turn * math.pi / 6, 0.0, VFOV36, *size)
         for channel in channels:
             panorama.through(grid, channel)
 

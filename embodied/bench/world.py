@@ -45,17 +45,17 @@ def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5, aim=4.0)
 
 
-def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: str) -> Iterator[Measure]:
+def pictures(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
     """Cube faces, panoramas and resampled views, and the naive way beside them."""
     house = generate_house(seed, LARGE, catalogue)
-    with open_world(house, catalogue, cache, size=256, quality=quality, look=look) as world:
+    with open_world(house, catalogue, cache, size=256, pictures=kind) as world:
         renderer, eyes = world.renderer, world.graph.positions
         nodes = np.linspace(0, len(eyes) - 1, 12).astype(int)
         cameras = [c for n in nodes for c in face_cameras(eyes[n])]
-        face = _face(renderer, cameras, quality, 10.0 if quality == "unlit" else 12.0)
+        face = _face(renderer, cameras, kind, 10.0 if kind == "unlit" else 12.0)
         yield face
         colours = measure(
-            f"256 panorama, six faces of rgb, {quality}",
+            f"256 panorama, six faces of rgb, {kind}",
             lambda: [[renderer.rgb(c, (256, 256)) for c in face_cameras(eyes[n])] for n in nodes],
             per=len(nodes),
             repeats=3,
@@ -63,7 +63,7 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: s
         )
         yield colours
         whole = measure(
-            f"256 panorama with depth and ids, {quality}",
+            f"256 panorama with depth and ids, {kind}",
             lambda: [renderer.panorama(eyes[n]) for n in nodes],
             per=len(nodes),
             repeats=3,
@@ -72,11 +72,11 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: s
         yield share("panorama with depth and ids of rgb alone", whole, colours, aim=1.4)
         panorama = renderer.panorama(eyes[0])
         yield measure("36 views at 224 px from a panorama", lambda: panorama.views36(224), repeats=15, aim=15.0)
-    if quality != "unlit":
-        with open_world(house, catalogue, cache, size=256, quality="unlit") as plain:
+    if kind != "unlit":
+        with open_world(house, catalogue, cache, size=256, pictures="unlit") as plain:
             unlit = _face(plain.renderer, cameras, "unlit", None)
         yield unlit
-        yield share(f"{quality} cube face of unlit", face, unlit, aim=1.2)
+        yield share(f"{kind} cube face of unlit", face, unlit, aim=1.2)
     naive = measure(
         "the naive way: a new mujoco.Renderer per view, all rooms", naive_view(house, catalogue, eyes[0]), repeats=3
     )
@@ -84,8 +84,8 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, quality: str, look: s
     yield ratio("naive view over our face", naive, face)
 
 
-def _face(renderer: Renderer, cameras: Sequence[Camera], quality: str, aim: float | None) -> Measure:
-    name, draw = f"256x256 cube face, rgb, {quality}", lambda: [renderer.rgb(c, (256, 256)) for c in cameras]
+def _face(renderer: Renderer, cameras: Sequence[Camera], kind: str, aim: float | None) -> Measure:
+    name, draw = f"256x256 cube face, rgb, {kind}", lambda: [renderer.rgb(c, (256, 256)) for c in cameras]
     return measure(name, draw, per=len(cameras), repeats=5, aim=aim)
 
 

@@ -36,13 +36,12 @@ COMMANDS = (
     "corpus",
     "export",
     "train",
-    "eval",
-    "judge",
     "evaluate",
     "serve",
     "study",
     "iliad",
     "bench",
+    "cache",
 )
 """Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
 
@@ -60,6 +59,14 @@ REMEDIES = {
     errno.ENOENT: "there is no such file or folder, and it cannot be made; check the path",
 }
 """What to do about an error of the operating system."""
+
+EXTRAS = {
+    **dict.fromkeys(("torch", "safetensors", "sacrebleu"), "agents"),
+    **dict.fromkeys(("rerun", "rerun_cli", "av", "matplotlib"), "viz"),
+    **dict.fromkeys(("pyarrow", "networkx"), "data"),
+    **dict.fromkeys(("dm_control", "dm_env"), "drive"),
+}
+"""Which extra of the distribution brings a library that a small installation lacks."""
 
 KILLED = (
     "a worker process was ended from outside, most often because memory ran out; run the same command again, "
@@ -132,11 +139,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         _close_bars()
         print(f"error: {KILLED}", file=sys.stderr)
         return 2
-    except ImportError:
-        found = strangers()
-        if "--traceback" in argv or not found:
+    except ImportError as e:
+        found, extra = strangers(), EXTRAS.get((e.name or "").partition(".")[0])
+        if "--traceback" in argv or not (found or extra):
             raise
-        print(f"error: {'; '.join(found)}; {REMEDY}", file=sys.stderr)
+        missing = f"this needs {e.name}, which is not installed; pip install 'embodied-houses[{extra}]'"
+        print(f"error: {'; '.join(found) + '; ' + REMEDY if found else missing}", file=sys.stderr)
         return 2
 
 

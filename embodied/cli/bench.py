@@ -2,22 +2,29 @@
 
 houses, pictures, steps and memory measure the main line; views measures views of a panorama; plays counts environment
 steps with help, seen those with pixels; drive counts live pictures and the steps of a body on wheels that sees them;
+gpu measures pictures, features and learning on a CUDA device, and checks a little on the CPU where there is none;
 bakes lights a flat again and again; light compares the ways of drawing with a path tracer; growth lights houses of 40
-to 400 m² (fast, or --quality normal) and fits how the cost grows; serve lets --people take part in a study at once for
---seconds and tells how long a step takes from the browser to the disk and back. Close other programs first: they make every number
-worse.
+to 400 m² (fast, or --pictures normal) and fits how the cost grows; serve lets --people take part in a study at once for
+--seconds and tells how long a step takes from the browser to the disk and back. Close other programs first: they make
+every number worse.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
-from embodied.cli.options import folder_to_write, whole
-from embodied.render.pictures import DRAWN, LOOKS
+from embodied.cli.options import add_pictures, folder_to_write, whole
+from embodied.render.pictures import DRAWN, PictureSettings
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.bench.timing import Measure
 
 PARTS = (
     "houses",
@@ -27,6 +34,7 @@ PARTS = (
     "plays",
     "seen",
     "drive",
+    "gpu",
     "memory",
     "bakes",
     "light",
@@ -40,10 +48,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)"
     )
     parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
-    parser.add_argument("--quality", choices=DRAWN, default="unlit", help="how pictures are drawn (default: unlit)")
-    parser.add_argument(
-        "--look", choices=LOOKS, default="matte", help="what pictures and drive draw with (default: matte)"
-    )
+    add_pictures(parser, DRAWN, "unlit", what="how pictures, seen and drive draw the house")
     parser.add_argument("--houses", type=whole(), default=1000, help="memory loads and drops so many (default: 1000)")
     parser.add_argument(
         "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="light and growth write here"
@@ -58,27 +63,27 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     from embodied import gl
     from embodied.bench import bakes, drive, episodes, growth, light, seen, timing, views, world
-    from embodied.light.settings import QUALITIES
 
     parts = args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     catalogue = catalogue_of(args)
-    lit = args.quality if args.quality in QUALITIES else "fast"
+    lit = PictureSettings(kind=args.pictures).lit_by or "fast"
     if "serve" in parts:
         from embodied.bench import serve  # needs the extra of that name
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
-        "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.quality, args.look),
+        "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
         "steps": lambda: world.steps(catalogue, args.cache, args.seed),
         "views": lambda: views.views(catalogue, args.cache, args.seed),
         "plays": lambda: episodes.plays(catalogue, args.seed),
-        "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.quality),
-        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.quality, args.look),
+        "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
+        "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.pictures),
+        "gpu": lambda: _gpu(catalogue, args.cache, args.seed, lit),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
-    reports = {
+    reports: dict[str, Callable[[], Any]] = {
         "light": lambda: light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note),
         "serve": lambda: serve.measure(
             args.out, args.cache, people=args.people, seconds=args.seconds, seed=args.seed, progress=note
@@ -101,3 +106,11 @@ def run(args: argparse.Namespace) -> int:
             texts.append(report.text)
     show(args, facts, "\n\n".join(texts))
     return 0
+
+
+def _gpu(catalogue: Catalogue, cache: Path, seed: int, light: str) -> Iterator[Measure]:
+    """Agents do not know the benchmarks, so what learns is handed over here."""
+    from agents.vision.speed import works
+    from embodied.bench import gpu
+
+    return gpu.gpu(catalogue, cache, seed, light, works, progress=note)

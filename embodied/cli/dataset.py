@@ -2,7 +2,7 @@
 
 Interrupt it whenever you like: the same command goes on from there, and the files do not depend
 on the number of workers. One house is one unit of work. Whoever needs words only leaves the pictures
-out by --panoramas none; they can be drawn later, by the same command without it.
+out by --pictures none; they can be drawn later, by the same command without it.
 
 `embodied dataset from-people --people STUDY.people --data DATA --out DIR` writes DATA again with the words of the
 people of `embodied serve`: their routes for HANNA, VLN and ILIAD, their sub-goals for VNLA, and, where they gave
@@ -16,9 +16,10 @@ import dataclasses
 from collections.abc import Iterable
 
 from embodied.cli.common import add_cache, add_json, add_packs, note, pause, show
-from embodied.cli.options import HOUSES, LOOK_HELP, any_path, face, folder_to_write, whole
+from embodied.cli.options import HOUSES, add_pictures, any_path, face, folder_to_write, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
-from embodied.render.pictures import LOOKS, QUALITIES, PictureSettings
+from embodied.render.pictures import KINDS as PICTURE_KINDS
+from embodied.render.pictures import PictureSettings
 
 FROM_PEOPLE = "from-people"
 WORDS_ONLY = ("hari",)
@@ -101,13 +102,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_drawing(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--panoramas",
-        choices=QUALITIES[:5],
-        help="how well every viewpoint is drawn, after its house was lit but for 'unlit' (default: as the pictures "
-        "that are there already, else fast; hari: none)",
-    )
-    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP.replace("default: ", "default: as are there, else "))
+    otherwise = "as the pictures that are there already, else fast; hari: none"
+    add_pictures(parser, PICTURE_KINDS, what="how the panorama of every viewpoint is drawn", otherwise=otherwise)
     parser.add_argument(
         "--size", type=face, metavar="PIXELS", help="side of a panorama's cube face (default: as are there, else 256)"
     )
@@ -127,7 +123,7 @@ def from_people(args: argparse.Namespace) -> int:
     rated = rated_by_people(args.people, source)
     data = write_people_dataset(source, words, args.out, only=args.people_only)
     facts: dict[str, object] = {"folder": str(args.out), "digest": data.digest, "wordings": len(words)}
-    text = f"{data.table()}\n{len(words)} wordings of people; digest {data.digest[:16]}, in {args.out}"
+    text = f"{data.table()}\n{len(words)} wordings by people; digest {data.digest[:16]}, in {args.out}"
     if len(rated) > 1:
         rater = fitted([s for s, _ in rated], [(n - 1) / (STARS - 1) for _, n in rated], STARS - 1)
         write_json(args.out / "rater.json", dataclasses.asdict(rater))
@@ -175,10 +171,9 @@ def run(args: argparse.Namespace) -> int:
         config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray
     )
     data = Dataset(args.out)
-    pictures = chosen_pictures(args.kind, args.panoramas, args.size, data.pictures, args.look)
-    if pictures.quality != "none":
-        way = f"{pictures.quality}, {pictures.shown_with}, faces of {pictures.size} pixels"
-        note(f"drawing panoramas: {way}; what is drawn already is kept")
+    pictures = chosen_pictures(args.kind, args.pictures, args.size, data.pictures)
+    if pictures.kind != "none":
+        note(f"drawing panoramas: {pictures.kind}, faces of {pictures.size} pixels; what is drawn already is kept")
         draw_panoramas(
             config,
             args.out,
@@ -192,33 +187,26 @@ def run(args: argparse.Namespace) -> int:
     if args.export:
         files = [f for name in programs for f in export_folder(name, data, args.export / name)]
         note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
-    drawn = dataclasses.asdict(pictures) | {"look": pictures.shown_with}
     splits = {name: dataclasses.asdict(counts) for name, counts in data.index.splits.items()}
     show(
         args,
-        {"folder": str(args.out), "digest": data.digest, "splits": splits, "panoramas": drawn},
+        {"folder": str(args.out), "digest": data.digest, "splits": splits, "pictures": dataclasses.asdict(pictures)},
         f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}",
     )
     return 0
 
 
-def chosen_pictures(
-    kind: str, quality: str | None, size: int | None, held: PictureSettings | None, look: str | None = None
-) -> PictureSettings:
-    """How the panoramas of a data set are drawn; quality 'none': not at all.
+def chosen_pictures(kind: str, pictures: str | None, size: int | None, held: PictureSettings | None) -> PictureSettings:
+    """How the panoramas of a data set are drawn; 'none': not at all.
 
     Args:
-      quality, size: what --panoramas and --size say; None where they are left out.
-      look: what --look says, likewise.
+      pictures, size: what --pictures and --size say; None where they are left out.
       held: how those that the data set holds were drawn, None where it holds none. They are gone on with rather than
         drawn again in another way that nobody asked for.
     """
-    if quality is None and held is not None:
-        return dataclasses.replace(held, size=size or held.size, look=look or held.look)
-    chosen = quality or ("none" if kind in WORDS_ONLY else "fast")
-    if look is None and held is not None and held.quality == chosen:
-        look = held.look
-    return PictureSettings(size or PictureSettings().size, chosen, look=look)
+    if pictures is None and held is not None:
+        return dataclasses.replace(held, size=size or held.size)
+    return PictureSettings(size or PictureSettings().size, pictures or ("none" if kind in WORDS_ONLY else "fast"))
 
 
 def chosen_scale(args: argparse.Namespace) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
-from embodied.cli.options import face, folder_to_write, whole
+from embodied.cli.options import add_pictures, face, folder_to_write, whole
 from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.pictures import DRAWN
 
@@ -37,13 +37,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
-    parser.add_argument("--quality", choices=DRAWN, default="normal", help="unlit is drawn at once (default: normal)")
+    add_pictures(parser, DRAWN, "normal")
     parser.add_argument(
         "--out",
         type=folder_to_write,
         default=Path("out/demo"),
         metavar="DIR",
         help="folder to write (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--small", action="store_true", help="only light one small flat and show a room of it, as DIR/room.png"
     )
     add_video(parser)
     add_sinks(parser, "DIR/episode.rrd")
@@ -53,6 +56,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    if args.small:
+        return show_a_room(args)
     with viewers_of(args) as viewers:
         return demonstrate(args, viewers)
 
@@ -74,7 +79,7 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects, {len(graph.ids)} viewpoints")
     from embodied.world import open_world
 
-    with open_world(house, catalogue, args.cache, graph=graph, size=args.size, quality=args.quality) as world:
+    with open_world(house, catalogue, args.cache, graph=graph, size=args.size, pictures=args.pictures) as world:
         with timed("light and panoramas", seconds):
             world.render_all(progress=True)
         with timed("the first task: find something", seconds):
@@ -100,6 +105,41 @@ def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
             ]
         ),
     )
+    return 0
+
+
+SMALL = (32.0, 36.0)
+"""Area of the flat of --small, square metres."""
+
+
+def show_a_room(args: argparse.Namespace) -> int:
+    """A small flat from the seed, lit, and the view of it that shows most objects; needs neither torch nor Rerun."""
+    import cv2
+    import numpy as np
+
+    from embodied.generate import generate_house
+    from embodied.generate.config import HouseConfig
+    from embodied.world import open_world
+
+    catalogue = catalogue_of(args)
+    seconds: dict[str, float] = {}
+    args.out.mkdir(parents=True, exist_ok=True)
+    with timed("a small flat (about 10 s)", seconds):
+        house = generate_house(args.seed, HouseConfig(area=SMALL, hour=11.0, weather="clear"), catalogue)
+        house.save(args.out / "house.json")
+        fetch(catalogue, house)
+    note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects")
+    with open_world(house, catalogue, args.cache, size=args.size, pictures="fast") as world:
+        with timed("light, followed through the flat once (about 40 s)", seconds):
+            seen = {n: world.panorama(n) for n in range(len(world.graph.ids))}
+        best = max(
+            ((n, yaw) for n in seen for yaw in np.arange(12) * np.pi / 6),
+            key=lambda at: len(np.unique(seen[at[0]].view(at[1], -0.15, np.radians(60), (90, 160))[2])),
+        )
+        picture = world.camera(world.graph.positions[best[0]], best[1], -0.15, np.radians(60), (720, 1280)).rgb
+    cv2.imwrite(str(args.out / "room.png"), np.ascontiguousarray(picture[..., ::-1]))
+    facts = {"room": str(args.out / "room.png"), "house": str(args.out / "house.json"), "seconds": seconds}
+    show(args, facts, f"a room of it: {facts['room']}")
     return 0
 
 

@@ -7,30 +7,27 @@ versions and free disk. Exits 1, with the remedy, when houses cannot be generate
 from __future__ import annotations
 
 import argparse
+import importlib
 import importlib.metadata
 import platform
 import shutil
+import subprocess
+import sys
 import tempfile
 import warnings
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from embodied.cli import message_of
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
+from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.origins import REMEDY, strangers
 from embodied.distribution import DISTRIBUTION
 
-LIBRARIES = (
-    DISTRIBUTION,
-    "mujoco",
-    "trimesh",
-    "torch",
-    "opencv-python-headless",
-    "rerun-sdk",
-    "gymnasium",
-    "mitsuba",
-    "numpy",
-    "shapely",
-)
+LIBRARIES = (DISTRIBUTION, "mujoco", "trimesh", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely")
+"""What houses, light and pictures need."""
+EXTRAS = {"agents": ("torch", "safetensors"), "viz": ("rerun-sdk", "av", "matplotlib"), "data": ("pyarrow",)}
+"""What else there is, by the extra of the distribution that brings it."""
 FREE_DISK = 2.0
 """GiB below which rendering houses will soon fail."""
 
@@ -48,6 +45,11 @@ class Finding:
 
 
 def add(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--fix",
+        action="store_true",
+        help="install by pip, without root, what is missing: furniture models, and software OpenGL and LLVM",
+    )
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -55,7 +57,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     findings = []
-    for look in (versions, packages, renderer, packs, path_tracer, vulkan, body, disk):
+    if args.fix:
+        for line_of in fix(catalogue_packs=tuple(args.pack)):
+            note(line_of)
+    for look in (versions, extras, packages, renderer, packs, path_tracer, vulkan, body, disk):
         findings.append(look(args))
         if not args.json:
             print(line(findings[-1]), flush=True)
@@ -74,16 +79,53 @@ def line(f: Finding) -> str:
     return f"[{mark}] {f.name:<12} {f.text}" + ("" if f.ok else f"\n       {'':<12} -> {f.remedy}")
 
 
+def fix(catalogue_packs: tuple[Path, ...]) -> Iterator[str]:
+    """Install what pip can bring and this machine lacks; yields what is done."""
+    from assets.importing.packs import find_packs
+    from embodied import gl
+    from embodied.light.backend import find_llvm
+
+    wanted = []
+    if not find_packs(catalogue_packs):
+        wanted.append("embodied-houses-furniture")
+    if sys.platform == "linux" and platform.machine() == "x86_64" and not (gl.available() and find_llvm()):
+        wanted.append("lavavu-osmesa")
+    for name in wanted:
+        yield f"pip install {name}"
+        # without what that package needs itself: only libraries in it are used
+        subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", name], check=False)
+    importlib.invalidate_caches()
+    if not wanted:
+        yield "nothing is missing that pip could bring"
+
+
 def versions(_: argparse.Namespace) -> Finding:
     """Python and library versions; every one listed is needed."""
-    found, missing = [f"Python {platform.python_version()}"], []
-    for name in LIBRARIES:
+    found, missing = _installed(LIBRARIES)
+    text = ", ".join([f"Python {platform.python_version()}", *found])
+    text += f"; missing: {', '.join(missing)}" if missing else ""
+    return Finding("versions", not missing, text, f"pip install {DISTRIBUTION}")
+
+
+def extras(_: argparse.Namespace) -> Finding:
+    """Libraries that only some commands need."""
+    parts, lacking = [], []
+    for extra, names in EXTRAS.items():
+        found, missing = _installed(names)
+        parts += found
+        lacking += [extra] * bool(missing)
+    remedy = f"pip install '{DISTRIBUTION}[{','.join(lacking)}]' (agents that learn, recordings, exports)"
+    return Finding("extras", not lacking, ", ".join(parts) or "none installed", remedy, False)
+
+
+def _installed(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    found, missing = [], []
+    for name in names:
         try:
             found.append(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:
             missing.append(name)
-    text = ", ".join(found) + (f"; missing: {', '.join(missing)}" if missing else "")
-    return Finding("versions", not missing, text, "run `make setup`, or pip install -e . -c constraints.txt")
+    return found, missing
 
 
 def packages(_: argparse.Namespace) -> Finding:
@@ -108,33 +150,32 @@ def packs(args: argparse.Namespace) -> Finding:
     from assets.importing.packs import find_packs
 
     remedy = (
-        "apt-get install sweethome3d-furniture (version 1.8 or later), or name existing files with --pack and "
-        "folders with --own"
+        "embodied doctor --fix, or pip install embodied-houses-furniture, or apt-get install sweethome3d-furniture; "
+        "until then houses hold the simple furniture that is built in code"
     )
     try:
         found, missing = find_packs(tuple(args.pack)), catalogue_of(args).missing()
     except (ValueError, OSError) as e:
-        return Finding("furniture", False, message_of(e), remedy)
+        return Finding("furniture", False, message_of(e), remedy, False)
     text = ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in found) or "no furniture library found"
     if missing:
         text += f"; {len(missing)} models of the catalogue are in none of them, e.g. {', '.join(missing[:3])}"
-    return Finding("furniture", not missing, text, remedy)
+    return Finding("furniture", not missing, text, remedy, False)
 
 
 def path_tracer(_: argparse.Namespace) -> Finding:
     """Mitsuba's back end: CUDA or LLVM; slow without them; houses are drawn unlit without Mitsuba."""
-    from embodied.light.backend import SLOWER, LightError, device
+    from embodied.light.backend import SLOWER, VARIANTS, LightError, device
 
     try:
         with warnings.catch_warnings(action="ignore"):
             found = device()
     except LightError as e:
-        return Finding("path tracer", False, str(e), "pip install mitsuba; until then use --quality unlit", False)
+        return Finding("path tracer", False, str(e), "until then draw houses without light (unlit)", False)
     if found == "scalar":
-        return Finding(
-            "path tracer", False, f"Mitsuba without CUDA and LLVM, {SLOWER}", "apt-get install libllvm19", False
-        )
-    return Finding("path tracer", True, f"Mitsuba on {found}", needed=False)
+        return Finding("path tracer", False, f"Mitsuba without CUDA and LLVM, {SLOWER}", "embodied doctor --fix", False)
+    variant = next(v for v, _ in VARIANTS if v.startswith(found))
+    return Finding("path tracer", True, f"Mitsuba on {found} (variant {variant})", needed=False)
 
 
 def vulkan(_: argparse.Namespace) -> Finding:
@@ -146,7 +187,7 @@ def vulkan(_: argparse.Namespace) -> Finding:
         "Vulkan",
         found is not None,
         found or "no Vulkan loader",
-        "only --backend filament needs it: apt-get install libvulkan1 mesa-vulkan-drivers",
+        "only --pictures fast-filament and normal-filament need it: apt-get install libvulkan1 mesa-vulkan-drivers",
         False,
     )
 

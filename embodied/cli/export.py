@@ -118,7 +118,7 @@ def _add_lerobot(parser: argparse.ArgumentParser) -> None:
     _add_data(parser)
     parser.add_argument(
         "--episodes", type=any_path, nargs="+", metavar="FILE",
-        help="episodes (.jsonl) of `embodied eval` or `judge` (default: an expert plays --split)",
+        help="episodes (.jsonl) of `embodied evaluate` (default: an expert plays --split)",
     )  # fmt: skip
     parser.add_argument("--split", default="train", help="what the expert plays (default: %(default)s)")
     parser.add_argument("--tasks", type=whole(), metavar="N", help="the expert plays the first so many tasks")
@@ -178,7 +178,7 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args.encoder, args.network)
-    drawn = {name: pictures_of(data, name, args.quality) for name in names_of(data)}
+    drawn = {name: pictures_of(data, name, args.pictures) for name in names_of(data)}
     files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
 
     def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:

@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
         args.data,
         encoder,
         args.cache,
-        quality=args.quality,
+        picture_kind=args.pictures,
         splits=args.split or (),
         first=args.houses,
         lights=args.lights,

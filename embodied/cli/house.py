@@ -7,8 +7,9 @@ own viewer), connectivity.json (the navigation graph in Matterport's format) and
 from __future__ import annotations
 
 import argparse
+import importlib.util
 
-from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, show
+from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, note, show
 from embodied.cli.options import add_fields, any_path, chosen, folder_to_write
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
@@ -39,7 +40,6 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from embodied.house.floor_plan import save_plan
     from embodied.navigation.graph import build_graph, to_matterport
     from embodied.scene.export import export_glb, export_mjcf
 
@@ -55,7 +55,10 @@ def run(args: argparse.Namespace) -> int:
         args.out.mkdir(parents=True, exist_ok=True)
         house.save(args.out / "house.json")
         to_matterport(graph, house, args.out / "connectivity.json")
-        save_plan(house, args.out / "plan.png", graph=graph)
+        if drew_plan := importlib.util.find_spec("matplotlib") is not None:
+            from embodied.house.floor_plan import save_plan
+
+            save_plan(house, args.out / "plan.png", graph=graph)
         stages.next()
         if args.glb or not args.no_mjcf:
             fetch(catalogue, house)
@@ -65,6 +68,8 @@ def run(args: argparse.Namespace) -> int:
         stages.next()
         if args.glb:
             export_glb(house, catalogue, args.out / "house.glb")
+    if not drew_plan:
+        note("plan.png is left out, because Matplotlib is not installed: pip install 'embodied-houses[viz]'")
     facts = {
         "seed": args.seed,
         "digest": house.digest,

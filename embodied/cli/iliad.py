@@ -115,7 +115,7 @@ def walks(args: argparse.Namespace) -> int:
         raise ValueError(
             "--world nav wants --data, a folder that `embodied dataset vln` or `hanna` built, with features"
         )
-    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.quality, args.cache)
+    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.pictures, args.cache)
     config: NavConfig = config_of(args.student)
     teacher = args.teacher or config.teacher
     if teacher == "learned" and args.shared is None:
@@ -147,5 +147,5 @@ def _record(
     from viz.sinks import Sinks
 
     told, walk = shown
-    with drawn_world(data, trip.world, args.cache, pictures_of(data, trip.world, args.quality)) as eyes:
+    with drawn_world(data, trip.world, args.cache, pictures_of(data, trip.world, args.pictures)) as eyes:
         record_episode(eyes, episode_of(student, trip, walk, told.description), Sinks(args.rrd), eyes=eyes)

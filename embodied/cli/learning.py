@@ -1,4 +1,4 @@
-"""Options of the commands that learn: `embodied train vision | hanna | vnla | hari`, `features`, `judge` and `study`.
+"""Options of the commands that learn: `embodied train vision | hanna | vnla | hari`, `features` and `study`.
 
 Free of torch, so that `embodied --help` answers at once; what they do is in agents.vision.run,
 agents.hanna.run, agents.hanna.judging and agents.hanna.study.
@@ -21,11 +21,11 @@ from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES,
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.vision.config import TORCHVISIONS, WAYS, VisionConfig
+from agents.vision.config import RENDER_PRESETS, TORCHVISIONS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
-from embodied.cli.common import add_cache, add_json
-from embodied.cli.options import REPEATS, add_fields, any_path, folder_to_write, positive, whole
+from embodied.cli.common import add_cache
+from embodied.cli.options import REPEATS, add_fields, add_pictures, any_path, folder_to_write, positive, whole
 
 
 def add_common(parser: argparse.ArgumentParser, threads: int = 2) -> None:
@@ -34,12 +34,16 @@ def add_common(parser: argparse.ArgumentParser, threads: int = 2) -> None:
         "--data", type=any_path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built"
     )
     add_cache(parser)
+    add_threads(parser, threads)
+
+
+def add_threads(parser: argparse._ActionsContainer, threads: int = 2) -> None:
     parser.add_argument(
-        "--threads", type=whole(), default=threads, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
+        "--threads", type=whole(), default=threads, metavar="N", help="CPU threads of PyTorch (default: %(default)s)"
     )
 
 
-def add_encoder(parser: argparse.ArgumentParser) -> None:
+def add_encoder(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--encoder",
         type=any_path,
@@ -52,15 +56,15 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
         choices=(*TORCHVISIONS, "random"),
         help="torchvision network of --encoder; 'random' for an untrained compact one",
     )
-    add_quality(parser)
+    add_drawn(parser)
 
 
-def add_quality(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--quality",
-        choices=tuple(WAYS),
-        help="how the houses are drawn that features come from; matte is fast without reflections, glossy and "
-        "reference are traced at 96 pixels by few rays (default: as the panoramas that the data set holds, else unlit)",
+def add_drawn(parser: argparse._ActionsContainer) -> None:
+    add_pictures(
+        parser,
+        tuple(RENDER_PRESETS),
+        what="how the houses are drawn that features come from, traced and reference at 96 pixels with few rays",
+        otherwise="as the panoramas that the data set holds, else unlit",
     )
 
 
@@ -166,7 +170,7 @@ def _add_strips(parser: argparse.ArgumentParser) -> None:
     )
     _add_lights(parser)
     _add_strips_folder(parser)
-    add_quality(parser)
+    add_drawn(parser)
 
 
 def _add_strips_folder(parser: argparse.ArgumentParser) -> None:
@@ -192,18 +196,18 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
     _add_lights(parser)
     _add_strips_folder(parser)
-    add_quality(parser)
+    add_drawn(parser)
     _add_named_encoders(
         parser,
         "encoders that are there already, to be judged instead of those that --rows names; those of one name are "
         "training seeds of one kind",
     )
     parser.add_argument(
-        "--pictures",
+        "--test-pictures",
         nargs="+",
-        choices=tuple(WAYS),
-        default=tuple(WAYS),
-        metavar="QUALITY",
+        choices=tuple(RENDER_PRESETS),
+        default=tuple(RENDER_PRESETS),
+        metavar="KIND",
         help="what the table of pictures judges on (default: all)",
     )
     parser.add_argument(
@@ -232,7 +236,7 @@ SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "la
 """As in agents.vision.occasions, which --help should not import."""
 
 
-def add_shown(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+def add_shown(parser: argparse._ActionsContainer, *, several: bool = False) -> None:
     parser.add_argument(
         "--shown",
         choices=SHOWN,
@@ -275,7 +279,7 @@ def add_train_vnla(parser: argparse.ArgumentParser) -> None:
 def add_study_vnla(parser: argparse.ArgumentParser) -> None:
     add_common(parser, threads=1)
     add_encoder(parser)
-    add_study(parser, "askers, interventions, rooms or rules", threads=False)
+    add_study(parser, "askers, interventions, algorithm-6, rooms or rules", threads=False)
     parser.add_argument(
         "--without-rooms", type=any_path, metavar="DIR", help="a data set of --no-rooms, for the table 'rooms'"
     )
@@ -313,7 +317,7 @@ def add_train_hari(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
         metavar="FILE",
         help="a trained execution policy (best.safetensors)",
     )
-    add_quality(intention)
+    add_drawn(intention)
     add_fields(intention, IntentionConfig, scales=INTENTION_SCALES, words={"states": STATES})
     return intention
 
@@ -358,7 +362,7 @@ def add_study_hanna(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data)",
     )
-    add_quality(parser)
+    add_drawn(parser)
     add_device(parser)
     add_begin(parser)
     add_fields(parser, TrainingConfig, skip=("training_houses", "lights"), scales=SCALES)
@@ -382,12 +386,12 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         "learned with)",
     )
     parser.add_argument(
-        "--pictures",
+        "--test-pictures",
         nargs="+",
-        choices=tuple(WAYS),
-        default=("unlit", "matte", "fast", "reference"),
-        metavar="QUALITY",
-        help="how the houses are drawn that they are judged in, of which `embodied features --quality` made "
+        choices=tuple(RENDER_PRESETS),
+        default=("unlit", "fast-matte", "fast", "reference"),
+        metavar="KIND",
+        help="how the houses are drawn that they are judged in, of which `embodied features --pictures` made "
         "features; the last is what the others are ranked against (default: %(default)s)",
     )
     parser.add_argument("--split", default="test_unseen", help="whose tasks (default: %(default)s)")
@@ -409,38 +413,8 @@ def _named_file(text: str) -> tuple[str, Path]:
     return name, any_path(path)
 
 
-def add_eval(parser: argparse.ArgumentParser) -> None:
-    add_common(parser)
-    add_encoder(parser)
-    parser.add_argument(
-        "--agent",
-        type=any_path,
-        metavar="FILE",
-        help="a trained agent (default: the shipped one of the data set's kind)",
-    )
-    parser.add_argument("--split", nargs="+", help="which splits (default: test_unseen; HARI: all three of test)")
-    parser.add_argument(
-        "--only",
-        nargs="+",
-        metavar="NAME",
-        help="which rows (default: all; of HANNA besides, judged more as the text has it: 'learned, likeliest move', "
-        "'learned, without a trail' and others)",
-    )
-    parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
-    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
-    parser.add_argument(
-        "--batch",
-        type=whole(),
-        default=32,
-        help="episodes side by side; no influence on results (default: %(default)s)",
-    )
-    add_shown(parser)
-    parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where tables and episodes go")
-    add_json(parser)
-
-
 def add_study_bandit(parser: argparse.ArgumentParser) -> None:
-    add_study(parser, "3.2, 3.4, 3.5 or held-out", data="corpus that `embodied corpus` made")
+    add_study(parser, "3.2, 3.4, 3.5, rates or held-out", data="corpus that `embodied corpus` made")
     add_scale(parser, BANDIT_SCALES)
     add_fields(parser, BanditConfig, scales=BANDIT_SCALES)
 
@@ -468,7 +442,7 @@ def add_train_iliad(parser: argparse.ArgumentParser) -> None:
 
 
 def add_study_iliad(parser: argparse.ArgumentParser) -> None:
-    add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', describer or speakers")
+    add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', algorithms, describer or speakers")
     parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="which one (default: %(default)s)")
     add_scale(parser, REGEX_SCALES)
     _add_regex_files(parser)
@@ -530,7 +504,7 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
         "--decisions",
         choices=DECISIONS,
         default="drawn",
-        help="judge with moves and questions drawn, as they are while they are rated, or as `embodied judge` takes "
+        help="judge with moves and questions drawn, as they are while they are rated, or as `embodied evaluate` takes "
         "them (default: %(default)s)",
     )
     parser.add_argument(

@@ -87,7 +87,7 @@ def light(args: argparse.Namespace) -> int:
     text = "; ".join(f"{h.sky.hour:g} h, {h.sky.weather}" for h in lightings)
     told = (
         f"{changed.name} is lit at {text}\n"
-        f"pictures: embodied render {args.folder} --quality {args.quality}\n"
+        f"pictures: embodied render {args.folder} --pictures {'fast' if args.quality == 'fast' else 'normal'}\n"
         f"MuJoCo:   embodied export mjcf --house {args.folder} --light {args.quality} --out {args.folder / 'lit'}"
     )
     show(args, facts[0] if args.lights == 1 else {"lights": facts}, told)

@@ -157,15 +157,42 @@ def _refuse_unwritable(wanted: Path) -> None:
         raise argparse.ArgumentTypeError(f"{there} may not be written by you; choose another place than {wanted}")
 
 
-LOOK_HELP = (
-    "matte: what baked light shows to everybody; gloss: reflections laid over it, for qualities fast and normal, at "
-    "two to three times the price (default: gloss where it can be)"
-)
+def add_pictures(
+    parser: argparse._ActionsContainer,
+    kinds: Sequence[str],
+    default: str | None = None,
+    *,
+    what: str = "how the house is drawn",
+    otherwise: str = "",
+) -> None:
+    """--pictures: one of `kinds`, in the words of embodied.render.pictures.
+
+    Args:
+      what: is drawn, for the help.
+      otherwise: what happens without the option, where there is no default.
+    """
+    texts = [f"{k}: {PICTURE_HELP[k]}" for k in kinds if k in PICTURE_HELP]
+    ends = f"(default: {default or otherwise})"
+    parser.add_argument("--pictures", choices=kinds, default=default, help=f"{what}; {'; '.join(texts)} {ends}")
+
+
+PICTURE_HELP = {
+    "none": "nothing is drawn",
+    "unlit": "no light is computed",
+    "fast": "global illumination in about a minute",
+    "normal": "finer global illumination",
+    "fast-matte": "without reflections, two to three times faster to draw",
+    "normal-matte": "likewise",
+    "fast-filament": "drawn by MuJoCo's Filament through Vulkan",
+    "normal-filament": "likewise",
+    "traced": "rays are traced into the baked light",
+    "reference": "path tracing, slow",
+}
 VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
 """As in embodied.envs.vnla, which --help should not import."""
 
 
-def add_rules(parser: argparse.ArgumentParser) -> None:
+def add_rules(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--rules",
         choices=VNLA_RULES,
@@ -195,6 +222,13 @@ def add_hari_rules(parser: argparse.ArgumentParser) -> None:
         default=STATES[1],
         help="how the agent's own place is described without asking (default: %(default)s)",
     )
+    group.add_argument(
+        "--kept",
+        type=float,
+        default=0.1,
+        metavar="SHARE",
+        help="share of the object classes, the commonest, that sparse descriptions keep (default: %(default)s)",
+    )
 
 
 def hari_rules_of(args: argparse.Namespace) -> HariRules:
@@ -202,7 +236,7 @@ def hari_rules_of(args: argparse.Namespace) -> HariRules:
     from embodied.envs.hari import Costs, HariRules
 
     costs, cooperative = Costs.alike(args.cost), not args.uncooperative
-    return HariRules(costs, args.stack, args.longest, cooperative, args.states, args.horizon)
+    return HariRules(costs, args.stack, args.longest, cooperative, args.states, args.horizon, args.kept)
 
 
 # Options made from settings ---------------------------------------------------------------------

@@ -11,10 +11,10 @@ import math
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
-from embodied.cli.options import LOOK_HELP, face, file_ending_in, house_folder, whole
+from embodied.cli.options import add_pictures, face, file_ending_in, house_folder, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
-from embodied.render.pictures import BACKENDS, LOOKS, QUALITIES, PictureSettings
+from embodied.render.pictures import PICTURES, PictureSettings
 
 if TYPE_CHECKING:
     from embodied.world import World
@@ -23,17 +23,7 @@ if TYPE_CHECKING:
 def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
     parser.add_argument("--size", type=face, default=512, help="side of a cube face in pixels (default: %(default)s)")
-    parser.add_argument(
-        "--quality",
-        choices=QUALITIES[1:],
-        default="normal",
-        help="unlit: at once; fast, normal: global illumination, normal is the default; glossy: traced from it; "
-        "reference: path-traced, slow",
-    )
-    parser.add_argument(
-        "--backend", choices=BACKENDS, default="classic", help="classic: OpenGL through EGL; filament: Vulkan"
-    )
-    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP)
+    add_pictures(parser, PICTURES, "normal")
     parser.add_argument("--node", type=whole(0), help="draw only this viewpoint")
     parser.add_argument(
         "--equirect", type=file_ending_in(".png"), metavar="PNG", help="where to write the picture of --node"
@@ -64,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
             "ideal, and environments and training photograph what they show of them"
         )
     catalogue = catalogue_of(args)
-    pictures = PictureSettings(args.size, args.quality, args.backend, look=args.look)
+    pictures = PictureSettings(args.size, args.pictures)
     with open_folder(args.folder, catalogue, args.cache, pictures) as world:
         fetch(catalogue, world.house)
         if args.node is not None:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, show
-from embodied.cli.options import LOOK_HELP, face, house_folder, whole
+from embodied.cli.options import add_pictures, face, house_folder, whole
 from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.photograph import CAMERAS
-from embodied.render.pictures import DRAWN, LOOKS, PictureSettings
+from embodied.render.pictures import DRAWN, PictureSettings
 
 if TYPE_CHECKING:
     from embodied.interface import Agent
@@ -31,8 +31,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--episodes", type=whole(), default=1, metavar="N", help="how many tasks (default: %(default)s)"
     )
-    parser.add_argument("--quality", choices=DRAWN, default="normal", help="how the house is drawn (default: normal)")
-    parser.add_argument("--look", choices=LOOKS, help=LOOK_HELP)
+    add_pictures(parser, DRAWN, "normal")
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
@@ -112,7 +111,7 @@ def world_of(args: argparse.Namespace) -> World:
     from embodied.generate import generate_house
     from embodied.world import open_folder, open_world
 
-    catalogue, pictures = catalogue_of(args), PictureSettings(args.size, args.quality, look=args.look)
+    catalogue, pictures = catalogue_of(args), PictureSettings(args.size, args.pictures)
     if args.house:
         return open_folder(args.house, catalogue, args.cache, pictures)
     house = generate_house(args.seed, catalogue=catalogue)

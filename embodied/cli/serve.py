@@ -9,12 +9,13 @@ are made. `embodied dataset from-people` makes a data set of it.
 from __future__ import annotations
 
 import argparse
+import functools
 import importlib.util
 import json
 import os
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,12 +25,14 @@ from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 
 if TYPE_CHECKING:
+    from agents.language_models.client import Client
     from embodied.datasets.store import Dataset
-    from embodied.interface import Agent, Place
+    from embodied.interface import Agent, Assistant, Place
     from embodied.serve.game import AgentMaker
     from embodied.serve.study import Study
 
 LOOPBACK = "127.0.0.1"
+LOOPBACKS = (LOOPBACK, "localhost", "::1")
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -55,6 +58,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--invitations", type=whole(), metavar="N", help="make N single-use links instead of one for everybody"
     )
     parser.add_argument("--summary", action="store_true", help="print the summary of what was done so far, and end")
+    from agents.language_models.options import add_model
+
+    add_model(parser)
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -76,8 +82,17 @@ def run(args: argparse.Namespace) -> int:
     def draw(data: Dataset, name: str) -> Path:
         return drawn(data, name, study, args)
 
-    origins = (args.address.rstrip("/"),) if args.address else ()
-    opened = open_study(args.study, out, draw, agents_of(args.study.parent / study.data), origins)
+    from agents.language_models.options import client_of
+
+    client = functools.cache(lambda: client_of(args))
+    opened = open_study(
+        args.study,
+        out,
+        draw,
+        agents_of(args.study.parent / study.data, client),
+        {"llm": lambda base: model_assistant(base, client(), args.prompts)},
+        origins_of(args),
+    )
     if args.summary:
         from embodied.serve.results import as_text, summary
 
@@ -86,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     links = opened.links(address, args.invitations or 0)
     write_secret(out / "links.json", json.dumps(links, indent=1))
-    if args.host not in (LOOPBACK, "localhost", "::1"):
+    if args.host not in LOOPBACKS:
         note(f"listening on {args.host}: whoever reaches this machine can connect; without TLS, answers can be read")
     few = {k: v if len(v) <= 3 else [*v[:3], f"... {len(v)} in {out / 'links.json'}"] for k, v in links.items() if v}
     show(args, links, "\n".join(f"{name}: {link}" for name, many in few.items() for link in many))
@@ -103,14 +118,29 @@ def drawn(data: Dataset, name: str, study: Study, args: argparse.Namespace) -> P
 
     place, catalogue = data.place(name), catalogue_of(args)
     with open_world(
-        place.house, catalogue, args.cache, graph=place.graph, quality=study.quality, size=study.size
+        place.house, catalogue, args.cache, graph=place.graph, pictures=study.pictures, size=study.size
     ) as world:
-        note(f"panoramas of {name}: {study.quality}, faces of {study.size} pixels")
+        note(f"panoramas of {name}: {study.pictures}, faces of {study.size} pixels")
         return world.render_all(progress=True)
 
 
-def agents_of(folder: Path) -> Mapping[str, AgentMaker]:
-    """The policies that a study may name: those without learning, and the agent that ships for its kind of task."""
+def origins_of(args: argparse.Namespace) -> tuple[str, ...] | None:
+    """Addresses of the page that may connect; None where the server listens to all and nobody said its address."""
+    own = tuple(f"http://{name}:{args.port}" for name in ("127.0.0.1", "localhost", "[::1]"))
+    if args.address:
+        return (*own, args.address.rstrip("/"))
+    return own if args.host in LOOPBACKS else None
+
+
+def model_assistant(base: Assistant, client: Client, prompts: Path | None) -> Assistant:
+    """A language model that words what the simulated assistant knows."""
+    from agents.language_models.assistant import ModelAssistant
+
+    return ModelAssistant(base, client, prompts)
+
+
+def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentMaker]:
+    """The policies that a study may name: those without learning, the agent that ships, and a language model."""
     from embodied.datasets.store import Dataset
     from embodied.serve.game import POLICIES
 
@@ -128,7 +158,12 @@ def agents_of(folder: Path) -> Mapping[str, AgentMaker]:
         paths = {n: feature_path(data.folder / "features", agent.encoder_digest, n, pictures[n]) for n in places}
         return agent.policy(load_bank(paths, agent.encoder_digest, places, pictures))
 
-    return {**POLICIES, "shipped": shipped}
+    def model(places: Mapping[str, Place]) -> Agent:
+        from agents.language_models.agent import LanguageModelAgent
+
+        return LanguageModelAgent(client())
+
+    return {**POLICIES, "shipped": shipped, "llm": model}
 
 
 def write_secret(path: Path, text: str) -> None:

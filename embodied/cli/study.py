@@ -10,13 +10,13 @@
     embodied study stars --data DATA --out STUDY
     embodied study iliad 3.4 3.5 C.1 --out STUDY
     embodied study iliad 3.4 3.5 --world nav --data DATA --out STUDY
-    embodied study check STUDY
+    embodied study --check STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `houses`, `lights` (needs `embodied features --lights 3`),
 `departures` and `requests`. HARI's are 4.7, 4.8, `moves`, `sight` (needs `embodied features`), 'figure 4.5', 'figure
 4.5b' and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms) and
 `rules`. `bandit` has Table 3.2, Figures 3.4 and 3.5, and `held-out`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7',
-`describer` and `speakers`. `check` says which stored tables no longer belong to this code. Rows that tables share are
+`describer` and `speakers`. --check says which stored tables no longer belong to this code. Rows that tables share are
 trained once, each table is written as JSON, Markdown and, where it has one, as a figure. Interrupt it whenever you
 like: the same command goes on.
 """
@@ -40,7 +40,10 @@ if TYPE_CHECKING:
 def add(parser: argparse.ArgumentParser) -> None:
     from embodied.cli import learning
 
-    kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+    parser.add_argument(
+        "--check", type=any_folder, metavar="DIR", help="say which tables stored in DIR no longer belong to this code"
+    )
+    kinds = parser.add_subparsers(dest="what", metavar="WHAT")
     learning.add_study_hanna(kinds.add_parser("hanna", help="agents that ask people for help and follow their routes"))
     learning.add_study_realism(
         kinds.add_parser("realism", help="HANNA agents that learned from some pictures, in others")
@@ -51,16 +54,16 @@ def add(parser: argparse.ArgumentParser) -> None:
     learning.add_study_bandit(kinds.add_parser("bandit", help="a translator that learns from ratings"))
     learning.add_study_stars(kinds.add_parser("stars", help="HANNA agents that learn from ratings of their walks"))
     learning.add_study_iliad(kinds.add_parser("iliad", help="students that learn from descriptions"))
-    check = kinds.add_parser("check", help="say which stored tables no longer belong to this code")
-    check.add_argument("folder", type=any_folder, metavar="DIR", help="folder of a study, or of several")
 
 
 def run(args: argparse.Namespace) -> int:
     from agents.studies.engine import check, run_study
 
-    if args.what == "check":
-        print("\n".join(check(args.folder)) or f"no stored tables in {args.folder}")
+    if args.check is not None:
+        print("\n".join(check(args.check)) or f"no stored tables in {args.check}")
         return 0
+    if args.what is None:
+        raise ValueError("say which study, such as `embodied study hanna 4.5`, or --check DIR; --help lists them")
     makers = {
         "hanna": hanna,
         "realism": realism,
@@ -120,7 +123,7 @@ def hanna(args: argparse.Namespace) -> StudyLearner:
         config=config,
         evaluation=chosen(args, EVALUATIONS[args.scale]),
         device=args.device,
-        quality=args.quality,
+        picture_kind=args.pictures,
         begin=args.begin,
         elsewhere=args.judged_in,
     )
@@ -153,7 +156,7 @@ def vision(args: argparse.Namespace) -> StudyLearner:
     config = chosen(args, VisionConfig())
     args.rows = args.rows or (list(by_name(args.encoders)) or None)
     return EncoderStudy(
-        StripSource(args.data, args.strips or args.out / "strips", args.cache, args.quality, args.lights),
+        StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights),
         config,
         seeds_of(args, config.seed),
         args.split,
@@ -181,7 +184,7 @@ def hari(args: argparse.Namespace) -> StudyLearner:
         intention=config,
         executor=args.execution,
         encoder=encoder_of(args.encoder, args.network).digest if "sight" in args.tables else "",
-        quality=args.quality,
+        picture_kind=args.pictures,
     )
 
 
@@ -197,11 +200,12 @@ def vnla(args: argparse.Namespace) -> StudyLearner:
         args.tasks,
         threads=args.threads,
         encoder=args.encoder,
+        network=args.network,
         config=config,
         evaluation=chosen(args, EvaluationSettings()),
         without_rooms=args.without_rooms,
         others=args.others or args.seeds,
-        quality=args.quality,
+        picture_kind=args.pictures,
     )
 
 
@@ -245,7 +249,7 @@ def iliad(args: argparse.Namespace) -> StudyLearner:
     if args.world == "nav":
         refuse_regex_settings(args)
         learner = chosen(args, NAV_LEARNER_SCALES[args.scale])
-        source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.quality, args.cache)
+        source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.pictures, args.cache)
         world = NavStudyWorld(chosen(args, NAV_SCALES[args.scale]), source)
     else:
         learner = chosen(args, LEARNER_SCALES[args.scale])

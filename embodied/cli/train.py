@@ -65,7 +65,7 @@ def run_vision(args: argparse.Namespace) -> int:
     from embodied.cli.options import chosen
 
     use_threads(args.threads)
-    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.quality, args.lights)
+    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
     how = {"like": args.example, "device": args.device, "workers": args.workers}
     train_vision(source, chosen(args, VisionConfig()), args.out, **how, note=note)
     return 0
@@ -108,7 +108,7 @@ def _lessons(args: argparse.Namespace, kind: str) -> Lessons:
 
     use_threads(args.threads)
     encoder = encoder_of(args.encoder, args.network)
-    return Lessons(dataset_of(args.data, kind), encoder, args.quality, join_launcher(args.device))
+    return Lessons(dataset_of(args.data, kind), encoder, args.pictures, join_launcher(args.device))
 
 
 def run_hari(args: argparse.Namespace) -> int:
@@ -125,11 +125,11 @@ def run_hari(args: argparse.Namespace) -> int:
     if args.phase == "execution":
         config = chosen(args, EXECUTION_SCALES[args.scale])
         encoder = encoder_of(args.encoder, args.network).digest if config.sees == "features" else ""
-        how = {"quality": args.quality, "begin": args.begin, "minutes": args.minutes}
+        how = {"picture_kind": args.pictures, "begin": args.begin, "minutes": args.minutes}
         train_execution(data, config, args.out, encoder=encoder, note=note, **how)
     else:
         asking = chosen(args, INTENTION_SCALES[args.scale])
-        walking = with_eyes(load_executor(args.execution), data, args.quality)
+        walking = with_eyes(load_executor(args.execution), data, args.pictures)
         watch = _recorder(args, sees=walking.seeing is not None) if args.rrd else None
         train_intention(data, walking, asking, args.out, minutes=args.minutes, note=note, on_validation=watch)
     return 0
@@ -165,7 +165,7 @@ def run_nav(args: argparse.Namespace) -> int:
     from embodied.cli.options import chosen
 
     nav, learner = chosen(args, NAV_SCALES[args.scale]), chosen(args, NAV_LEARNER_SCALES[args.scale])
-    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.quality, args.cache)
+    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.pictures, args.cache)
     grounds = prepare(nav, source, args.out / "shared", note=note)
     home = args.out / "students" / nav.teacher / f"seed_{learner.seed}" / folder_name(learner)
     learn(grounds, learner, home, minutes=args.minutes, note=note)
@@ -184,7 +184,7 @@ def _recorder(args: argparse.Namespace, *, sees: bool = True) -> Callable[[int, 
     def keep(update: int, episodes: Sequence[Episode]) -> None:
         for number, episode in enumerate(episodes[:WATCHED]):
             name = episode.task.world
-            with drawn_world(data, name, args.cache, pictures_of(data, name, args.quality)) as world:
+            with drawn_world(data, name, args.cache, pictures_of(data, name, args.pictures)) as world:
                 file = args.out / f"validation_{update:06d}_{number}.rrd"
                 record_episode(world, episode, Sinks(file), eyes=world if sees else None)
 

@@ -1,7 +1,7 @@
 """Look at what happened: open a recording, or the episodes of a run.
 
 RUN is a .rrd file, which opens in the Rerun viewer (with --serve in the browser, with --connect in
-a viewer that runs already), or a folder that `embodied eval` or `judge` wrote: its episodes are
+a viewer that runs already), or a folder that `embodied evaluate` wrote: its episodes are
 listed, --page writes one HTML page about them, and --episode N makes the recording of one (with
 --data, the data set its houses come from), and with --video a film. What the agent sees in the
 recording is drawn as it was for the agent.
@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
-from embodied.cli.options import any_path, whole
+from embodied.cli.options import add_pictures, any_path, whole
 from embodied.cli.recording import add_sinks, add_video, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
-    from agents.vision.config import Looked
+    from agents.vision.config import RenderedInputs
     from assets.catalogue import Catalogue
     from embodied.datasets.store import Dataset
     from embodied.interface import Episode
@@ -36,9 +36,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings"
     )
-    parser.add_argument(
-        "--quality", choices=DRAWN, default="unlit", help="how --episode draws the house (default: unlit)"
-    )
+    add_pictures(parser, DRAWN, "unlit", what="how --episode draws the house")
     add_video(parser)
     add_sinks(parser, "RUN/recordings/N.rrd")
     add_cache(parser)
@@ -104,7 +102,7 @@ def record_one(args: argparse.Namespace, found: Sequence[Listed]) -> int:
 def record_again(
     run: Path, data: Dataset, episode: Episode, sinks: Sinks, catalogue: Catalogue, args: argparse.Namespace
 ) -> None:
-    """Record an episode of a run in its house, drawn again as `args.quality`, and with what its agent saw.
+    """Record an episode of a run in its house, drawn again as `args.pictures`, and with what its agent saw.
 
     Raises:
       DatasetError: it was played in a house that is not in the data set.
@@ -120,7 +118,7 @@ def record_again(
             from agents.vision.drawn import drawn_world  # loads torch
 
             eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
-        world = stack.enter_context(data.open_world(name, catalogue, args.cache, quality=args.quality, size=384))
+        world = stack.enter_context(data.open_world(name, catalogue, args.cache, args.pictures, size=384))
         watch = lambda steps: bar(steps, "recording", "step")
         record_episode(world, episode, sinks, eyes=eyes, watch=watch)
         if args.video:
@@ -128,17 +126,15 @@ def record_again(
     note(f"recorded {episode.task.id}")
 
 
-def looked_at(run: Path) -> Looked:
+def looked_at(run: Path) -> RenderedInputs:
     """What the agents of a run looked at; nothing where it does not say.
 
     Raises:
       RecordError: a damaged run.json.
     """
-    from agents.vision.config import Looked
+    from agents.vision.config import RenderedInputs
     from embodied.records import from_plain, read_json
 
     path = run / "run.json"
     facts = read_json(path) if path.exists() else {}
-    if isinstance(told := facts.get("pictures"), dict):  # runs that name no look are older than gloss
-        facts["pictures"] = {n: {"look": "matte"} | p if isinstance(p, dict) else p for n, p in told.items()}
-    return from_plain(Looked, {k: facts[k] for k in ("looking", "pictures") if k in facts}, str(path))
+    return from_plain(RenderedInputs, {k: facts[k] for k in ("looking", "pictures") if k in facts}, str(path))

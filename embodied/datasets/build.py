@@ -174,7 +174,7 @@ def draw_panoramas(
     folder: Path,
     cache: Path,
     *,
-    pictures: PictureSettings,
+    pictures: PictureSettings | str,
     workers: int = 1,
     watch: Watch | None = None,
     packs: tuple[Path, ...] = (),
@@ -186,13 +186,13 @@ def draw_panoramas(
     interruption. Pictures that were drawn otherwise, or by another version of the program, are drawn again.
 
     Args:
-      pictures: how all of them are drawn.
+      pictures: how all of them are drawn, as in embodied.open_world.
       workers, watch, packs, ray_address: as in `build_dataset`.
 
     Raises:
       LockedError: another process writes into the folder.
     """
-    arguments = (Path(folder).resolve(), Path(cache), pictures, packs)
+    arguments = (Path(folder).resolve(), Path(cache), PictureSettings.of(pictures), packs)
     work = units(config.plan)
     with locked(Path(folder)):
         for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)

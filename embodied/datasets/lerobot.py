@@ -152,7 +152,7 @@ def _pictures(data: Dataset, name: str) -> Path:
     if data.drawn_pictures(name) is None:
         raise DatasetError(
             f"{data.folder} has no pictures of {name!r}; draw them with `embodied dataset {data.kind} --out "
-            f"{data.folder} ... --panoramas fast`"
+            f"{data.folder} ... --pictures fast`"
         )
     return data.folder / "houses" / name / "panoramas.pano"
 

@@ -30,7 +30,7 @@ def drawn(panoramas: Path) -> Path:
     if not Path(panoramas).exists():
         raise ValueError(
             f"{panoramas} does not exist; draw the panoramas first: run the command that built the data set "
-            "once more, with --panoramas fast"
+            "once more, with --pictures fast"
         )
     return Path(panoramas)
 

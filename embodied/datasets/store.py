@@ -30,7 +30,7 @@ from embodied.interface import Assistant, Episode, FindObject, Language, Place, 
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import PeoplesWords, Said
 from embodied.navigation.graph import NavGraph, from_matterport
-from embodied.records import RecordError, from_plain, read_lines
+from embodied.records import read_lines
 from embodied.render.pictures import PictureSettings
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
 
@@ -157,7 +157,7 @@ class Dataset:
         name: str,
         catalogue: Catalogue,
         cache: Path,
-        pictures: PictureSettings = PictureSettings(),
+        pictures: PictureSettings | str = PictureSettings(),
         **changes: Any,
     ) -> World:
         """The world with pictures of one house; `pictures` and `changes` as in embodied.world.open_world."""
@@ -165,10 +165,17 @@ class Dataset:
 
         place = self.place(name)
         file = self.folder / "houses" / name / "panoramas.pano"
-        pictures = dataclasses.replace(pictures, **changes)
         # what is in a data set is data: whoever reads it has other drivers and, later, another version
         may = ("renderer", "code")
-        return World(place.house, catalogue, place.graph, cache, pictures, file=file, may_differ=may)
+        return World(
+            place.house,
+            catalogue,
+            place.graph,
+            cache,
+            PictureSettings.of(pictures, **changes),
+            file=file,
+            may_differ=may,
+        )
 
     def drawn_pictures(self, name: str) -> PictureSettings | None:
         """How the panoramas of a house that the data set holds were drawn; None where it holds none of this house."""
@@ -182,13 +189,10 @@ class Dataset:
             return None
         if made_of.get("house") != self.place(name).house.digest:
             return None
-        fields = {f.name: made_of[f.name] for f in dataclasses.fields(PictureSettings) if f.name in made_of}
         try:
-            drawn = from_plain(PictureSettings, {"look": "matte"} | fields)  # files of before gloss name no look
-        except RecordError:  # drawn by a version with other words for it
+            return PictureSettings.from_stored(made_of)
+        except ValueError:  # drawn by a version with other words for it
             return None
-        unnamed = dataclasses.replace(drawn, look=None)
-        return unnamed if unnamed.shown_with == drawn.look else drawn
 
     @property
     def pictures(self) -> PictureSettings | None:
@@ -265,7 +269,7 @@ class Dataset:
             wording=ANNA_SPLIT.get(name, ""),
             language=language or (PeoplesWords(said, PlainLanguage()) if said else None),
             routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
-            describer=self.describer() if self.kind == "hari" else None,
+            describer=self.describer(hari.kept) if self.kind == "hari" else None,
             hari=hari,
             vnla=vnla,
             assistant=assistant,
@@ -278,9 +282,9 @@ class Dataset:
         spoken = [n for n in names if f"{n}/{SUBGOALS}" in self.index.files]
         return tuple(s for n in spoken for s in self._lines(n, SUBGOALS, Said))
 
-    def describer(self) -> Describer:
-        """HARI's descriptions; frequent objects are counted over the training houses."""
-        return Describer(frequent_classes([self.place(n) for n in self.names("train")]))
+    def describer(self, kept: float = AS_PRINTED.kept) -> Describer:
+        """HARI's descriptions; the share of frequent classes is counted over the training houses."""
+        return Describer(frequent_classes([self.place(n) for n in self.names("train")], kept))
 
     def table(self) -> str:
         """The table of the splits, as Markdown."""

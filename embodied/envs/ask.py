@@ -46,7 +46,7 @@ class Prices:
 
 
 @dataclass(frozen=True)
-class AskRules:
+class AskSettings:
     """What may be varied of Ask-v0."""
 
     prices: Prices = Prices()
@@ -71,7 +71,7 @@ class AskEnv(HelpEnv):
         worlds: Mapping[str, Place],
         assistant: Assistant,
         moves: Moves | None = None,
-        rules: AskRules = AskRules(),
+        rules: AskSettings = AskSettings(),
         describer: Describer | None = None,
     ) -> None:
         super().__init__(worlds, assistant, moves)

@@ -6,12 +6,13 @@ execution policy's choice) and DONE is `Stop`.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from embodied.action_spaces import Moves
-from embodied.assistants.descriptions import Describer
+from embodied.assistants.descriptions import KEPT, Describer
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Place, Reply, Stop
 
@@ -70,12 +71,16 @@ class HariRules:
     rich as the assistant's."""
     horizon: int | None = None
     """H, the most steps of an episode; None: what its task says (30 in Table E.2)."""
+    kept: float = KEPT
+    """Share of the object classes, the commonest ones, that sparse descriptions keep (docs/sources.md, S170)."""
 
     def __post_init__(self) -> None:
         if min(self.stack, self.longest, self.horizon or 1) < 1:
             raise ValueError(
                 f"stack {self.stack}, longest {self.longest} and horizon {self.horizon} should be at least 1"
             )
+        if not 0 < self.kept <= 1:
+            raise ValueError(f"kept should be a share above 0 and at most 1, got {self.kept}")
         check_states(self.states)
 
 
@@ -87,13 +92,13 @@ class StackedGoal:
     node: int
     description: Description
     patience: int
-    """DO actions left before the goal is dropped; unused for the main goal."""
+    """Time steps left on it before it is dropped; unused for the main goal."""
 
 
 class HariEnv(HelpEnv):
     """E-bar of 4.3.4.1. Decisions where the text is open:
 
-    a sub-goal held for more than 3 times its shortest distance (in DO actions) is popped by itself
+    a sub-goal held for more than 3 times its shortest distance (in time steps) is popped by itself
     and at no cost (docs/sources.md, S53); reaching the horizon pays the task error, so that shaping telescopes
     (docs/sources.md, S54); sub-goals are described densely (docs/sources.md, S58).
     """
@@ -134,6 +139,7 @@ class HariEnv(HelpEnv):
     def _replied(self, reply: Reply) -> None:
         """T_G and p_desp of 4.3.4.2 and 4.3.4.3."""
         description = required(reply.description, "description in the reply")
+        self._tick()
         if reply.intention is Intention.CUR:
             self._state = description
         elif reply.intention is Intention.GOAL:
@@ -148,11 +154,7 @@ class HariEnv(HelpEnv):
 
     def _moved(self) -> None:
         self._state = self._see(self.world, self.pose.node)
-        if len(self._goals) > 1:
-            top = self._goals[-1]
-            self._goals[-1] = StackedGoal(top.node, top.description, top.patience - 1)
-            if top.patience <= 1:
-                self._goals.pop()
+        self._tick()
         self._on_top()
 
     def _stopped(self) -> None:
@@ -162,8 +164,15 @@ class HariEnv(HelpEnv):
         self._goals.pop()
         self._on_top()
 
+    def _tick(self) -> None:
+        """A time step was spent on the goal on top."""
+        top = self._goals[-1]
+        self._goals[-1] = dataclasses.replace(top, patience=top.patience - 1)
+
     def _on_top(self) -> None:
-        """g_t is the top of the stack."""
+        """g_t is the top of the stack; sub-goals that were held too long are not."""
+        while len(self._goals) > 1 and self._goals[-1].patience <= 0:
+            self._goals.pop()
         deep = len(self._goals) > 1
         self.targets = (self._goals[-1].node,) if deep else self.task.goal_nodes
         self.mode = Mode.SUB if deep else Mode.MAIN

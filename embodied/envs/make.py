@@ -13,7 +13,7 @@ from embodied.assistants.anna import Anna
 from embodied.assistants.ask import AskAssistant
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative
-from embodied.envs.ask import AskEnv, AskRules
+from embodied.envs.ask import AskEnv, AskSettings
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from embodied.house.house import Placement
     from embodied.tasks.ask import Look
 
-ASK_RULES = AskRules()
+ASK_SETTINGS = AskSettings()
 AS_PUBLISHED = "indirect"
 """VNLA as its program plays it: help is put into words."""
 
@@ -72,7 +72,7 @@ def environment_maker(
         advisor = assistant or Advisor(teacher, language or PlainLanguage())
         return lambda: rule(worlds, advisor, teacher.moves)
     if kind == "hari":
-        say = describer or Describer(frequent_classes(worlds.values()))
+        say = describer or Describer(frequent_classes(worlds.values(), hari.kept))
         willing = HariAssistant(say, stack=hari.stack, longest=hari.longest)
         asked = assistant or (willing if hari.cooperative else Uncooperative(willing))
         moves = PanoramicMoves()
@@ -84,7 +84,7 @@ def environment_maker(
 
 
 def ask_environment_maker(
-    worlds: Mapping[str, Place], look: Look, rules: AskRules = ASK_RULES, assistant: Assistant | None = None
+    worlds: Mapping[str, Place], look: Look, rules: AskSettings = ASK_SETTINGS, assistant: Assistant | None = None
 ) -> Callable[[], HelpEnv]:
     """A maker of Ask-v0's environments.
 

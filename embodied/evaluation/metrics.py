@@ -34,7 +34,12 @@ def navigation_error(episode: Episode, graph: NavGraph) -> float:
 
 
 def success(episode: Episode, graph: NavGraph) -> float:
-    """1 if the episode ended within the radius of a goal, inclusive (docs/sources.md, S3); else 0."""
+    """1 if the episode ended within the radius of a goal, inclusive (docs/sources.md, S3); else 0.
+
+    In HARI the agent must have said DONE, too: a task is complete by a_done (4.3.2).
+    """
+    if episode.task.kind == "hari" and episode.ended != "stop":
+        return 0.0
     return float(navigation_error(episode, graph) <= episode.task.radius + 1e-9)
 
 

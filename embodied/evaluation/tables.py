@@ -231,11 +231,12 @@ def heading(name: str) -> str:
 
 def markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
     """One line per row, with the episode and house counts and the seed."""
-    columns = list(columns or rows[0].values)
+    columns = list(columns or dict.fromkeys(name for r in rows for name in r.values))
+    nothing = Estimate(math.nan, math.nan, 0)
     head = ["agent", "split", *(heading(c) for c in columns), "episodes", "houses", "seed"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for r in rows:
-        cells = [r.agent, r.split, *(shown(c, r.values[c]) for c in columns), r.episodes, r.houses, r.seed]
+        cells = [r.agent, r.split, *(shown(c, r.values.get(c, nothing)) for c in columns), r.episodes, r.houses, r.seed]
         lines.append("| " + " | ".join(str(c) for c in cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -89,7 +89,7 @@ def _surface(carrier: Placement, name: str | None, catalogue: Catalogue) -> shap
     """The part of a carrier's surface that things may lie on, world; None where the catalogue does not know it."""
     asset = catalogue.assets.get(carrier.asset)
     found = [s for s in asset.surfaces if s.name == name] if asset else []
-    if not found:
+    if asset is None or not found:
         return None
     s, (kx, ky, _) = found[0], np.array(carrier.size) / np.array(asset.size)
     corners = np.array([(s.x0, s.y0), (s.x1, s.y0), (s.x1, s.y1), (s.x0, s.y1)]) * (kx, ky)

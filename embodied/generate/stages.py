@@ -251,7 +251,7 @@ def generate_house(
       HouseError: the configuration cannot be built, or a stage lacks what an earlier one should make.
       TypeError: a seed that is no whole number.
     """
-    seed = checked_seed(seed)
+    seed, catalogue = checked_seed(seed), (catalogue or load_catalogue()).furnishing
     best: tuple[int, House] | None = None
     for first in range(REDRAWN):
         draft = Draft(seed, config, catalogue, first=first, stages=stages)

@@ -10,7 +10,6 @@ the way of dm_control's suite: embodied.gym.suite.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -118,7 +117,7 @@ def make_driving(
     split: str = "train",
     seed: int = 0,
     cache: str | Path | None = None,
-    pictures: PictureSettings | None = None,
+    pictures: PictureSettings | str | None = None,
     worlds: Mapping[str, World] | None = None,
     **settings: Any,
 ) -> Driving:
@@ -126,8 +125,8 @@ def make_driving(
 
     Args:
       data, split: of any kind; the light of its houses is baked where the cache does not have it.
-      pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere. Matte unless they name a look:
-        every command is a picture of its own, and gloss takes more than twice the time.
+      pictures: how houses are drawn; as the data set's pictures are without reflections, 'fast-matte' elsewhere: every
+        command is a picture of its own, and reflections take more than twice the time.
       settings: fields of DriveSettings.
     """
     if isinstance(sees := settings.get("sees"), str):
@@ -138,22 +137,16 @@ def make_driving(
     return Driving(worlds, wanted)
 
 
-def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings | None) -> dict[str, World]:
+def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings | str | None) -> dict[str, World]:
     """The houses of a split."""
     whole, catalogue = Dataset(data), load_catalogue(cache)
     names = whole.names(split)
-    drawn = pictures or pictures_of(whole, names, wanted=False)
-    return {name: whole.open_world(name, catalogue, cache, _live(drawn)) for name in names}
+    drawn = pictures or pictures_of(whole, names, wanted=False).matte
+    return {name: whole.open_world(name, catalogue, cache, drawn) for name in names}
 
 
-def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | None) -> dict[str, World]:
+def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | str | None) -> dict[str, World]:
     """The flat that the other environments play in, too."""
     name, catalogue = f"flat_{seed}", load_catalogue(cache)
     house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
-    drawn = pictures or PictureSettings(quality="fast")
-    return {name: open_world(house, catalogue, cache, graph=graph, pictures=_live(drawn))}
-
-
-def _live(pictures: PictureSettings) -> PictureSettings:
-    """Without gloss unless they name it."""
-    return replace(pictures, look=pictures.look or "matte")
+    return {name: open_world(house, catalogue, cache, pictures or "fast-matte", graph=graph)}

@@ -414,8 +414,10 @@ class StageSettings:
     """Some of embodied.gym.eyes.SEES: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
     view: ViewSettings = ViewSettings()
     """How pixels are framed."""
-    pictures: PictureSettings | None = None
-    """How the houses are drawn; by default as the data set's pictures are, and 'fast' for a generated flat."""
+    pictures: PictureSettings | str | None = None
+    """How the houses are drawn: "unlit", "fast", ... as in embodied.open_world, or settings.
+
+    By default as the data set's pictures are, and 'fast' for a generated flat."""
     source: FeatureSource | None = None
     """The features; those of the installed default encoder where not given."""
     worlds: Mapping[str, SeenPlace] | None = None

@@ -69,7 +69,7 @@ def split_playground(
     *,
     cache: Path,
     worlds: Mapping[str, SeenPlace] | None = None,
-    pictures: PictureSettings | None = None,
+    pictures: PictureSettings | str | None = None,
     sees: Sequence[str] = ("oracle",),
     variants: Variants = Variants(),
     assistant: Assistant | None = None,
@@ -105,7 +105,7 @@ def flat_playground(
     *,
     cache: Path,
     worlds: Mapping[str, SeenPlace] | None = None,
-    pictures: PictureSettings | None = None,
+    pictures: PictureSettings | str | None = None,
     sees: Sequence[str] = ("oracle",),
     variants: Variants = Variants(),
     assistant: Assistant | None = None,
@@ -128,18 +128,18 @@ def flat_playground(
             met = meet(house, graph, catalogue, seed=seed)
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
-        drawn = pictures or PictureSettings(quality="fast" if set(sees) - {"oracle"} else "unlit")
+        drawn = PictureSettings.of(pictures or ("fast" if set(sees) - {"oracle"} else "unlit"))
         world = open_world(house, catalogue, cache, graph=graph, pictures=drawn)
         if drawn.lit:
             _light(world)
         worlds = {name: world}
-    name, world = next(iter(worlds.items()))
+    name, place = next(iter(worlds.items()))
     routes: tuple[Route, ...] = ()
     if kind in ("hanna", "vln"):
-        paths = paths or route_paths(world.graph, world.house.name, seed=seed, house_split="test")
-        routes = worded(world, paths, WORDINGS["test"], seed=seed, language=language)
+        paths = paths or route_paths(place.graph, place.house.name, seed=seed, house_split="test")
+        routes = worded(place, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
-    tasks = part_tasks(kind, world, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
+    tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
     make_env = environment_maker(
         kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari, assistant=assistant
     )
@@ -181,13 +181,13 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
       ValueError: none, not of all houses, or not in one way, though they are wanted.
     """
     found = {n: drawn for n in names if (drawn := data.drawn_pictures(n)) is not None}
-    again = f"`embodied dataset {data.kind} --out {data.folder} ... --panoramas fast`"
+    again = f"`embodied dataset {data.kind} --out {data.folder} ... --pictures fast`"
     if wanted and len(found) < len(names):
         raise ValueError(
             f"{data.folder} has pictures of {len(found)} of its {len(names)} houses here; draw them with "
             f"{again}, or choose sees='oracle'"
         )
-    if wanted and len(ways := {(p.quality, p.size, p.shown_with) for p in found.values()}) > 1:
+    if wanted and len(ways := {(p.kind, p.size) for p in found.values()}) > 1:
         raise ValueError(f"the pictures in {data.folder} are of several kinds ({sorted(ways)}); finish {again}")
     return next(iter(found.values()), PictureSettings())
 

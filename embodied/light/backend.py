@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from embodied.errors import UnableError
 from embodied.light import scalar
 from embodied.light.arrays import Array, RayScene
+from embodied.software import bundled
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -50,7 +51,7 @@ def find_llvm() -> str | None:
             version = re.search(r"libLLVM(?:[-.]so[-.]|[-.])?(?:so\.)?(\d+)", os.path.basename(path))
             if version and OLDEST_LLVM <= int(version[1]) < 40:
                 found.append((int(version[1]), path))
-    return max(found)[1] if found else ctypes.util.find_library("LLVM")
+    return max(found)[1] if found else ctypes.util.find_library("LLVM") or (str(bundled("LLVM") or "") or None)
 
 
 @functools.cache
@@ -59,12 +60,12 @@ def _module() -> types.ModuleType:
     if "DRJIT_LIBLLVM_PATH" not in os.environ and (llvm := find_llvm()):
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm  # Dr.Jit reads it once, when it is imported
     try:
+        import drjit as dr
         import mitsuba as mi
-    except ImportError as e:
-        raise LightError(
-            f"light needs mitsuba ({e}); `pip install mitsuba`, or look at the house with quality='unlit'"
-        ) from e
-    import drjit as dr
+    except (ImportError, NameError) as e:  # NameError: Dr.Jit's own, where a library of the system is missing
+        why = str(e.__context__ or e)
+        remedy = "apt-get install libatomic1" if "libatomic" in why else "pip install mitsuba"
+        raise LightError(f"light needs mitsuba ({why}); {remedy}, or look at houses without light (unlit)") from e
 
     mi.set_variant(variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name)))))
     if (threads := threads_allowed()) is not None:
@@ -95,7 +96,7 @@ def variant_of(has_backend: Callable[[str], bool]) -> str:
     warn(
         f"Dr.Jit finds neither CUDA nor LLVM: Mitsuba's scalar variant computes the light, {SLOWER}; install LLVM "
         f"{OLDEST_LLVM} or later (Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or look at houses "
-        "with quality='unlit'"
+        "with pictures='unlit'"
     )
     return SCALAR
 

@@ -36,7 +36,7 @@ LIKELY = 0.55
 
 
 @dataclass
-class Trail:
+class Mind:
     """What an agent remembers of one episode."""
 
     visits: dict[int, int] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class Trail:
     """The score of the thing then."""
 
 
-AskRule = Callable[[Observation, Detection | None, Trail], Action | None]
+AskRule = Callable[[Observation, Detection | None, Mind], Action | None]
 """What to do about what is known: an Ask, a Stop, or None to go on. It is given the thing that was reached, if any, the
 one nearest."""
 
@@ -62,13 +62,13 @@ class Asker:
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Any]:
-        trails = memory or [Trail() for _ in observations]
+        trails = memory or [Mind() for _ in observations]
         return [
             None if o is None or s is None else self.one(o, s, trail, rng)
             for o, s, trail, rng in zip(observations, situations, trails, rngs, strict=True)
         ], trails
 
-    def one(self, o: Observation, s: Situation, trail: Trail, rng: np.random.Generator) -> Action:
+    def one(self, o: Observation, s: Situation, trail: Mind, rng: np.random.Generator) -> Action:
         """The action of one episode; notes it in its trail."""
         action = self.rule(o, reached(o), trail)
         if isinstance(action, Ask) and action.intention in o.can_ask:
@@ -86,7 +86,7 @@ def reached(o: Observation) -> Detection | None:
     return min(near, key=lambda d: d.distance) if near else None
 
 
-def onward(o: Observation, s: Situation, trail: Trail, rng: np.random.Generator) -> Action:
+def onward(o: Observation, s: Situation, trail: Mind, rng: np.random.Generator) -> Action:
     """Along the route that is shown, else towards what looks like the thing, else where it has been least."""
     if o.advised is not None:
         return o.advised
@@ -104,17 +104,17 @@ def onward(o: Observation, s: Situation, trail: Trail, rng: np.random.Generator)
 # Rules ------------------------------------------------------------------------------------------
 
 
-def never(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+def never(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
     """Stops at the first thing that looks like it."""
     return Stop() if thing and thing.score >= LIKELY else None
 
 
-def always_route(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+def always_route(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
     """Asks for the way whenever none is shown."""
     return None if o.advised else Ask(Intention.ROUTE)
 
 
-def confirm_on_sight(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+def confirm_on_sight(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
     """Asks at everything that looks like it whether this is it."""
     return between(LIKELY - 0.1, 2.0)(o, thing, trail)
 
@@ -122,7 +122,7 @@ def confirm_on_sight(o: Observation, thing: Detection | None, trail: Trail) -> A
 def between(low: float, high: float) -> AskRule:
     """Stops at a thing whose score is at least `high`, passes by below `low`, and asks between."""
 
-    def rule(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+    def rule(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
         here = trail.confirmed == len(trail.visits) + sum(trail.visits.values())
         if thing is None:
             return None
@@ -142,7 +142,7 @@ def between(low: float, high: float) -> AskRule:
 def first(question: Intention, rule: AskRule) -> AskRule:
     """Asks one question at the beginning, then follows another rule."""
 
-    def both(o: Observation, thing: Detection | None, trail: Trail) -> Action | None:
+    def both(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
         return Ask(question) if question in o.can_ask and not trail.asked.get(question) else rule(o, thing, trail)
 
     return both

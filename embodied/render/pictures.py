@@ -1,20 +1,34 @@
-"""PictureSettings: how large and how well a house is drawn."""
+"""PictureSettings: how pictures of a house are made."""
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
-QUALITIES = ("none", "unlit", "fast", "normal", "glossy", "reference")
-"""From no pictures at all, through even light from all sides ('unlit') and light that was baked quickly ('fast') or
-well ('normal'), to rays into that light ('glossy') and the path tracer alone ('reference')."""
-DRAWN = ("unlit", "fast", "normal")
-"""Qualities that a Renderer draws, from anywhere."""
-TRACED = ("glossy", "reference")
-"""Qualities whose panoramas are ray-traced, from the viewpoints only."""
-BACKENDS = ("classic", "filament")
-"""Who draws colours: MuJoCo's OpenGL, or its Filament through Vulkan. Depth and ids are always the classic one's."""
-LOOKS = ("matte", "gloss")
-"""What baked light is shown with: what the pages hold, or reflections by rays from what is seen laid over it."""
+_STORED: Mapping[str, tuple[str, str, str]] = {
+    "none": ("none", "classic", "matte"),
+    "unlit": ("unlit", "classic", "matte"),
+    "fast": ("fast", "classic", "gloss"),
+    "normal": ("normal", "classic", "gloss"),
+    "fast-matte": ("fast", "classic", "matte"),
+    "normal-matte": ("normal", "classic", "matte"),
+    "fast-filament": ("fast", "filament", "matte"),
+    "normal-filament": ("normal", "filament", "matte"),
+    "traced": ("glossy", "classic", "matte"),
+    "reference": ("reference", "classic", "matte"),
+}
+"""The quality, backend and look that a kind of pictures is stored under in files of panoramas and features."""
+TRACED = ("traced", "reference")
+"""Kinds whose panoramas are ray-traced, from the viewpoints only."""
+KINDS = tuple(_STORED)
+"""'none': no pictures. 'unlit': even light from all sides. 'fast', 'normal': light that is baked quickly or well, with
+reflections; '-matte': without reflections; '-filament': by MuJoCo's Filament renderer. 'traced': rays into baked light.
+'reference': the path tracer alone."""
+PICTURES = KINDS[1:]
+DRAWN = tuple(k for k in PICTURES if k not in TRACED)
+"""Kinds that a Renderer draws, from anywhere."""
 SIZES = (8, 4096)
 """Smallest and largest side of a cube face, pixels."""
 
@@ -25,65 +39,89 @@ class PictureSettings:
 
     size: int = 256
     """Side of a cube face, pixels."""
-    quality: str = "unlit"
-    """One of QUALITIES."""
-    backend: str = "classic"
-    """One of BACKENDS."""
+    kind: str = "unlit"
+    """One of KINDS."""
     light: str | None = None
-    """Light settings by name (embodied.light); those that the quality stands for if None."""
-    look: str | None = None
-    """One of LOOKS; 'gloss' is for the qualities 'fast' and 'normal' of the classic renderer, and what None stands for
-    there; elsewhere it stands for 'matte'."""
+    """Light settings by name (embodied.light); those that the kind stands for if None."""
     rays: int | None = None
-    """Per pixel, of qualities in TRACED; None: as many as embodied.light.reference.RAYS has for the quality."""
+    """Per pixel, of kinds in TRACED; None: as many as embodied.light.reference.RAYS has for the kind."""
 
     def __post_init__(self) -> None:
-        if self.quality not in QUALITIES:
-            raise ValueError(f"quality {self.quality!r} is unknown; use one of {QUALITIES}")
-        if self.backend not in BACKENDS:
-            raise ValueError(f"backend {self.backend!r} is unknown; use one of {BACKENDS}")
+        if self.kind not in KINDS:
+            raise ValueError(f"pictures {self.kind!r} are unknown; use one of {', '.join(KINDS)}")
         check_size(self.size)
-        if self.backend == "filament" and self.quality not in ("fast", "normal"):
-            raise ValueError(
-                f"backend 'filament' draws qualities 'fast' and 'normal', not {self.quality!r}; use backend 'classic'"
-            )
-        if self.look not in (None, *LOOKS):
-            raise ValueError(f"look {self.look!r} is unknown; use one of {LOOKS}")
-        if self.look == "gloss" and not self._baked:
-            raise ValueError(
-                f"look 'gloss' is laid over what the classic renderer draws in qualities 'fast' and 'normal', not over "
-                f"{self.quality!r} by {self.backend!r}; use look 'matte'"
-            )
         if self.light is not None and not self.lit:
-            raise ValueError(f"quality {self.quality!r} is without light, so light={self.light!r} means nothing")
-
-        if self.rays is not None and (self.quality not in TRACED or self.rays < 1):
+            raise ValueError(f"pictures {self.kind!r} are without light, so light={self.light!r} means nothing")
+        if self.rays is not None and (not self.traced or self.rays < 1):
             raise ValueError(
-                f"rays={self.rays} should be at least 1, and quality one of {TRACED}, which are traced; it is "
-                f"{self.quality!r}"
+                f"rays={self.rays} should be at least 1, for pictures that are traced ({' or '.join(TRACED)}); these "
+                f"are {self.kind!r}"
             )
+
+    @classmethod
+    def of(cls, pictures: PictureSettings | str, **changes: Any) -> PictureSettings:
+        """Settings from a kind, or from other settings: `PictureSettings.of("fast", size=512)`.
+
+        Args:
+          changes: fields that differ.
+        """
+        return dataclasses.replace(cls(kind=pictures) if isinstance(pictures, str) else pictures, **changes)
+
+    @classmethod
+    def from_stored(cls, stored: Mapping[str, Any]) -> Self:
+        """The settings that `stored` made a record of.
+
+        Raises:
+          ValueError: another version has other words for it.
+        """
+        words = (stored.get("quality"), stored.get("backend"), stored.get("look", "matte"))
+        kind = next((k for k, named in _STORED.items() if named == words), None)
+        if kind is None or not isinstance(stored.get("size"), int):
+            raise ValueError(f"pictures stored as {words} are unknown; draw them again")
+        found = cls(stored["size"], kind, rays=stored.get("rays"))
+        light = stored.get("light")
+        return found if light in (None, found.lit_by) else dataclasses.replace(found, light=light)
+
+    def stored(self) -> dict[str, object]:
+        """What files of panoramas record of it."""
+        quality, backend, look = _STORED[self.kind]
+        return (
+            {"size": self.size, "quality": quality, "backend": backend, "light": self.lit_by}
+            | ({} if look == "matte" else {"look": look})
+            | ({} if self.rays is None else {"rays": self.rays})
+        )
 
     @property
     def lit(self) -> bool:
         """Whether the house is lit before it is drawn."""
-        return self.quality not in ("none", "unlit")
+        return self.kind not in ("none", "unlit")
 
     @property
     def lit_by(self) -> str | None:
         """Name of the light settings that the house is lit with; None where it is not lit."""
         if not self.lit:
             return None
-        return self.light or ("fast" if self.quality == "fast" else "normal")
+        return self.light or ("fast" if self.kind.startswith("fast") else "normal")
 
     @property
-    def shown_with(self) -> str:
-        """One of LOOKS: `look`, or what it stands for where it is None."""
-        return self.look or ("gloss" if self._baked else "matte")
+    def gloss(self) -> bool:
+        """Whether reflections are laid over baked light."""
+        return self.kind in ("fast", "normal")
 
     @property
-    def _baked(self) -> bool:
-        """Whether the classic renderer draws pages of baked light, over which gloss can be laid."""
-        return self.quality in ("fast", "normal") and self.backend == "classic"
+    def matte(self) -> PictureSettings:
+        """The same without reflections."""
+        return dataclasses.replace(self, kind=f"{self.kind}-matte") if self.gloss else self
+
+    @property
+    def filament(self) -> bool:
+        """Whether MuJoCo's Filament renderer draws the colours."""
+        return self.kind.endswith("-filament")
+
+    @property
+    def traced(self) -> bool:
+        """Whether panoramas are ray-traced."""
+        return self.kind in TRACED
 
 
 def check_size(size: int) -> None:

@@ -78,15 +78,17 @@ class Server:
     """Owns the connections; everything else is in the sessions and in the store."""
 
     def __init__(
-        self, sessions: Sessions, store: Store, pictures: Pictures, secret: str, origins: Iterable[str] = ()
+        self, sessions: Sessions, store: Store, pictures: Pictures, secret: str, origins: Iterable[str] | None = None
     ) -> None:
         """
         Args:
           secret: makes links and completion codes.
-          origins: addresses of the page, besides the server's own, that may connect: 'https://study.example.org'.
+          origins: addresses of the page that may connect, 'https://study.example.org'; None for the one that the
+            browser asked for, whatever its name is.
         """
         self.sessions, self.store, self.pictures = sessions, store, pictures
-        self.origins, self._secret = frozenset(origins), secret.encode()
+        self.origins = None if origins is None else frozenset(origins)
+        self._secret = secret.encode()
         self._sockets: dict[str, WebSocket] = {}
         self._open = 0
         self._joining = Bucket(JOIN_RATE, JOIN_BURST)
@@ -210,7 +212,9 @@ class Server:
         origin = socket.headers.get("origin")
         if origin is None:
             return False
-        return origin in self.origins or urlsplit(origin).netloc == socket.headers.get("host")
+        if self.origins is not None:
+            return origin in self.origins
+        return urlsplit(origin).netloc == socket.headers.get("host")
 
     async def _enter(self, socket: WebSocket, hello: dict[str, Any]) -> Person:
         """Whoever connects: somebody known by their token, or somebody new by a link."""

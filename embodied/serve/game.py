@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 from embodied.action_spaces import PanoramicMoves
@@ -16,7 +17,9 @@ from embodied.interface import (
     Action,
     Agent,
     Ask,
+    Assistant,
     Episode,
+    Intention,
     Move,
     Observation,
     Place,
@@ -36,6 +39,8 @@ from embodied.serve.talk import Follower, Overheard, PathSpeaker, Relay, TalkEnv
 from embodied.teachers.vnla import VnlaTeacher
 
 AgentMaker = Callable[[Mapping[str, Place]], Agent]
+AssistantMaker = Callable[[Assistant], Assistant]
+"""Puts an assistant in the place of the simulated one, which it is given."""
 POLICIES: Mapping[str, AgentMaker] = {
     "shortest": lambda places: Shortest(),
     "random": lambda places: RandomWalk(),
@@ -59,11 +64,17 @@ class Table:
     assistant: Any
 
 
-def set_table(part: Part, data: Dataset, agents: Mapping[str, AgentMaker] = POLICIES) -> Table:
+def set_table(
+    part: Part,
+    data: Dataset,
+    agents: Mapping[str, AgentMaker] = POLICIES,
+    assistants: Mapping[str, AssistantMaker] = MappingProxyType({}),
+) -> Table:
     """Everything that a part that is played needs.
 
     Args:
       agents: policies by name.
+      assistants: by name, besides 'simulated'.
 
     Raises:
       ValueError: an unknown agent or assistant, or tasks of HARI, which is not played in free words.
@@ -80,11 +91,13 @@ def set_table(part: Part, data: Dataset, agents: Mapping[str, AgentMaker] = POLI
     moves, prices = PanoramicMoves(), {q.text: q.price for q in part.questions}
     own = OWN_RULES.get(data.kind)
     assistant: Any = None
-    if part.assistant == "simulated":
-        assistant = split.make_env().assistant or PathSpeaker()
+    if part.assistant == "simulated" or part.assistant in assistants:
+        simulated = split.make_env().assistant or PathSpeaker()
+        assistant = assistants.get(part.assistant, lambda base: base)(simulated)
     elif part.assistant not in (PERSON, "none"):
         assistant = loaded(part.assistant)
-    by_own_rule = own is not None and (part.assistant == "simulated" or part.agent not in (PERSON, *POLICIES))
+    simulated_help = part.assistant in ("simulated", *assistants)
+    by_own_rule = own is not None and (simulated_help or part.agent not in (PERSON, *POLICIES))
 
     def make_env() -> tuple[HelpEnv, Relay]:
         relay = Relay() if assistant is None else Overheard(assistant)
@@ -210,11 +223,8 @@ class Game:
 
     def _answer(self, question: str) -> Any:
         rng = stream(self.seed, "assistant", self.task.id, self.env.time)
-        (intention, *_) = self.assistant.intentions(self.env.situation)
-        if hasattr(self.assistant, "answer_text"):
-            reply = self.assistant.answer_text(self.env.situation, question, rng=rng)
-        else:
-            reply = self.assistant.answer(self.env.situation, intention, rng=rng)
+        asked = dataclasses.replace(self.env.situation, question=question)
+        reply = self.assistant.answer(asked, Intention.FREE, rng=rng)
         return parse(to_json(reply))
 
     def _ask(self, question: str, time: float) -> None:

@@ -7,13 +7,14 @@ import secrets
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from embodied.datasets.store import Dataset
 from embodied.interface import Episode
 from embodied.records import load_lines, to_json
 from embodied.render.panorama_file import PanoramaFile
 from embodied.serve.app import Server, key_of
-from embodied.serve.game import POLICIES, AgentMaker, set_table
+from embodied.serve.game import POLICIES, AgentMaker, AssistantMaker, set_table
 from embodied.serve.pictures import Pictures
 from embodied.serve.results import Writer
 from embodied.serve.sessions import Sessions
@@ -57,14 +58,16 @@ def open_study(
     folder: Path,
     draw: PanoramaDrawer,
     agents: Mapping[str, AgentMaker] = POLICIES,
-    origins: Iterable[str] = (),
+    assistants: Mapping[str, AssistantMaker] = MappingProxyType({}),
+    origins: Iterable[str] | None = None,
 ) -> Opened:
     """Open a study and read what people did before.
 
     Args:
       folder: where the log and the results are kept.
       draw: see PanoramaDrawer.
-      agents: policies by name.
+      agents, assistants: by name, see `set_table`.
+      origins: see Server.
 
     Raises:
       StudyError: not a study, or its log is another's.
@@ -73,7 +76,7 @@ def open_study(
     study, data_path = load_study(path), path.parent
     data = Dataset(data_path / study.data)
     folder.mkdir(parents=True, exist_ok=True)
-    tables = {p.name: set_table(p, data, agents) for p in study.parts if p.kind == "play"}
+    tables = {p.name: set_table(p, data, agents, assistants) for p in study.parts if p.kind == "play"}
     viewed = {p.name: tuple(load_lines(data_path / p.episodes, Episode)) for p in study.parts if p.episodes}
     worlds = {w for t in tables.values() for w in t.places} | {e.task.world for v in viewed.values() for e in v}
     for world in sorted(worlds):

@@ -246,7 +246,8 @@ class Sessions:
                 return [_event("alone", now, person=person.id, part=part.name)]
             person.waiting = part.name, since
             return []
-        return [_event("ended", now, person=person.id, why="done" if sum(person.done.values()) else "nothing")]
+        served = sum(person.done.values()) > 0 or person.without  # whoever waited in vain did their share
+        return [_event("ended", now, person=person.id, why="done" if served else "nothing")]
 
     def late(self, now: float) -> list[Event]:
         """Games that end because somebody has gone or does nothing."""

@@ -43,9 +43,9 @@ class Part:
     per_person: int = 3
     """Most that one person does of this part."""
     agent: str = PERSON
-    """Who acts: 'person', a policy that the server knows ('shortest', 'random', 'hanna', ...) or 'module:Class'."""
+    """Who acts: 'person', a policy that the server knows ('shortest', 'shipped', 'llm', ...) or 'module:Class'."""
     assistant: str = PERSON
-    """Who answers: 'person', 'simulated', 'none' or 'module:Class'."""
+    """Who answers: 'person', 'simulated', 'llm', 'none' or 'module:Class'."""
     questions: tuple[Question, ...] = ()
     """Questions that a person may choose; with `free_question`, own words besides."""
     free_question: bool = True
@@ -62,7 +62,7 @@ class Part:
     of: str = ""
     """What is judged: the episodes of this part of the study; or, with `episodes`, those of a file."""
     episodes: str = ""
-    """A file episodes*.jsonl that `embodied eval`, `judge` or a study wrote."""
+    """A file episodes*.jsonl that `embodied evaluate` or a study wrote."""
     ask: str = ""
     """What raters and describers are asked."""
     advice: str = ""
@@ -112,8 +112,8 @@ class Study:
     """How long a partner waits for somebody who does nothing."""
     pace: float = 1.0
     """Seconds between the steps of a machine that a person watches."""
-    quality: str = "unlit"
-    """How panoramas are drawn that the data set does not hold."""
+    pictures: str = "unlit"
+    """How panoramas are drawn that the data set does not hold: unlit, fast, normal, ..."""
     size: int = 512
     """Their faces' side, pixels."""
 

@@ -95,7 +95,7 @@ export class AgentView implements View<AgentScreen> {
   private going = false;
   private elsewhere: string | null = null;
   private readonly view = new Panorama(() => this.turned());
-  private readonly corner = h("div", { class: "corner" });
+  private readonly corner = h("div", { class: "corner top" });
   private readonly banner = h("div", { class: "banner", role: "status" });
   private readonly talk = h("ol", { class: "talk", "aria-live": "polite", "aria-label": "Conversation" });
   private readonly request = h("p", { class: "request" });
@@ -300,7 +300,17 @@ export class AssistantView implements View<AssistantScreen> {
     if (node < 0) return;
     this.looking = node;
     if (node === this.node) this.view.look(this.state.yaw, this.state.pitch);
+    else this.view.look(this.openSide(node));
     this.draw();
+  }
+
+  /** Towards the farthest neighbour of a viewpoint: where there is something to see. */
+  private openSide(node: number): number {
+    const { nodes, edges } = this.house!;
+    const [x, y] = nodes[node]!;
+    const off = edges.flatMap(([a, b]) => (a === node ? [nodes[b]!] : b === node ? [nodes[a]!] : [])).map(([u, v]) => [u - x, v - y]);
+    const [dx, dy] = off.sort((a, b) => Math.hypot(b[0]!, b[1]!) - Math.hypot(a[0]!, a[1]!))[0] ?? [1, 0];
+    return Math.atan2(dy!, dx!);
   }
 
   private answer(text: string): void {

@@ -24,7 +24,7 @@ class NavConfig:
     """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the first that leads to the walk's end ('program',
     docs/sources.md, S93, S141)."""
     candidates: int = 5
-    """Sampled descriptions besides the likeliest one."""
+    """|D_cand|: the likeliest description and sampled ones (Table C.2)."""
     executor_iterations: int = 20_000
     """Updates of the teacher's executor."""
     describer_iterations: int = 20_000
@@ -51,9 +51,9 @@ class NavConfig:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} must be a multiple of heads {self.heads}")
-        if self.candidates < 0 or self.more_paths < 0 or not self.teacher_rate > 0 or not 0 < self.held_out < 1:
+        if self.candidates < 1 or self.more_paths < 0 or not self.teacher_rate > 0 or not 0 < self.held_out < 1:
             raise ValueError(
-                f"candidates {self.candidates} and more_paths {self.more_paths} must not be negative, "
+                f"candidates {self.candidates} must be at least 1, more_paths {self.more_paths} not negative, "
                 f"teacher_rate {self.teacher_rate} above 0, "
                 f"held_out {self.held_out} between 0 and 1"
             )

@@ -48,13 +48,13 @@ class NavData:
 
 
 def nav_data(
-    source: Dataset, config: NavConfig, encoder: str, quality: str | None = None, *, cache: Path | None = None
+    source: Dataset, config: NavConfig, encoder: str, picture_kind: str | None = None, *, cache: Path | None = None
 ) -> NavData:
     """A data set `vln` or `hanna` with features as the data of NAV.
 
     Args:
       encoder: digest of the encoder that made the features.
-      quality: of the pictures, as in agents.vision.run.pictures_of.
+      picture_kind: of the pictures, as in agents.vision.run.pictures_of.
       cache: where catalogue, sightings and more paths are kept; only they need it.
 
     Raises:
@@ -75,7 +75,7 @@ def nav_data(
     splits["test"] = [one for name in unseen for trip in house_trips(source, name) for one in each_wording(trip)]
     names = (*training, *unseen)
     places = {name: source.place(name) for name in names}
-    pictures = {name: pictures_of(source, name, quality) for name in names}
+    pictures = {name: pictures_of(source, name, picture_kind) for name in names}
     paths: dict[str, Path] = {n: feature_path(source.folder / "features", encoder, n, pictures[n]) for n in names}
     vocabulary = build_vocabulary(request for trip in splits["train"] for request in trip.requests)
     eyes = NavEyes(places, load_bank(paths, encoder, places, pictures), vocabulary)

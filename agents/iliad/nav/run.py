@@ -34,7 +34,7 @@ class NavSource:
     """A data set of `embodied dataset vln` (or hanna, whose assistants know such paths) with features."""
     encoder: str
     """Digest of the encoder that made them."""
-    quality: str | None
+    picture_kind: str | None
     """Of the pictures, as in agents.vision.run.pictures_of."""
     cache: Path
 
@@ -43,7 +43,9 @@ class NavSource:
         Raises:
           FileNotFoundError, ValueError: a data set of another kind, or without such features.
         """
-        return nav_data(dataset_of(self.folder, "vln", "hanna"), config, self.encoder, self.quality, cache=self.cache)
+        return nav_data(
+            dataset_of(self.folder, "vln", "hanna"), config, self.encoder, self.picture_kind, cache=self.cache
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ class LearnedNavTeacher:
     def describe(
         self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
     ) -> list[str | None]:
-        uniforms = rng.random((len(tasks), self.candidates, LONGEST))
+        uniforms = rng.random((len(tasks), self.candidates - 1, LONGEST))
         found: list[str | None] = [None] * len(tasks)
         left = []
         for i, (trip, walk) in enumerate(zip(tasks, executions, strict=True)):
@@ -92,7 +92,7 @@ class LearnedNavTeacher:
         drawn = self.candidates_of(trips, walks)
         found = self._kept(trips, walks, drawn)
         rest = [i for i in range(len(trips)) if self.pragmatics == "text" or not found[i]]
-        if rest and self.candidates:
+        if rest and self.candidates > 1:
             some, those = [trips[i] for i in rest], [walks[i] for i in rest]
             several = self._kept(some, those, self.candidates_of(some, those, uniforms[rest]))
             for i, more in zip(rest, several):

@@ -37,7 +37,7 @@ class RegexConfig:
     pragmatics: str = "program"
     """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the best one ('program', docs/sources.md, S93)."""
     candidates: int = 10
-    """Sampled descriptions besides the likeliest one."""
+    """|D_cand|: the likeliest description and sampled ones (Table C.2)."""
     marginal: str = "asked"
     """Which rules the student knows without requests: drawn as requests are ('asked'), of half of their shapes only
     ('narrow'), or of more shapes with any letters, most of which nobody asks for ('wide'; docs/sources.md, S140)."""
@@ -78,10 +78,10 @@ class RegexConfig:
         for name in ("executor_iterations", "describer_iterations", "teacher_batch"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if min(self.candidates, self.pretraining_iterations) < 0 or self.vocabulary < 1000:
+        if self.candidates < 1 or self.pretraining_iterations < 0 or self.vocabulary < 1000:
             raise ValueError(
-                f"candidates {self.candidates} and pretraining_iterations {self.pretraining_iterations} must not be "
-                f"negative, vocabulary {self.vocabulary} not below 1000"
+                f"candidates {self.candidates} must be at least 1, pretraining_iterations "
+                f"{self.pretraining_iterations} not negative, vocabulary {self.vocabulary} not below 1000"
             )
 
 

@@ -49,7 +49,7 @@ class LearnedTeacher:
     def describe(
         self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator
     ) -> list[str | None]:
-        uniforms = rng.random((len(tasks), self.candidates, LONGEST_REQUEST))
+        uniforms = rng.random((len(tasks), self.candidates - 1, LONGEST_REQUEST))
         said: list[str | None] = [None] * len(tasks)
         open_ones = []
         for i, (q, e) in enumerate(zip(tasks, executions, strict=True)):
@@ -74,7 +74,7 @@ class LearnedTeacher:
         cases = [(q, e, d[0]) for q, e, d in zip(tasks, executions, greedy)]
         found = [kept([d], [p], 1.0) for (_, _, d), p in zip(cases, self.performances(cases))]
         rest = [i for i in range(len(tasks)) if self.pragmatics == "text" or not found[i]]
-        if rest and self.candidates:
+        if rest and self.candidates > 1:
             several = self.candidates_of([tasks[i] for i in rest], [executions[i] for i in rest], uniforms[rest])
             cases = [(tasks[i], executions[i], d) for i, many in zip(rest, several) for d in many]
             performances = iter(self.performances(cases))

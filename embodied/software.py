@@ -1,0 +1,60 @@
+"""Libraries of software OpenGL (OSMesa) and of LLVM that came by pip, for machines where nobody may install packages.
+
+The wheel lavavu-osmesa (Linux, x86-64) carries both. `embodied doctor --fix` brings it; nothing of LavaVu itself is
+used.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import functools
+import importlib
+import importlib.util
+from pathlib import Path
+from unittest import mock
+
+FOLDER = "lavavu_osmesa.libs"
+WHEEL = "lavavu"
+
+
+@functools.cache
+def bundled(stem: str) -> Path | None:
+    """The library 'OSMesa' or 'LLVM' of the wheel, loaded with all it needs; None where the wheel is not installed or
+    does not fit this machine."""
+    spec = importlib.util.find_spec(WHEEL)
+    if spec is None or spec.origin is None:
+        return None
+    folder = Path(spec.origin).parent.parent / FOLDER
+    found = sorted(folder.glob(f"lib{stem}-*.so*"))
+    return found[0] if found and _loaded(folder, found[0]) else None
+
+
+def _loaded(folder: Path, wanted: Path) -> bool:
+    """Load the libraries of `folder` until `wanted` is among them: each needs others by names that only this finds."""
+    waiting = sorted(folder.glob("*.so*"))
+    while waiting:
+        left = [path for path in waiting if not _try(path)]
+        if wanted not in left:
+            return True
+        if left == waiting:
+            return False
+        waiting = left
+    return False
+
+
+def _try(path: Path) -> bool:
+    try:
+        ctypes.CDLL(str(path))
+    except OSError:
+        return False
+    return True
+
+
+def bind_osmesa() -> None:
+    """Let PyOpenGL, and so MuJoCo, use the wheel's OSMesa where the system has none; call it before importing them."""
+    library, load = bundled("OSMesa"), ctypes.CDLL
+    if library is not None and ctypes.util.find_library("OSMesa") is None:
+        found = lambda name, mode: load(str(library) if "OSMesa" in str(name) else name, mode)
+        with mock.patch.object(ctypes.cdll, "_dlltype", found):
+            importlib.import_module("OpenGL.platform")

@@ -1,0 +1,1 @@
+"""Furniture libraries (.sh3f) of embodied-houses, found by that package; there is nothing to import."""

@@ -1,0 +1,69 @@
+"""SmolLM2-135M in the line. It is weak: what is tested is that its answers are taken as they are."""
+
+from __future__ import annotations
+
+import dataclasses
+import socket
+import subprocess
+import time
+import urllib.request
+
+import pytest
+from hand_worlds import grid_world
+
+pytest.importorskip("openai", reason="the optional extra [llm] is not installed")
+pytest.importorskip("llama_cpp", reason="the optional extra [smollm] is not installed")
+
+from agents.language_models.agent import LanguageModelAgent
+from agents.language_models.assistant import ModelAssistant
+from agents.language_models.cache import AnswerCache
+from agents.language_models.client import Client, ServerSettings
+from agents.language_models.small import NAME, command
+from embodied.envs.make import ask_environment_maker, environment_maker, look_of
+from embodied.evaluation.metrics import usage
+from embodied.evaluation.rollout import play
+from embodied.interface import Ask, Intention
+from embodied.language import PlainLanguage
+from embodied.records import to_json
+from embodied.tasks.ask import ask_pool, ask_tasks
+from embodied.tasks.find import find_pool, find_task
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def served():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        port = s.getsockname()[1]
+    server = subprocess.Popen(command(port), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        for _ in range(240):
+            try:
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/v1/models", timeout=1).read()
+                break
+            except OSError:
+                time.sleep(0.25)
+        yield f"http://127.0.0.1:{port}/v1"
+    finally:
+        server.terminate()
+        server.wait(10)
+
+
+def test_a_real_model_acts_and_answers_and_replays_without_its_server(served, tmp_path):
+    world = grid_world()
+    find = environment_maker("find", {"grid": world})
+    task = find_task(find_pool(world, seed=0), 0, seed=0, language=PlainLanguage())
+    tasks = [dataclasses.replace(task, horizon=1)]
+    settings = ServerSettings(NAME, served, form="object", most_tokens=60, together=1, timeout=300.0)
+    client = Client(settings, AnswerCache(tmp_path / "answers.sqlite"))
+    (first,) = play(find, LanguageModelAgent(client), tasks, seed=0)
+    used = usage(first)
+    assert used is not None and used.tokens_in > 50 and used.calls == len(first.steps) == 1
+    env = ask_environment_maker({"grid": world}, look_of(None))()
+    env.assistant = ModelAssistant(env.assistant, client)
+    env.reset(ask_tasks(ask_pool(world, look_of(None), seed=0), 1, seed=0)[0])
+    env.step(Ask(Intention.REGION))
+    assert env.last_step.reply.text and env.last_step.reply.usage.tokens_out > 0
+    offline = Client(settings, AnswerCache(tmp_path / "answers.sqlite"), offline=True)
+    assert to_json(play(find, LanguageModelAgent(offline), tasks, seed=0)[0]) == to_json(first)

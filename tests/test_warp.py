@@ -1,0 +1,115 @@
+"""MuJoCo Warp shows the house that the classic renderer shows: on Warp's CPU device, where mujoco-warp is installed."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import math
+import sys
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished, painted
+
+from embodied.errors import UnableError
+from embodied.render.camera import camera_at
+from embodied.render.classic import Renderer
+from embodied.scene.house_meshes import owners
+
+EYE = (2.5, 2.6, 1.2)
+SIZE = 64
+
+
+def test_without_mujoco_warp_the_error_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco_warp", None)
+    monkeypatch.delitem(sys.modules, "embodied.render.warp", raising=False)
+    with pytest.raises(UnableError, match=r"pip install 'embodied-houses\[warp\]'"):
+        importlib.import_module("embodied.render.warp")
+
+
+@pytest.fixture(scope="module")
+def house():
+    return furnished(two_rooms())
+
+
+@pytest.fixture(scope="module")
+def lit(house):
+    """Pages whose colours change smoothly and differently along u and v, so that a turned texture is seen."""
+    u, v = np.meshgrid(np.linspace(0, 1, 128), np.linspace(0, 1, 64))
+    page = np.stack([60 + 180 * u, 220 - 160 * v, 90 + 60 * u + 60 * v], -1).astype(np.uint8)
+    pages = painted(house, HandCatalogue())
+    along = lambda m: np.clip(m.vertices[:, [0, 2]] / (10, 3) + m.vertices[:, [1, 1]] / (50, 20), 0, 1)
+    uv = lambda m: m.uv if m.kind == "outdoor" else along(m).astype(np.float32)
+    shine = lambda m: (0.0, 0.5) if m.owner.endswith("/glass") else None
+    meshes = tuple(dataclasses.replace(m, uv=uv(m), gloss=shine(m)) for m in pages.meshes)
+    return dataclasses.replace(pages, pages=(page,), meshes=meshes)
+
+
+@pytest.fixture(scope="module")
+def classic(house, lit):
+    with Renderer(house, HandCatalogue(), size=SIZE, lit=lit) as renderer:
+        yield renderer
+
+
+@pytest.fixture(scope="module")
+def warped(house, lit):
+    pytest.importorskip("mujoco_warp", reason="needs the extra [warp]")
+    from embodied.render.warp import WarpRenderer
+
+    with WarpRenderer(house, HandCatalogue(), lit, size=(SIZE, SIZE), device="cpu") as renderer:
+        yield renderer
+
+
+def decibels(a: np.ndarray, b: np.ndarray) -> float:
+    """Peak signal-to-noise ratio of two uint8 pictures."""
+    return float(10 * np.log10(255**2 / np.mean((a.astype(float) - b) ** 2)))
+
+
+@pytest.mark.gl
+def test_a_panorama_is_the_classic_one(house, classic, warped):
+    a, b = classic.panorama(EYE), warped.panorama(EYE)
+    same = a.ids == b.ids
+    assert same.mean() > 0.99 and decibels(a.rgb, b.rgb) > 30
+    inside = same & (a.depth < 10)
+    assert inside.mean() > 0.9 and np.abs(a.depth - b.depth)[inside].max() < 0.02
+    assert np.array_equal(np.isinf(b.depth), b.ids == 0)
+    panes = [i + 1 for i, o in enumerate(owners(house)) if o.endswith("/glass")]
+    glass = same & np.isin(a.ids, panes)
+    assert glass.sum() > 50, "panes count as what is seen where they are"
+    assert np.median(np.abs(a.rgb.astype(int) - b.rgb)[glass]) <= 2, "and colours shine through"
+
+
+@pytest.mark.gl
+def test_every_view_of_a_batch_is_its_own_camera(classic, warped):
+    positions = np.array([EYE, (7.0, 2.0, 1.4), (1.0, 3.0, 1.0)])
+    yaws, pitches = np.array([0.3, 2.5, -1.2]), np.array([0.0, -0.4, 0.5])
+    batch = warped.views(positions, yaws, pitches)
+    assert batch.rgb.shape == (3, SIZE, SIZE, 3)
+    for k in range(3):
+        shot = classic.through(camera_at(positions[k], yaws[k], pitches[k], math.pi / 2), (SIZE, SIZE))
+        assert decibels(shot.rgb, batch.rgb.numpy()[k]) > 28, k
+        assert (shot.ids == batch.ids.numpy()[k]).mean() > 0.98, k
+
+
+def test_pictures_are_handed_to_torch_without_a_copy(warped):
+    torch = pytest.importorskip("torch")
+    batch = warped.views([EYE], [0.0])
+    for array, kind in ((batch.rgb, torch.uint8), (batch.depth, torch.float32), (batch.ids, torch.int32)):
+        tensor = torch.from_dlpack(array)
+        assert tensor.data_ptr() == array.ptr and tensor.dtype == kind and tensor.shape == array.shape
+
+
+def test_what_is_not_asked_for_is_not_drawn(warped):
+    before = warped.views([EYE], [0.0]).ids.numpy().copy()
+    colours = warped.views([EYE], [math.pi], sees=("rgb",))
+    turned = colours.rgb.numpy().copy()
+    assert np.array_equal(colours.ids.numpy(), before)
+    assert np.array_equal(turned, warped.views([EYE], [math.pi]).rgb.numpy())
+
+
+def test_a_batch_larger_than_the_renderer_is_refused(warped):
+    with pytest.raises(ValueError, match="7 views.*1 to 6"):
+        warped.views([EYE] * 7, [0.0] * 7)
+    with pytest.raises(ValueError, match="sound"):
+        warped.views([EYE], [0.0], sees=("sound",))
