@@ -36,7 +36,7 @@ def excursion(world) -> Excursion:
 def folders(world, tmp_path_factory):
     home = tmp_path_factory.mktemp("forms")
     for form in FORMATS:
-        export_walks(form, home / form, [excursion(world)], {world.name: world}, seed=0, shot=SMALL)
+        export_walks(form, home / form, [excursion(world)], {world.name: world}, seed=0, shot=SMALL, depth=True)
     return home
 
 

@@ -92,6 +92,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         sub.add_argument(
             "--width", type=video_side, metavar="PIXELS", help="width of pictures (default: that of the program)"
         )
+        if name == "lerobot-vlnce":
+            sub.add_argument("--depth", action="store_true", help="also write videos of depth")
         add_cache(sub)
     for name in FORMATS:
         sub = what.add_parser(name, help=f"a house as {name}")
@@ -266,6 +268,7 @@ def run_walks(args: argparse.Namespace) -> int:
         shot=shot,
         wander=args.wander,
         split=args.split,
+        depth=args.what == "lerobot-vlnce" and args.depth,
         watch=lambda episodes: bar(episodes, "walks", "walk"),
     )
     for world in worlds.values():

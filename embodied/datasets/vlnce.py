@@ -3,7 +3,7 @@
   vlnce        samples.jsonl with a line per step, images/, and the episodes in Habitat's files
   streamvln    annotations.json with the actions of each walk, images/<walk>/rgb/000.jpg
   uninavid     conversations that ask for the next four actions, with a video of what was seen until then
-  lerobot-vlnce    LeRobot v3.0 with depth, for policies that `lerobot-eval` judges in embodied.gym.lerobot
+  lerobot-vlnce    LeRobot v3.0, for policies that `lerobot-eval` judges in embodied.gym.lerobot
   internnav    InternData-N1's vln_ce: a LeRobot v2.1 folder per house, cameras level and 30 degrees down, pixel goals
 
 A walk may leave the expert's way: what is written as the action is always what the expert does there (DAgger).
@@ -139,6 +139,7 @@ def export_walks(
     shot: Shot = Shot(),
     wander: float = 0.0,
     split: str = "train",
+    depth: bool = False,
     watch: Callable[[Iterable[Excursion]], Iterable[Excursion]] = iter,
 ) -> int:
     """Play episodes and write them in one of FORMATS; returns how many steps there are.
@@ -146,6 +147,7 @@ def export_walks(
     Args:
       folder: new or empty.
       wander: the share of actions, below 1, that are drawn instead of the expert's; what is written stays the expert's.
+      depth: whether 'lerobot-vlnce' has videos of depth; policies that want colours alone cannot read them.
       watch: goes through the episodes, as a progress bar does.
 
     Raises:
@@ -169,7 +171,7 @@ def export_walks(
         write_vlnce(folder, split, with_experts(episodes, worlds, ContinuousEnv(body, Grounds())))
     if form == "lerobot-vlnce":
         with whole_folder(folder) as draft:
-            return _lerobot(draft, taught, shot)
+            return _lerobot(draft, taught, shot, depth)
     writers = {"vlnce": _samples, "streamvln": _streamvln, "uninavid": _uninavid, "internnav": _internnav}
     return writers[form](folder, taught, shot)
 
@@ -234,9 +236,9 @@ LEROBOT: Columns = {
 }
 
 
-def _lerobot(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+def _lerobot(folder: Path, walks: Iterable[Taught], shot: Shot, with_depth: bool) -> int:
     camera = RecordedCamera(shot.height, shot.width, shot.vfov)
-    writer = Writer(folder, camera, LEROBOT, key="observation.image", fps=STEPS, depth=True)
+    writer = Writer(folder, camera, LEROBOT, key="observation.image", fps=STEPS, depth=with_depth)
     for t in walks:
         walk, n = t.walk, len(t.labels)
         poses = zip(walk.positions[:-1], walk.yaws[:-1], walk.pitches[:-1], strict=True)
