@@ -42,7 +42,7 @@ def commands() -> list[tuple[str, list[str]]]:
         for page in pages
         if page.name not in ("command_line.md", "details.md")  # made from the code, and from the data of all tables
         for block in re.findall(r"^```(?:sh)?\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
-        for line in block.splitlines()
+        for line in block.replace("\\\n", " ").splitlines()
     ]
     tables = sorted((ROOT / "docs/results/data").glob("*.json"))
     lines += [(table.name, line) for table in tables for line in json.loads(table.read_text())["command"].splitlines()]
