@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_data import build
+from hand_data import built
 
 from agents.common.session import metrics_of
 from agents.vision.config import drawing
@@ -15,6 +15,7 @@ from agents.vision.features import feature_path, save_features
 from agents.vnla.agent import load_agent
 from embodied.cli import main
 from embodied.cli.view import looked_at
+from embodied.identity import read_finished
 from embodied.interface import Episode
 from embodied.records import episodes_file, load_lines
 
@@ -41,13 +42,13 @@ def with_features(data):
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("vnla")
-    return with_features(build(folder / "data", folder / "cache", "vnla"))
+    return with_features(built(folder / "data", "vnla"))
 
 
 @pytest.fixture(scope="module")
 def without_rooms(tmp_path_factory):
     folder = tmp_path_factory.mktemp("no rooms")
-    return with_features(build(folder / "data", folder / "cache", "vnla", rooms=False))
+    return with_features(built(folder / "data", "vnla", rooms=False))
 
 
 def run(*words) -> int:
@@ -96,6 +97,10 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     assert run(*askers) == 0
     text = (tmp_path / "vnla-askers.md").read_text()
     assert "| teacher |" in text and "Not run: none, first, random." in text and "(34.95)" in text
+    printed = ("study", "vnla", "algorithm-6", *words[4:], "--rows", "Algorithm 6, learned")
+    assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
+    (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")
+    assert read_finished(trained)[0]["settings"]["rules"] == "algorithm-6"
 
 
 def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, monkeypatch):
@@ -121,6 +126,6 @@ def test_a_rule_of_play_is_chosen_on_the_command_line(rules, data, capsys):
 
 
 def test_another_kind_of_data_is_refused_with_what_to_build(tmp_path, capsys):
-    other = build(tmp_path / "data", tmp_path / "cache", "find")
+    other = built(tmp_path / "data", "find")
     assert run("train", "vnla", "--data", other.folder, "--out", tmp_path / "run", *SMALL) == 2
     assert "embodied dataset vnla" in capsys.readouterr().err

@@ -229,7 +229,7 @@ def _evaluate(
             write_json(args.out / "behaviour.json", found, indent=1)
         write_json(args.out / "run.json", fingerprint(**about), indent=1)
         note(f"table and episodes in {args.out}")
-    text = tables.markdown(rows, [c for c in _columns(args.kind, files) if all(c in r.values for r in rows)])
+    text = tables.markdown(rows, [c for c in _columns(args.kind, files) if any(c in r.values for r in rows)])
     if found:
         text += f"\n{json.dumps(found, indent=1)}"
     result: dict[str, object] = {"data": data and data.digest, "rows": json.loads(tables.as_json(rows))}
