@@ -43,7 +43,7 @@ def coloured(path, n: int, *, seed: int) -> None:
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("encoders")
-    return build(folder / "data", folder / "cache", make_house=small_house)
+    return build(folder / "data", folder / "cache", "find", size="1x4", make_house=small_house)
 
 
 @pytest.fixture

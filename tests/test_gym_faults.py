@@ -14,7 +14,7 @@ import numpy as np
 import psutil
 import pytest
 from conftest import two_rooms
-from hand_data import build
+from hand_data import built
 from hand_worlds import grid_world
 from handmade import HandCatalogue, furnished
 from test_gym import make
@@ -174,7 +174,7 @@ def test_pictures_of_all_houses_have_one_even_size(tmp):
 
 @pytest.mark.slow
 def test_a_data_set_that_is_dropped_keeps_none_of_its_houses(tmp_path):
-    build(tmp_path / "data", tmp_path / "cache", "vnla")
+    built(tmp_path / "data", "vnla")
     for _ in range(3):
         split = Dataset(tmp_path / "data").split("val_seen")
         env = HelpGymEnv(split.make_env, split.tasks, Closed())

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from conftest import two_rooms
-from hand_data import build
+from hand_data import built
 from hand_worlds import grid_world
 from handmade import HandCatalogue, furnished
 
@@ -178,7 +178,7 @@ def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monk
 
 @pytest.mark.slow
 def test_a_data_set_without_pictures_says_the_command_that_draws_them(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache")
+    data = built(tmp_path / "data")
     with pytest.raises(ValueError, match=r"pictures of 0 of its \d+ houses.*--pictures fast"):
         embodied.gym.env.make(data.kind, data=data.folder, split="train", cache=tmp_path / "cache", sees="rgb")
 

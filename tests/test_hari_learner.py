@@ -8,7 +8,7 @@ import itertools
 import numpy as np
 import pytest
 import torch
-from hand_data import build
+from hand_data import built
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
@@ -565,7 +565,7 @@ def test_the_skyline_needs_no_execution_policy_on_sub_goals(fork_executor):
 @pytest.mark.slow
 def test_the_tables_are_made_from_a_data_set(tmp_path):
     """Agents that were hardly trained, beside a rule, and an execution policy alone."""
-    data = build(tmp_path / "data", tmp_path / "cache", "hari")
+    data = built(tmp_path / "data", "hari")
     walking = dataclasses.replace(SMALL, hidden_size=16, iterations=1, validate_every=1, validation_tasks=2)
     asking = dataclasses.replace(QUICK, hidden_size=8, iterations=1, batch=4, validation_tasks=3, horizon=6)
     study = HariStudy(data.folder, (0,), 2, (0,), execution=walking, intention=asking)

@@ -9,7 +9,7 @@ from agents.common.settings import AT_LEAST_ONE, POSITIVE, require, require_word
 SCORES = ("success", "nDTW", "SDTW")
 """What a person's stars are simulated from."""
 DECISIONS = ("drawn", "usual")
-"""How agents decide while they are judged: as while they are rated, or as `embodied judge` has it."""
+"""How agents decide while they are judged: as while they are rated, or as `embodied evaluate` has it."""
 
 
 @dataclass(frozen=True)

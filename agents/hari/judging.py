@@ -11,7 +11,7 @@ from agents.hari.intention import counts_of
 from agents.hari.policy import policy_of
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent
 from agents.hari.run import CONDITIONS, ground_of, rules_of
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
@@ -56,6 +56,7 @@ def judge(
     only: Sequence[str] = (),
     keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+    instead: Callable[[SplitData], SplitData] = lambda split: split,
 ) -> list[Row]:
     """One row per policy and split, over the same tasks, in the environment that the agent was trained for.
 
@@ -63,6 +64,7 @@ def judge(
       limit: at most so many tasks per split, from all houses alike.
       only: names of rows; none for all.
       keep: is given split, name and episodes (to save them).
+      instead: gives a split another assistant.
 
     Raises:
       ValueError: an unknown row.
@@ -72,7 +74,7 @@ def judge(
         raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
     rows = []
     for split in splits:
-        whole = data.split(split, hari=rules_of(agent.config))
+        whole = instead(data.split(split, hari=rules_of(agent.config)))
         tasks = spread(whole.tasks, limit)
         graphs = {n: p.graph for n, p in whole.worlds.items()}
         for name in watch(only or list(judged)):

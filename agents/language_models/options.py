@@ -9,8 +9,8 @@ from agents.language_models.cache import AnswerCache
 from agents.language_models.client import FORMS, Client, ServerSettings
 
 
-def add_model(parser: argparse.ArgumentParser) -> None:
-    """--model and all that belongs to it; `client_of` reads them."""
+def add_model(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+    """--model and all that belongs to it, as a group; `client_of` reads them."""
     group = parser.add_argument_group("the language model")
     plain = ServerSettings("")
     group.add_argument("--model", metavar="NAME", help="name of the model, as its server knows it")
@@ -40,6 +40,7 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--offline", action="store_true", help="only answers that are kept are used")
     group.add_argument("--prompts", type=Path, metavar="DIR", help="folder with prompts of your own (agent.md, ...)")
+    return group
 
 
 def client_of(args: argparse.Namespace) -> Client:

@@ -36,8 +36,6 @@ COMMANDS = (
     "corpus",
     "export",
     "train",
-    "eval",
-    "judge",
     "evaluate",
     "serve",
     "study",

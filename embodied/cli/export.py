@@ -111,7 +111,7 @@ def _add_lerobot(parser: argparse.ArgumentParser) -> None:
     _add_data(parser)
     parser.add_argument(
         "--episodes", type=any_path, nargs="+", metavar="FILE",
-        help="episodes (.jsonl) of `embodied eval` or `judge` (default: an expert plays --split)",
+        help="episodes (.jsonl) of `embodied evaluate` (default: an expert plays --split)",
     )  # fmt: skip
     parser.add_argument("--split", default="train", help="what the expert plays (default: %(default)s)")
     parser.add_argument("--tasks", type=whole(), metavar="N", help="the expert plays the first so many tasks")

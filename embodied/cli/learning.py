@@ -1,4 +1,4 @@
-"""Options of the commands that learn: `embodied train vision | hanna | vnla | hari`, `features`, `judge` and `study`.
+"""Options of the commands that learn: `embodied train vision | hanna | vnla | hari`, `features` and `study`.
 
 Free of torch, so that `embodied --help` answers at once; what they do is in agents.vision.run,
 agents.hanna.run, agents.hanna.judging and agents.hanna.study.
@@ -24,7 +24,7 @@ from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from agents.vision.config import RENDER_PRESETS, TORCHVISIONS, VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
-from embodied.cli.common import add_cache, add_json
+from embodied.cli.common import add_cache
 from embodied.cli.options import REPEATS, add_fields, add_pictures, any_path, folder_to_write, positive, whole
 
 
@@ -34,12 +34,16 @@ def add_common(parser: argparse.ArgumentParser, threads: int = 2) -> None:
         "--data", type=any_path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built"
     )
     add_cache(parser)
+    add_threads(parser, threads)
+
+
+def add_threads(parser: argparse._ActionsContainer, threads: int = 2) -> None:
     parser.add_argument(
-        "--threads", type=whole(), default=threads, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
+        "--threads", type=whole(), default=threads, metavar="N", help="CPU threads of PyTorch (default: %(default)s)"
     )
 
 
-def add_encoder(parser: argparse.ArgumentParser) -> None:
+def add_encoder(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--encoder",
         type=any_path,
@@ -55,7 +59,7 @@ def add_encoder(parser: argparse.ArgumentParser) -> None:
     add_drawn(parser)
 
 
-def add_drawn(parser: argparse.ArgumentParser) -> None:
+def add_drawn(parser: argparse._ActionsContainer) -> None:
     add_pictures(
         parser,
         tuple(RENDER_PRESETS),
@@ -232,7 +236,7 @@ SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "la
 """As in agents.vision.occasions, which --help should not import."""
 
 
-def add_shown(parser: argparse.ArgumentParser, *, several: bool = False) -> None:
+def add_shown(parser: argparse._ActionsContainer, *, several: bool = False) -> None:
     parser.add_argument(
         "--shown",
         choices=SHOWN,
@@ -409,36 +413,6 @@ def _named_file(text: str) -> tuple[str, Path]:
     return name, any_path(path)
 
 
-def add_eval(parser: argparse.ArgumentParser) -> None:
-    add_common(parser)
-    add_encoder(parser)
-    parser.add_argument(
-        "--agent",
-        type=any_path,
-        metavar="FILE",
-        help="a trained agent (default: the shipped one of the data set's kind)",
-    )
-    parser.add_argument("--split", nargs="+", help="which splits (default: test_unseen; HARI: all three of test)")
-    parser.add_argument(
-        "--only",
-        nargs="+",
-        metavar="NAME",
-        help="which rows (default: all; of HANNA besides, judged more as the text has it: 'learned, likeliest move', "
-        "'learned, without a trail' and others)",
-    )
-    parser.add_argument("--tasks", type=whole(), metavar="N", help="at most so many tasks, from all houses alike")
-    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: %(default)s)")
-    parser.add_argument(
-        "--batch",
-        type=whole(),
-        default=32,
-        help="episodes side by side; no influence on results (default: %(default)s)",
-    )
-    add_shown(parser)
-    parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where tables and episodes go")
-    add_json(parser)
-
-
 def add_study_bandit(parser: argparse.ArgumentParser) -> None:
     add_study(parser, "3.2, 3.4, 3.5, rates or held-out", data="corpus that `embodied corpus` made")
     add_scale(parser, BANDIT_SCALES)
@@ -530,7 +504,7 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
         "--decisions",
         choices=DECISIONS,
         default="drawn",
-        help="judge with moves and questions drawn, as they are while they are rated, or as `embodied judge` takes "
+        help="judge with moves and questions drawn, as they are while they are rated, or as `embodied evaluate` takes "
         "them (default: %(default)s)",
     )
     parser.add_argument(

@@ -211,6 +211,11 @@ class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
         """Radians turned to the left since the start, in [-pi, pi)."""
         return float(wrap(self.play.yaw - self.play.excursion.yaw))
 
+    def moved(self) -> np.ndarray:
+        """(5,) float32: gps, sine and cosine of `turned`, the camera's tilt in radians."""
+        turned = self.turned()
+        return np.array([*self.gps(), math.sin(turned), math.cos(turned), self.play.pitch], np.float32)
+
     def expert(self, *, along: bool = False) -> Follower:
         """Who knows the way from wherever the body is, for training."""
         return Follower(self.play, along=along)

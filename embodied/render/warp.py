@@ -123,7 +123,10 @@ class WarpRenderer:
             self._context = context
             self._of_all = {
                 (rgb, rest): dataclasses.replace(
-                    context, render_rgb=yes if rgb else no, render_depth=yes if rest else no, render_seg=yes if rest else no
+                    context,
+                    render_rgb=yes if rgb else no,
+                    render_depth=yes if rest else no,
+                    render_seg=yes if rest else no,
                 )
                 for rgb, rest in ((True, True), (True, False), (False, True))
             }
@@ -171,7 +174,11 @@ class WarpRenderer:
         with wp.ScopedDevice(self.device):
             at, turned, tilted = (
                 x if isinstance(x, wp.array) else wp.array(np.asarray(x, np.float32), dtype=kind)
-                for x, kind in ((positions, wp.vec3), (yaws, float), (np.zeros(n) if pitches is None else pitches, float))
+                for x, kind in (
+                    (positions, wp.vec3),
+                    (yaws, float),
+                    (np.zeros(n) if pitches is None else pitches, float),
+                )
             )
             wp.launch(_aim, n, inputs=[at, turned, tilted], outputs=[self._data.cam_xpos, self._data.cam_xmat])
             self._data.nworld = n
@@ -239,7 +246,9 @@ def device_of(name: str | None) -> Any:
     try:
         return wp.get_preferred_device() if name is None else wp.get_device(name)
     except (ValueError, RuntimeError) as e:
-        raise UnableError(f"Warp has no device {name!r} here ({e}); use one of {[str(d) for d in wp.get_devices()]}") from e
+        raise UnableError(
+            f"Warp has no device {name!r} here ({e}); use one of {[str(d) for d in wp.get_devices()]}"
+        ) from e
 
 
 def _compiled(
