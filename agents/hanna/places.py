@@ -215,7 +215,8 @@ def main() -> None:
         "paper": None,
         "command": "python -m agents.hanna.places --validation VAL --data TEST --out docs/results/data",
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} lit houses, pictures {args.pictures}; {WALKS} walks of {MOVES} moves in each",
+        "settings": f"{houses} houses that nothing learned from, pictures {args.pictures or 'of the data set'}; "
+        f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
         "rows": rows,
         "notes": ["'again': the agent's own panoramas through a robot's camera, compared without turning."],

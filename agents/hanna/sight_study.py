@@ -24,7 +24,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
-from embodied.evaluation.tables import Row, row
+from embodied.evaluation.tables import Row, Samples, interval, less, measured, row
 from embodied.interface import Agent, Episode
 from embodied.locks import locked
 from embodied.records import episodes_file, load_lines, save_lines
@@ -75,12 +75,14 @@ def main() -> None:
     torch.set_num_threads(1)
     data = Dataset(args.data)
     args.episodes.mkdir(parents=True, exist_ok=True)
-    rows = []
+    rows, taken = [], dict[str, Samples]()
     with locked(args.episodes):
         for shown in args.shown:
             for name in args.rows if shown == args.shown[0] else [r for r in args.rows if r in EVERYWHERE]:
                 episodes = [e for split in args.split for e in episodes_of(data, split, shown, name, args)]
                 graphs = {e.task.world: data.place(e.task.world).graph for e in episodes}
+                if shown == args.shown[0]:
+                    taken[name] = measured(episodes, graphs)["success"]
                 values = numbers(row(name, args.split[0], episodes, graphs, seed=args.seed))
                 print(shown, name, {k: v["mean"] for k, v in values.items()}, flush=True)
                 rows.append({"label": f"{name} ({shown})", "values": values, "printed": {}})
@@ -105,6 +107,7 @@ def main() -> None:
                 "notes": [
                     "blind: all features zero, for the networks and for the matcher of pictures.",
                     "rules only: no learned network; moves are drawn evenly under the same rules, help every 5 steps.",
+                    *(lead(taken["learned"], taken[other], other) for other in taken if other != "learned"),
                 ],
             },
             indent=1,
@@ -126,6 +129,12 @@ def episodes_of(data: Dataset, name: str, shown: str, agent_name: str, args: arg
         tasks = spread(split.tasks, args.tasks)
         save_lines(path, play(split.make_env, judged[agent_name], tasks, seed=args.seed, batch=32, agent=agent_name))
     return list(load_lines(path, Episode))
+
+
+def lead(learned: Samples, other: Samples, name: str) -> str:
+    """How far the learned agent is ahead, task by task."""
+    ahead = interval([less(learned, other)])
+    return f"learned, less {name}: {100 * ahead.mean:.1f} ± {100 * ahead.half:.1f} points of success."
 
 
 def numbers(made: Row) -> dict[str, dict[str, float | int]]:

@@ -33,8 +33,10 @@ from embodied.scene.lit_pages import LitPages, glass_surfaces
 from embodied.scene.model import VISUAL, build_spec, compile_spec, owner_of_name
 
 try:
-    import mujoco_warp as mjw
     import warp as wp
+
+    wp.config.quiet = True  # it tells of devices and compilers on standard output
+    import mujoco_warp as mjw
 except ImportError as e:
     raise UnableError(
         f"the back end 'warp' needs mujoco-warp ({e}); pip install 'embodied-houses[warp]', or use backend 'classic'"
@@ -121,7 +123,7 @@ class WarpRenderer:
             context.znear, context.zfar = NEAR, FAR
             yes, no = (wp.array([x], dtype=bool) for x in (True, False))
             self._context = context
-            self._of_all = {
+            self._passes = {
                 (rgb, rest): dataclasses.replace(
                     context,
                     render_rgb=yes if rgb else no,
@@ -137,7 +139,7 @@ class WarpRenderer:
                 self._behind = (
                     dataclasses.replace(self._model, geom_rgba=wp.array(clear[None], dtype=wp.vec4)),
                     dataclasses.replace(
-                        self._of_all[True, False],
+                        self._passes[True, False],
                         rgb_data=wp.zeros_like(context.rgb_data),
                         seg_data=wp.zeros_like(context.seg_data),
                     ),
@@ -183,7 +185,7 @@ class WarpRenderer:
             wp.launch(_aim, n, inputs=[at, turned, tilted], outputs=[self._data.cam_xpos, self._data.cam_xmat])
             self._data.nworld = n
             through = colours and self._behind is not None
-            mjw.render(self._model, self._data, self._of_all[colours, rest or through])
+            mjw.render(self._model, self._data, self._passes[colours, rest or through])
             if self._behind is not None and through:
                 mjw.render(self._behind[0], self._data, self._behind[1])
             batch = Batch(*(a[:n] for a in (self._batch.rgb, self._batch.depth, self._batch.ids)))
@@ -225,6 +227,10 @@ class WarpRenderer:
         batch = self.views([position] * 6, FACE_YAWS, FACE_PITCHES)
         return Panorama(batch.rgb.numpy(), batch.depth.numpy(), batch.ids.numpy())
 
+    def wait(self) -> None:
+        """Return when the device has drawn what was asked for; `views` only asks."""
+        wp.synchronize_device(self.device)
+
     def close(self) -> None:
         """Free what lies on the device; the renderer cannot be used afterwards."""
         vars(self).clear()
@@ -242,13 +248,18 @@ def device_of(name: str | None) -> Any:
     Raises:
       UnableError: it is not here.
     """
-    wp.config.quiet = True
     try:
         return wp.get_preferred_device() if name is None else wp.get_device(name)
     except (ValueError, RuntimeError) as e:
         raise UnableError(
             f"Warp has no device {name!r} here ({e}); use one of {[str(d) for d in wp.get_devices()]}"
         ) from e
+
+
+def card() -> str | None:
+    """Name of the GPU that is used by default; None where there is none."""
+    device = device_of(None)
+    return str(device.name) if device.is_cuda else None
 
 
 def _compiled(
@@ -281,7 +292,7 @@ def _aim(
     pitches: wp.array[float],
     xpos: wp.array2d[wp.vec3],
     xmat: wp.array2d[wp.mat33],
-):
+) -> None:
     """The camera of every world as in embodied.render.camera.camera_at; it looks along its -z, with y up."""
     i = wp.tid()
     cy, sy, cp, sp = wp.cos(yaws[i]), wp.sin(yaws[i]), wp.cos(pitches[i]), wp.sin(pitches[i])
@@ -290,7 +301,7 @@ def _aim(
 
 
 @wp.func
-def _channel(packed: wp.uint32, shift: int):  # noqa: ANN202
+def _channel(packed: wp.uint32, shift: int) -> float:
     return float((packed >> wp.uint32(shift)) & wp.uint32(255))
 
 
@@ -309,26 +320,19 @@ def _finish(
     rgb_out: wp.array4d[wp.uint8],
     depth_out: wp.array3d[float],
     ids_out: wp.array3d[int],
-):
+) -> None:
     """Bytes of packed colours, with what stands behind glass; depth and owners of what was met."""
     i, row, column = wp.tid()
     pixel = row * width + column
     geom = seg[i, pixel][0]
     if colours:
-        share = 1.0
-        if through and geom >= 0:
-            share = opacities[geom]
+        share = wp.where(through and geom >= 0, opacities[wp.max(geom, 0)], 1.0)
         for c in range(3):
             value = _channel(rgb[i, pixel], 16 - 8 * c)
             if share < 1.0:
                 value = share * value + (1.0 - share) * _channel(behind[i, pixel], 16 - 8 * c)
             rgb_out[i, row, column, c] = wp.uint8(int(value + 0.5))
     if rest:
-        owner = 0
-        if geom >= 0:
-            owner = owned[geom]
+        owner = wp.where(geom >= 0, owned[wp.max(geom, 0)], 0)
         ids_out[i, row, column] = owner
-        if owner == 0:
-            depth_out[i, row, column] = wp.inf
-        else:
-            depth_out[i, row, column] = depth[i, pixel]
+        depth_out[i, row, column] = wp.where(owner > 0, depth[i, pixel], wp.inf)
