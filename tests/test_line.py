@@ -111,7 +111,7 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
         return facts
 
     monkeypatch.setattr(demo, "find_something", kept)
-    words = ("demo", "--seed", 2, "--quality", "unlit", "--size", 48, "--json", "--cache", shared_cache)
+    words = ("demo", "--seed", 2, "--pictures", "unlit", "--size", 48, "--json", "--cache", shared_cache)
     assert main([*map(str, words), "--out", str(tmp_path)]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["walk"]["success"] and told["walk"]["spl"] == 1.0
