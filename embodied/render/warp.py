@@ -35,7 +35,7 @@ from embodied.scene.model import VISUAL, build_spec, compile_spec, owner_of_name
 try:
     import warp as wp
 
-    wp.config.quiet = True  # it tells of devices and compilers on standard output
+    wp.config.log_level = wp.LOG_WARNING  # else it tells of devices and compilers on standard output
     import mujoco_warp as mjw
 except ImportError as e:
     raise UnableError(
@@ -212,7 +212,7 @@ class WarpRenderer:
     def view(self, position: Sequence[float] | np.ndarray, yaw: float, pitch: float = 0.0) -> View:
         """The picture from `position` (x, y, z) along (yaw, pitch), radians."""
         batch = self.views([position], [yaw], [pitch])
-        return View(batch.rgb.numpy()[0], batch.depth.numpy()[0], batch.ids.numpy()[0])
+        return View(*(a.numpy()[0].copy() for a in (batch.rgb, batch.depth, batch.ids)))
 
     def panorama(self, position: Sequence[float] | np.ndarray) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z).
@@ -225,7 +225,7 @@ class WarpRenderer:
                 f"faces of a panorama are square and see 90 degrees, not {self.size} and {math.degrees(self.vfov):g}"
             )
         batch = self.views([position] * 6, FACE_YAWS, FACE_PITCHES)
-        return Panorama(batch.rgb.numpy(), batch.depth.numpy(), batch.ids.numpy())
+        return Panorama(*(a.numpy().copy() for a in (batch.rgb, batch.depth, batch.ids)))
 
     def wait(self) -> None:
         """Return when the device has drawn what was asked for; `views` only asks."""
