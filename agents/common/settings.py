@@ -118,16 +118,15 @@ MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes")
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationSettings:
-    """How an agent by imitation is judged, in validations too."""
+    """How an agent that learns by imitation is evaluated, in validations too."""
 
     evaluation_temperature: float = 0.0
-    """How navigation actions are chosen when judged: 0 takes the likeliest, 1 draws from
-    the distribution, between them it is sharpened. An agent that is often wrong and always takes its
-    likeliest action walks in circles (docs/sources.md, S36)."""
+    """Sampling temperature of navigation actions in evaluation: 0 is greedy decoding, 1 samples from the distribution.
+    An agent that is often wrong and decodes greedily walks in circles (docs/sources.md, S36)."""
     ask_threshold: float = 0.5
-    """When judged, the learned rule asks where asking is more probable than this."""
+    """In evaluation, the learned rule asks where asking is more probable than this."""
     evaluation_batch: int = 32
-    """Episodes judged side by side; has no influence on results, only on speed."""
+    """Episodes evaluated in parallel; changes speed, not results."""
 
     def __post_init__(self) -> None:
         require(self, AT_LEAST_ONE, "evaluation_batch")

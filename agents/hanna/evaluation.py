@@ -38,11 +38,15 @@ ASK_THRESHOLDS: Mapping[str, Mapping[str, HannaAskRule]] = {
 }
 """Rules of asking put before one pair of networks, from few requests to many, by kind of rule."""
 EVAL_ABLATIONS: Mapping[str, Mapping[str, Any]] = {
-    "learned, without search": {"search": 0.0},
-    "learned, not by image": {"by_image": False},
-    "learned, without a trail": {"by_image": False, "again": 1.0},
+    "learned, without search": {"frontier_discount": 0.0},
+    "learned, not by image": {"use_goal_image": False},
+    "learned, without a trail": {"use_goal_image": False, "revisit_weight": 1.0},
     "learned, likeliest move": {"choose": choose_at(0.0)},
-    "learned, likeliest move, without a trail": {"choose": choose_at(0.0), "by_image": False, "again": 1.0},
+    "learned, likeliest move, without a trail": {
+        "choose": choose_at(0.0),
+        "use_goal_image": False,
+        "revisit_weight": 1.0,
+    },
 }
 """What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when it
 asks (docs/sources.md, S36, S161; S162 stays)."""
@@ -132,7 +136,7 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     rules = dataclasses.replace(learned, network=nothing, ask_rule=every5)
     return {
         "blind": blind,
-        "blind, not by image": dataclasses.replace(blind, by_image=False),
+        "blind, not by image": dataclasses.replace(blind, use_goal_image=False),
         "blind, ask every 5": dataclasses.replace(blind, ask_rule=every5),
         "rules only": rules,
         "rules only, ask every 10": dataclasses.replace(rules, ask_rule=ask_every(10)),

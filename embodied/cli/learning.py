@@ -160,12 +160,12 @@ def add_train_vision(parser: argparse.ArgumentParser) -> None:
         "--workers", type=whole(), default=1, metavar="N", help="render N houses in parallel (default: %(default)s)"
     )
     parser.add_argument(
-        "--like",
+        "--distil-from",
         type=any_path,
         dest="example",
         metavar="FILE",
-        help="begin with this encoder, go on seeing places drawn without light as it does, and see these pictures of "
-        "them alike: agents that know its features may then be shown either (no labels but for probes)",
+        help="distil from this encoder: start from its weights, and map the new pictures to the features that it gives "
+        "for the same places without light, so that agents trained on its features can use either encoder",
     )
     add_fields(parser, VisionConfig, skip=("like",))
 
