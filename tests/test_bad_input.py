@@ -60,7 +60,7 @@ def said(capsys, *words: str) -> str:
         (("assets", "list", "--class", "zebra"), "no object class 'zebra'"),
         (("render", "/nowhere"), "name a folder that `embodied house` wrote"),
         (("light", "/nowhere"), "name a folder that `embodied house` wrote"),
-        (("eval", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
+        (("evaluate", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
         (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json does not exist"),
         (("bench", "nothing"), "unknown benchmark"),
         (("house", "--seed", "seven", "--out", "x"), "invalid int value: 'seven'; `embodied house --help` explains"),

@@ -118,7 +118,7 @@ def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     data = built(tmp_path / "d")
     out = tmp_path / "out"
     assert (
-        main(["eval", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)])
+        main(["evaluate", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)])
         == 0
     )
     printed = capsys.readouterr().out
@@ -128,5 +128,5 @@ def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     assert (out / "table.csv").read_text().count("\n") == 1 + 2 * 10
     assert (out / "episodes_test_unseen_random_walk.jsonl").exists()
     assert json.loads((out / "run.json").read_text())["data"] == data.digest
-    assert main(["eval", "vnla", "--data", str(data.folder)]) == 2
+    assert main(["evaluate", "vnla", "--data", str(data.folder)]) == 2
     assert "data set of 'hanna'" in capsys.readouterr().err

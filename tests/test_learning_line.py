@@ -95,7 +95,20 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert "continuing after update 2" in capsys.readouterr().err
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2, 3]
     best, out = tmp_path / "best.safetensors", tmp_path / "table"
-    judge = ("judge", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 4, "--threads", 1)
+    judge = (
+        "evaluate",
+        "hanna",
+        "--data",
+        data.folder,
+        "--agent",
+        best,
+        "--network",
+        "random",
+        "--tasks",
+        4,
+        "--threads",
+        1,
+    )
     assert run(*judge, "--out", out) == 0
     table = (out / "table.md").read_text()
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):

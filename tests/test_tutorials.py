@@ -45,8 +45,9 @@ def commands() -> list[tuple[str, list[str]]]:
         (page.name, line.removeprefix(".venv/bin/"))
         for page in pages
         if page.name not in ("command_line.md", "details.md")  # made from the code, and from the data of all tables
-        for block in re.findall(r"^```(?:sh)?\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
-        for line in block.splitlines()
+        for kind, block in re.findall(r"(?ms)^```(\w*)\n(.*?)^```$", page.read_text(encoding="utf-8"))
+        if kind in ("", "sh", "bash")
+        for line in block.replace("\\\n", " ").splitlines()
     ]
     tables = sorted((ROOT / "docs/results/data").glob("*.json"))
     lines += [(table.name, line) for table in tables for line in json.loads(table.read_text())["command"].splitlines()]

@@ -39,10 +39,11 @@ def lit(house):
     u, v = np.meshgrid(np.linspace(0, 1, 128), np.linspace(0, 1, 64))
     page = np.stack([60 + 180 * u, 220 - 160 * v, 90 + 60 * u + 60 * v], -1).astype(np.uint8)
     pages = painted(house, HandCatalogue())
-    uv = lambda m: np.clip(m.vertices[:, [0, 2]] / (10, 3) + m.vertices[:, [1, 1]] / (50, 20), 0, 1).astype(np.float32)
-    return dataclasses.replace(
-        pages, pages=(page,), meshes=tuple(dataclasses.replace(m, uv=uv(m)) for m in pages.meshes)
-    )
+    along = lambda m: np.clip(m.vertices[:, [0, 2]] / (10, 3) + m.vertices[:, [1, 1]] / (50, 20), 0, 1)
+    uv = lambda m: m.uv if m.kind == "outdoor" else along(m).astype(np.float32)
+    shine = lambda m: (0.0, 0.5) if m.owner.endswith("/glass") else None
+    meshes = tuple(dataclasses.replace(m, uv=uv(m), gloss=shine(m)) for m in pages.meshes)
+    return dataclasses.replace(pages, pages=(page,), meshes=meshes)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +77,7 @@ def test_a_panorama_is_the_classic_one(house, classic, warped):
     panes = [i + 1 for i, o in enumerate(owners(house)) if o.endswith("/glass")]
     glass = same & np.isin(a.ids, panes)
     assert glass.sum() > 50, "panes count as what is seen where they are"
-    assert np.abs(a.rgb.astype(int) - b.rgb)[glass].mean() < 3, "and colours shine through"
+    assert np.median(np.abs(a.rgb.astype(int) - b.rgb)[glass]) <= 2, "and colours shine through"
 
 
 @pytest.mark.gl
@@ -89,6 +90,17 @@ def test_every_view_of_a_batch_is_its_own_camera(classic, warped):
         shot = classic.through(camera_at(positions[k], yaws[k], pitches[k], math.pi / 2), (SIZE, SIZE))
         assert decibels(shot.rgb, batch.rgb.numpy()[k]) > 28, k
         assert (shot.ids == batch.ids.numpy()[k]).mean() > 0.98, k
+
+
+def test_a_picture_stays_as_it_is_when_the_next_is_drawn(warped):
+    first = warped.view(EYE, 0.0)
+    held = first.rgb.copy()
+    warped.view(EYE, math.pi)
+    assert np.array_equal(first.rgb, held)
+    panorama = warped.panorama(EYE)
+    held = panorama.depth.copy()
+    warped.panorama((7.0, 2.0, 1.4))
+    assert np.array_equal(panorama.depth, held)
 
 
 def test_pictures_are_handed_to_torch_without_a_copy(warped):

@@ -43,7 +43,7 @@ class TrainingConfig(ImitationSettings):
     text_heads: int = 8
     """Number of instruction-attention heads."""
     dropout: float = 0.3
-    """Share of units that are silent in training."""
+    """Dropout rate in training."""
     iterations: int = 30_000
     """Updates of the weights."""
     training_steps: int = 20

@@ -85,11 +85,11 @@ class VisionConfig:
     learning_rate: float = 2e-3
     """Highest rate of a one-cycle schedule."""
     weight_decay: float = 1e-2
-    """Of AdamW."""
+    """Weight decay of AdamW."""
     least_views: int = 50
     """A class is learned if it is visible in at least this many training views."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Random seed."""
     cameras: tuple[str, ...] = ("ideal",)
     """Kinds of camera, 'ideal', 'phone' or 'robot', one of which takes each strip, drawn evenly."""
     like: str = ""

@@ -2,6 +2,7 @@
 
 houses, pictures, steps and memory measure the main line; views measures views of a panorama; plays counts environment
 steps with help, seen those with pixels; drive counts live pictures and the steps of a body on wheels that sees them;
+gpu measures pictures, features and learning on a CUDA device, and checks a little on the CPU where there is none;
 bakes lights a flat again and again; light compares the ways of drawing with a path tracer; growth lights houses of 40
 to 400 m² (fast, or --pictures normal) and fits how the cost grows; serve lets --people take part in a study at once for
 --seconds and tells how long a step takes from the browser to the disk and back. Close other programs first: they make
@@ -12,14 +13,18 @@ from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
 from embodied.cli.options import add_pictures, folder_to_write, whole
 from embodied.render.pictures import DRAWN, PictureSettings
+
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
+    from embodied.bench.timing import Measure
 
 PARTS = (
     "houses",
@@ -29,6 +34,7 @@ PARTS = (
     "plays",
     "seen",
     "drive",
+    "gpu",
     "memory",
     "bakes",
     "light",
@@ -41,14 +47,22 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)"
     )
-    parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=7, help="seed of the houses (default: %(default)s)")
     add_pictures(parser, DRAWN, "unlit", what="how pictures, seen and drive draw the house")
-    parser.add_argument("--houses", type=whole(), default=1000, help="memory loads and drops so many (default: 1000)")
     parser.add_argument(
-        "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="light and growth write here"
+        "--houses", type=whole(), default=1000, help="memory: load and release this many houses (default: 1000)"
     )
-    parser.add_argument("--people", type=whole(2), default=50, help="who take part at once, for serve (default: 50)")
-    parser.add_argument("--seconds", type=whole(), default=60, help="how long, for serve (default: 60)")
+    parser.add_argument(
+        "--out",
+        type=folder_to_write,
+        default=Path("out/bench"),
+        metavar="DIR",
+        help="folder for the files of light, growth and serve",
+    )
+    parser.add_argument(
+        "--people", type=whole(2), default=50, help="serve: this many people take part at once (default: 50)"
+    )
+    parser.add_argument("--seconds", type=whole(), default=60, help="serve: the study runs for this long (default: 60)")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)
@@ -73,6 +87,7 @@ def run(args: argparse.Namespace) -> int:
         "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
         "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.pictures),
+        "gpu": lambda: _gpu(catalogue, args.cache, args.seed, lit),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
         "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
@@ -99,3 +114,11 @@ def run(args: argparse.Namespace) -> int:
             texts.append(report.text)
     show(args, facts, "\n\n".join(texts))
     return 0
+
+
+def _gpu(catalogue: Catalogue, cache: Path, seed: int, light: str) -> Iterator[Measure]:
+    """Agents do not know the benchmarks, so what learns is handed over here."""
+    from agents.vision.speed import works
+    from embodied.bench import gpu
+
+    return gpu.gpu(catalogue, cache, seed, light, works, progress=note)

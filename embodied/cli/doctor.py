@@ -165,7 +165,7 @@ def packs(args: argparse.Namespace) -> Finding:
 
 def path_tracer(_: argparse.Namespace) -> Finding:
     """Mitsuba's back end: CUDA or LLVM; slow without them; houses are drawn unlit without Mitsuba."""
-    from embodied.light.backend import SLOWER, LightError, device
+    from embodied.light.backend import SLOWER, VARIANTS, LightError, device
 
     try:
         with warnings.catch_warnings(action="ignore"):
@@ -174,7 +174,8 @@ def path_tracer(_: argparse.Namespace) -> Finding:
         return Finding("path tracer", False, str(e), "until then draw houses without light (unlit)", False)
     if found == "scalar":
         return Finding("path tracer", False, f"Mitsuba without CUDA and LLVM, {SLOWER}", "embodied doctor --fix", False)
-    return Finding("path tracer", True, f"Mitsuba on {found}", needed=False)
+    variant = next(v for v, _ in VARIANTS if v.startswith(found))
+    return Finding("path tracer", True, f"Mitsuba on {found} (variant {variant})", needed=False)
 
 
 def vulkan(_: argparse.Namespace) -> Finding:

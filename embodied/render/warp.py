@@ -33,8 +33,10 @@ from embodied.scene.lit_pages import LitPages, glass_surfaces
 from embodied.scene.model import VISUAL, build_spec, compile_spec, owner_of_name
 
 try:
-    import mujoco_warp as mjw
     import warp as wp
+
+    wp.config.log_level = wp.LOG_WARNING  # else it tells of devices and compilers on standard output
+    import mujoco_warp as mjw
 except ImportError as e:
     raise UnableError(
         f"the back end 'warp' needs mujoco-warp ({e}); pip install 'embodied-houses[warp]', or use backend 'classic'"
@@ -121,9 +123,12 @@ class WarpRenderer:
             context.znear, context.zfar = NEAR, FAR
             yes, no = (wp.array([x], dtype=bool) for x in (True, False))
             self._context = context
-            self._of_all = {
+            self._passes = {
                 (rgb, rest): dataclasses.replace(
-                    context, render_rgb=yes if rgb else no, render_depth=yes if rest else no, render_seg=yes if rest else no
+                    context,
+                    render_rgb=yes if rgb else no,
+                    render_depth=yes if rest else no,
+                    render_seg=yes if rest else no,
                 )
                 for rgb, rest in ((True, True), (True, False), (False, True))
             }
@@ -134,7 +139,7 @@ class WarpRenderer:
                 self._behind = (
                     dataclasses.replace(self._model, geom_rgba=wp.array(clear[None], dtype=wp.vec4)),
                     dataclasses.replace(
-                        self._of_all[True, False],
+                        self._passes[True, False],
                         rgb_data=wp.zeros_like(context.rgb_data),
                         seg_data=wp.zeros_like(context.seg_data),
                     ),
@@ -171,12 +176,16 @@ class WarpRenderer:
         with wp.ScopedDevice(self.device):
             at, turned, tilted = (
                 x if isinstance(x, wp.array) else wp.array(np.asarray(x, np.float32), dtype=kind)
-                for x, kind in ((positions, wp.vec3), (yaws, float), (np.zeros(n) if pitches is None else pitches, float))
+                for x, kind in (
+                    (positions, wp.vec3),
+                    (yaws, float),
+                    (np.zeros(n) if pitches is None else pitches, float),
+                )
             )
             wp.launch(_aim, n, inputs=[at, turned, tilted], outputs=[self._data.cam_xpos, self._data.cam_xmat])
             self._data.nworld = n
             through = colours and self._behind is not None
-            mjw.render(self._model, self._data, self._of_all[colours, rest or through])
+            mjw.render(self._model, self._data, self._passes[colours, rest or through])
             if self._behind is not None and through:
                 mjw.render(self._behind[0], self._data, self._behind[1])
             batch = Batch(*(a[:n] for a in (self._batch.rgb, self._batch.depth, self._batch.ids)))
@@ -203,7 +212,7 @@ class WarpRenderer:
     def view(self, position: Sequence[float] | np.ndarray, yaw: float, pitch: float = 0.0) -> View:
         """The picture from `position` (x, y, z) along (yaw, pitch), radians."""
         batch = self.views([position], [yaw], [pitch])
-        return View(batch.rgb.numpy()[0], batch.depth.numpy()[0], batch.ids.numpy()[0])
+        return View(*(a.numpy()[0].copy() for a in (batch.rgb, batch.depth, batch.ids)))
 
     def panorama(self, position: Sequence[float] | np.ndarray) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z).
@@ -216,7 +225,11 @@ class WarpRenderer:
                 f"faces of a panorama are square and see 90 degrees, not {self.size} and {math.degrees(self.vfov):g}"
             )
         batch = self.views([position] * 6, FACE_YAWS, FACE_PITCHES)
-        return Panorama(batch.rgb.numpy(), batch.depth.numpy(), batch.ids.numpy())
+        return Panorama(*(a.numpy().copy() for a in (batch.rgb, batch.depth, batch.ids)))
+
+    def wait(self) -> None:
+        """Return when the device has drawn what was asked for; `views` only asks."""
+        wp.synchronize_device(self.device)
 
     def close(self) -> None:
         """Free what lies on the device; the renderer cannot be used afterwards."""
@@ -235,11 +248,18 @@ def device_of(name: str | None) -> Any:
     Raises:
       UnableError: it is not here.
     """
-    wp.config.quiet = True
     try:
         return wp.get_preferred_device() if name is None else wp.get_device(name)
     except (ValueError, RuntimeError) as e:
-        raise UnableError(f"Warp has no device {name!r} here ({e}); use one of {[str(d) for d in wp.get_devices()]}") from e
+        raise UnableError(
+            f"Warp has no device {name!r} here ({e}); use one of {[str(d) for d in wp.get_devices()]}"
+        ) from e
+
+
+def card() -> str | None:
+    """Name of the GPU that is used by default; None where there is none."""
+    device = device_of(None)
+    return str(device.name) if device.is_cuda else None
 
 
 def _compiled(
@@ -272,7 +292,7 @@ def _aim(
     pitches: wp.array[float],
     xpos: wp.array2d[wp.vec3],
     xmat: wp.array2d[wp.mat33],
-):
+) -> None:
     """The camera of every world as in embodied.render.camera.camera_at; it looks along its -z, with y up."""
     i = wp.tid()
     cy, sy, cp, sp = wp.cos(yaws[i]), wp.sin(yaws[i]), wp.cos(pitches[i]), wp.sin(pitches[i])
@@ -281,7 +301,7 @@ def _aim(
 
 
 @wp.func
-def _channel(packed: wp.uint32, shift: int):  # noqa: ANN202
+def _channel(packed: wp.uint32, shift: int) -> float:
     return float((packed >> wp.uint32(shift)) & wp.uint32(255))
 
 
@@ -300,26 +320,19 @@ def _finish(
     rgb_out: wp.array4d[wp.uint8],
     depth_out: wp.array3d[float],
     ids_out: wp.array3d[int],
-):
+) -> None:
     """Bytes of packed colours, with what stands behind glass; depth and owners of what was met."""
     i, row, column = wp.tid()
     pixel = row * width + column
     geom = seg[i, pixel][0]
     if colours:
-        share = 1.0
-        if through and geom >= 0:
-            share = opacities[geom]
+        share = wp.where(through and geom >= 0, opacities[wp.max(geom, 0)], 1.0)
         for c in range(3):
             value = _channel(rgb[i, pixel], 16 - 8 * c)
             if share < 1.0:
                 value = share * value + (1.0 - share) * _channel(behind[i, pixel], 16 - 8 * c)
             rgb_out[i, row, column, c] = wp.uint8(int(value + 0.5))
     if rest:
-        owner = 0
-        if geom >= 0:
-            owner = owned[geom]
+        owner = wp.where(geom >= 0, owned[wp.max(geom, 0)], 0)
         ids_out[i, row, column] = owner
-        if owner == 0:
-            depth_out[i, row, column] = wp.inf
-        else:
-            depth_out[i, row, column] = depth[i, pixel]
+        depth_out[i, row, column] = wp.where(owner > 0, depth[i, pixel], wp.inf)

@@ -1,0 +1,133 @@
+"""Benchmarks on a CUDA device: live pictures by OpenGL and by MuJoCo Warp, features and learning.
+
+Where there is no CUDA device a few small pictures are drawn on the CPU, which tells that all parts work and no more.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import multiprocessing
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assets.catalogue import Catalogue
+from embodied import gl
+from embodied.bench.seen import FLAT
+from embodied.bench.timing import Measure, from_values, measure
+from embodied.errors import UnableError
+from embodied.generate import generate_house
+from embodied.house.house import House
+from embodied.render.camera import camera_at
+from embodied.render.classic import Renderer
+from embodied.seeds import stream
+from embodied.world import World, open_world
+
+CONTEXTS = (1, 4, 8)
+"""Processes that draw at once by OpenGL, each with a context of its own."""
+SIZES, WORLDS = (64, 128, 256), (64, 256, 1024)
+"""Sides of square pictures, pixels, and how many Warp draws at once."""
+SEES = (("rgb",), ("rgb", "depth", "ids"))
+SECONDS = 3.0
+"""How long a process draws."""
+REPEATS = 5
+
+Works = Callable[[str], Mapping[str, tuple[Callable[[], object], int]]]
+"""From a device of PyTorch to what learners do there: by name, one call, and how many things it does."""
+
+
+def gpu(
+    catalogue: Catalogue, cache: Path, seed: int, light: str, works: Works, *, progress: Callable[[str], None]
+) -> Iterator[Measure]:
+    """Pictures per second of one lit flat, and what learners do per second, by the clock.
+
+    Args:
+      light: by name, 'fast' or 'normal'.
+    """
+    warp: Any
+    try:
+        from embodied.render import warp
+    except UnableError as e:
+        progress(str(e))
+        warp = None
+    card = None if warp is None else warp.card()
+    if card is None:
+        progress("There is no CUDA device here: a small check on the CPU, whose numbers say nothing about a GPU.")
+    contexts, sizes, worlds = (CONTEXTS, SIZES, WORLDS) if card else (CONTEXTS[:1], SIZES[:1], (8,))
+    house = generate_house(seed, FLAT, catalogue)
+    with open_world(house, catalogue, cache, pictures=f"{light}-matte") as world:
+        assert world.lit is not None
+        for count, size in itertools.product(contexts, sizes):
+            yield from_values(
+                f"classic, {gl.info().device}, {count} contexts, {size} x {size}, rgb",
+                _by_processes(count, house, catalogue, cache, light, size, seed),
+                "1/s",
+            )
+        for size, count in itertools.product(sizes if warp else (), worlds):
+            with warp.WarpRenderer(house, catalogue, world.lit, worlds=count, size=(size, size)) as renderer:
+                poses = _poses(world, count, seed)
+                for sees in SEES:
+                    look = functools.partial(_look, renderer, poses, sees)
+                    name = f"Warp, {card or 'CPU'}, {count} worlds, {size} x {size}, {', '.join(sees)}"
+                    yield measure(name, look, "1/s", repeats=REPEATS, per=count)
+    device = "cuda" if card else "cpu"
+    for name, (body, per) in works(device).items():
+        yield measure(f"{name}, {card or 'CPU'}", body, "1/s", repeats=REPEATS, per=per)
+
+
+def _poses(world: World, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) positions of nodes and (n,) yaws, drawn at random."""
+    rng = stream(seed, "bench", "gpu")
+    nodes = rng.integers(len(world.graph.positions), size=count)
+    return world.graph.positions[nodes], rng.uniform(-np.pi, np.pi, count)
+
+
+def _look(renderer: Any, poses: tuple[np.ndarray, np.ndarray], sees: tuple[str, ...]) -> None:
+    renderer.views(*poses, sees=sees)
+    renderer.wait()
+
+
+def _by_processes(
+    count: int, house: House, catalogue: Catalogue, cache: Path, light: str, size: int, seed: int
+) -> list[float]:
+    """Frames per second of `count` processes together, which draw at the same time."""
+    spawn = multiprocessing.get_context("spawn")
+    begin, told = spawn.Barrier(count), spawn.SimpleQueue()
+    jobs = [
+        spawn.Process(target=_film, args=(begin, told, house, catalogue, cache, light, size, seed))
+        for _ in range(count)
+    ]
+    for job in jobs:
+        job.start()
+    for job in jobs:
+        job.join()
+    if failed := [job.exitcode for job in jobs if job.exitcode]:
+        raise UnableError(f"{len(failed)} of {count} drawing processes failed; try fewer contexts, see above why")
+    return [sum(told.get() for _ in jobs)]
+
+
+def _film(
+    begin: Any, told: Any, house: House, catalogue: Catalogue, cache: Path, light: str, size: int, seed: int
+) -> None:
+    """Draw for SECONDS, together with the other processes; tells the frames per second."""
+    try:
+        with (
+            open_world(house, catalogue, cache, pictures=f"{light}-matte") as world,
+            Renderer(house, catalogue, lit=world.lit, size=size) as renderer,
+        ):
+            cameras = [camera_at(at, yaw) for at, yaw in zip(*_poses(world, 64, seed), strict=True)]
+            for camera in cameras:
+                renderer.rgb(camera, (size, size))
+            begin.wait()
+            start, frames = time.perf_counter(), 0
+            while time.perf_counter() < start + SECONDS:
+                renderer.rgb(cameras[frames % len(cameras)], (size, size))
+                frames += 1
+            told.put(frames / (time.perf_counter() - start))
+    except BaseException:
+        begin.abort()
+        raise
