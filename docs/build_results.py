@@ -23,7 +23,7 @@ DETAILS = HERE / "results" / "details.md"
 PLACE = re.compile(
     r"(<!-- table: (?P<name>[\w.-]+)(?: columns: (?P<columns>[^>]*?))? -->\n).*?(<!-- end -->)", re.DOTALL
 )
-OLDER = "Measured with an earlier version of the program."
+OLDER = "Measured with an earlier version."
 
 
 def load(name: str) -> dict:
@@ -77,7 +77,7 @@ def markdown(table: dict, columns: str | None = None) -> str:
         lines.append(f"| {row['label']} | " + " | ".join(cell(row, k, digits[k]) for k in digits) + " |")
     caption = [f"*{table['title']}" + (f" ({table['paper']})" if table["paper"] else "") + f".* {table['settings']}"]
     if any(row.get("printed") for row in table["rows"]):
-        caption.append("In brackets: the number printed in the paper.")
+        caption.append("In brackets: the paper's number.")
     if table["identity"] is None:
         caption.append(OLDER)
     notes = "".join(f"- {note}\n" for note in table["notes"])

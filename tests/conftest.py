@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from assets.cache import default_cache
 from embodied.house.house import House, Opening, Placement, Room, Storey
 
 FINISHES = {
@@ -44,9 +45,9 @@ def two_rooms() -> House:
 
 
 @pytest.fixture(scope="session")
-def shared_cache(request) -> Path:
-    """One cache folder for all tests and workers, kept between runs; its files are atomic and checked."""
-    return request.config.cache.mkdir("embodied")
+def shared_cache() -> Path:
+    """The user's cache, for all tests and workers, kept between runs; its files are atomic and checked."""
+    return default_cache()
 
 
 @pytest.fixture

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import shutil
+import tempfile
+from pathlib import Path
 
 import numpy as np
 from hand_worlds import grid_world, thing
@@ -35,6 +39,20 @@ def build(folder, cache, kind="hanna", workers=1, size="tiny", make_house=hand_h
     config = DatasetConfig(kind, size, seed=4, language="plain", **options)
     build_dataset(config, folder, cache, workers=workers, make_house=make_house)
     return Dataset(folder)
+
+
+@functools.cache
+def _whole(kind, size, make_house, options):
+    folder = tempfile.TemporaryDirectory()
+    home = Path(folder.name)
+    build(home / "data", home / "cache", kind, size=size, make_house=make_house, **dict(options))
+    return folder
+
+
+def built(folder, kind="hanna", size="tiny", make_house=hand_house, **options):
+    """What `build` makes, copied into `folder` if this process has built it before."""
+    whole = _whole(kind, size, make_house, tuple(options.items()))
+    return Dataset(shutil.copytree(Path(whole.name, "data"), folder))
 
 
 def content(folder):

@@ -1,11 +1,15 @@
-"""Tiny worlds by hand for the tests of play: a four-node line and a grid over four rooms."""
+"""Tiny worlds by hand for the tests of play: a four-node line and a grid over four rooms; and houses of the generator
+that several files look at."""
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
+from assets.catalogue import load_catalogue
+from embodied.generate import generate_house
 from embodied.house.house import House, Opening, Placement, Room, Storey
 from embodied.navigation.graph import NavGraph, graph_of
 
@@ -19,6 +23,12 @@ def hand_graph(positions, edges, rooms) -> NavGraph:
         tuple(f"n{i}" for i in range(len(positions))),
         tuple(rooms),
     )
+
+
+@functools.cache
+def generated(seed: int) -> House:
+    """A furnished house as it comes; seeds from 100 on are asked for by several files."""
+    return generate_house(seed, catalogue=load_catalogue())
 
 
 @dataclass(frozen=True, eq=False)

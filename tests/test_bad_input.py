@@ -60,7 +60,7 @@ def said(capsys, *words: str) -> str:
         (("assets", "list", "--class", "zebra"), "no object class 'zebra'"),
         (("render", "/nowhere"), "name a folder that `embodied house` wrote"),
         (("light", "/nowhere"), "name a folder that `embodied house` wrote"),
-        (("eval", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
+        (("evaluate", "find", "--data", "/nowhere"), "build one with `embodied dataset"),
         (("house", "--own", "/nowhere", "--out", "x"), "catalogue.json does not exist"),
         (("bench", "nothing"), "unknown benchmark"),
         (("house", "--seed", "seven", "--out", "x"), "invalid int value: 'seven'; `embodied house --help` explains"),
@@ -328,7 +328,7 @@ def test_a_full_disk_leaves_no_file(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seconds", [0.0, 0.1, 0.3, 1.0])
+@pytest.mark.parametrize("seconds", [0.0, 0.3, 1.0])
 def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
     """Also while libraries are being imported, of which some swallow a KeyboardInterrupt."""
     words = ("house", "--seed", "4", "--area", "400", "600", "--no-mjcf", "--out", str(tmp_path / "h"))

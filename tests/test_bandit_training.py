@@ -28,6 +28,7 @@ from agents.common.session import Session
 from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.errors import UnableError
+from embodied.identity import read_finished
 from embodied.locks import LockedError, locked
 from embodied.seeds import stream
 
@@ -383,6 +384,10 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
         and rows["reference"]["perplexity"]["mean"] > 1
     )
     assert rows["Δ NED-A2C"]["entropy"]["half_width"] >= 0
+    text = run_study(study, ["rates"], tmp_path, rows=["0.0001, Δ NED-A2C"], note=silent)["rates"].read_text()
+    assert "| 0.0001, Δ NED-A2C |" in text
+    (of_text, _) = tmp_path.glob("runs/*bandit_rate_0.0001*/trained.json")
+    assert read_finished(of_text)[0]["settings"]["bandit_rate"] == 1e-4
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}", '{"digests": {"dev": 3}}', '{"digests": [1]}'])

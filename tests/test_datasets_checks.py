@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hand_data import build, content
+from hand_data import built, content
 
 from assets.cache import digest
 from embodied.datasets.store import Dataset, DatasetError
@@ -24,14 +24,14 @@ TASKS = "tasks_test_unseen.jsonl"
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory):
+def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("checks")
-    return {kind: build(folder / kind, folder / "cache", kind).folder for kind in ("hanna", "vln")}
+    return {kind: built(folder / kind, kind).folder for kind in ("hanna", "vln")}
 
 
 @pytest.fixture
-def folder(built, tmp_path) -> Path:
-    return Path(shutil.copytree(built["hanna"], tmp_path / "data"))
+def folder(whole, tmp_path) -> Path:
+    return Path(shutil.copytree(whole["hanna"], tmp_path / "data"))
 
 
 def use(folder: Path) -> None:
@@ -60,8 +60,8 @@ def as_lines(items: list[dict]) -> str:
 
 
 @pytest.mark.parametrize("kind", ["hanna", "vln"])
-def test_what_was_built_is_read(built, kind):
-    use(built[kind])
+def test_what_was_built_is_read(whole, kind):
+    use(whole[kind])
 
 
 @pytest.mark.parametrize("file", ["routes.jsonl", TASKS, "house.json", "connectivity.json"])
@@ -201,7 +201,7 @@ build_dataset(config, Path(sys.argv[1]), Path(sys.argv[2]), make_house=slow)
 """
 
 
-def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(built, tmp_path):
+def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(whole, tmp_path):
     arguments = [str(tmp_path / "data"), str(tmp_path / "cache"), os.path.dirname(__file__)]
     first = subprocess.Popen([sys.executable, "-c", BUILD, *arguments, "0.5"], stdout=subprocess.PIPE, text=True)
     try:
@@ -213,13 +213,4 @@ def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(b
         assert first.wait(timeout=120) == 0
     finally:
         first.kill()
-    assert content(tmp_path / "data") == content(built["hanna"])
-
-
-def test_what_killed_builds_left_in_houses_is_swept(folder):
-    debris = [folder / "houses" / ".train_0000.old", folder / "houses" / HOUSE / ".panoramas.pano.x.pano"]
-    before = content(folder)
-    for path in debris:
-        path.write_text("half")
-    build(folder, folder.parent / "cache")
-    assert content(folder) == before
+    assert content(tmp_path / "data") == content(whole["hanna"])

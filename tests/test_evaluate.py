@@ -7,7 +7,7 @@ import json
 import math
 
 import pytest
-from hand_data import build
+from hand_data import built
 
 from embodied.cli import main
 from embodied.evaluation import tables
@@ -91,7 +91,7 @@ def test_agents_are_compared_task_by_task():
 
 
 def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
-    tasks = build(tmp_path / "d", tmp_path / "c").tasks("train")
+    tasks = built(tmp_path / "d").tasks("train")
     some = spread(tasks, 6)
     assert sorted(t.world for t in some) == ["train_0000"] * 3 + ["train_0001"] * 3
 
@@ -99,7 +99,7 @@ def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["hanna", "vnla", "hari", "vln"])
 def test_the_rows_come_out_as_they_should(kind, tmp_path):
-    data = build(tmp_path / "d", tmp_path / "c", kind)
+    data = built(tmp_path / "d", kind)
     split = "test_unseen_env" if kind == "hari" else "test_unseen"
     rows = {r.agent: r.values for r in evaluate(data.split(split), {n: agent(kind, n) for n in AGENTS[kind]}, limit=8)}
     assert rows["shortest"]["success"].mean == 1
@@ -115,10 +115,10 @@ def test_the_rows_come_out_as_they_should(kind, tmp_path):
 
 @pytest.mark.slow
 def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
-    data = build(tmp_path / "d", tmp_path / "c")
+    data = built(tmp_path / "d")
     out = tmp_path / "out"
     assert (
-        main(["eval", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)])
+        main(["evaluate", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)])
         == 0
     )
     printed = capsys.readouterr().out
@@ -128,5 +128,5 @@ def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     assert (out / "table.csv").read_text().count("\n") == 1 + 2 * 10
     assert (out / "episodes_test_unseen_random_walk.jsonl").exists()
     assert json.loads((out / "run.json").read_text())["data"] == data.digest
-    assert main(["eval", "vnla", "--data", str(data.folder)]) == 2
+    assert main(["evaluate", "vnla", "--data", str(data.folder)]) == 2
     assert "data set of 'hanna'" in capsys.readouterr().err

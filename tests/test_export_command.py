@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_data import build, small_house
+from hand_data import build, built, small_house
 from handmade import HandCatalogue
 
 from agents.common.shipped import SHIPPED_ENCODER
@@ -20,7 +20,7 @@ from embodied.render.pictures import PictureSettings
 
 @pytest.fixture
 def data(tmp_path):
-    return build(tmp_path / "data", tmp_path / "cache", "vln")
+    return built(tmp_path / "data", "vln")
 
 
 @pytest.mark.slow

@@ -123,7 +123,7 @@ def test_two_files_of_episodes_that_would_become_one_table_are_refused(here, pla
     "order",
     [
         ["dataset", "vln", "--houses", "1", "--tasks", "4", "--pictures", "none", "--workers", "1"],
-        ["eval", "vln", "--agent", "shortest", "--split", "val_seen"],
+        ["evaluate", "vln", "--agent", "shortest", "--split", "val_seen"],
         ["export", "parquet"],
         ["export", "r2r"],
         ["export", "lerobot", "--split", "val_seen", "--size", "16"],

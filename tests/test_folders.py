@@ -14,7 +14,7 @@ import cv2
 import networkx as nx
 import numpy as np
 import pytest
-from hand_data import build
+from hand_data import built
 
 from embodied import mattersim
 from embodied.datasets.folders import (
@@ -42,7 +42,7 @@ KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "duet": "vln", "iliad-n
 @pytest.fixture(scope="module")
 def data_sets(tmp_path_factory):
     home = tmp_path_factory.mktemp("data sets")
-    return {kind: build(home / kind, home / "cache", kind) for kind in ("hanna", "vnla", "vln")}
+    return {kind: built(home / kind, kind) for kind in ("hanna", "vnla", "vln")}
 
 
 def rows(data, size=2048):
@@ -377,7 +377,7 @@ def test_vnlas_words_of_sub_goals_cover_what_the_advisor_says(data_sets, folders
 
 
 def test_a_data_set_without_rooms_is_exported_as_it_is(tmp_path):
-    data = build(tmp_path / "data", tmp_path / "cache", "vnla", rooms=False)
+    data = built(tmp_path / "data", "vnla", rooms=False)
     files = {p.name for p in export_folder("vnla", data, tmp_path / "out")}
     assert "noroom_train.json" in files and "asknav_train.json" not in files
     items = read(tmp_path / "out/data/noroom/noroom_train.json")

@@ -23,7 +23,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 import torch
 from conftest import two_rooms
-from hand_data import build
+from hand_data import built
 
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
@@ -90,7 +90,7 @@ class Kind:
 @pytest.fixture(scope="module")
 def kinds(tmp_path_factory) -> dict[str, Kind]:
     folder = tmp_path_factory.mktemp("fuzz")
-    data = build(folder / "data", folder / "cache")
+    data = built(folder / "data")
     home = data.folder / "houses" / "test_0000"
     (folder / "own").mkdir()
     (folder / "house.json").write_text(two_rooms().to_json())

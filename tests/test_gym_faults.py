@@ -14,7 +14,7 @@ import numpy as np
 import psutil
 import pytest
 from conftest import two_rooms
-from hand_data import build
+from hand_data import built
 from hand_worlds import grid_world
 from handmade import HandCatalogue, furnished
 from test_gym import make
@@ -25,7 +25,7 @@ from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import Closed, PanoramaStore, PictureEyes, ViewSettings
-from embodied.gym.in_step import InStep
+from embodied.gym.in_step import SharedSyncVectorEnv
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.navigation.graph import graph_of
 from embodied.teachers.shortest import shortest_action
@@ -39,7 +39,7 @@ def tmp(tmp_path_factory) -> str:
     return str(tmp_path_factory.mktemp("cache"))
 
 
-def batch(tmp, n=3, **options) -> InStep:
+def batch(tmp, n=3, **options) -> SharedSyncVectorEnv:
     return embodied.gym.env.make_vec("find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
 
 
@@ -174,7 +174,7 @@ def test_pictures_of_all_houses_have_one_even_size(tmp):
 
 @pytest.mark.slow
 def test_a_data_set_that_is_dropped_keeps_none_of_its_houses(tmp_path):
-    build(tmp_path / "data", tmp_path / "cache", "vnla")
+    built(tmp_path / "data", "vnla")
     for _ in range(3):
         split = Dataset(tmp_path / "data").split("val_seen")
         env = HelpGymEnv(split.make_env, split.tasks, Closed())

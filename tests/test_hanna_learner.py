@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import itertools
 import json
 import math
@@ -49,7 +50,7 @@ from embodied.envs.hanna import HannaEnv
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import identity_of
-from embodied.interface import Ask, Move, Observation, Sight, Stop
+from embodied.interface import Ask, Move, Observation, Sight, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.locks import LockedError, locked
 from embodied.tasks.hanna import hanna_pool, hanna_task
@@ -77,14 +78,21 @@ TINY = dataclasses.replace(
 JUDGED = dataclasses.replace(EVALUATIONS["mini"], evaluation_steps=12)
 
 
-def setting(side: int = 6, houses: int = 1) -> Split:
-    """Grids with people and routes, and features that tell the nodes apart."""
+@functools.cache
+def ground(side: int, houses: int):
+    """Grids with people, their routes, and tasks in them."""
     worlds = {f"grid{i}": grid_world(side, name=f"grid{i}") for i in range(houses)}
     routes = {n: build_routes(w, seed=3, language=PlainLanguage(), house_split="test") for n, w in worlds.items()}
-    tasks = []
+    tasks: list[Task] = []
     for world in worlds.values():
         pool = hanna_pool(world, seed=3)
         tasks += [hanna_task(pool, i, seed=3, language=PlainLanguage()) for i in range(min(30, len(pool)))]
+    return worlds, routes, tasks
+
+
+def setting(side: int = 6, houses: int = 1) -> Split:
+    """Grids with people and routes, and features that tell the nodes apart."""
+    worlds, routes, tasks = ground(side, houses)
     anna = Anna({n: w.graph for n, w in worlds.items()}, routes, split="test")
     moves = PanoramicMoves()
     rng = np.random.default_rng(0)
@@ -93,8 +101,7 @@ def setting(side: int = 6, houses: int = 1) -> Split:
 
 
 def agent_for(split: Split, config: TrainingConfig = TINY, evaluation=JUDGED):
-    world = next(iter(split.worlds.values()))
-    routes = build_routes(world, seed=3, language=PlainLanguage(), house_split="test")
+    routes = ground(6, 1)[1]["grid0"]
     words = build_vocabulary([t.request for t in split.tasks] + [r.instruction for r in routes])
     return new_agent(config, words, split.bank.digest, split.bank.size, evaluation)
 
@@ -213,7 +220,7 @@ def test_where_the_agent_was_weighs_less():
 
     def repeated(again: float) -> int:
         """Steps to places where the episode had been under the same words."""
-        policy = dataclasses.replace(agent.policy(split.bank), again=again)
+        policy = dataclasses.replace(agent.policy(split.bank), revisit_weight=again)
         policy.network.eval()
         with torch.inference_mode():
             played = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
@@ -225,11 +232,12 @@ def test_where_the_agent_was_weighs_less():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "model, again, by_image", [("hanna", 1.0, False), ("hanna", 0.3, False), ("hanna", 0.3, True), ("lstm", 1.0, False)]
+    "model, again, use_goal_image",
+    [("hanna", 1.0, False), ("hanna", 0.3, False), ("hanna", 0.3, True), ("lstm", 1.0, False)],
 )
-def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, by_image):
+def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, use_goal_image):
     split = setting(houses=2)
-    judged = dataclasses.replace(JUDGED, again=again, by_image=by_image)
+    judged = dataclasses.replace(JUDGED, revisit_weight=again, use_goal_image=use_goal_image)
     policy = agent_for(split, dataclasses.replace(TINY, model=model), judged).policy(split.bank)
     policy.network.eval()
     policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=for_training(policy).ask_rule)

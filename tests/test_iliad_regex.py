@@ -527,12 +527,12 @@ def test_an_episode_is_told_from_request_to_what_was_learned(grounds):
 @pytest.mark.slow
 def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
     config = dataclasses.replace(SMALL, teacher="grammar")
-    study = IliadStudy(RegexStudyWorld(config), QUICK, (0, 1))
+    study = IliadStudy(RegexStudyWorld(config), QUICK, (0,))
     pages = run_study(study, ["3.5", "C.1"], tmp_path, note=silent)
     text = pages["3.5"].read_text()
     assert "| λ = 0.5 | " in text and "(55.7)" in text and "Not run" not in text
     runs = list((tmp_path / "runs").iterdir())
-    assert len(runs) == 2 * 5, "both tables have the run that is as it is"
+    assert len(runs) == 5, "both tables have the run that is as it is"
     assert "Not run: DAgger" in run_study(study, ["3.4"], tmp_path, report=True, note=silent)["3.4"].read_text()
     other = dataclasses.replace(study, config=dataclasses.replace(QUICK, learning_rate=0.5))
     text = run_study(other, ["3.5"], tmp_path, report=True, note=silent)["3.5"].read_text()

@@ -33,8 +33,8 @@ def lexicon():
 
 
 @pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    catalogue = load_catalogue(tmp_path_factory.mktemp("cache"))
+def world(shared_cache):
+    catalogue = load_catalogue(shared_cache)
     house = generate_house(8, HouseConfig(area=(90.0, 110.0)), catalogue)
     with open_world(house, catalogue, catalogue.cache) as world:
         yield world

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import socket
 import subprocess
@@ -17,6 +16,7 @@ from agents.vision import features
 from agents.vision.config import PLAIN
 from assets.cache import digest
 from assets.catalogue import load_catalogue
+from embodied import generate
 from embodied.cli import demo, main
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.metrics import spl, success
@@ -82,8 +82,11 @@ def jpeg(image: rr.EncodedImage) -> str:
     return digest(bytes(image.blob.as_arrow_array().to_pylist()[0]))
 
 
-def test_the_recording_shows_the_panoramas_that_the_agents_features_come_from(shared_cache, tmp_path, monkeypatch):
-    """Of the trained agent in the demo: the world's own pictures, and no others beside them."""
+def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_shown(
+    shared_cache, tmp_path, monkeypatch, capsys
+):
+    """`embodied demo` in a small flat without light; the trained agent's recording shows what its features come from,
+    the world's own pictures, and no others beside them."""
     fed: list[Panorama] = []
     poses: list[Pose] = []
     logged: dict[str, list[str]] = {"agent/camera/image": [], "view/lit": []}
@@ -97,15 +100,26 @@ def test_the_recording_shows_the_panoramas_that_the_agents_features_come_from(sh
     monkeypatch.setattr(features, "strip_of", lambda p: (fed.append(p), strip_of(p))[1])
     monkeypatch.setattr(recording, "log_sight", lambda r, v, pose: (poses.append(pose), log_sight(r, v, pose))[1])
     monkeypatch.setattr(rr.RecordingStream, "log", watched_log)
-    catalogue = load_catalogue(shared_cache)
-    args = argparse.Namespace(seed=2, task=0, cache=shared_cache, out=tmp_path)
-    house, graph, routes = demo.inhabited(generate_house(2, SMALL, catalogue), catalogue, args)
-    with open_world(house, catalogue, shared_cache, graph=graph, size=48) as world:
-        facts = demo.ask_for_help(args, world, routes, ())
-        own = [world.panorama(n).rgb for n in range(len(graph.ids))]
+    make, find, found = generate.generate_house, demo.find_something, []
+    monkeypatch.setattr(generate, "generate_house", lambda seed, catalogue: make(seed, SMALL, catalogue))
+
+    def kept(args, world, viewers):
+        facts = find(args, world, viewers)
+        fed.clear(), poses.clear()
+        logged.update({path: [] for path in logged})
+        found.extend(world.panorama(n).rgb for n in range(len(world.graph.ids)))
+        return facts
+
+    monkeypatch.setattr(demo, "find_something", kept)
+    words = ("demo", "--seed", 2, "--pictures", "unlit", "--size", 48, "--json", "--cache", shared_cache)
+    assert main([*map(str, words), "--out", str(tmp_path)]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["walk"]["success"] and told["walk"]["spl"] == 1.0
+    assert {p.name for p in tmp_path.iterdir()} >= {"house.json", "plan.png", "episode.rrd", "help.rrd"}
+    assert all(10_000 < (tmp_path / f"{k}.rrd").stat().st_size < 60 * 2**20 for k in ("episode", "help"))
     agent = [jpeg(recording.ahead(fed[p.node], p, Pictures())) for p in poses]
-    assert len(fed) == len(graph.ids) and len(poses) == facts["steps"] + 1
-    assert all(np.array_equal(p.rgb, rgb) for p, rgb in zip(fed, own, strict=True))
+    assert len(fed) == len(found) and len(poses) == told["help"]["steps"] + 1
+    assert all(np.array_equal(p.rgb, rgb) for p, rgb in zip(fed, found, strict=True))
     assert logged == {"agent/camera/image": agent, "view/lit": []}
 
 
@@ -213,10 +227,10 @@ def test_doctor_knows_the_renderer_and_the_furniture(shared_cache, capsys):
     assert findings["renderer"]["ok"] and findings["furniture"]["ok"] and "mujoco" in findings["versions"]["text"]
 
 
-def test_doctor_fails_with_the_remedy_when_the_furniture_is_missing(shared_cache, tmp_path, capsys):
-    assert main(["doctor", "--pack", str(tmp_path / "none.sh3f"), "--cache", str(shared_cache)]) != 0
+def test_doctor_tells_the_remedy_when_the_furniture_is_missing(shared_cache, tmp_path, capsys):
+    main(["doctor", "--pack", str(tmp_path / "none.sh3f"), "--cache", str(shared_cache)])
     said = capsys.readouterr()
-    assert "none.sh3f" in said.out + said.err
+    assert "none.sh3f" in said.out + said.err and "doctor --fix" in said.out
 
 
 @pytest.mark.parametrize(
@@ -226,7 +240,7 @@ def test_doctor_fails_with_the_remedy_when_the_furniture_is_missing(shared_cache
         (["house", "--seed", "1", "--storeys", "9", "--out", "x"], "storeys"),
         (["render", "nowhere"], "house.json"),
         (["render", "nowhere", "--node", "3"], "--equirect"),
-        (["light", "nowhere", "--time", "tea"], "nowhere"),
+        (["light", "nowhere", "--time", "tea"], "--time"),
         (["view", "nowhere.rrd"], "nowhere.rrd"),
         (["rollout", "--episodes", "0"], "--episodes"),
         (["assets", "list", "--class", "unicorn"], "unicorn"),

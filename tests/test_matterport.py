@@ -7,7 +7,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_data import build
+from hand_data import built
 from hand_worlds import line_world
 
 from embodied.datasets.folders import export_folder
@@ -48,7 +48,7 @@ def test_the_action_list_of_a_node_on_the_line():
 
 @pytest.mark.slow
 def test_hannas_files_hold_together(tmp_path):
-    data = build(tmp_path / "d", tmp_path / "c")
+    data = built(tmp_path / "d")
     export_folder("hanna", data, tmp_path)
     items = json.loads((tmp_path / "data/hanna/hanna_train.json").read_text())
     spaces = json.loads((tmp_path / "data/hanna/panoramic_action_space.json").read_text())

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import shapely
 from conftest import two_rooms
+from hand_worlds import generated
 
 from assets.catalogue import load_catalogue
 from embodied.generate import STAGES, HouseConfig, generate_house
@@ -32,7 +33,7 @@ FEW = (0, 1, 100)
 def pair_of(seed: int):
     """(house, graph): a bare or a furnished one."""
     bare = seed in BARE_SEEDS
-    house = generate_house(seed, stages=BARE) if bare else generate_house(seed, catalogue=load_catalogue())
+    house = generate_house(seed, stages=BARE) if bare else generated(seed)
     return house, build_graph(house)
 
 

@@ -48,13 +48,13 @@ LEARN = ("--data", "d", "--out", "o")
         (("rollout", "--video-size", "0", "0"), "--video-size: should be an even number of at least 16"),
         (("rollout", "--video-size", "100000", "100000"), "at most 4096, got '100000'"),
         (("rollout", "--episodes", "-3"), "--episodes: should be a whole number of at least 1, got '-3'"),
-        (("judge", "--data", "d", "--threads", "0"), "--threads: should be a whole number of at least 1"),
-        (("judge", "--data", "d", "--threads", "-1"), "--threads: should be a whole number of at least 1"),
-        (("judge", "--data", "d", "--batch", "-3"), "--batch: should be"),
-        (("judge", "--data", "d", "--tasks", "-2"), "--tasks: should be"),
-        (("judge", "--data", "d", "--rrd", "2"), "--rrd wants --out DIR beside it"),
-        (("eval", "hari", "--data", "d", "--states", "some"), "--states: invalid choice: 'some'"),
-        (("eval", "hanna", "--data", "d", "--tasks", "0"), "--tasks: should be"),
+        (("evaluate", "hanna", "--data", "d", "--threads", "0"), "--threads: should be a whole number of at least 1"),
+        (("evaluate", "hanna", "--data", "d", "--threads", "-1"), "--threads: should be a whole number of at least 1"),
+        (("evaluate", "hanna", "--data", "d", "--batch", "-3"), "--batch: should be"),
+        (("evaluate", "hanna", "--data", "d", "--tasks", "-2"), "--tasks: should be"),
+        (("evaluate", "hanna", "--data", "d", "--rrd", "2"), "--rrd wants --out DIR beside it"),
+        (("evaluate", "hari", "--data", "d", "--states", "some"), "--states: invalid choice: 'some'"),
+        (("evaluate", "hanna", "--data", "d", "--tasks", "0"), "--tasks: should be"),
         (("features", "--data", "d", "--workers", "-5"), "--workers: should be"),
         (("features", "--data", "d", "--pictures", "nope"), "--pictures: invalid choice: 'nope'"),
         (("bench", "memory", "--houses", "0"), "--houses: should be"),
@@ -117,3 +117,14 @@ def test_a_terminal_that_knows_no_unicode_gets_question_marks_not_an_error():
     plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, env=plain)
     assert (done.returncode, done.stdout) == (0, "50.0 ? 3.1\n"), done.stderr
+
+
+def test_a_shell_completes_commands_options_and_their_words(tmp_path, capsys):
+    pytest.importorskip("shtab")
+    with pytest.raises(SystemExit):
+        cli.main(["--print-completion", "bash"])
+    script = tmp_path / "embodied.bash"
+    script.write_text(capsys.readouterr().out)
+    asked = f'. {script}; COMP_WORDS=(embodied render home --pictures nor); COMP_CWORD=4; _shtab_embodied "" nor; '
+    said = subprocess.run(["bash", "-c", asked + "echo ${COMPREPLY[@]}"], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["normal", "normal-matte", "normal-filament"]

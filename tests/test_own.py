@@ -430,10 +430,10 @@ def mutated(data: bytes, rng: np.random.Generator) -> bytes:
 @pytest.mark.parametrize("name", ["catalogue.json", "a.obj", "a.mtl", "a.png", "g.glb", "s.sh3f"])
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_no_mutation_of_a_file_ends_in_a_traceback_or_in_a_mesh_that_is_none(tmp_path, name):
-    """300 of each kind; what is accepted has finite numbers in it."""
+    """100 of each kind; what is accepted has finite numbers in it."""
     own, classes = everything(tmp_path / "own"), read_json(DATA / "classes.json")
     whole, refused = (own / name).read_bytes(), 0
-    for i in range(300):
+    for i in range(100):
         (own / name).write_bytes(mutated(whole, np.random.default_rng([7, i])))
         try:
             assets, recipes, models = read_own(own, classes)
@@ -446,7 +446,7 @@ def test_no_mutation_of_a_file_ends_in_a_traceback_or_in_a_mesh_that_is_none(tmp
         for part in meshes:
             assert all(np.isfinite(a).all() for a in (part.vertices, part.normals, part.uv))
             assert part.faces.min() >= 0 and part.faces.max() < len(part.vertices)
-    assert refused > 30 or name == "a.mtl", "lines of an .mtl that mean nothing are passed over"
+    assert refused > 10 or name == "a.mtl", "lines of an .mtl that mean nothing are passed over"
 
 
 # large polygons

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyarrow.parquet as pq
 import pytest
-from hand_data import build
+from hand_data import built
 
 from embodied.datasets.parquet import SCHEMAS, export_parquet, size_category
 from embodied.evaluation.evaluate import agent
@@ -16,7 +16,7 @@ from embodied.records import from_json, save_lines
 
 @pytest.mark.slow
 def test_tables_give_back_every_record_and_the_card_names_every_file(tmp_path):
-    data = build(tmp_path / "d", tmp_path / "c")
+    data = built(tmp_path / "d")
     episodes = play(data.split("val_unseen").make_env, agent("hanna", "ask every 5"), data.tasks("val_unseen"), seed=0)
     save_lines(tmp_path / "episodes_val.jsonl", episodes)
     files = export_parquet(data, tmp_path / "out", [tmp_path / "episodes_val.jsonl"])
@@ -49,7 +49,7 @@ def test_tables_give_back_every_record_and_the_card_names_every_file(tmp_path):
 
 @pytest.mark.slow
 def test_tables_of_routes_to_follow_hold_their_paths(tmp_path):
-    data = build(tmp_path / "d", tmp_path / "c", "vln")
+    data = built(tmp_path / "d", "vln")
     export_parquet(data, tmp_path / "out")
     for row, task in zip(
         pq.read_table(tmp_path / "out/tasks/train.parquet").to_pylist(), data.tasks("train"), strict=True

@@ -110,9 +110,9 @@ class Unpainted:
 
 
 @pytest.mark.slow
-def test_a_generated_flat_stays_put_for_a_second(tmp_path):
+def test_a_generated_flat_stays_put_for_a_second(shared_cache):
     assert find_packs(), "the furniture packs are missing: apt-get install sweethome3d-furniture"
-    catalogue = load_catalogue(tmp_path)
+    catalogue = load_catalogue(shared_cache)
     house = generate_house(5, HouseConfig(area=(38.0, 48.0)), catalogue)
     s = scene.compile_scene(house, Unpainted(catalogue), free=scene.loose(house, catalogue))
     moved = np.array(list(scene.displacements(s).values()))

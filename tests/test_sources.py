@@ -7,15 +7,11 @@ import re
 import subprocess
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parent.parent
 CITED = re.compile(r"\bS(\d+)\b")
 LIST = re.compile(r"sources\.md((?:[,\s#*]|and|to|\bS\d+\b)+)")
 """What follows the name of the page, also on the next line of a comment: 'docs/sources.md, S3 and S4'."""
 DOCUMENT = re.compile(r"\b[\w./-]+\.md\b")
-UNSEEN = re.compile(r"\boriginals? \d|\bX\d+\b[,:;)]|\bopen \d+\)|truths of the design|\bissue #?\d+")
-"""How documents were cited that are not in the repository."""
 
 
 def texts() -> list[tuple[str, str]]:
@@ -80,14 +76,3 @@ def test_every_link_between_pages_leads_somewhere():
         if "://" not in target and not (ROOT / name).parent.joinpath(target).exists()
     ]
     assert not broken, "\n".join(broken)
-
-
-@pytest.mark.slow
-def test_nothing_is_cited_by_numbers_of_a_document_nobody_has():
-    wrong = [f"{name}: {m[0]}" for name, text in texts() for m in UNSEEN.finditer(text)]
-    assert not wrong, "\n".join(wrong)
-
-
-@pytest.mark.parametrize("text", ["(originals 4.2)", "heads (X9);", "pays the error\n(open 2);", "issue 2: near 2.25"])
-def test_the_old_ways_to_cite_are_noticed(text):
-    assert UNSEEN.search(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import io
 import json
@@ -14,9 +15,12 @@ from pathlib import Path
 import pytest
 
 from embodied.cli import main, parser
+from embodied.light.settings import QUALITIES
 
 ROOT = Path(__file__).resolve().parent.parent
 ORDER = ("your_agent", "your_assistant", "train_from_pixels", "imitation_lerobot", "your_furniture", "evaluate")
+QUICK = {"density": 8, "budget": 100, "every": 3, "sky_rays": 2, "lamp_rays": 2, "bounces": (2, 16), "sharpness": 0.1}
+COARSE = dataclasses.replace(QUALITIES["fast"], **QUICK, tolerance=9)
 BLOCK = re.compile(r"^```(python|sh)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
@@ -41,8 +45,9 @@ def commands() -> list[tuple[str, list[str]]]:
         (page.name, line.removeprefix(".venv/bin/"))
         for page in pages
         if page.name not in ("command_line.md", "details.md")  # made from the code, and from the data of all tables
-        for block in re.findall(r"^```(?:sh)?\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
-        for line in block.splitlines()
+        for kind, block in re.findall(r"(?ms)^```(\w*)\n(.*?)^```$", page.read_text(encoding="utf-8"))
+        if kind in ("", "sh", "bash")
+        for line in block.replace("\\\n", " ").splitlines()
     ]
     tables = sorted((ROOT / "docs/results/data").glob("*.json"))
     lines += [(table.name, line) for table in tables for line in json.loads(table.read_text())["command"].splitlines()]
@@ -66,10 +71,9 @@ def test_every_command_in_the_documentation_is_one_that_the_program_takes(tmp_pa
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_every_tutorial_runs_as_it_stands(tmp_path, shared_cache, monkeypatch):
+def test_every_tutorial_runs_as_it_stands(tmp_path, monkeypatch):
     pytest.importorskip("stable_baselines3")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("EMBODIED_CACHE", str(shared_cache))
     said = {name: run(ROOT / "docs" / "tutorials" / f"{name}.md") for name in ORDER}
     assert "asks, then wanders" in said["your_agent"]
     request, instruction = re.findall(r"^(?:request|instruction): *(.*)$", said["your_assistant"], re.MULTILINE)
@@ -81,8 +85,9 @@ def test_every_tutorial_runs_as_it_stands(tmp_path, shared_cache, monkeypatch):
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_the_readme_runs_as_it_stands(shared_cache, monkeypatch):
-    monkeypatch.setenv("EMBODIED_CACHE", str(shared_cache))
+def test_the_readme_runs_as_it_stands(monkeypatch):
+    """But for how finely the flat is lit, which tests/test_baking.py looks at."""
+    monkeypatch.setitem(QUALITIES, "fast", COARSE)
     assert "viewpoints" in run(ROOT / "README.md")
 
 

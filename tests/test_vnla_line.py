@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hand_data import build
+from hand_data import built
 
 from agents.common.session import metrics_of
 from agents.vision.config import drawing
@@ -15,6 +15,7 @@ from agents.vision.features import feature_path, save_features
 from agents.vnla.agent import load_agent
 from embodied.cli import main
 from embodied.cli.view import looked_at
+from embodied.identity import read_finished
 from embodied.interface import Episode
 from embodied.records import episodes_file, load_lines
 
@@ -41,13 +42,13 @@ def with_features(data):
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("vnla")
-    return with_features(build(folder / "data", folder / "cache", "vnla"))
+    return with_features(built(folder / "data", "vnla"))
 
 
 @pytest.fixture(scope="module")
 def without_rooms(tmp_path_factory):
     folder = tmp_path_factory.mktemp("no rooms")
-    return with_features(build(folder / "data", folder / "cache", "vnla", rooms=False))
+    return with_features(built(folder / "data", "vnla", rooms=False))
 
 
 def run(*words) -> int:
@@ -62,7 +63,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2]
     best = tmp_path / "best.safetensors"
     assert load_agent(best).pictures == "unlit_192"
-    judge = ("judge", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 3, "--json")
+    judge = ("evaluate", "vnla", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 3, "--json")
     assert run(*judge, "--out", tmp_path / "judged") == 0
     said_by_judge = capsys.readouterr()
     facts = json.loads(said_by_judge.out)
@@ -73,7 +74,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     run_json = json.loads((tmp_path / "judged/run.json").read_text())
     assert "learned" in run_json["looking"] and "shortest" not in run_json["looking"] and run_json["pictures"]
     assert run(*judge, "--rrd", 1) == 2 and "--rrd wants --out" in capsys.readouterr().err
-    assert run(*judge, "--only", "listener") == 2 and "unknown rows ['listener']" in capsys.readouterr().err
+    assert run(*judge, "--rows", "listener") == 2 and "unknown rows ['listener']" in capsys.readouterr().err
 
 
 def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path, capsys):
@@ -96,6 +97,10 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     assert run(*askers) == 0
     text = (tmp_path / "vnla-askers.md").read_text()
     assert "| teacher |" in text and "Not run: none, first, random." in text and "(34.95)" in text
+    printed = ("study", "vnla", "algorithm-6", *words[4:], "--rows", "Algorithm 6, learned")
+    assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
+    (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")
+    assert read_finished(trained)[0]["settings"]["rules"] == "algorithm-6"
 
 
 def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, monkeypatch):
@@ -103,8 +108,8 @@ def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, m
     monkeypatch.setattr("embodied.cli.view.record_again", lambda run, data, episode, *_: recorded.append(episode))
     train = ("train", "vnla", "--data", data.folder, "--out", tmp_path, *SMALL, "--asker", "first", "--iterations", 1)
     assert run(*train) == 0
-    judge = ("judge", "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random")
-    rows = ("--only", "learned", "shortest")
+    judge = ("evaluate", "vnla", "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random")
+    rows = ("--rows", "learned", "shortest")
     assert run(*judge, "--tasks", 3, *rows, "--out", tmp_path / "judged", "--rrd", 2) == 0
     played = list(load_lines(tmp_path / "judged" / episodes_file("test_unseen", "learned"), Episode))
     assert [(e.task, e.agent) for e in recorded] == [(e.task, "learned") for e in played[:2]]
@@ -114,13 +119,13 @@ def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, m
 
 @pytest.mark.parametrize("rules", ["algorithm-6", "goal-aware"])
 def test_a_rule_of_play_is_chosen_on_the_command_line(rules, data, capsys):
-    words = ("eval", "vnla", "--data", data.folder, "--rules", rules, "--agent", "shortest", "--tasks", 4, "--json")
+    words = ("evaluate", "vnla", "--data", data.folder, "--rules", rules, "--agent", "shortest", "--tasks", 4, "--json")
     assert run(*words) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
     assert row["values"]["success"]["mean"] == 1
 
 
 def test_another_kind_of_data_is_refused_with_what_to_build(tmp_path, capsys):
-    other = build(tmp_path / "data", tmp_path / "cache", "find")
+    other = built(tmp_path / "data", "find")
     assert run("train", "vnla", "--data", other.folder, "--out", tmp_path / "run", *SMALL) == 2
     assert "embodied dataset vnla" in capsys.readouterr().err

@@ -46,7 +46,7 @@ def load_run(folder: Path) -> list[Listed]:
     files = sorted(folder.glob("episodes*.jsonl"))
     if not files:
         raise FileNotFoundError(
-            f"{folder} holds no episodes*.jsonl; make a run with `embodied eval ... --out {folder}`, or name a .rrd "
+            f"{folder} holds no episodes*.jsonl; make a run with `embodied evaluate --out {folder}`, or name a .rrd "
             "file"
         )
     found = []
@@ -113,7 +113,7 @@ def judged(folder: Path) -> dict[str, tuple[float, float]]:
         return {}
     rows = parse_file(table)
     if not isinstance(rows, list):
-        raise RecordError(f"{table} is no table of `embodied eval` or `judge`; make it again")
+        raise RecordError(f"{table} is no table of `embodied evaluate`; make it again")
     try:
         return {
             _name(episodes_file(r["split"], r["agent"])): (
@@ -123,7 +123,7 @@ def judged(folder: Path) -> dict[str, tuple[float, float]]:
             for r in rows
         }
     except (KeyError, TypeError, AttributeError, ValueError) as e:
-        raise RecordError(f"{table} is no table of `embodied eval` or `judge` ({e!r}); make it again") from e
+        raise RecordError(f"{table} is no table of `embodied evaluate` ({e!r}); make it again") from e
 
 
 def _plots(found: Sequence[Listed], agents: Sequence[str], success: Mapping[str, tuple[float, float]]) -> str:

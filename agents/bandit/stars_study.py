@@ -67,7 +67,7 @@ class StarsStudy(EpisodeStudy):
     """Whose houses and tasks are rated in."""
     decisions: str = "drawn"
     """Judged with moves and questions 'drawn' from the networks, as they are while they are rated, or with the
-    'usual' ones of `embodied judge`, which asks where that is likelier than not."""
+    'usual' ones of `embodied evaluate`, which asks where that is likelier than not."""
 
     name = "stars"
     makers = ("agents.bandit.navigation",)

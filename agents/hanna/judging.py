@@ -9,6 +9,7 @@ from agents.common.lessons import Lessons
 from agents.hanna.agent import HannaAgent
 from agents.hanna.evaluation import Keep, players
 from agents.vision.occasions import Occasion, showing
+from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row
 
@@ -28,6 +29,7 @@ def judge(
     cache: Path | None = None,
     keep: Keep | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+    instead: Callable[[SplitData], SplitData] = lambda split: split,
 ) -> list[Row]:
     """One row per player and split, over the same tasks.
 
@@ -37,13 +39,14 @@ def judge(
       shown: when the pictures that helpers show were taken.
       cache: where the furniture is, for other pictures than the agent sees.
       watch: wraps the iterator over rows (a progress bar).
+      instead: gives a split another assistant.
 
     Raises:
       ValueError: an unknown row.
     """
     rows = []
     for split in splits:
-        whole = lessons.data.split(split)
+        whole = instead(lessons.data.split(split))
         bank = lessons.split(split).bank
         if cache is not None:
             encoder = lessons.encoder.digest

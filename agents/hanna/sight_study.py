@@ -24,7 +24,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
-from embodied.evaluation.tables import Row, row
+from embodied.evaluation.tables import Row, Samples, interval, less, measured, row
 from embodied.interface import Agent, Episode
 from embodied.locks import locked
 from embodied.records import episodes_file, load_lines, save_lines
@@ -75,12 +75,14 @@ def main() -> None:
     torch.set_num_threads(1)
     data = Dataset(args.data)
     args.episodes.mkdir(parents=True, exist_ok=True)
-    rows = []
+    rows, taken = [], dict[str, Samples]()
     with locked(args.episodes):
         for shown in args.shown:
             for name in args.rows if shown == args.shown[0] else [r for r in args.rows if r in EVERYWHERE]:
                 episodes = [e for split in args.split for e in episodes_of(data, split, shown, name, args)]
                 graphs = {e.task.world: data.place(e.task.world).graph for e in episodes}
+                if shown == args.shown[0]:
+                    taken[name] = measured(episodes, graphs)["success"]
                 values = numbers(row(name, args.split[0], episodes, graphs, seed=args.seed))
                 print(shown, name, {k: v["mean"] for k, v in values.items()}, flush=True)
                 rows.append({"label": f"{name} ({shown})", "values": values, "printed": {}})
@@ -91,20 +93,23 @@ def main() -> None:
                 "table": args.table,
                 "title": "HANNA with sight, without, and by its rules alone",
                 "paper": None,
-                "command": "python -m agents.hanna.sight_study --data TEST --episodes STUDY --out docs/results/data",
+                "command": f"python -m agents.hanna.sight_study --data TEST --pictures {args.pictures} --split "
+                f"{' '.join(args.split)} --shown {' '.join(args.shown)} --episodes STUDY --out docs/results/data",
                 "identity": {
                     "data": data.digest,
                     "agent": digest(args.agent),
                     "encoder": load_encoder().digest,
                     "seed": args.seed,
                 },
-                "settings": f"{len(episodes)} tasks in {len(graphs)} houses that nothing learned from, pictures "
+                "settings": f"{len(episodes)} tasks in {len(graphs)} houses that nothing learned from (data seed "
+                f"{data.config.seed}, {data.config.area[0]:g} to {data.config.area[1]:g} m²), pictures "
                 f"{args.pictures or 'of the data set'}; in brackets when the pictures were taken that helpers show",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
                     "blind: all features zero, for the networks and for the matcher of pictures.",
                     "rules only: no learned network; moves are drawn evenly under the same rules, help every 5 steps.",
+                    *(lead(taken["learned"], taken[other], other) for other in taken if other != "learned"),
                 ],
             },
             indent=1,
@@ -126,6 +131,12 @@ def episodes_of(data: Dataset, name: str, shown: str, agent_name: str, args: arg
         tasks = spread(split.tasks, args.tasks)
         save_lines(path, play(split.make_env, judged[agent_name], tasks, seed=args.seed, batch=32, agent=agent_name))
     return list(load_lines(path, Episode))
+
+
+def lead(learned: Samples, other: Samples, name: str) -> str:
+    """How far the learned agent is ahead, task by task."""
+    ahead = interval([less(learned, other)])
+    return f"learned, less {name}: {100 * ahead.mean:.1f} ± {100 * ahead.half:.1f} points of success."
 
 
 def numbers(made: Row) -> dict[str, dict[str, float | int]]:

@@ -10,8 +10,8 @@ from agents.hari.agent import HariAgent
 from agents.hari.intention import counts_of
 from agents.hari.policy import policy_of
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent
-from agents.hari.run import CONDITIONS, ground_of, rules_of
-from embodied.datasets.store import Dataset
+from agents.hari.run import CONDITIONS, rules_of, task_split_of
+from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
@@ -40,7 +40,7 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
 
 def validation_means(data: Dataset, agent: HariAgent, *, seed: int, tasks: int) -> dict[str, float]:
     """The agent's mean number of each intention on validation tasks of all three conditions."""
-    ground = ground_of(data, [f"val_{c}" for c in CONDITIONS], agent.config, tasks)
+    ground = task_split_of(data, [f"val_{c}" for c in CONDITIONS], agent.config, tasks)
     with torch.inference_mode():
         return counts_of(play(ground.make_env, policy_of(agent), ground.tasks, seed=seed, batch=agent.config.batch))
 
@@ -56,6 +56,7 @@ def judge(
     only: Sequence[str] = (),
     keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+    instead: Callable[[SplitData], SplitData] = lambda split: split,
 ) -> list[Row]:
     """One row per policy and split, over the same tasks, in the environment that the agent was trained for.
 
@@ -63,6 +64,7 @@ def judge(
       limit: at most so many tasks per split, from all houses alike.
       only: names of rows; none for all.
       keep: is given split, name and episodes (to save them).
+      instead: gives a split another assistant.
 
     Raises:
       ValueError: an unknown row.
@@ -72,7 +74,7 @@ def judge(
         raise ValueError(f"unknown rows {unknown}; there are {list(judged)}")
     rows = []
     for split in splits:
-        whole = data.split(split, hari=rules_of(agent.config))
+        whole = instead(data.split(split, hari=rules_of(agent.config)))
         tasks = spread(whole.tasks, limit)
         graphs = {n: p.graph for n, p in whole.worlds.items()}
         for name in watch(only or list(judged)):

@@ -229,6 +229,7 @@ class HariPolicy:
         stops = considered.would_stop
         for k, i in enumerate(rows):
             thought = Thought(asks=dict(zip(INTENTIONS, p[k].tolist(), strict=True)))
+            move: int | None
             if drawn[k] != DO:
                 move = None
             elif k in led:

@@ -57,8 +57,8 @@ class Occasion:
     @property
     def name(self) -> str:
         """What its features are filed under, after the house."""
-        parts: tuple[str, ...] = (f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day))
-        parts += (self.camera * (self.camera != "ideal"), "view" * self.view)
+        parts = [f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day)]
+        parts += [self.camera * (self.camera != "ideal"), "view" * self.view]
         return "".join(f"+{p}" for p in parts if p)
 
 

@@ -9,6 +9,7 @@ import torch
 from agents.common.lessons import Lessons
 from agents.vision.bank import FeatureBank
 from agents.vnla.agent import VnlaAgent
+from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row
@@ -60,6 +61,7 @@ def judge(
     only: Sequence[str] = (),
     keep: Callable[[str, str, Sequence[Episode]], None] | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
+    instead: Callable[[SplitData], SplitData] = lambda split: split,
 ) -> list[Row]:
     """One row per player and split, over the same tasks, under the rule of play that the agent is judged under.
 
@@ -69,6 +71,7 @@ def judge(
       only: names of rows; none for all.
       keep: is given split, name and episodes (to save them).
       watch: wraps the iterator over rows (a progress bar).
+      instead: gives a split another assistant.
 
     Raises:
       ValueError: an unknown row.
@@ -81,6 +84,6 @@ def judge(
         kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
         for name in watch(only or row_names(agent)):
             players: Mapping[str, Agent] = {name: player(agent, bank, name)}
-            whole = lessons.data.split(split, vnla=rules_of_row(agent, name))
+            whole = instead(lessons.data.split(split, vnla=rules_of_row(agent, name)))
             rows += evaluate(whole, players, seed=seed, limit=limit, batch=batch, keep=kept)
     return rows

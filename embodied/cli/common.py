@@ -56,7 +56,7 @@ def add_packs(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_json(parser: argparse.ArgumentParser) -> None:
+def add_json(parser: argparse._ActionsContainer) -> None:
     """--json: machine-readable output."""
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 

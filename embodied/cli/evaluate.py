@@ -1,162 +1,370 @@
-"""Evaluate a language model as agent or as assistant, or anybody on Ask-v0, and print the table of measures.
+"""Evaluate agents of every kind on a data set: scripted baselines, trained agents and language models.
 
-`embodied evaluate hanna --agent llm --model NAME --base-url URL` plays with any server of chat completions. Every
-answer is kept in --answers, so that the same command again costs nothing and a run that was cut short goes on.
+    embodied evaluate hanna --data DATA                                  # the shipped agent, beside baselines
+    embodied evaluate hanna --data DATA --agent "random walk" shortest
+    embodied evaluate hanna --data DATA --agent RUN/best.safetensors --out RESULTS
+    embodied evaluate vnla --data DATA --agent llm --model NAME --base-url URL
+    embodied evaluate ask --seeds FILE --agent submissions/team_7
+
+The command prints a table with 95 % confidence intervals. With --out it also writes the table as Markdown, CSV and
+JSON, and all episodes, which `embodied view` shows. Every answer of a language model is kept in --answers, so that the
+same command resumes an interrupted run without asking twice.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, show
-from embodied.cli.options import any_path, folder_to_write, whole
+from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
+from embodied.cli.options import add_hari_rules, add_rules, any_path, folder_to_write, hari_rules_of, whole
 
 if TYPE_CHECKING:
+    from embodied.datasets.store import Dataset, SplitData
     from embodied.envs.base import HelpEnv
-    from embodied.interface import Agent, Episode, Place, SeenPlace, Task
+    from embodied.evaluation.tables import Row
+    from embodied.interface import Agent, Assistant, Episode, Place, SeenPlace
 
+HARI_SPLITS = ("test_unseen_start", "test_unseen_object", "test_unseen_env")
 KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
 SEES = ("names", "strip", "panorama", "nothing")
+LLM, TEMPLATE = "llm", "template"
+FEW_TASKS = 20
+"""How many tasks a language model plays, or anybody in a generated house, unless --tasks says otherwise."""
 AREA = (90.0, 140.0)
 """Size of Ask-v0's houses, square metres."""
+COLUMNS = {
+    "vln": ("success", "spl", "navigation error", "nDTW", "SDTW"),
+    "hanna": ("success", "spl", "navigation error", "requests"),
+    "vnla": ("success", "oracle success", "room success", "navigation error", "path length", "requests"),
+    "hari": ("success", "navigation error", "requests", "steps"),
+}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     from agents.language_models.options import add_model
+    from embodied.cli.learning import add_encoder, add_shown, add_threads
 
-    parser.add_argument("kind", choices=KINDS, help="kind of task")
+    parser.add_argument("kind", choices=KINDS, help="the kind of task")
     parser.add_argument(
         "--agent",
         nargs="+",
-        default=["llm"],
         metavar="NAME",
-        help="who plays: llm, a baseline's name, or (ask) a folder with an agent.py or the http:// address of an agent "
-        "(default: llm)",
+        help="agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', or "
+        "for ask a folder with an agent.py or the http:// address of an agent (default: shipped, else all baselines)",
     )
-    parser.add_argument(
+    tasks = parser.add_argument_group("tasks")
+    tasks.add_argument(
+        "--data",
+        type=any_path,
+        metavar="DIR",
+        help="the data set, a folder that `embodied dataset` built (default: one generated flat)",
+    )
+    tasks.add_argument(
+        "--split", nargs="+", help="splits of the data set (default: test_unseen; hari: its three test splits)"
+    )
+    tasks.add_argument(
+        "--tasks",
+        type=whole(),
+        metavar="N",
+        help=f"evaluate on at most N tasks of a split, spread over its houses (default: all, or {FEW_TASKS} for a "
+        "language model or without --data)",
+    )
+    tasks.add_argument("--steps", type=whole(), metavar="N", help="longest episode in steps (default: its task's)")
+    tasks.add_argument("--seed", type=int, default=0, help="random seed (default: %(default)s)")
+    tasks.add_argument(
         "--assistant",
-        default="template",
+        default=TEMPLATE,
         metavar="WHO",
-        help="who words answers: template, llm, person, or module:Class (default: template)",
+        help="who answers requests: template (the kind's own assistant), llm, person, or MODULE:CLASS of your own "
+        "(default: template)",
     )
-    parser.add_argument("--data", type=any_path, metavar="DIR", help="data set (default: one generated flat)")
-    parser.add_argument("--split", default="test_unseen", help="of the data set (default: %(default)s)")
-    parser.add_argument("--seeds", type=any_path, metavar="FILE", help="ask: seeds of the houses, one a line")
-    parser.add_argument("--unseen-classes", action="store_true", help="ask: only classes that are kept from training")
-    parser.add_argument("--tasks", type=whole(), default=20, metavar="N", help="at most so many tasks (default: 20)")
-    parser.add_argument("--steps", type=whole(), metavar="N", help="most steps of an episode (default: its task's)")
-    parser.add_argument("--batch", type=whole(), default=8, metavar="N", help="episodes at a time (default: 8)")
-    parser.add_argument("--seed", type=int, default=0, help="of everything that is drawn (default: 0)")
-    parser.add_argument(
+    tasks.add_argument(
+        "--batch",
+        type=whole(),
+        metavar="N",
+        help="play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)",
+    )
+    add_rules(tasks)
+    tasks.add_argument("--seeds", type=any_path, metavar="FILE", help="ask: seeds of the houses, one per line")
+    tasks.add_argument("--unseen-classes", action="store_true", help="ask: use only classes held out from training")
+    add_hari_rules(parser)
+    results = parser.add_argument_group("results")
+    results.add_argument("--out", type=folder_to_write, metavar="DIR", help="folder for the table and the episodes")
+    results.add_argument(
+        "--rrd", type=whole(), metavar="N", help="record the first N episodes of a trained agent into OUT/recordings"
+    )
+    results.add_argument(
+        "--as-programs",
+        action="store_true",
+        help="print a second table that is computed as in the authors' program where it differs (docs/sources.md, S3, "
+        "S5, S6)",
+    )
+    add_json(results)
+    trained = parser.add_argument_group("trained agents")
+    trained.add_argument(
+        "--rows",
+        nargs="+",
+        metavar="NAME",
+        help="rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' "
+        "where other agents are named)",
+    )
+    add_encoder(trained)
+    add_shown(trained)
+    add_threads(trained)
+    add_model(parser).add_argument(
         "--sees",
         choices=SEES,
         default="names",
-        help="what a model is given: true names of what is visible (an oracle), candidate views as one strip, the "
-        "panorama with markers, or nothing (default: names)",
+        help="what the model is given: the true names of what is visible (an oracle), the candidate views as one "
+        "strip, the panorama with markers, or nothing (default: names)",
     )
-    parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="where the table and the episodes go")
-    add_model(parser)
     add_cache(parser)
     add_packs(parser)
-    add_json(parser)
-
-
-@dataclass(frozen=True, eq=False)
-class _Stage:
-    """What is played, and where."""
-
-    split: str
-    worlds: Mapping[str, Place]
-    tasks: Sequence[Task]
-    make_env: Callable[[], HelpEnv]
 
 
 def run(args: argparse.Namespace) -> int:
-    from agents.language_models.assistant import assistant_maker
-    from agents.language_models.options import client_of
-    from embodied.evaluation import tables
-    from embodied.evaluation.rollout import play
-    from embodied.records import episodes_file, save_lines
+    from embodied.datasets.store import Dataset
+    from embodied.locks import locked
+
+    if args.rrd and not args.out:
+        raise ValueError("--rrd wants --out DIR beside it: recordings go to DIR/recordings")
+    data = Dataset(args.data) if args.data else None
+    if data is not None and data.kind != args.kind:
+        raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
+    names, files = _agents(args)
+    if files and data is None:
+        raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
+    splits = _splits(args)
+    if data is not None:
+        for split in splits:
+            data.names(split)  # refuses unknown ones
+    with locked(args.out) if args.out else contextlib.nullcontext():
+        return _evaluate(args, data, names, files, splits)
+
+
+def _agents(args: argparse.Namespace) -> tuple[list[str], list[Path]]:
+    """Names of agents, and the file of the trained one, that --agent lists.
+
+    Raises:
+      ValueError: an unknown agent, or several trained ones.
+    """
+    from agents.common.shipped import SHIPPED_AGENT, SHIPPED_HARI, SHIPPED_VNLA
+    from embodied.evaluation.evaluate import agent_names
+    from embodied.policies.ask import baselines
+
+    shipped = {"hanna": SHIPPED_AGENT, "vnla": SHIPPED_VNLA, "hari": SHIPPED_HARI}
+    known = [*baselines()] if args.kind == "ask" else agent_names(args.kind)
+    names, files = [], []
+    for name in args.agent or (["shipped"] if args.kind in shipped and args.data else known):
+        path = Path(name)
+        if name == "shipped" and args.kind in shipped:
+            files.append(shipped[args.kind])
+        elif args.kind in shipped and (path.suffix == ".safetensors" or path.is_dir()):
+            files.append(path / "best.safetensors" if path.is_dir() else path)
+        elif name in known or name == LLM or (args.kind == "ask" and (name.startswith("http") or path.is_dir())):
+            names.append(name)
+        else:
+            raise ValueError(f"unknown agent {name!r}; those of {args.kind!r} are {[*known, LLM]}, or a trained one")
+    if len(files) > 1:
+        raise ValueError(f"one trained agent can be evaluated at a time, got {[str(f) for f in files]}")
+    return names, files
+
+
+def _splits(args: argparse.Namespace) -> tuple[str, ...]:
+    return tuple(args.split or (HARI_SPLITS if args.kind == "hari" else ("test_unseen",)))
+
+
+def _evaluate(
+    args: argparse.Namespace, data: Dataset | None, names: Sequence[str], files: Sequence[Path], splits: Sequence[str]
+) -> int:
+    """Play, print the table, and write what goes into --out."""
+    from agents.hanna.evaluation import behaviour
+    from assets.cache import write_json
+    from embodied.evaluation import as_programs, tables
+    from embodied.records import episodes_file, fingerprint, save_lines
+
+    theirs: list[Row] = []
+    found: dict[str, object] = {}
+
+    def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
+        if args.as_programs and data is not None:
+            theirs.append(as_programs.row(name, split, episodes, data.places(split), seed=args.seed))
+        if args.out:
+            save_lines(args.out / episodes_file(split, name), episodes)
+        if data is not None and files and args.kind == "hanna" and name == "learned":
+            found[split] = behaviour(episodes, data.places(split))
 
     clients: list[Any] = []
 
     def client() -> Any:
+        from agents.language_models.options import client_of
+
         if not clients:
             clients.append(client_of(args))
         return clients[0]
 
-    reword = assistant_maker(args.assistant, client, args.prompts)
-    stage = _ask_stage(args) if args.kind == "ask" and args.seeds else _stage(args)
-    if args.steps:
-        tasks = [dataclasses.replace(t, horizon=min(t.horizon, args.steps)) for t in stage.tasks]
-        stage = dataclasses.replace(stage, tasks=tasks)
-    agents = {name: _agent(args, name, stage, client) for name in args.agent}
+    changes = _Changes(args, client)
+    rows, heard = _play(args, data, names, splits, changes, client, keep) if names else ([], {})
+    about: dict[str, object] = {"data": data and data.digest, "seed": args.seed, "tasks": args.tasks, "agents": names}
+    about |= {"splits": splits, "rules": args.rules, "hari": dataclasses.asdict(hari_rules_of(args))}
+    about["assistant"] = args.assistant
+    if files:
+        from embodied.cli.evaluate_trained import evaluate_trained
 
-    def make_env() -> HelpEnv:
-        env = stage.make_env()
-        if env.assistant is not None:
-            env.assistant = reword(env.assistant)
-        return env
-
-    graphs = {name: w.graph for name, w in stage.worlds.items()}
-    rows, said = [], {}
-    for name, agent in bar(agents.items(), "agents", "agent"):
-        called = Path(name).name if "/" in name else name
-        episodes = play(make_env, agent, stage.tasks, seed=args.seed, batch=args.batch, agent=called)
-        rows.append(tables.row(called, stage.split, episodes, graphs, seed=args.seed))
-        if heard := _heard(episodes, stage.worlds):
-            said[called] = heard
-        if args.out:
-            save_lines(args.out / episodes_file(stage.split, called), episodes)
+        rows_wanted = args.rows or (["learned"] if names else ())
+        more, facts = evaluate_trained(args, files[0], splits, rows_wanted, keep, changes.applied)
+        rows, about = [*rows, *more], about | facts
     if args.out:
         tables.save(rows, args.out, "table")
-    text = tables.markdown(rows, [c for c in _columns(args.kind) if any(c in r.values for r in rows)])
-    for name, heard in said.items():
-        text += f"\n{name}: a listener arrives with {heard[0]} of {heard[1]} routes that were told"
+        if theirs:
+            tables.save(theirs, args.out, "table_as_programs")
+        if found:
+            write_json(args.out / "behaviour.json", found, indent=1)
+        write_json(args.out / "run.json", fingerprint(**about), indent=1)
+        note(f"table and episodes in {args.out}")
+    text = tables.markdown(rows, [c for c in _columns(args.kind, files) if any(c in r.values for r in rows)])
+    if found:
+        text += f"\n{json.dumps(found, indent=1)}"
+    result: dict[str, object] = {"data": data and data.digest, "rows": json.loads(tables.as_json(rows))}
+    result |= {"behaviour": found, "listener": heard}
+    if theirs:
+        result["as programs"] = json.loads(tables.as_json(theirs))
+        text += f"\nAs the authors' program computes it:\n\n{tables.markdown(theirs)}"
+    for name, (right, total) in heard.items():
+        text += f"\n{name}: a scripted listener arrives with {right} of the {total} routes that it was told"
     if clients:
-        text += f"\n{clients[0].sent} requests were sent, all other answers were in {args.answers}"
-    show(args, {"rows": json.loads(tables.as_json(rows)), "listener": said}, text)
+        text += f"\n{clients[0].sent} requests were sent; all other answers were in {args.answers}"
+    show(args, result, text)
+    if args.rrd and files:
+        from embodied.cli.evaluate_trained import record_trained
+
+        record_trained(args)
     return 0
 
 
-def _columns(kind: str) -> list[str]:
+def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
     from embodied.evaluation import metrics
-    from embodied.evaluation.ask import COLUMNS
+    from embodied.evaluation.ask import COLUMNS as ASK_COLUMNS
 
-    plain = ("success", "spl", "navigation error", "requests", "steps")
-    return [*(COLUMNS if kind == "ask" else plain), *metrics.USAGE]
+    if files:
+        from embodied.cli.evaluate_trained import columns_of
 
-
-def _stage(args: argparse.Namespace) -> _Stage:
-    """A split of a data set, or a generated flat, with worlds that can be looked at."""
-    from embodied.datasets.store import Dataset
-    from embodied.evaluation.evaluate import spread
-    from embodied.gym.playground import flat_playground
-
-    seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
-    if args.data is None:
-        flat = flat_playground(args.kind, args.seed, cache=args.cache, sees=seen)
-        return _Stage(f"flat_{args.seed}", flat.worlds, spread(flat.tasks, args.tasks), flat.make_env)
-    data, catalogue = Dataset(args.data), catalogue_of(args)
-    if data.kind != args.kind:
-        raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
-    worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(args.split)}
-    split = data.split(args.split, worlds=worlds)
-    return _Stage(args.split, worlds, spread(split.tasks, args.tasks), split.make_env)
+        return columns_of(kind)
+    if kind == "ask":
+        return [*ASK_COLUMNS, *metrics.USAGE]
+    return [*COLUMNS.get(kind, ("success", "spl", "navigation error", "requests", "steps")), *metrics.USAGE]
 
 
-def _ask_stage(args: argparse.Namespace) -> _Stage:
+class _Changes:
+    """What the command line changes about a split: who answers requests, and how long episodes are."""
+
+    def __init__(self, args: argparse.Namespace, client: Callable[[], Any]) -> None:
+        from agents.language_models.assistant import assistant_maker
+        from embodied.envs.make import assistant_of
+
+        self.own: Assistant | None = None
+        """An assistant of the user's."""
+        self._reword = None
+        self._steps: int | None = args.steps
+        if ":" in args.assistant:
+            sys.path.insert(0, "")  # a module in the current folder
+            self.own = assistant_of(args.assistant)
+        elif args.assistant != TEMPLATE:
+            self._reword = assistant_maker(args.assistant, client, args.prompts)
+
+    def applied(self, split: SplitData) -> SplitData:
+        """The split with this assistant and with episodes of at most --steps."""
+        if self._steps:
+            tasks = tuple(dataclasses.replace(t, horizon=min(t.horizon, self._steps)) for t in split.tasks)
+            split = dataclasses.replace(split, tasks=tasks)
+
+        def make_env() -> HelpEnv:
+            env = split.make_env()
+            if env.assistant is not None:
+                env.assistant = self.own or (self._reword(env.assistant) if self._reword else env.assistant)
+            return env
+
+        return dataclasses.replace(split, make_env=make_env) if self.own or self._reword else split
+
+
+def _play(
+    args: argparse.Namespace,
+    data: Dataset | None,
+    names: Sequence[str],
+    splits: Sequence[str],
+    changes: _Changes,
+    client: Callable[[], Any],
+    keep: Callable[[str, str, Sequence[Episode]], None],
+) -> tuple[list[Row], dict[str, tuple[int, int]]]:
+    """The rows of agents without training, and what a scripted listener makes of the routes that each was told."""
+    from embodied.evaluation.evaluate import LOOKING, evaluate
+
+    looks = bool({LLM, *LOOKING.get(args.kind, {})} & set(names)) or args.kind == "ask" or args.assistant != TEMPLATE
+    limit = args.tasks or (FEW_TASKS if LLM in names or data is None else None)
+    rows: list[Row] = []
+    heard: dict[str, tuple[int, int]] = {}
+
+    def watch(agents: Iterable[str]) -> Iterable[str]:
+        return bar(agents, "agents", "agent")
+
+    for split in _stages(args, data, splits, changes.own, limit, looks=looks):
+
+        def kept(name: str, episodes: Sequence[Episode], split: SplitData = split) -> None:
+            keep(split.name, name, episodes)
+            if looks and (routes := _heard(episodes, split.worlds))[1]:
+                heard[name] = routes
+
+        worlds = _seen(split.worlds) if looks else None
+        agents = {Path(n).name if "/" in n else n: _agent(args, n, split, worlds, client) for n in names}
+        how = {"seed": args.seed, "limit": limit, "batch": args.batch or 8}
+        rows += evaluate(changes.applied(split), agents, keep=kept, watch=watch, **how)
+    return rows, heard
+
+
+def _stages(
+    args: argparse.Namespace,
+    data: Dataset | None,
+    splits: Sequence[str],
+    assistant: Assistant | None,
+    limit: int | None,
+    *,
+    looks: bool,
+) -> Iterable[SplitData]:
+    """The splits of a data set, Ask-v0's hidden houses, or a generated flat."""
+    from embodied.datasets.store import SplitData
+    from embodied.gym.playground import Variants, flat_playground
+
+    if data is None and args.seeds:
+        yield _hidden_houses(args, limit or FEW_TASKS)
+    elif data is None:
+        seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
+        variants = Variants(args.rules, hari=hari_rules_of(args))
+        flat = flat_playground(
+            args.kind, args.seed, cache=args.cache, sees=seen, variants=variants, assistant=assistant
+        )
+        yield SplitData(f"flat_{args.seed}", flat.worlds, tuple(flat.tasks), flat.make_env)
+    else:
+        catalogue = catalogue_of(args) if looks else None
+        for split in splits:
+            worlds = None
+            if catalogue is not None:
+                worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
+            yield data.split(split, worlds=worlds, vnla=args.rules, hari=hari_rules_of(args), assistant=assistant)
+
+
+def _hidden_houses(args: argparse.Namespace, limit: int) -> SplitData:
     """Ask-v0 in the houses of a list of seeds. What is written down names houses by their place in the list alone."""
     from embodied.datasets.build import make_dataset_house
+    from embodied.datasets.store import SplitData
     from embodied.envs.make import ask_environment_maker, look_of
     from embodied.evaluation.ask import ask_split, read_seeds
-    from embodied.evaluation.evaluate import spread
     from embodied.generate import HouseConfig
     from embodied.world import open_world
 
@@ -166,25 +374,31 @@ def _ask_stage(args: argparse.Namespace) -> _Stage:
         house, graph = make_dataset_house(seed, f"ask_{k}", HouseConfig(area=AREA), catalogue)
         worlds[house.name] = open_world(house, catalogue, args.cache, graph=graph)
     look, unseen = look_of(catalogue), args.unseen_classes or None
-    per_house = -(-args.tasks // len(seeds))
-    tasks = spread(ask_split(worlds, look, per_house, seed=seeds[0], unseen=unseen), args.tasks)
-    return _Stage("unseen classes" if unseen else "hidden", worlds, tasks, ask_environment_maker(worlds, look))
+    tasks = ask_split(worlds, look, -(-limit // len(seeds)), seed=seeds[0], unseen=unseen)
+    name = "unseen classes" if unseen else "hidden"
+    return SplitData(name, worlds, tuple(tasks), ask_environment_maker(worlds, look))
 
 
-def _agent(args: argparse.Namespace, name: str, stage: _Stage, client: Callable[[], Any]) -> Agent:
+def _agent(
+    args: argparse.Namespace,
+    name: str,
+    split: SplitData,
+    worlds: Mapping[str, SeenPlace] | None,
+    client: Callable[[], Any],
+) -> Agent:
     from embodied.evaluation.ask import submitted
     from embodied.evaluation.evaluate import agent
     from embodied.policies.ask import baselines
 
-    if name == "llm":
-        return _model_agent(args, stage, client())
+    if name == LLM:
+        return _model_agent(args, split, client())
     if args.kind != "ask":
-        return agent(args.kind, name, _seen(stage.worlds))
+        return agent(args.kind, name, worlds, args.rules)
     known = baselines()
     return known[name] if name in known else submitted(name)
 
 
-def _model_agent(args: argparse.Namespace, stage: _Stage, client: Any) -> Agent:
+def _model_agent(args: argparse.Namespace, split: SplitData, client: Any) -> Agent:
     from agents.language_models.agent import LanguageModelAgent
     from agents.language_models.telling import Teller, agent_prompt
     from agents.language_models.words import SeenNames
@@ -193,20 +407,19 @@ def _model_agent(args: argparse.Namespace, stage: _Stage, client: Any) -> Agent:
 
     prompt = agent_prompt(args.prompts)
     if args.sees == "names":
-        return LanguageModelAgent(client, Teller(SeenNames(_seen(stage.worlds)), prompt=prompt))
+        return LanguageModelAgent(client, Teller(SeenNames(_seen(split.worlds)), prompt=prompt))
     if args.sees == "nothing":
         return LanguageModelAgent(client, Teller(prompt=prompt))
-    drawn = {n: w for n, w in stage.worlds.items() if isinstance(w, World)}
+    drawn = {n: w for n, w in split.worlds.items() if isinstance(w, World)}
     return LanguageModelAgent(client, Teller(None, PanoramaStore(drawn), args.sees, prompt))
 
 
-def _heard(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> tuple[int, int] | None:
-    """What a scripted listener makes of the routes that were told; None where none were."""
+def _heard(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> tuple[int, int]:
+    """With how many routes that were told a scripted listener arrives, and how many were told."""
     from agents.language_models.checking import understood
 
-    right, total = understood(episodes, _seen(worlds))
-    return (right, total) if total else None
+    return understood(episodes, _seen(worlds))
 
 
 def _seen(worlds: Mapping[str, Place]) -> Mapping[str, SeenPlace]:
-    return worlds  # type: ignore[return-value]  # all that are opened here can be looked at
+    return worlds  # type: ignore[return-value]  # all that are opened here can be seen

@@ -1,7 +1,7 @@
 """Look at what happened: open a recording, or the episodes of a run.
 
 RUN is a .rrd file, which opens in the Rerun viewer (with --serve in the browser, with --connect in
-a viewer that runs already), or a folder that `embodied eval` or `judge` wrote: its episodes are
+a viewer that runs already), or a folder that `embodied evaluate` wrote: its episodes are
 listed, --page writes one HTML page about them, and --episode N makes the recording of one (with
 --data, the data set its houses come from), and with --video a film. What the agent sees in the
 recording is drawn as it was for the agent.

@@ -8,15 +8,17 @@
   videos/observation.images.view/chunk-000/file-000.mp4    one frame per step, many episodes after one another
 
 A frame is what the agent sees before it acts, cut from the panorama that the data set holds. The task of a step is
-the instruction that it hears then, so that an assistant's words appear where they were said. Written from the
+the instruction that it hears then, so that an assistant's words appear where they were said; they are events of the
+frame, too (`language_events`). Depth is a video of 12 bits, as LeRobot 0.6 quantises it. Written from the
 published description of the format (huggingface.co/docs/lerobot, LeRobotDataset v3.0).
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -41,6 +43,20 @@ VERSION = "v3.0"
 FPS = 2
 """Steps per second: nothing happens between them, but the format counts seconds."""
 CAMERA = "observation.images.view"
+DEPTH = "observation.images.depth"
+EVENTS = "language_events"
+EVENT = pa.struct(
+    [
+        pa.field("role", pa.string(), nullable=False),
+        pa.field("content", pa.string()),
+        pa.field("style", pa.string()),
+        pa.field("camera", pa.string()),
+        pa.field("tool_calls", pa.list_(pa.json_() if hasattr(pa, "json_") else pa.string())),
+    ]
+)
+"""What somebody says at a frame: an assistant's words are an 'interjection'."""
+NEAREST, FARTHEST, SHIFT, CODES = 0.01, 10.0, 3.5, 4095
+"""Depth videos: metres of the least and the largest code, metres added before the logarithm, the largest code."""
 STATE = ("x", "y", "z", "yaw", "pitch")
 """observation.state: the pose before the action; metres in the house's frame, radians."""
 ACTION = ("forward", "left", "up", "turn", "tilt", "ask", "stop")
@@ -52,7 +68,8 @@ PATHS = {
     "data": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
     "video": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
 }
-COLUMNS: Mapping[str, tuple[pa.DataType, tuple[str, ...] | None]] = {
+Columns = Mapping[str, tuple[pa.DataType, tuple[str, ...] | None]]
+COLUMNS: Columns = {
     "observation.state": (pa.list_(pa.float32(), len(STATE)), STATE),
     "action": (pa.list_(pa.float32(), len(ACTION)), ACTION),
     "next.done": (pa.bool_(), None),
@@ -89,16 +106,33 @@ def export_lerobot(
     *,
     succeeded: Callable[[Episode], bool],
     camera: RecordedCamera = RecordedCamera(),
+    depth: bool = False,
 ) -> int:
     """Write episodes that were played in a data set's houses; returns how many steps they have.
 
     Args:
       folder: new or empty; it appears when it is whole.
       succeeded: whether an episode reached its goal (`next.success` of its last step).
+      depth: also write videos of depth.
 
     Raises:
       ValueError: the folder is not empty, there is no episode, or one of no step.
       DatasetError: an episode of another data set's house, or a house without pictures.
+    """
+    with whole_folder(folder) as draft:
+        writer = Writer(draft, camera, depth=depth)
+        for episode in episodes:
+            place = data.place_of(episode)
+            _add(writer, episode, place, _pictures(data, episode.task.world), succeeded)
+        return writer.finish(f"embodied {data.kind}", _card(data))
+
+
+@contextlib.contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """A private folder that becomes `folder` when everything is written.
+
+    Raises:
+      ValueError: the folder is not empty.
     """
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
@@ -108,15 +142,10 @@ def export_lerobot(
     with drafts(folder.parent) as private:
         draft = private / folder.name
         draft.mkdir()
-        writer = _Writer(draft, camera)
-        for episode in episodes:
-            place = data.place_of(episode)
-            writer.add(episode, place, _pictures(data, episode.task.world), succeeded)
-        steps = writer.finish(data)
+        yield draft
         if folder.exists():
             folder.rmdir()
         draft.rename(folder)
-    return steps
 
 
 def _pictures(data: Dataset, name: str) -> Path:
@@ -143,43 +172,89 @@ def action(step: Step, place: Place) -> np.ndarray:
     return np.array([forward, left, dz, turn, tilt, asked, stopped], np.float32)
 
 
-class _Writer:
+def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeeded: Callable[[Episode], bool]) -> None:
+    """One more episode."""
+    if not episode.steps:
+        raise ValueError(f"the episode of {episode.task.id!r} has no step; leave it out")
+    rows = {
+        "observation.state": np.stack([state(s.pose, place) for s in episode.steps]),
+        "action": np.stack([action(s, place) for s in episode.steps]),
+    }
+    with PanoramaFile(pictures) as file:
+        frames = [seen(file, s.pose, writer.camera) for s in episode.steps]
+        depths = [seen_depth(file, s.pose, writer.camera) for s in episode.steps] if writer.depth else []
+    words = [s.instruction for s in episode.steps]
+    said = [(s.reply and s.reply.text) or "" for s in episode.steps]
+    facts = {"embodied/task": episode.task.id, "embodied/house": episode.task.world, "embodied/agent": episode.agent}
+    writer.add(rows, frames, depths, words, said, succeeded(episode), facts)
+
+
+class Writer:
     """Owns the files of a data set that is being written."""
 
-    def __init__(self, folder: Path, camera: RecordedCamera) -> None:
-        self._folder, self._camera = folder, camera
-        self._video = _Video(folder, camera)
+    def __init__(
+        self,
+        folder: Path,
+        camera: RecordedCamera,
+        columns: Columns = COLUMNS,
+        *,
+        key: str = CAMERA,
+        fps: int = FPS,
+        depth: bool = False,
+    ) -> None:
+        self._folder, self._columns, self._fps = folder, columns, fps
+        self.camera, self.depth = camera, depth
+        self._videos = [_Video(folder, camera, key, fps)]
+        if depth:
+            self._videos.append(_Video(folder, camera, DEPTH, fps, depth=True))
         self._rows: list[dict[str, np.ndarray]] = []
-        self._colours: list[np.ndarray] = []
+        self._said: list[str] = []
+        self._counts: list[list[np.ndarray]] = [[] for _ in self._videos]
         self._tasks: dict[str, int] = {}
         self._episodes: list[dict[str, Any]] = []
         self._steps = 0
 
-    def add(self, episode: Episode, place: Place, pictures: Path, succeeded: Callable[[Episode], bool]) -> None:
-        """One more episode."""
-        n, number = len(episode.steps), len(self._episodes)
-        if n == 0:
-            raise ValueError(f"the episode of {episode.task.id!r} has no step; leave it out")
+    def add(
+        self,
+        rows: Mapping[str, np.ndarray],
+        frames: Sequence[np.ndarray],
+        depths: Sequence[np.ndarray],
+        words: Sequence[str],
+        said: Sequence[str],
+        success: bool,
+        facts: Mapping[str, Any],
+    ) -> None:
+        """One more episode of n steps.
+
+        Args:
+          rows: the columns that are not LeRobot's own, (n, k) each.
+          frames, depths: (h, w, 3) uint8; (h, w) float32 metres, where depth is written.
+          words: what the agent is to do, by step.
+          said: what an assistant says at a step; '' for nothing.
+          facts: columns of its row in the table of episodes.
+        """
+        n, number = len(words), len(self._episodes)
         done = np.arange(n) == n - 1
-        rows = {
-            "observation.state": np.stack([state(s.pose, place) for s in episode.steps]),
-            "action": np.stack([action(s, place) for s in episode.steps]),
+        whole = {
+            **rows,
             "next.done": done,
-            "next.success": done & succeeded(episode),
-            "timestamp": (np.arange(n) / FPS).astype(np.float32),
+            "next.success": done & success,
+            "timestamp": (np.arange(n) / self._fps).astype(np.float32),
             "frame_index": np.arange(n),
             "episode_index": np.full(n, number),
             "index": self._steps + np.arange(n),
-            "task_index": np.array([self._tasks.setdefault(s.instruction, len(self._tasks)) for s in episode.steps]),
+            "task_index": np.array([self._tasks.setdefault(text, len(self._tasks)) for text in words]),
         }
-        with PanoramaFile(pictures) as file:
-            frames = [seen(file, s.pose, self._camera) for s in episode.steps]
-        where, colours = self._video.add(frames), _colours(frames)
-        numbers = {name: _statistics(np.asarray(rows[name], np.float64)) for name in COLUMNS}
+        where: dict[str, Any] = {}
+        numbers = {name: _statistics(np.asarray(whole[name], np.float64)) for name in self._columns}
+        for video, pictures, counts in zip(self._videos, (frames, depths), self._counts, strict=False):
+            where |= video.add(pictures)
+            counts.append(_depths(pictures) if video.depth else _colours(pictures))
+            numbers[video.key] = _statistics_of_counts(counts[-1], video.depth)
         self._episodes.append(
             {
                 "episode_index": number,
-                "tasks": list(dict.fromkeys(s.instruction for s in episode.steps)),
+                "tasks": list(dict.fromkeys(words)),
                 "length": n,
                 "dataset_from_index": self._steps,
                 "dataset_to_index": self._steps + n,
@@ -188,50 +263,57 @@ class _Writer:
                 "meta/episodes/chunk_index": 0,
                 "meta/episodes/file_index": 0,
                 **where,
-                "embodied/task": episode.task.id,
-                "embodied/house": episode.task.world,
-                "embodied/agent": episode.agent,
-                **_flat({**numbers, CAMERA: _statistics_of_colours(colours)}),
+                **facts,
+                **_flat(numbers),
             }
         )
-        self._rows.append(rows)
-        self._colours.append(colours)
+        self._rows.append(whole)
+        self._said += said
         self._steps += n
 
-    def finish(self, data: Dataset) -> int:
-        """Everything but the videos; returns the number of steps."""
+    def finish(self, robot: str, card: str) -> int:
+        """Everything but the videos; returns the number of steps.
+
+        Args:
+          robot: who moves.
+          card: what README.md says of the episodes.
+        """
         if not self._episodes:
             raise ValueError("there are no episodes to write; give files that hold some")
-        self._video.close()
-        rows = {name: np.concatenate([r[name] for r in self._rows]) for name in COLUMNS}
-        table = pa.table({name: _column(rows[name], kind) for name, (kind, _) in COLUMNS.items()})
+        rows = {name: np.concatenate([r[name] for r in self._rows]) for name in self._columns}
+        columns = {name: _column(rows[name], kind) for name, (kind, _) in self._columns.items()}
+        table = pa.table({**columns, EVENTS: _events(self._said)})
         _save(self._folder / PATHS["data"].format(chunk_index=0, file_index=0), table)
-        numbers = {name: _statistics(np.asarray(rows[name], np.float64)) for name in COLUMNS}
-        statistics = {**numbers, CAMERA: _statistics_of_colours(sum(self._colours[1:], self._colours[0]))}
+        statistics = {name: _statistics(np.asarray(rows[name], np.float64)) for name in self._columns}
+        for video, counts in zip(self._videos, self._counts, strict=True):
+            video.close()
+            statistics[video.key] = _statistics_of_counts(sum(counts[1:], counts[0]), video.depth)
         write_json(self._folder / "meta" / "stats.json", statistics, indent=1)
         _save(self._folder / "meta" / "tasks.parquet", _table_of_tasks(list(self._tasks)))
         _save(
             self._folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet", pa.Table.from_pylist(self._episodes)
         )
-        write_json(self._folder / "meta" / "info.json", self._info(data), indent=1)
-        write_bytes(self._folder / "README.md", _card(data, len(self._episodes), self._steps).encode())
+        write_json(self._folder / "meta" / "info.json", self._info(robot), indent=1)
+        counted = f"{len(self._episodes)} episodes ({self._steps} steps)"
+        write_bytes(self._folder / "README.md", (HEAD + card.replace("$COUNT$", counted)).encode())
         return self._steps
 
-    def _info(self, data: Dataset) -> dict[str, Any]:
-        features: dict[str, Any] = {CAMERA: self._video.feature()}
-        for name, (kind, names) in COLUMNS.items():
+    def _info(self, robot: str) -> dict[str, Any]:
+        features: dict[str, Any] = {video.key: video.feature() for video in self._videos}
+        for name, (kind, names) in self._columns.items():
             dtype = DTYPES[kind.value_type if names else kind]
             features[name] = {"dtype": dtype, "shape": [len(names)] if names else [1], "names": names and list(names)}
+        features[EVENTS] = {"dtype": "language", "shape": [1], "names": None}
         return {
             "codebase_version": VERSION,
-            "robot_type": f"embodied {data.kind}",
+            "robot_type": robot,
             "total_episodes": len(self._episodes),
             "total_frames": self._steps,
             "total_tasks": len(self._tasks),
             "chunks_size": CHUNK,
             "data_files_size_in_mb": FILE_MB,
             "video_files_size_in_mb": FILE_MB,
-            "fps": FPS,
+            "fps": self._fps,
             "splits": {"train": f"0:{len(self._episodes)}"},
             "data_path": PATHS["data"],
             "video_path": PATHS["video"],
@@ -239,31 +321,46 @@ class _Writer:
         }
 
 
+def _events(said: Sequence[str]) -> pa.Array:
+    """A list of EVENT for each step: what an assistant says there, '' for nothing."""
+    texts = [text for text in said if text]
+    n = len(texts)
+    kinds = [EVENT.field(k) for k in range(EVENT.num_fields)]
+    words = [pa.array(["assistant"] * n, pa.string()), pa.array(texts, pa.string())]
+    words += [pa.array(["interjection"] * n, pa.string()), *(pa.nulls(n, k.type) for k in kinds[3:])]
+    ends = np.cumsum([0, *(bool(text) for text in said)])
+    return pa.ListArray.from_arrays(pa.array(ends, pa.int32()), pa.StructArray.from_arrays(words, fields=kinds))
+
+
 class _Video:
     """Owns the video file that is being written; episodes stand in it one after another."""
 
-    def __init__(self, folder: Path, camera: RecordedCamera) -> None:
-        self._folder, self._camera = folder, camera
+    def __init__(self, folder: Path, camera: RecordedCamera, key: str, fps: int, *, depth: bool = False) -> None:
+        self._folder, self._camera, self._fps = folder, camera, fps
+        self.key, self.depth = key, depth
         self._number = -1
         self._container: Any = None
         self._frames = 0
 
     def add(self, frames: Sequence[np.ndarray]) -> dict[str, Any]:
-        """Append frames, (h, w, 3) uint8 each; returns where they lie, as the table of episodes says it."""
+        """Append frames, (h, w, 3) uint8 or metres; returns where they lie, as the table of episodes says it."""
         if self._container is None or self._path().stat().st_size > FILE_MB * 2**20:
             self._begin()
         start = self._frames
-        for rgb in frames:
-            frame = av.VideoFrame.from_ndarray(rgb, "rgb24")
-            frame.pts, frame.time_base = self._frames, Fraction(1, FPS)
+        for picture in frames:
+            if self.depth:
+                frame = av.VideoFrame.from_ndarray(depth_codes(picture), "gray12le")
+            else:
+                frame = av.VideoFrame.from_ndarray(picture, "rgb24")
+            frame.pts, frame.time_base = self._frames, Fraction(1, self._fps)
             for packet in self._stream.encode(frame):
                 self._container.mux(packet)
             self._frames += 1
         return {
-            f"videos/{CAMERA}/chunk_index": self._number // CHUNK,
-            f"videos/{CAMERA}/file_index": self._number % CHUNK,
-            f"videos/{CAMERA}/from_timestamp": start / FPS,
-            f"videos/{CAMERA}/to_timestamp": self._frames / FPS,
+            f"videos/{self.key}/chunk_index": self._number // CHUNK,
+            f"videos/{self.key}/file_index": self._number % CHUNK,
+            f"videos/{self.key}/from_timestamp": start / self._fps,
+            f"videos/{self.key}/to_timestamp": self._frames / self._fps,
         }
 
     def close(self) -> None:
@@ -276,15 +373,20 @@ class _Video:
     def feature(self) -> dict[str, Any]:
         """What info.json says of the pictures."""
         c = self._camera
-        facts = {"height": c.height, "width": c.width, "codec": "h264", "pix_fmt": "yuv420p", "is_depth_map": False}
-        facts |= {"fps": FPS, "channels": 3}
-        info = {**{f"video.{k}": v for k, v in facts.items()}, "has_audio": False}
+        codec, pixels, channels = ("hevc", "gray12le", 1) if self.depth else ("h264", "yuv420p", 3)
+        facts: dict[str, Any] = {"height": c.height, "width": c.width, "codec": codec, "pix_fmt": pixels}
+        facts |= {"fps": self._fps, "channels": channels}
+        if self.depth:
+            facts |= {"depth_min": NEAREST, "depth_max": FARTHEST, "shift": SHIFT, "use_log": True}
+        info = {**{f"video.{k}": v for k, v in facts.items()}, "is_depth_map": self.depth, "has_audio": False}
+        if self.depth:
+            info["depth_unit"] = "mm"
         names = ["height", "width", "channels"]
-        return {"dtype": "video", "shape": [c.height, c.width, 3], "names": names, "info": info}
+        return {"dtype": "video", "shape": [c.height, c.width, channels], "names": names, "info": info}
 
     def _path(self) -> Path:
         chunk, file = divmod(self._number, CHUNK)
-        return self._folder / PATHS["video"].format(video_key=CAMERA, chunk_index=chunk, file_index=file)
+        return self._folder / PATHS["video"].format(video_key=self.key, chunk_index=chunk, file_index=file)
 
     def _begin(self) -> None:
         self.close()
@@ -292,18 +394,34 @@ class _Video:
         self._path().parent.mkdir(parents=True, exist_ok=True)
         self._container = av.open(str(self._path()), "w")
         # a key frame every second one, so that any step is decoded at once; no frames out of order
-        self._stream = self._container.add_stream("libx264", rate=FPS, options={"crf": "18", "g": "2", "bf": "0"})
-        self._stream.width, self._stream.height, self._stream.pix_fmt = (
-            self._camera.width,
-            self._camera.height,
-            "yuv420p",
-        )
+        if self.depth:
+            options = {"x265-params": "lossless=1:keyint=2:bframes=0:log-level=error"}
+            self._stream = self._container.add_stream("hevc", rate=self._fps, options=options)
+            self._stream.pix_fmt = "gray12le"
+        else:
+            options = {"crf": "18", "g": "2", "bf": "0"}
+            self._stream = self._container.add_stream("libx264", rate=self._fps, options=options)
+            self._stream.pix_fmt = "yuv420p"
+        self._stream.width, self._stream.height = self._camera.width, self._camera.height
+
+
+def depth_codes(metres: np.ndarray) -> np.ndarray:
+    """(h, w) uint16 of 12 bits: depth on a logarithmic scale, near things finer, as LeRobot 0.6 decodes it."""
+    low, high = math.log(NEAREST + SHIFT), math.log(FARTHEST + SHIFT)
+    clipped = np.clip(metres, NEAREST, FARTHEST)
+    return np.rint((np.log(clipped + SHIFT) - low) / (high - low) * CODES).astype(np.uint16)
 
 
 def seen(file: PanoramaFile, pose: Pose, camera: RecordedCamera) -> np.ndarray:
     """(h, w, 3) uint8: what an agent at `pose` has before its eyes."""
     colours_only = Panorama(file.rgb(pose.node), *(np.empty((6, file.size, 0)),) * 2)
     return colours_only.view_rgb(pose.yaw, pose.pitch, camera.vfov, (camera.height, camera.width))
+
+
+def seen_depth(file: PanoramaFile, pose: Pose, camera: RecordedCamera) -> np.ndarray:
+    """(h, w) float32 metres along the optical axis: the same view's depth."""
+    view = file.read(pose.node).view(pose.yaw, pose.pitch, camera.vfov, (camera.height, camera.width))
+    return np.asarray(view[1], np.float32)
 
 
 def _column(values: np.ndarray, kind: pa.DataType) -> pa.Array:
@@ -352,25 +470,34 @@ def _colours(frames: Sequence[np.ndarray]) -> np.ndarray:
     return np.stack([*counts, np.eye(1, 256, dtype=np.int64)[0] * len(frames)])
 
 
-def _statistics_of_colours(counts: np.ndarray) -> dict[str, list]:
-    """Of what `_colours` counted: values in [0, 1], shaped (3, 1, 1)."""
-    colours, values = counts[:3], np.arange(256) / 255.0
-    total = colours.sum(1)
-    mean = colours @ values / total
-    deviation = np.sqrt(np.maximum(colours @ values**2 / total - mean**2, 0.0))
-    share = np.cumsum(colours, axis=1) / total[:, None]
+def _depths(frames: Sequence[np.ndarray]) -> np.ndarray:
+    """(2, 10001) int64: how often each millimetre occurs; at the start of row 1, how many frames."""
+    bins = round(1000 * FARTHEST) + 1
+    millimetres = [np.rint(1000 * np.clip(f, NEAREST, FARTHEST)).astype(np.int64).ravel() for f in frames]
+    counts = np.bincount(np.concatenate(millimetres), minlength=bins)
+    return np.stack([counts, np.eye(1, bins, dtype=np.int64)[0] * len(frames)])
+
+
+def _statistics_of_counts(counts: np.ndarray, depth: bool) -> dict[str, list]:
+    """Of what `_colours` or `_depths` counted: values in [0, 1] or millimetres, shaped (channels, 1, 1)."""
+    shown, frames = counts[:-1], int(counts[-1, 0])
+    values = np.arange(shown.shape[1]) / (1.0 if depth else 255.0)
+    total = shown.sum(1)
+    mean = shown @ values / total
+    deviation = np.sqrt(np.maximum(shown @ values**2 / total - mean**2, 0.0))
+    share = np.cumsum(shown, axis=1) / total[:, None]
     at = lambda q: values[(share >= q).argmax(1)]
-    found = {"min": at(1e-12), "max": values[255 - (colours[:, ::-1] > 0).argmax(1)], "mean": mean, "std": deviation}
+    last = shown.shape[1] - 1 - (shown[:, ::-1] > 0).argmax(1)
+    found = {"min": at(1e-12), "max": values[last], "mean": mean, "std": deviation}
     found |= {name: at(q) for name, q in QUANTILES.items()}
-    return {**{name: v.reshape(3, 1, 1).tolist() for name, v in found.items()}, "count": [int(counts[3, 0])]}
+    return {**{name: v.reshape(-1, 1, 1).tolist() for name, v in found.items()}, "count": [frames]}
 
 
 def _flat(statistics: Mapping[str, Mapping[str, list]]) -> dict[str, list]:
     return {f"stats/{name}/{what}": v for name, found in statistics.items() for what, v in found.items()}
 
 
-def _card(data: Dataset, episodes: int, steps: int) -> str:
-    return f"""---
+HEAD = """---
 license: apache-2.0
 task_categories:
 - robotics
@@ -381,12 +508,16 @@ configs:
   data_files: data/*/*.parquet
 ---
 
-{episodes} episodes ({steps} steps) of agents in generated, lit houses: {data.kind} tasks of the data set
+"""
+
+
+def _card(data: Dataset) -> str:
+    return f"""$COUNT$ of agents in generated, lit houses: {data.kind} tasks of the data set
 {data.digest[:16]} (seed {data.config.seed}), written by `embodied export lerobot`.
 
 LeRobotDataset {VERSION}, {FPS} frames a "second": a frame is what the agent sees before a step
 (`{CAMERA}`), `observation.state` its pose ({", ".join(STATE)}; metres and
 radians, z up), `action` how the pose changes in its own frame
 ({", ".join(ACTION)}), the task of a frame the instruction that
-it hears at that moment. `meta/episodes` says which task, house and agent.
+it hears at that moment, `{EVENTS}` what an assistant answers then. `meta/episodes` says which task, house and agent.
 """

@@ -62,7 +62,7 @@ class Part:
     of: str = ""
     """What is judged: the episodes of this part of the study; or, with `episodes`, those of a file."""
     episodes: str = ""
-    """A file episodes*.jsonl that `embodied eval`, `judge` or a study wrote."""
+    """A file episodes*.jsonl that `embodied evaluate` or a study wrote."""
     ask: str = ""
     """What raters and describers are asked."""
     advice: str = ""

@@ -1,0 +1,175 @@
+"""Environments as LeRobot's programs want them (0.6.1): `lerobot-eval`, EnvHub.
+
+    from embodied.gym.lerobot import make_env
+    envs = make_env(n_envs=4, env="VLNCE", data="DIR", split="val_unseen")     # {"embodied/VLNCE-v0": {0: VectorEnv}}
+
+Observations are `pixels` (pictures) and `agent_pos` (a vector), actions are vectors of float32: in VLNCE-v0 and
+ObjectNav-v0 a score for each action, of which the largest is taken; in Drive-v0 the velocities. Every info has
+`is_success`; `task_description`, `task` and `_max_episode_steps` are attributes.
+
+EnvHub reads a file `env.py` of a repository; `hub_file` writes one that makes these environments.
+"""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+
+from assets.cache import write_bytes
+from embodied.envs.continuous import POSITION
+from embodied.gym import continuous, drive
+from embodied.gym.spaces import LARGE
+
+ENVS = ("VLNCE", "ObjectNav", "Drive")
+
+
+class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
+    """VLNCE-v0 or ObjectNav-v0 for LeRobot's policies; agent_pos is embodied.envs.continuous.POSITION."""
+
+    metadata = continuous.ContinuousGymEnv.metadata
+
+    def __init__(self, env: continuous.ContinuousGymEnv) -> None:
+        self.env = env
+        lens, actions = env.course.lens, env.course.body.actions
+        self.observation_space = spaces.Dict(
+            {
+                "pixels": spaces.Box(0, 255, (lens.height, lens.width, 3), np.uint8),
+                "agent_pos": spaces.Box(-LARGE, LARGE, (len(POSITION),), np.float32),
+            }
+        )
+        self.action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
+        self.render_mode = env.render_mode
+        self._max_episode_steps = env.course.body.steps
+
+    @property
+    def task_description(self) -> str:
+        """The instruction."""
+        return self.env.task_description
+
+    @property
+    def task(self) -> str:
+        """The name of the task."""
+        return self.env.course.kind
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        super().reset(seed=seed)
+        _, info = self.env.reset(seed=seed, options=options)
+        return self._seen(), info
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        _, reward, terminated, truncated, info = self.env.step(int(np.argmax(action)))
+        return self._seen(), reward, terminated, truncated, info
+
+    def render(self) -> np.ndarray | None:
+        return self.env.render()
+
+    def close(self) -> None:
+        self.env.close()
+
+    def _seen(self) -> dict[str, Any]:
+        return {"pixels": self.env.pixels()["rgb"], "agent_pos": self.env.own_way()}
+
+
+class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
+    """Drive-v0 for LeRobot's policies; agent_pos is its motion, and the direction of the goal where there is one."""
+
+    metadata = drive.DriveEnv.metadata
+
+    def __init__(self, env: drive.DriveEnv) -> None:
+        self.env, known = env, env.observation_space
+        assert isinstance(known, spaces.Dict)
+        self.action_space, self.render_mode = env.action_space, env.render_mode
+        self._parts = [name for name in ("motion", "touched", "goal") if name in known.spaces]
+        numbers = sum(int(np.prod(known[name].shape or ())) for name in self._parts)
+        self.observation_space = spaces.Dict(
+            {"pixels": known["rgb"], "agent_pos": spaces.Box(-LARGE, LARGE, (numbers,), np.float32)}
+        )
+        settings = env.driving.settings
+        self._max_episode_steps = round(settings.seconds / settings.control)
+
+    @property
+    def task_description(self) -> str:
+        """The request."""
+        return self.env.driving.request
+
+    @property
+    def task(self) -> str:
+        return self.env.driving.settings.task
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        super().reset(seed=seed)
+        o, info = self.env.reset(seed=seed, options=options)
+        return self._seen(o), info | {"is_success": False}
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        o, reward, terminated, truncated, info = self.env.step(action)
+        return self._seen(o), reward, terminated, truncated, {"is_success": False} | info
+
+    def render(self) -> np.ndarray | None:
+        return self.env.render()
+
+    def close(self) -> None:
+        self.env.close()
+
+    def _seen(self, o: dict[str, Any]) -> dict[str, Any]:
+        return {"pixels": o["rgb"], "agent_pos": np.concatenate([o[name] for name in self._parts]).astype(np.float32)}
+
+
+def make_env(
+    n_envs: int = 1, use_async_envs: bool = False, cfg: Any = None, *, env: str = "VLNCE", **options: Any
+) -> dict[str, dict[int, gym.vector.VectorEnv]]:
+    """What LeRobot's EnvHub calls: {suite: {number of the task: environments}}.
+
+    Args:
+      use_async_envs: a process for each; otherwise they share their houses in one.
+      cfg: LeRobot's configuration; not needed.
+      env: one of ENVS.
+      options: of `gymnasium.make("embodied/VLNCE-v0", ...)`.
+
+    Raises:
+      ValueError: an unknown `env`.
+    """
+    if env not in ENVS:
+        raise ValueError(f"env is {env!r}; use one of {ENVS}")
+    suite = f"embodied/{env}-v0"
+    if use_async_envs and n_envs > 1:
+        one = functools.partial(make_one, env, **options)
+        envs: gym.vector.VectorEnv = gym.vector.AsyncVectorEnv([one] * n_envs, context="spawn")
+    elif env == "Drive":
+        envs = gym.vector.SyncVectorEnv([functools.partial(make_one, env, **options)] * n_envs)
+    else:
+        course = continuous.make_course(env.lower(), **{"sees": ("rgb",)} | options)
+        envs = gym.vector.SyncVectorEnv(
+            [lambda: ContinuousForLeRobot(continuous.ContinuousGymEnv(course, render_mode="rgb_array"))] * n_envs
+        )
+    return {suite: {0: envs}}
+
+
+def make_one(env: str, **options: Any) -> gym.Env[Any, Any]:
+    """One environment for LeRobot's policies."""
+    options = {"sees": ("rgb",), "render_mode": "rgb_array"} | options
+    if env == "Drive":
+        return DriveForLeRobot(drive.make(**options))
+    return ContinuousForLeRobot(continuous.make(env.lower(), **options))
+
+
+def hub_file(path: Path, env: str = "VLNCE", **options: Any) -> None:
+    """Write the env.py of an EnvHub repository, which makes `env` with these options."""
+    text = f'''"""LeRobot's EnvHub: houses of `pip install embodied-houses`."""
+
+from embodied.gym import lerobot
+
+
+def make_env(n_envs=1, use_async_envs=False, cfg=None):
+    return lerobot.make_env(n_envs, use_async_envs, cfg, env={env!r}, **{options!r})
+'''
+    write_bytes(Path(path), text.encode())
