@@ -216,9 +216,9 @@ def main() -> None:
         "title": "Recognising pictures that were taken at another time",
         "paper": None,
         "command": f"python -m agents.hanna.places --validation VAL --data TEST --pictures {args.pictures} "
-        f"--split {' '.join(args.split)} --out docs/results/data",
+        f"--split {' '.join(args.split)} --table {args.table}" + (f" --houses {args.houses}" if args.houses else ""),
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} houses that nothing learned from (data seed {Dataset(judged).config.seed}), "
+        "settings": f"{houses} house{'s' * (houses > 1)} that nothing learned from (data seed {Dataset(judged).config.seed}), "
         f"pictures {args.pictures or 'of the data set'}; "
         f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
