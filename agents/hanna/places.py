@@ -218,8 +218,8 @@ def main() -> None:
         "command": f"python -m agents.hanna.places --validation VAL --data TEST --pictures {args.pictures} "
         f"--split {' '.join(args.split)} --table {args.table}" + (f" --houses {args.houses}" if args.houses else ""),
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} house{'s' * (houses > 1)} that nothing learned from (data seed {Dataset(judged).config.seed}), "
-        f"pictures {args.pictures or 'of the data set'}; "
+        "settings": f"{houses} house{'s' * (houses > 1)} that nothing learned from "
+        f"(data seed {Dataset(judged).config.seed}), pictures {args.pictures or 'of the data set'}; "
         f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
         "rows": rows,
