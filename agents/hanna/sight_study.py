@@ -102,9 +102,10 @@ def main() -> None:
                     "encoder": load_encoder().digest,
                     "seed": args.seed,
                 },
-                "settings": f"{len(episodes)} tasks in {len(graphs)} house{'s' * (len(graphs) > 1)} that nothing learned "
-                f"from (data seed {data.config.seed}, {data.config.area[0]:g} to {data.config.area[1]:g} m²), pictures "
-                f"{args.pictures or 'of the data set'}; in brackets when the pictures were taken that helpers show",
+                "settings": f"{len(episodes)} tasks in {len(graphs)} house{'s' * (len(graphs) > 1)} "
+                f"that nothing learned from (data seed {data.config.seed}, {data.config.area[0]:g} to "
+                f"{data.config.area[1]:g} m²), pictures {args.pictures or 'of the data set'}; "
+                "in brackets when the pictures were taken that helpers show",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
