@@ -216,10 +216,10 @@ def main() -> None:
         "title": "Recognising pictures that were taken at another time",
         "paper": None,
         "command": f"python -m agents.hanna.places --validation VAL --data TEST --pictures {args.pictures} "
-        f"--split {' '.join(args.split)} --out docs/results/data",
+        f"--split {' '.join(args.split)} --table {args.table}" + (f" --houses {args.houses}" if args.houses else ""),
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} houses used for no training (data seed {Dataset(judged).config.seed}), "
-        f"pictures {args.pictures or 'of the data set'}; "
+        "settings": f"{houses} house{'s' * (houses > 1)} used for no training "
+        f"(data seed {Dataset(judged).config.seed}), pictures {args.pictures or 'of the data set'}; "
         f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
         "rows": rows,

@@ -94,16 +94,18 @@ def main() -> None:
                 "title": "HANNA with sight, without, and by its rules alone",
                 "paper": None,
                 "command": f"python -m agents.hanna.sight_study --data TEST --pictures {args.pictures} --split "
-                f"{' '.join(args.split)} --shown {' '.join(args.shown)} --episodes STUDY --out docs/results/data",
+                f"{' '.join(args.split)} --shown {' '.join(args.shown)} --episodes STUDY --table {args.table}"
+                + (f" --houses {args.houses}" if args.houses else ""),
                 "identity": {
                     "data": data.digest,
                     "agent": digest(args.agent),
                     "encoder": load_encoder().digest,
                     "seed": args.seed,
                 },
-                "settings": f"{len(episodes)} tasks in {len(graphs)} houses used for no training (data seed "
-                f"{data.config.seed}, {data.config.area[0]:g} to {data.config.area[1]:g} m²), pictures "
-                f"{args.pictures or 'of the data set'}; in brackets: how the goal image was taken",
+                "settings": f"{len(episodes)} tasks in {len(graphs)} house{'s' * (len(graphs) > 1)} "
+                f"used for no training (data seed {data.config.seed}, {data.config.area[0]:g} to "
+                f"{data.config.area[1]:g} m²), pictures {args.pictures or 'of the data set'}; "
+                "in brackets: how the goal image was taken",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
