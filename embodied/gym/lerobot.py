@@ -83,8 +83,9 @@ class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
     metadata = drive.DriveEnv.metadata
 
     def __init__(self, env: drive.DriveEnv) -> None:
-        self.env, known = env, env.observation_space
-        assert isinstance(known, spaces.Dict)
+        known = env.observation_space
+        assert isinstance(known, spaces.Dict), "as drive.seen_space gives it"
+        self.env = env
         self.action_space, self.render_mode = env.action_space, env.render_mode
         self._parts = [name for name in ("motion", "touched", "goal") if name in known.spaces]
         numbers = sum(int(np.prod(known[name].shape or ())) for name in self._parts)
