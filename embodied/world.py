@@ -336,7 +336,7 @@ def open_folder(
     folder, cache = Path(folder), cache or default_cache()
     catalogue = catalogue or load_catalogue(cache)
     if not (folder / "house.json").exists():
-        raise FileNotFoundError(f"{folder} holds no house.json; make one with `embodied house --seed 7 --out {folder}`")
+        raise FileNotFoundError(f"{folder} holds no house.json; name a folder that `embodied house` wrote")
     house = load_house(folder / "house.json", catalogue)
     graph, pictures = build_graph(house), PictureSettings.of(pictures, **changes)
     file = folder / "panoramas.pano"

@@ -11,7 +11,8 @@ import torch
 
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
 from agents.bandit.ratings import CLEAN, Rater, deviation, granular, skewed
-from agents.common.actor_critic import Decisions, DivergedError, actor_loss, advantages, critic_loss, descend
+from agents.common.actor_critic import Decisions, actor_loss, advantages, critic_loss
+from agents.common.session import DivergedError, descend
 from embodied.seeds import stream
 
 
@@ -141,7 +142,7 @@ def test_a_loss_that_is_no_number_changes_no_weight():
     weight = torch.nn.Parameter(torch.ones(2))
     optimizer = torch.optim.Adam([weight], 0.1)
     with pytest.raises(DivergedError, match="lower the learning rate"):
-        descend((weight * float("nan")).sum(), optimizer, 5.0, "test, update 3")
+        descend((weight * float("nan")).sum(), optimizer, "test, update 3", 5.0)
     assert weight.tolist() == [1.0, 1.0]
 
 
@@ -156,7 +157,7 @@ def test_actor_critic_finds_the_better_of_two_arms_from_coarse_ratings():
         ratings = torch.tensor([rater.rate(0.8 if a else 0.3, rng=rng) for a in arms], dtype=torch.float32)
         chosen = logits.log_softmax(-1)[torch.tensor(arms).long()][:, None]
         rated = Decisions(chosen, value.expand(16)[:, None], ratings, torch.ones(16, 1, dtype=torch.bool))
-        descend(actor_loss(rated), optimizers[0], 5.0, "actor")
-        descend(critic_loss(rated), optimizers[1], 5.0, "critic")
+        descend(actor_loss(rated), optimizers[0], "actor", 5.0)
+        descend(critic_loss(rated), optimizers[1], "critic", 5.0)
     assert logits.softmax(-1)[1] > 0.9
     assert value.item() > 0.7

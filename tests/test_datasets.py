@@ -142,8 +142,6 @@ def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
     with pytest.raises(DatasetError, match="half built: 2 of 4"):
         Dataset(tmp_path / "half")
     assert not [p for p in (tmp_path / "half" / "houses").iterdir() if p.name.startswith(".")], "no debris"
-    (tmp_path / "half" / "houses" / ".train_0001.killed").mkdir()
-    (tmp_path / "half" / "houses" / ".train_0001.killed" / "house.json").write_text("{")  # as SIGKILL leaves it
     again = build(tmp_path / "half", tmp_path / "cache")
     assert again.digest == whole.digest and content(tmp_path / "half") == content(tmp_path / "whole")
 

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hand_data import build, built, content
+from hand_data import built, content
 
 from assets.cache import digest
 from embodied.datasets.store import Dataset, DatasetError
@@ -214,12 +214,3 @@ def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(w
     finally:
         first.kill()
     assert content(tmp_path / "data") == content(whole["hanna"])
-
-
-def test_what_killed_builds_left_in_houses_is_swept(folder):
-    debris = [folder / "houses" / ".train_0000.old", folder / "houses" / HOUSE / ".panoramas.pano.x.pano"]
-    before = content(folder)
-    for path in debris:
-        path.write_text("half")
-    build(folder, folder.parent / "cache")
-    assert content(folder) == before

@@ -28,7 +28,6 @@ from embodied import cli
 from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import Dataset
-from embodied.evaluation import tables
 from embodied.evaluation.rollout import play
 from embodied.generate import generate_house
 from embodied.house.house import HouseError
@@ -152,9 +151,10 @@ def test_no_command_touches_what_stands_beside_what_it_writes(order, here, tmp_p
 DELETES = {"rmtree", "unlink", "rmdir", "remove"}
 REVIEWED = {
     "assets/cache.py": "drafts, which are marked",
+    "embodied/cli/cache.py": "what it was asked to, of the kinds that the program keeps in a cache",
+    "agents/bandit/corpus.py": "the mark of a whole corpus, before it writes another",
     "embodied/locks.py": "its own lock",
     "embodied/bench/serve.py": "what people did in a study that it has just written",
-    "embodied/bench/freeze.py": "a folder that holds what it made",
     "embodied/datasets/lerobot.py": "an empty folder",
     "embodied/light/baking.py": "a bake in the cache",
     "embodied/light/files.py": "a bake in the cache",
@@ -351,14 +351,3 @@ def test_a_recording_is_never_an_option_and_everybody_is_warned(tmp_path, monkey
     Path("a.rrd").write_bytes(b"GIF89a")
     assert cli.main(["view", "a.rrd", "--serve"]) == 2
     assert "is no recording of Rerun" in capsys.readouterr().err
-
-
-# Tables -------------------------------------------------------------------------------------------
-
-
-def test_a_share_of_all_has_the_exact_interval():
-    """Clopper and Pearson: of n of n, the lower end is the n-th root of 0.025."""
-    for mean in (0.0, 1.0):
-        assert tables._at_the_end(tables.Estimate(mean, 0.0, 40)).half == pytest.approx(0.0881, abs=1e-4)
-    for other in (tables.Estimate(0.5, 0.1, 40), tables.Estimate(1.0, 0.02, 40), tables.Estimate(float("nan"), 0.0, 0)):
-        assert tables._at_the_end(other) is other

@@ -129,7 +129,7 @@ def test_thin_bars_do_not_flicker_while_the_camera_turns(metal, monkeypatch):
         return float(np.std(seen, axis=0).mean())
 
     many = flicker()
-    monkeypatch.setattr(gloss, "LONELY", 0)
+    monkeypatch.setattr(gloss, "MIN_SAMPLES", 0)
     monkeypatch.setattr(gloss, "BRUSHED", 1)
     assert many < 0.7 * flicker()
 

@@ -25,7 +25,7 @@ from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import Closed, PanoramaStore, PictureEyes, ViewSettings
-from embodied.gym.in_step import InStep
+from embodied.gym.in_step import SharedSyncVectorEnv
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.navigation.graph import graph_of
 from embodied.teachers.shortest import shortest_action
@@ -39,7 +39,7 @@ def tmp(tmp_path_factory) -> str:
     return str(tmp_path_factory.mktemp("cache"))
 
 
-def batch(tmp, n=3, **options) -> InStep:
+def batch(tmp, n=3, **options) -> SharedSyncVectorEnv:
     return embodied.gym.env.make_vec("find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
 
 

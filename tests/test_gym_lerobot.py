@@ -10,7 +10,8 @@ from conftest import two_rooms
 from gymnasium.utils.env_checker import check_env
 from handmade import HandCatalogue, furnished
 
-from embodied.gym.lerobot import ENVS, POSITION, hub_file, make_env, make_one
+from embodied.envs.continuous import POSITION
+from embodied.gym.lerobot import ENVS, hub_file, make_env, make_one
 from embodied.world import open_world
 
 pytestmark = pytest.mark.gl

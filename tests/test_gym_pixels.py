@@ -20,7 +20,7 @@ from embodied.envs.base import HelpEnv
 from embodied.gym import eyes as module
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import FAR, AllEyes, Closed, FeatureEyes, PanoramaStore, PictureEyes, ViewSettings, checked_sees
-from embodied.gym.in_step import InStep, refuse_too_many
+from embodied.gym.in_step import SharedSyncVectorEnv, refuse_too_many
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import FindObject, Move, Pose, Sight, Stop, Task
 from embodied.navigation.graph import graph_of
@@ -107,7 +107,7 @@ def test_features_come_from_the_very_panoramas_that_are_shown(world):
 def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world, threads):
     store = PanoramaStore({world.name: world})
     eyes = PictureEyes(store, ("rgb",), ViewSettings(height=16, width=16))
-    envs = InStep(lambda: env_of(world, Closed()), 12, eyes, threads=threads)
+    envs = SharedSyncVectorEnv(lambda: env_of(world, Closed()), 12, eyes, threads=threads)
     o, _ = envs.reset(seed=5)
     for _ in range(6):
         o, *_ = envs.step(np.zeros(12, dtype=np.int64))
@@ -121,7 +121,7 @@ def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world,
 
 def test_a_batch_gives_what_gymnasium_would_batch(world):
     eyes = PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), ViewSettings(height=16, width=16))
-    ours = InStep(lambda: env_of(world, Closed()), 5, eyes, threads=2)
+    ours = SharedSyncVectorEnv(lambda: env_of(world, Closed()), 5, eyes, threads=2)
     theirs = gym.vector.SyncVectorEnv([lambda: env_of(world, eyes)] * 5)
     assert ours.observation_space == theirs.observation_space
     assert ours.single_observation_space == theirs.single_observation_space
@@ -136,7 +136,7 @@ def test_a_batch_gives_what_gymnasium_would_batch(world):
         assert (earlier == kept).all(), "what was handed out stays"
     assert ours.get_attr("render_mode") == (None,) * 5
     with pytest.raises(ValueError, match="threads should be at least 1"):
-        InStep(lambda: env_of(world, Closed()), 2, eyes, threads=0)
+        SharedSyncVectorEnv(lambda: env_of(world, Closed()), 2, eyes, threads=0)
     ours.close(), theirs.close()
 
 

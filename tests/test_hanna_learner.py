@@ -220,7 +220,7 @@ def test_where_the_agent_was_weighs_less():
 
     def repeated(again: float) -> int:
         """Steps to places where the episode had been under the same words."""
-        policy = dataclasses.replace(agent.policy(split.bank), again=again)
+        policy = dataclasses.replace(agent.policy(split.bank), revisit_weight=again)
         policy.network.eval()
         with torch.inference_mode():
             played = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
@@ -232,11 +232,12 @@ def test_where_the_agent_was_weighs_less():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "model, again, by_image", [("hanna", 1.0, False), ("hanna", 0.3, False), ("hanna", 0.3, True), ("lstm", 1.0, False)]
+    "model, again, use_goal_image",
+    [("hanna", 1.0, False), ("hanna", 0.3, False), ("hanna", 0.3, True), ("lstm", 1.0, False)],
 )
-def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, by_image):
+def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, use_goal_image):
     split = setting(houses=2)
-    judged = dataclasses.replace(JUDGED, again=again, by_image=by_image)
+    judged = dataclasses.replace(JUDGED, revisit_weight=again, use_goal_image=use_goal_image)
     policy = agent_for(split, dataclasses.replace(TINY, model=model), judged).policy(split.bank)
     policy.network.eval()
     policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=for_training(policy).ask_rule)

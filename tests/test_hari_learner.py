@@ -15,11 +15,11 @@ from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, criti
 from agents.common.checkpoint import CheckpointError
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import Ground, IntentionRun, counts_of, learn_once, train, values
+from agents.hari.intention import IntentionRun, TaskSplit, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from agents.hari.policy import DO, DONE, Belief, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from agents.hari.pretraining import (
-    Curriculum,
+    PretrainingData,
     _begin,
     give_subgoal,
     guided_share,
@@ -75,19 +75,19 @@ def fork_task(goal: int) -> Task:
     return Task(f"fork/hari/{goal}", "hari", "fork", Pose(0), what, (goal,), "find a mug in a hall", 0.0, 6)
 
 
-def fork_lessons() -> Curriculum:
+def fork_lessons() -> PretrainingData:
     """Both ways of the fork, with the goal described densely or as the next action."""
-    return Curriculum(
+    return PretrainingData(
         {"fork": fork_world()}, Describer(()), [fork_task(1), fork_task(2)] * 8, [fork_task(1), fork_task(2)]
     )
 
 
-def grid_lessons() -> tuple[HandWorld, Curriculum]:
+def grid_lessons() -> tuple[HandWorld, PretrainingData]:
     world = grid_world()
     config = HariConfig(fewest_nodes=1)
     pool = hari_pool(world, seed=0, config=config)
     tasks = [hari_task(pool, i, seed=0, language=PlainLanguage(), config=config) for i in range(48)]
-    return world, Curriculum({"grid": world}, Describer(frequent_classes([world], 0.5)), tasks, tasks[:24])
+    return world, PretrainingData({"grid": world}, Describer(frequent_classes([world], 0.5)), tasks, tasks[:24])
 
 
 def words_of(world: HandWorld) -> FeatureWords:
@@ -467,7 +467,7 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
     agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
     run = IntentionRun(agent, new_heads(config, SMALL.hidden_size)[1])
     world = fork_world()
-    ground = Ground({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
+    ground = TaskSplit({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
     for update in range(config.updates):
         learn_once(run, ground, update)
     episodes = play(fork_env, policy_of(agent, sample=False), [fork_task(1), fork_task(2)], seed=0)
@@ -516,7 +516,7 @@ def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
         pretrain(other, lessons, tmp_path / "parts", identity(other.config), note=silent)
 
     say = lessons.describer
-    ground = Ground(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
+    ground = TaskSplit(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
     runs = {}
     for name, stops in (("one", (3,)), ("two", (1, 3))):
         for updates in stops:

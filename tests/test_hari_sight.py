@@ -22,9 +22,9 @@ from agents.hari.agent import (
 )
 from agents.hari.config import STATES, ExecutionConfig, IntentionConfig
 from agents.hari.policy import policy_of
-from agents.hari.pretraining import Curriculum, learn_once, pretraining_success
+from agents.hari.pretraining import PretrainingData, learn_once, pretraining_success
 from agents.hari.rules import RULES, RuleAgent
-from agents.hari.sight import Headings, Seeing, hidden_channels
+from agents.hari.sight import FeatureSpec, Headings, hidden_channels
 from agents.hari.study import Covered
 from agents.hari.words import collate, feature_words, percept
 from embodied.action_spaces import PanoramicMoves
@@ -41,7 +41,7 @@ D = 4
 CONFIG = ExecutionConfig(
     hidden_size=32, layers=1, heads=2, dropout=0.0, learning_rate=3e-3, iterations=90, batch=16, sees="features"
 )
-SEEING = Seeing(D, "hand-made")
+SEEING = FeatureSpec(D, "hand-made")
 
 
 def mirrored(name: str) -> HandWorld:
@@ -80,9 +80,9 @@ class Eyes:
         return out
 
 
-def lessons() -> Curriculum:
+def lessons() -> PretrainingData:
     tasks = [task(name) for name in WORLDS]
-    return Curriculum(WORLDS, Describer(()), tasks * 8, tasks * 20)
+    return PretrainingData(WORLDS, Describer(()), tasks * 8, tasks * 20)
 
 
 def fresh(config: ExecutionConfig = CONFIG) -> Executor:

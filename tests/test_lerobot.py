@@ -68,6 +68,11 @@ def test_every_step_is_a_row_with_its_pose_its_action_and_the_words_of_the_momen
     words = dict(zip(heard["task_index"], heard["task"]))
     assert [words[k] for k in table["task_index"]] == [s.instruction for s in steps]
     assert len(set(table["task_index"])) > 3, "an assistant spoke"
+    said = [[event["content"] for event in events] for events in table["language_events"]]
+    assert said == [[s.reply.text] if s.reply and s.reply.text else [] for s in steps] and any(said)
+    assert {(e["role"], e["style"]) for events in table["language_events"] for e in events} == {
+        ("assistant", "interjection")
+    }
     graph = data.place("train_0000").graph
     assert np.allclose(np.array(table["observation.state"])[:, :3], [graph.positions[s.pose.node] for s in steps])
     acts, asked = np.array(table["action"]), [ACTION.index("ask"), ACTION.index("stop")]
@@ -147,7 +152,7 @@ def test_what_cannot_be_exported_is_said_and_leaves_nothing(data, episodes, tmp_
 
 
 def test_lerobots_own_reader_reads_it(folder, data, episodes):
-    """Where it is installed; LeRobot 0.4.4 did on 22 November 2026, frames decoded by its PyAV backend."""
+    """Where it is installed; LeRobot 0.4.4 and 0.6.1 did in November 2026, frames decoded by its PyAV backend."""
     reader = pytest.importorskip("lerobot.datasets.lerobot_dataset")
     read = reader.LeRobotDataset("embodied/walks", root=folder, video_backend="pyav")
     steps = [s for e in episodes for s in e.steps]
@@ -157,5 +162,7 @@ def test_lerobots_own_reader_reads_it(folder, data, episodes):
         item = read[k]
         assert item["task"] == steps[k].instruction
         assert item["observation.state"].shape == (5,) and item["action"].shape == (7,)
+        spoken = [event["content"] for event in item.get("language_events", ())]
+        assert spoken == ([steps[k].reply.text] if steps[k].reply and steps[k].reply.text else [])
         picture = item[CAMERA].permute(1, 2, 0).numpy() * 255
         assert np.abs(picture - shown[k]).mean() < 3

@@ -117,3 +117,14 @@ def test_a_terminal_that_knows_no_unicode_gets_question_marks_not_an_error():
     plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, env=plain)
     assert (done.returncode, done.stdout) == (0, "50.0 ? 3.1\n"), done.stderr
+
+
+def test_a_shell_completes_commands_options_and_their_words(tmp_path, capsys):
+    pytest.importorskip("shtab")
+    with pytest.raises(SystemExit):
+        cli.main(["--print-completion", "bash"])
+    script = tmp_path / "embodied.bash"
+    script.write_text(capsys.readouterr().out)
+    asked = f'. {script}; COMP_WORDS=(embodied render home --pictures nor); COMP_CWORD=4; _shtab_embodied "" nor; '
+    said = subprocess.run(["bash", "-c", asked + "echo ${COMPREPLY[@]}"], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["normal", "normal-matte", "normal-filament"]

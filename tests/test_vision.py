@@ -289,7 +289,7 @@ def test_training_the_encoder_lowers_its_loss(tmp_path):
 def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatch):
     tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
-    config = VisionConfig(network="keen", epochs=3, batch=2, least_views=1)
+    config = VisionConfig(network="compact_maxpool", epochs=3, batch=2, least_views=1)
     houses, folder = [strips_of_colours(4, seed=0), strips_of_colours(4, seed=1)], tmp_path / "run"
     whole, _, _ = train_encoder(houses, config, note=lambda line: None)
 
@@ -367,9 +367,9 @@ def test_an_epoch_sees_each_viewpoint_once_however_often_its_house_was_lit():
 def test_a_frozen_body_stays_as_it_began(monkeypatch):
     tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
-    config = VisionConfig(network="keen", epochs=1, batch=2, least_views=1, frozen=True)
+    config = VisionConfig(network="compact_maxpool", epochs=1, batch=2, least_views=1, frozen=True)
     learned, _, _ = train_encoder([strips_of_colours(4, seed=0)], config, note=lambda line: None)
-    began = random_encoder("keen", seed=config.seed)
+    began = random_encoder("compact_maxpool", seed=config.seed)
     assert all(torch.equal(a, b) for a, b in zip(*map(_body, (learned, began)), strict=True))
     assert not torch.equal(learned.network.neck.weight, began.network.neck.weight)
 
@@ -408,9 +408,9 @@ def test_lite0_is_the_packages_network():
     assert torch.allclose(found[:, :112], fine, atol=1e-5)
     assert torch.allclose(found[:, 112:, 1::2, 1::2].mean(), x.mean(), atol=0.05) and found.shape == (1, 432, 4, 6)
     with pytest.raises(ValueError, match="lite0"):
-        begin_as_imagenet(build("keen"))
+        begin_as_imagenet(build("compact_maxpool"))
     with pytest.raises(ValueError, match="'imagenet' goes with networks .'lite0'"):
-        VisionConfig(network="keen", begin="imagenet")
+        VisionConfig(network="compact_maxpool", begin="imagenet")
 
 
 def test_an_encoder_file_knows_its_digest_and_notices_damage(tmp_path):

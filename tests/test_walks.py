@@ -13,7 +13,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 from PIL import Image
 
-from embodied.datasets.vlnce import FORMATS, Shot, export_walks, pixel_goal, pose_of, teach, wandering
+from embodied.datasets.vlnce import FORMATS, Shot, export_walks, frames, pixel_goal, pose_of, teach, wandering
 from embodied.envs.continuous import Aim, ContinuousEnv, Excursion, Move
 from embodied.world import open_world
 
@@ -36,7 +36,7 @@ def excursion(world) -> Excursion:
 def folders(world, tmp_path_factory):
     home = tmp_path_factory.mktemp("forms")
     for form in FORMATS:
-        export_walks(form, home / form, [excursion(world)], {world.name: world}, seed=0, shot=SMALL)
+        export_walks(form, home / form, [excursion(world)], {world.name: world}, seed=0, shot=SMALL, depth=True)
     return home
 
 
@@ -98,6 +98,20 @@ def test_interndata_has_poses_that_step_a_quarter_of_a_metre_and_pixel_goals_on_
         z = depth[v, u] / 1000
         seen = poses[k, :3, :3] @ [(u + 0.5 - 24) * z / focal, (v + 0.5 - 16) * z / focal, z] + poses[k, :3, 3]
         assert np.linalg.norm(seen[:2] - poses[k + f, :2, 3]) < 0.6, "the pixel shows the floor where the body will be"
+
+
+def test_lerobots_form_has_the_experts_action_the_way_so_far_and_depth_of_12_bits(folders, world, taught):
+    home = folders / "lerobot-vlnce"
+    rows = pq.read_table(home / "data/chunk-000/file-000.parquet").to_pydict()
+    assert np.argmax(rows["action"], axis=1).tolist() == list(taught.labels)
+    assert rows["observation.state"][0] == pytest.approx([0, 0, 0, 1, 0], abs=1e-6)
+    info = json.loads((home / "meta/info.json").read_text())
+    assert info["features"]["observation.images.depth"]["info"]["is_depth_map"] is True
+    with av.open(str(home / "videos/observation.images.depth/chunk-000/file-000.mp4")) as video:
+        planes = [f.to_ndarray() for f in video.decode(video=0)]
+    for codes, (_, depth) in zip(planes, frames(taught, SMALL), strict=True):
+        metres = np.exp(codes / 4095 * math.log(13.5 / 3.51)) * 3.51 - 3.5
+        assert np.abs(metres - np.clip(depth, 0.01, 10)).max() < 3e-3
 
 
 def test_labels_of_a_walk_that_wanders_lead_back(world):

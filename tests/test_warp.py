@@ -92,6 +92,25 @@ def test_every_view_of_a_batch_is_its_own_camera(classic, warped):
         assert (shot.ids == batch.ids.numpy()[k]).mean() > 0.98, k
 
 
+@pytest.mark.gl
+def test_a_pane_of_two_faces_in_one_place_has_no_holes(house, classic, warped):
+    at, yaw = (2.5, 1.4, 1.5), -math.pi / 2
+    a, b = classic.view(at, yaw, 0.0, math.pi / 2, (SIZE, SIZE)), warped.view(at, yaw)
+    pane = a.ids == 1 + owners(house).index("window_1/glass")
+    assert pane.sum() > 300 and (b.ids[pane] == a.ids[pane]).mean() > 0.95
+
+
+def test_a_picture_stays_as_it_is_when_the_next_is_drawn(warped):
+    first = warped.view(EYE, 0.0)
+    held = first.rgb.copy()
+    warped.view(EYE, math.pi)
+    assert np.array_equal(first.rgb, held)
+    panorama = warped.panorama(EYE)
+    held = panorama.depth.copy()
+    warped.panorama((7.0, 2.0, 1.4))
+    assert np.array_equal(panorama.depth, held)
+
+
 def test_pictures_are_handed_to_torch_without_a_copy(warped):
     torch = pytest.importorskip("torch")
     batch = warped.views([EYE], [0.0])

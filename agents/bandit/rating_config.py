@@ -32,9 +32,9 @@ class RatingConfig:
     """What a rating is made from: 'success', 'nDTW' of the walk against the shortest one, which teaches to stand
     still rather than to err (docs/results/bandit.md), or 'SDTW': nDTW where the goal was reached, else nothing."""
     clip: float = 5.0
-    """Longest gradient."""
+    """Gradients are clipped to this norm."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Random seed."""
 
     def __post_init__(self) -> None:
         require_word(self, "score", SCORES)

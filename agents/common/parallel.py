@@ -58,7 +58,7 @@ def add_gradients(parameters: Iterable[torch.nn.Parameter]) -> None:
         at += g.numel()
 
 
-def whole(
+def reduce_metrics(
     numbers: Mapping[str, float], names: Sequence[str], added: Collection[str], device: torch.device
 ) -> dict[str, float]:
     """`numbers` of all processes, each named in `names`: those in `added` summed up, of the others the mean over
@@ -74,12 +74,12 @@ def whole(
     }
 
 
-def one_voice(note: Callable[[str], None]) -> Callable[[str], None]:
+def rank_zero(note: Callable[[str], None]) -> Callable[[str], None]:
     """`note` in the first process, silence in the others."""
     return note if rank() == 0 else lambda line: None
 
 
-def any_of_us(flag: bool, device: torch.device) -> bool:
+def any_rank(flag: bool, device: torch.device) -> bool:
     """Whether `flag` is true in any process, so that all stop together."""
     if processes() == 1:
         return flag

@@ -126,7 +126,7 @@ class Session:
         """Of what is being counted, such as a pass; the caller empties it."""
         self.history: list[dict[str, float]] = []
         """What was found so far, such as one entry per validation."""
-        self._note = parallel.one_voice(note)
+        self._note = parallel.rank_zero(note)
         self._may_change, self._minutes, self._saved_every, self._every = may_change, minutes, checkpoint_minutes, every
         self._means: dict[str, list[float]] = {}
         self._writer: SummaryWriter | None = None
@@ -227,8 +227,8 @@ class Session:
             last = self.progress.update == self.total
             if self._means and (self.progress.update % self._every == 0 or last):
                 self._report()
-            stopped = parallel.any_of_us(self._stop.is_set(), self._device)
-            late = parallel.any_of_us(self._minutes is not None and now - began > 60 * self._minutes, self._device)
+            stopped = parallel.any_rank(self._stop.is_set(), self._device)
+            late = parallel.any_rank(self._minutes is not None and now - began > 60 * self._minutes, self._device)
             if first and (last or stopped or late or now - saved > 60 * self._saved_every):
                 self.save()
                 saved = now

@@ -56,9 +56,9 @@ class RunSettings:
     batch: int = 32
     """Episodes per update."""
     checkpoint_minutes: float = 3.0
-    """How often the run is saved, so that it can go on after an interruption."""
+    """Minutes between checkpoints, from which an interrupted run resumes."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Random seed."""
 
     def __post_init__(self) -> None:
         require(self, AT_LEAST_ONE, "batch")
@@ -72,7 +72,7 @@ class ValidatedRunSettings(RunSettings):
     iterations: int
     """Updates of the weights."""
     learning_rate: float = 1e-4
-    """Of Adam."""
+    """Learning rate of Adam."""
     validate_every: int = 500
     """Updates between validations."""
     validation_tasks: int = 300
@@ -91,7 +91,7 @@ class ImitationSettings(ValidatedRunSettings):
     cooldown: float = 0.0
     """The last share of the updates, over which the learning rate falls to zero (docs/sources.md, S32, S113)."""
     weight_decay: float = 5e-4
-    """The authors' programs'; the text does not mention it (docs/sources.md, S28)."""
+    """Weight decay, as in the authors' programs; the text does not mention it (docs/sources.md, S28)."""
     training_houses: int = 0
     """Learn from so many of the data set's training houses; 0: from all."""
     lights: int = 1
@@ -118,16 +118,15 @@ MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes")
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationSettings:
-    """How an agent by imitation is judged, in validations too."""
+    """How an agent that learns by imitation is evaluated, in validations too."""
 
     evaluation_temperature: float = 0.0
-    """How navigation actions are chosen when judged: 0 takes the likeliest, 1 draws from
-    the distribution, between them it is sharpened. An agent that is often wrong and always takes its
-    likeliest action walks in circles (docs/sources.md, S36)."""
+    """Sampling temperature of navigation actions in evaluation: 0 is greedy decoding, 1 samples from the distribution.
+    An agent that is often wrong and decodes greedily walks in circles (docs/sources.md, S36)."""
     ask_threshold: float = 0.5
-    """When judged, the learned rule asks where asking is more probable than this."""
+    """In evaluation, the learned rule asks where asking is more probable than this."""
     evaluation_batch: int = 32
-    """Episodes judged side by side; has no influence on results, only on speed."""
+    """Episodes evaluated in parallel; changes speed, not results."""
 
     def __post_init__(self) -> None:
         require(self, AT_LEAST_ONE, "evaluation_batch")

@@ -151,7 +151,7 @@ def learn_once(
         raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
     losses = [float(x.detach()) for x in lesson.losses]
     numbers = {"loss navigation": losses[0], "loss asking": losses[1], "gradient": norm, **lesson.numbers}
-    return parallel.whole(numbers, NUMBERS, ADDED, lesson.learned.device)
+    return parallel.reduce_metrics(numbers, NUMBERS, ADDED, lesson.learned.device)
 
 
 NUMBERS = (

@@ -62,7 +62,7 @@ class HannaAgent:
             judged.ask_threshold,
             first=judged.first_ask_threshold,
             on_route=judged.route_ask_threshold,
-            patience=judged.patience,
+            patience=judged.min_moves_between_requests,
         )
         rule = learned if config.ask_rule == "learned" else RULES[config.ask_rule][1]
         return HannaPolicy(
@@ -74,9 +74,9 @@ class HannaAgent:
             instruction_length=config.instruction_length,
             turn_to_agent=config.turn_to_agent,
             read_assistance=config.read_assistance,
-            again=judged.again,
-            by_image=judged.by_image,
-            search=judged.search,
+            revisit_weight=judged.revisit_weight,
+            use_goal_image=judged.use_goal_image,
+            frontier_discount=judged.frontier_discount,
         )
 
 

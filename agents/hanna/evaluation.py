@@ -37,12 +37,16 @@ ASK_THRESHOLDS: Mapping[str, Mapping[str, HannaAskRule]] = {
     "at random": {f"learned, with {p:g}": ask_with(p) for p in (0.03, 0.06, 0.12, 0.2, 0.35, 0.6)},
 }
 """Rules of asking put before one pair of networks, from few requests to many, by kind of rule."""
-PLAINER: Mapping[str, Mapping[str, Any]] = {
-    "learned, without search": {"search": 0.0},
-    "learned, not by image": {"by_image": False},
-    "learned, without a trail": {"by_image": False, "again": 1.0},
+EVAL_ABLATIONS: Mapping[str, Mapping[str, Any]] = {
+    "learned, without search": {"frontier_discount": 0.0},
+    "learned, not by image": {"use_goal_image": False},
+    "learned, without a trail": {"use_goal_image": False, "revisit_weight": 1.0},
     "learned, likeliest move": {"choose": choose_at(0.0)},
-    "learned, likeliest move, without a trail": {"choose": choose_at(0.0), "by_image": False, "again": 1.0},
+    "learned, likeliest move, without a trail": {
+        "choose": choose_at(0.0),
+        "use_goal_image": False,
+        "revisit_weight": 1.0,
+    },
 }
 """What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when it
 asks (docs/sources.md, S36, S161; S162 stays)."""
@@ -77,17 +81,17 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped
 def by_the_text(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
     """The agent as the text judges it: the likeliest move and decision to ask, without rules of ours (docs/sources.md,
     S36, S161, S162)."""
-    plain = PLAINER["learned, likeliest move, without a trail"]
+    plain = EVAL_ABLATIONS["learned, likeliest move, without a trail"]
     return dataclasses.replace(agent.policy(bank), **plain, ask_rule=RULES[agent.config.ask_rule][1])
 
 
 def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
     """Those of `hanna_policies` and `sight_policies`, and the agent with each rule of ASK_THRESHOLDS and in each way of
-    PLAINER."""
+    EVAL_ABLATIONS."""
     learned = of(agent, bank)
     rules = {name: rule for kind in ASK_THRESHOLDS.values() for name, rule in kind.items()}
     asking = {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
-    plainer = {name: dataclasses.replace(learned, **changed) for name, changed in PLAINER.items()}
+    plainer = {name: dataclasses.replace(learned, **changed) for name, changed in EVAL_ABLATIONS.items()}
     return {**hanna_policies(agent, bank, of), **asking, **plainer, **sight_policies(agent, bank)}
 
 
@@ -132,7 +136,7 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     rules = dataclasses.replace(learned, network=nothing, ask_rule=every5)
     return {
         "blind": blind,
-        "blind, not by image": dataclasses.replace(blind, by_image=False),
+        "blind, not by image": dataclasses.replace(blind, use_goal_image=False),
         "blind, ask every 5": dataclasses.replace(blind, ask_rule=every5),
         "rules only": rules,
         "rules only, ask every 10": dataclasses.replace(rules, ask_rule=ask_every(10)),

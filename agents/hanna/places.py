@@ -143,12 +143,12 @@ def facts(asked: Sequence[Query], least: float) -> dict[str, dict[str, float | i
 Asked = Mapping[str, list[Query]]
 
 
-def ask(data: Dataset, splits: Sequence[str], picture_kind: str | None) -> Asked:
+def ask(data: Dataset, splits: Sequence[str], quality: str | None, houses: int | None = None) -> Asked:
     """Queries by occasion, of all of OCCASIONS whose features are there for every house; 'again' are the agent's own
     panoramas through a camera, with their headings."""
     encoder, out = load_encoder(SHIPPED_ENCODER).digest, dict[str, list[Query]]()
-    for name in dict.fromkeys(n for s in splits for n in data.names(s)):
-        drawn, graph = pictures_of(data, name, picture_kind), data.place(name).graph
+    for name in dict.fromkeys(n for s in splits for n in data.names(s)[:houses]):
+        drawn, graph = pictures_of(data, name, quality), data.place(name).graph
         own, _ = load_features(feature_path(data.folder / "features", encoder, name, drawn), encoder=encoder)
         for word, occasion in OCCASIONS.items():
             path = shown_path(data, name, occasion, encoder, drawn)
@@ -196,7 +196,9 @@ def main() -> None:
     parser.add_argument("--validation", type=Path, required=True, help="data set whose unseen houses choose thresholds")
     parser.add_argument("--data", type=Path, help="data set in whose houses they are judged; without it none are")
     parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
-    parser.add_argument("--validation-splits", nargs="+", default=["val_unseen", "test_unseen"])
+    parser.add_argument("--validation-splits", nargs="+", default=SPLITS, help="of whose houses (default: both unseen)")
+    parser.add_argument("--split", nargs="+", default=["test_unseen"], help="of whose houses (default: test_unseen)")
+    parser.add_argument("--houses", type=int, help="of the first so many houses of each split (default: all)")
     parser.add_argument("--table", default="sight-places", help="name of the table (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("docs/results/data"))
     args = parser.parse_args()
@@ -204,7 +206,7 @@ def main() -> None:
     chosen = thresholds(ask(Dataset(args.validation), args.validation_splits, args.pictures))
     print(f"thresholds {chosen}")
     judged = args.data or args.validation
-    asked = ask(Dataset(judged), ["test_unseen"] if args.data else args.validation_splits, args.pictures)
+    asked = ask(Dataset(judged), args.split if args.data else args.validation_splits, args.pictures, args.houses)
     rows = [
         {"label": word, "values": facts(some, chosen[kind_of(word)]), "printed": {}} for word, some in asked.items()
     ]
@@ -213,9 +215,11 @@ def main() -> None:
         "table": args.table,
         "title": "Recognising pictures that were taken at another time",
         "paper": None,
-        "command": "python -m agents.hanna.places --validation VAL --data TEST --out docs/results/data",
+        "command": f"python -m agents.hanna.places --validation VAL --data TEST --pictures {args.pictures} "
+        f"--split {' '.join(args.split)} --table {args.table}" + (f" --houses {args.houses}" if args.houses else ""),
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} houses that nothing learned from, pictures {args.pictures or 'of the data set'}; "
+        "settings": f"{houses} house{'s' * (houses > 1)} used for no training "
+        f"(data seed {Dataset(judged).config.seed}), pictures {args.pictures or 'of the data set'}; "
         f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,
         "rows": rows,

@@ -91,11 +91,11 @@ class HannaPolicy:
     guided_asking: float = 0.0
     """Share of the episodes of a batch, the first ones, in which 'every5' asks in place of `ask_rule`: a mixture
     of policies as in DAgger (Ross et al. 2011). For training."""
-    again: float = 1.0
+    revisit_weight: float = 1.0
     """A move's weight for each time the agent was, under the same words, where it knows the move to lead."""
-    by_image: bool = False
+    use_goal_image: bool = False
     """Go by the image of where to go, if one is shown (hanna.trail.weigh_by_image)."""
-    search: float = 0.0
+    frontier_discount: float = 0.0
     """How it looks for what the image shows; see hanna.trail.weigh_by_image."""
     keep_moments: bool = False
     """Keep Scores, with their gradients, in memory: for training."""
@@ -138,10 +138,10 @@ class HannaPolicy:
             weights = moves[row, : n + 1]
             known = False
             if trails:
-                weights = weigh(trails[row], o, weights, self.again)
-            if trails and self.by_image:
+                weights = weigh(trails[row], o, weights, self.revisit_weight)
+            if trails and self.use_goal_image:
                 trails[row] = trails[row].thinking(o, moves[row, 1 : n + 1])
-                weights, known = weigh_by_image(trails[row], o, weights, self.search)
+                weights, known = weigh_by_image(trails[row], o, weights, self.frontier_discount)
             index = self.choose(weights, rng)  # drawn before asking, so asking shifts no draw
             given = None if imposed is None else imposed[position]
             index = index if given is None else given
@@ -190,7 +190,7 @@ class HannaPolicy:
             torch.full((k,), START, device=device),
             (-1,) * k,
             F.dropout(ones, share) if share else None,
-            trails=(Trail(),) * k if self.again < 1 or self.by_image else (),
+            trails=(Trail(),) * k if self.revisit_weight < 1 or self.use_goal_image else (),
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
@@ -269,8 +269,8 @@ def for_training(
         ask_rule=ask_rule,
         environment_dropout=environment_dropout,
         guided_asking=guided_asking,
-        again=1.0,
-        by_image=False,
+        revisit_weight=1.0,
+        use_goal_image=False,
         keep_moments=True,
     )
 

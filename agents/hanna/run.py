@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.common.lessons import Lessons
-from agents.common.parallel import one_voice
+from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.weights import weights_digest
@@ -46,7 +46,7 @@ def train_agent(
     Raises:
       ValueError: `begin` has networks of other sizes, or learned from another encoder.
     """
-    houses, note = config.training_houses or None, one_voice(note)
+    houses, note = config.training_houses or None, rank_zero(note)
     data, encoder = lessons.data, lessons.encoder
     training = lessons.split("train", houses=houses, lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)

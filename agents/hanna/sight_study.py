@@ -93,15 +93,19 @@ def main() -> None:
                 "table": args.table,
                 "title": "HANNA with sight, without, and by its rules alone",
                 "paper": None,
-                "command": "python -m agents.hanna.sight_study --data TEST --episodes STUDY --out docs/results/data",
+                "command": f"python -m agents.hanna.sight_study --data TEST --pictures {args.pictures} --split "
+                f"{' '.join(args.split)} --shown {' '.join(args.shown)} --episodes STUDY --table {args.table}"
+                + (f" --houses {args.houses}" if args.houses else ""),
                 "identity": {
                     "data": data.digest,
                     "agent": digest(args.agent),
                     "encoder": load_encoder().digest,
                     "seed": args.seed,
                 },
-                "settings": f"{len(episodes)} tasks in {len(graphs)} houses that nothing learned from, pictures "
-                f"{args.pictures or 'of the data set'}; in brackets when the pictures were taken that helpers show",
+                "settings": f"{len(episodes)} tasks in {len(graphs)} house{'s' * (len(graphs) > 1)} "
+                f"used for no training (data seed {data.config.seed}, {data.config.area[0]:g} to "
+                f"{data.config.area[1]:g} m²), pictures {args.pictures or 'of the data set'}; "
+                "in brackets: how the goal image was taken",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
@@ -134,7 +138,7 @@ def episodes_of(data: Dataset, name: str, shown: str, agent_name: str, args: arg
 def lead(learned: Samples, other: Samples, name: str) -> str:
     """How far the learned agent is ahead, task by task."""
     ahead = interval([less(learned, other)])
-    return f"learned, less {name}: {100 * ahead.mean:.1f} ± {100 * ahead.half:.1f} points of success."
+    return f"learned minus {name}: {100 * ahead.mean:.1f} ± {100 * ahead.half:.1f} points of success."
 
 
 def numbers(made: Row) -> dict[str, dict[str, float | int]]:

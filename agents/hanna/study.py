@@ -13,7 +13,7 @@ from agents.common.lessons import Lessons, drawings, split_of
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.evaluation import ASK_THRESHOLDS, PLAINER, all_policies, as_shipped, by_the_text, counted
+from agents.hanna.evaluation import ASK_THRESHOLDS, EVAL_ABLATIONS, all_policies, as_shipped, by_the_text, counted
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
@@ -151,7 +151,7 @@ TABLES: Mapping[str, StudyTable] = {
         (
             learned("as mini is"),
             *(learned(name, **off) for name, off in RECIPE.items()),
-            *(learned(name.removeprefix("learned, "), name) for name in PLAINER),
+            *(learned(name.removeprefix("learned, "), name) for name in EVAL_ABLATIONS),
         ),
         (*FULL, "mistake repeat", "request repeat"),
         TEST,

@@ -43,7 +43,7 @@ class TrainingConfig(ImitationSettings):
     text_heads: int = 8
     """Number of instruction-attention heads."""
     dropout: float = 0.3
-    """Share of units that are silent in training."""
+    """Dropout rate in training."""
     iterations: int = 30_000
     """Updates of the weights."""
     training_steps: int = 20
@@ -100,31 +100,31 @@ class TrainingConfig(ImitationSettings):
 
 @dataclass(frozen=True, kw_only=True)
 class HannaEvaluation(EvaluationSettings):
-    """How a HANNA agent is judged."""
+    """How a HANNA agent is evaluated."""
 
     evaluation_steps: int = 50
-    """Horizon of episodes that are judged."""
-    again: float = 1.0
-    """When judged, the weight of a move for each time the agent was, under the same words, where it knows the move to
-    lead (hanna.trail); 1 does not mind. The likeliest action alone walks to and fro (docs/sources.md, S36)."""
-    by_image: bool = False
-    """When judged, an agent that is shown an image of where to go stops there and nowhere else, and walks straight to
-    it where it has been there (hanna.trail; docs/sources.md, S161)."""
-    search: float = 0.0
-    """When judged by image, what the worth of a way that was not tried yet is multiplied with for each move back to it,
-    so that an agent that looks for what it was shown does not go in circles; 0: it does not search (hanna.trail)."""
+    """Longest episode in evaluation, steps."""
+    revisit_weight: float = 1.0
+    """In evaluation, the probability of a move is multiplied by this for each earlier visit, under the same words, to
+    the place that it leads to; 1: no effect. Greedy decoding alone walks to and fro (docs/sources.md, S36)."""
+    use_goal_image: bool = False
+    """In evaluation, an agent that is shown a goal image stops only at that place, and takes the shortest way through
+    its topological map where it has been there (hanna.trail; docs/sources.md, S161)."""
+    frontier_discount: float = 0.0
+    """In evaluation with goal images, the value of an untried way is multiplied by this for each move back to it, so
+    that the agent explores without going in circles; 0: no exploration (hanna.trail)."""
     first_ask_threshold: float = 0.5
-    """When judged, `ask_threshold` while no image of where to go has been shown (docs/sources.md, S162)."""
+    """In evaluation, `ask_threshold` while no image of where to go has been shown (docs/sources.md, S162)."""
     route_ask_threshold: float = 0.5
-    """When judged, `ask_threshold` on a route (docs/sources.md, S162)."""
-    patience: int = 0
-    """When judged, moves after departing from a route before the learned rule asks again."""
+    """In evaluation, `ask_threshold` on a route (docs/sources.md, S162)."""
+    min_moves_between_requests: int = 0
+    """In evaluation, moves after departing from a route before the learned rule asks again."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require(self, AT_LEAST_ONE, "evaluation_steps")
-        require(self, NOT_NEGATIVE, "patience")
-        require(self, SHARE, "again", "search", "first_ask_threshold", "route_ask_threshold")
+        require(self, NOT_NEGATIVE, "min_moves_between_requests")
+        require(self, SHARE, "revisit_weight", "frontier_discount", "first_ask_threshold", "route_ask_threshold")
 
 
 SCALES: dict[str, TrainingConfig] = {
@@ -149,12 +149,12 @@ SCALES: dict[str, TrainingConfig] = {
 """'mini': minutes on two cores; 'paper': Table D.1, for one GPU (docs/sources.md, S31)."""
 EVALUATIONS: dict[str, HannaEvaluation] = {
     "mini": HannaEvaluation(
-        again=0.1,
-        by_image=True,
-        search=0.2,
+        revisit_weight=0.1,
+        use_goal_image=True,
+        frontier_discount=0.2,
         first_ask_threshold=0.25,
         route_ask_threshold=0.7,
-        patience=2,
+        min_moves_between_requests=2,
         evaluation_temperature=0.5,
     ),
     "paper": HannaEvaluation(),

@@ -14,7 +14,7 @@ from agents.common.tensor_file import put
 from agents.common.weights import load_weights, save_weights
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
-from agents.hari.sight import Seeing
+from agents.hari.sight import FeatureSpec
 from agents.hari.words import FeatureWords
 from embodied.identity import Identity
 from embodied.interface import FeatureSource, Sight
@@ -32,7 +32,7 @@ class HariAbout:
     execution: ExecutionConfig
     intention: IntentionConfig | None = None
     """None for an execution policy alone."""
-    sight: Seeing | None = None
+    sight: FeatureSpec | None = None
     """None for an execution policy that reads words alone."""
 
 
@@ -43,7 +43,7 @@ class Executor:
     network: ExecutionNetwork
     words: FeatureWords
     config: ExecutionConfig
-    seeing: Seeing | None = None
+    seeing: FeatureSpec | None = None
     """Whose features it learned from; None: it reads words alone."""
     eyes: FeatureSource | None = None
     """Where the features come from; not part of its file."""
@@ -71,7 +71,7 @@ class HariAgent:
 
 
 def new_executor(
-    config: ExecutionConfig, words: FeatureWords, seeing: Seeing | None = None, eyes: FeatureSource | None = None
+    config: ExecutionConfig, words: FeatureWords, seeing: FeatureSpec | None = None, eyes: FeatureSource | None = None
 ) -> Executor:
     """Random weights that follow from the seed; of a policy that sees where `seeing` says whose features."""
     with torch.random.fork_rng(devices=[]):

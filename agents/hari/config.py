@@ -77,7 +77,7 @@ class IntentionConfig(ValidatedRunSettings):
     hidden_size: int = 512
     """Width of the recurrent networks."""
     learning_rate: float = 1e-5
-    """Of Adam."""
+    """Learning rate of Adam."""
     critic_iterations: int = 5_000
     """Updates of the critic alone, before the first of both."""
     iterations: int = 50_000

@@ -35,7 +35,7 @@ MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class TaskSplit:
     """Where the intention policy learns and is validated."""
 
     places: Mapping[str, Place]
@@ -46,8 +46,8 @@ class Ground:
 def train(
     agent: HariAgent,
     critic: RecurrentHead,
-    training: Ground,
-    validation: Ground,
+    training: TaskSplit,
+    validation: TaskSplit,
     folder: Path,
     identity: Identity,
     *,
@@ -113,7 +113,7 @@ class IntentionRun:
         return {**heads, "actor optimizer": self.actor_optimizer, "critic optimizer": self.critic_optimizer}
 
 
-def learn_once(run: IntentionRun, ground: Ground, update: int) -> dict[str, float]:
+def learn_once(run: IntentionRun, ground: TaskSplit, update: int) -> dict[str, float]:
     """One update: of the critic alone among the first `critic_iterations`, else of both; returns numbers to report."""
     config = run.agent.config
     tasks = tasks_of_update(ground.tasks, update, config.batch, config.seed)
@@ -189,7 +189,7 @@ def numbers_of(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict
     return {"success": success, **counts_of(episodes)}
 
 
-def _validation_of(agent: HariAgent, ground: Ground) -> Sequence[Episode]:
+def _validation_of(agent: HariAgent, ground: TaskSplit) -> Sequence[Episode]:
     config, tasks = agent.config, ground.tasks[: agent.config.validation_tasks]
     with torch.inference_mode():
         return play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)

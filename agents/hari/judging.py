@@ -10,7 +10,7 @@ from agents.hari.agent import HariAgent
 from agents.hari.intention import counts_of
 from agents.hari.policy import policy_of
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent
-from agents.hari.run import CONDITIONS, ground_of, rules_of
+from agents.hari.run import CONDITIONS, rules_of, task_split_of
 from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
@@ -40,7 +40,7 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
 
 def validation_means(data: Dataset, agent: HariAgent, *, seed: int, tasks: int) -> dict[str, float]:
     """The agent's mean number of each intention on validation tasks of all three conditions."""
-    ground = ground_of(data, [f"val_{c}" for c in CONDITIONS], agent.config, tasks)
+    ground = task_split_of(data, [f"val_{c}" for c in CONDITIONS], agent.config, tasks)
     with torch.inference_mode():
         return counts_of(play(ground.make_env, policy_of(agent), ground.tasks, seed=seed, batch=agent.config.batch))
 

@@ -41,7 +41,7 @@ REDIRECTED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Curriculum:
+class PretrainingData:
     """Where pre-training takes place."""
 
     places: Mapping[str, Place]
@@ -71,7 +71,7 @@ class Walk:
 
 def pretrain(
     executor: Executor,
-    lessons: Curriculum,
+    lessons: PretrainingData,
     folder: Path,
     identity: Identity,
     *,
@@ -117,7 +117,7 @@ def pretrain(
 
 
 def learn_once(
-    executor: Executor, optimizer: torch.optim.Optimizer, lessons: Curriculum, update: int
+    executor: Executor, optimizer: torch.optim.Optimizer, lessons: PretrainingData, update: int
 ) -> dict[str, float]:
     """One update; returns its loss per step and the share of steps at which the likeliest move was right.
 
@@ -155,7 +155,7 @@ def guided_share(config: ExecutionConfig, update: int) -> float:
 
 
 def _play(
-    executor: Executor, lessons: Curriculum, walks: Sequence[Walk], horizon: int, beta: float
+    executor: Executor, lessons: PretrainingData, walks: Sequence[Walk], horizon: int, beta: float
 ) -> tuple[list[Tensor], list[Tensor]]:
     """Walk by the policy's own draws; per step (b,) cross-entropies against the shortest path, (b,) whether right.
 
@@ -189,7 +189,7 @@ def _play(
     return losses, right
 
 
-def _begin(lessons: Curriculum, task: Task, rng: np.random.Generator) -> Walk:
+def _begin(lessons: PretrainingData, task: Task, rng: np.random.Generator) -> Walk:
     """An episode with its goal described as in pre-training."""
     place, goal = lessons.places[task.world], task.goal_nodes[0]
     if not isinstance(task.goal, FindObject):
@@ -252,7 +252,7 @@ def _go(walk: Walk, column: int, poses: Sequence[Pose], stop: int) -> None:
         walk.pose = poses[column]
 
 
-def pretraining_success(executor: Executor, lessons: Curriculum, tasks: Sequence[Task]) -> float:
+def pretraining_success(executor: Executor, lessons: PretrainingData, tasks: Sequence[Task]) -> float:
     """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state; by sight
     alone where the policy sees."""
     config = executor.config
@@ -264,7 +264,7 @@ def pretraining_success(executor: Executor, lessons: Curriculum, tasks: Sequence
     return sum(w.ended and w.pose.node in w.task.goal_nodes for w in walks) / len(walks)
 
 
-def _play_greedily(executor: Executor, lessons: Curriculum, walks: Sequence[Walk], horizon: int) -> None:
+def _play_greedily(executor: Executor, lessons: PretrainingData, walks: Sequence[Walk], horizon: int) -> None:
     beliefs = executor.network.begin(len(walks)).clone()
     for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]

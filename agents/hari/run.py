@@ -12,9 +12,9 @@ from agents.common.tensor_file import checksum_of
 from agents.common.weights import weights_digest
 from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import Ground, train
-from agents.hari.pretraining import Curriculum, pretrain
-from agents.hari.sight import Seeing, eyes_of
+from agents.hari.intention import TaskSplit, train
+from agents.hari.pretraining import PretrainingData, pretrain
+from agents.hari.sight import FeatureSpec, eyes_of
 from agents.hari.words import feature_words
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.envs.base import HelpEnv
@@ -36,11 +36,11 @@ def hari_data(folder: Path) -> Dataset:
     return dataset_of(folder, "hari")
 
 
-def lessons_of(data: Dataset) -> Curriculum:
+def lessons_of(data: Dataset) -> PretrainingData:
     """The pre-training splits."""
     places: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
     validation = spread(data.tasks("pretrain_val"), None)
-    return Curriculum(places, data.describer(), data.tasks("pretrain"), validation)
+    return PretrainingData(places, data.describer(), data.tasks("pretrain"), validation)
 
 
 def rules_of(config: IntentionConfig) -> HariRules:
@@ -51,13 +51,13 @@ def rules_of(config: IntentionConfig) -> HariRules:
     )
 
 
-def ground_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:
+def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> TaskSplit:
     """Some splits as one place to learn or to be validated in; at most `limit` tasks, from all splits alike."""
     parts = [data.split(s, hari=rules_of(config)) for s in splits]
     each = None if limit is None else -(-limit // len(splits))
     tasks = [t for part in parts for t in spread(part.tasks, each)]
     places: Mapping[str, Place] = {name: place for part in parts for name, place in part.worlds.items()}
-    return Ground(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
+    return TaskSplit(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
 
 
 def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[[], HelpEnv]:
@@ -119,7 +119,7 @@ def train_execution(
 
 
 def execution_identity(
-    data: Dataset, config: ExecutionConfig, seeing: Seeing | None, begin: Path | None = None
+    data: Dataset, config: ExecutionConfig, seeing: FeatureSpec | None, begin: Path | None = None
 ) -> dict[str, Any]:
     """All that an execution policy depends on; `begin` as of train_execution."""
     more: dict[str, object] = {} if seeing is None else {"sight": seeing}
@@ -140,8 +140,8 @@ def train_intention(
     """Train, or go on training, the intention policy of a run folder over a trained execution policy that has its eyes;
     `on_validation` is given the episodes of each validation."""
     actor, critic = new_heads(config, executor.config.hidden_size)
-    training = ground_of(data, ["train"], config)
-    validation = ground_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)
+    training = task_split_of(data, ["train"], config)
+    validation = task_split_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)
     size = sum(p.numel() for p in actor.parameters())
     note(f"{len(training.tasks)} tasks in {len(training.places)} houses, {size:,} parameters of each head")
     agent, watch = HariAgent(executor, actor, config), on_validation

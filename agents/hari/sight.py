@@ -22,7 +22,7 @@ TILTS = VIEWS // TURNS
 
 
 @dataclass(frozen=True)
-class Seeing:
+class FeatureSpec:
     """Whose features a policy learned from."""
 
     size: int
@@ -76,7 +76,7 @@ def hidden_channels(size: int, share: float, rng: np.random.Generator) -> np.nda
 
 def eyes_of(
     data: Dataset, encoder: str, *, splits: Sequence[str] = (), picture_kind: str | None = None
-) -> tuple[FeatureBank, Seeing]:
+) -> tuple[FeatureBank, FeatureSpec]:
     """The features of the houses of some splits (none: of all), and what to call them.
 
     Args:
@@ -91,4 +91,4 @@ def eyes_of(
     places: Mapping[str, Place] = {n: data.place(n) for n in names}
     paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in names}
     bank = load_bank(paths, encoder, places, pictures)
-    return bank, Seeing(bank.size, encoder, ", ".join(sorted({drawing(p) for p in pictures.values()})))
+    return bank, FeatureSpec(bank.size, encoder, ", ".join(sorted({drawing(p) for p in pictures.values()})))

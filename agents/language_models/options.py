@@ -24,13 +24,37 @@ def add_model(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
         help="environment variable with the key, where the server wants one (default: %(default)s)",
     )
     group.add_argument("--form", choices=FORMS, default=plain.form, help="how JSON is asked for (default: %(default)s)")
-    group.add_argument("--temperature", type=float, default=0.0, help="of sampling (default: 0)")
-    group.add_argument("--most-tokens", type=int, default=plain.most_tokens, metavar="N", help="of an answer")
+    group.add_argument("--temperature", type=float, default=0.0, help="sampling temperature (default: 0)")
+    group.add_argument(
+        "--most-tokens",
+        type=int,
+        default=plain.most_tokens,
+        metavar="N",
+        help="longest answer in tokens (default: %(default)s)",
+    )
     group.add_argument("--price-in", type=float, default=0.0, metavar="X", help="price of a million tokens sent")
     group.add_argument("--price-out", type=float, default=0.0, metavar="X", help="price of a million tokens answered")
-    group.add_argument("--timeout", type=float, default=plain.timeout, metavar="S", help="seconds for an answer")
-    group.add_argument("--tries", type=int, default=plain.tries, metavar="N", help="most times that a request is sent")
-    group.add_argument("--together", type=int, default=plain.together, metavar="N", help="most requests at a time")
+    group.add_argument(
+        "--timeout",
+        type=float,
+        default=plain.timeout,
+        metavar="S",
+        help="seconds to wait for an answer (default: %(default)s)",
+    )
+    group.add_argument(
+        "--tries",
+        type=int,
+        default=plain.tries,
+        metavar="N",
+        help="send a request at most N times (default: %(default)s)",
+    )
+    group.add_argument(
+        "--together",
+        type=int,
+        default=plain.together,
+        metavar="N",
+        help="send at most N requests at a time (default: %(default)s)",
+    )
     group.add_argument(
         "--answers",
         type=Path,

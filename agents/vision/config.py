@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from embodied.render.photograph import check_camera
 from embodied.render.pictures import PictureSettings
 
-OURS = ("compact", "keen", "lite0", "lite0_means")
+OURS = ("compact", "compact_maxpool", "lite0", "lite0_means")
 IMAGENET = ("lite0", "lite0_means")
 """Networks for which ImageNet weights come in a package."""
 TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
@@ -68,16 +68,16 @@ class VisionConfig:
     """How the encoder is trained."""
 
     network: str = "compact"
-    """One of NETWORKS: 'compact' and 'keen' are small residual networks, 'lite0' is EfficientNet-Lite0;
-    of half of the features of 'keen' and 'lite0' a view keeps the largest value, of all others the mean."""
+    """One of NETWORKS: 'compact' and 'compact_maxpool' are small residual networks, 'lite0' is EfficientNet-Lite0.
+    Half of the features of 'compact_maxpool' and 'lite0' are max-pooled over a view, all others mean-pooled."""
     begin: str = "random"
     """'imagenet' takes the weights of a package, which there are for 'lite0' and 'lite0_means'."""
     frozen: bool = False
-    """The body stays as it begins; the neck and the heads learn."""
+    """Freeze the body; the neck and the heads are trained."""
     training_houses: int = 0
-    """Learn from so many of the data set's training houses; 0: from all."""
+    """Train on this many of the data set's training houses; 0: on all."""
     epochs: int = 6
-    """Times that every strip is seen."""
+    """Passes over the strips."""
     batch: int = 8
     """Strips per update."""
     shade: float = 0.0
@@ -85,11 +85,11 @@ class VisionConfig:
     learning_rate: float = 2e-3
     """Highest rate of a one-cycle schedule."""
     weight_decay: float = 1e-2
-    """Of AdamW."""
+    """Weight decay of AdamW."""
     least_views: int = 50
-    """A class is learned if it is visible in at least this many training views."""
+    """Classes that are visible in fewer training views are left out."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Random seed."""
     cameras: tuple[str, ...] = ("ideal",)
     """Kinds of camera, 'ideal', 'phone' or 'robot', one of which takes each strip, drawn evenly."""
     like: str = ""

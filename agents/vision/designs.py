@@ -28,7 +28,7 @@ class Design:
 
 DESIGNS: Mapping[str, Design] = {
     "compact": Design("compact"),
-    "keen": Design("compact", 256, 128),
+    "compact_maxpool": Design("compact", 256, 128),
     "lite0": Design("lite0", 256, 128),
     "lite0_means": Design("lite0", 192),
     **{name: Design(name) for name in ARCHITECTURES if name.startswith("resnet")},

@@ -36,7 +36,7 @@ from embodied.identity import identity_of
 
 ENCODERS: Mapping[str, Mapping[str, Any]] = {
     "compact": {"network": "compact"},
-    "keen": {"network": "keen"},
+    "compact_maxpool": {"network": "compact_maxpool"},
     "lite0, frozen": {"network": "lite0", "begin": "imagenet", "frozen": True},
     "lite0 means, frozen": {"network": "lite0_means", "begin": "imagenet", "frozen": True},
     "lite0, fine-tuned": {"network": "lite0", "begin": "imagenet", "learning_rate": 5e-4},

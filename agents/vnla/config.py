@@ -43,7 +43,7 @@ class VnlaSettings(ImitationSettings):
     coverage: int = 10
     """Width of what is remembered of every word: how much attention it had."""
     dropout: float = 0.5
-    """Share of units that are silent in training."""
+    """Dropout rate in training."""
     iterations: int = 100_000
     """Updates of the weights; the program's direct-mute agents: 70,000."""
     batch: int = 100

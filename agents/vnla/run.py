@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.common.lessons import Lessons
-from agents.common.parallel import one_voice
+from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import Vocabulary, build_vocabulary
@@ -50,7 +50,7 @@ def train_agent(
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.vnla.training.train."""
-    houses, note = config.training_houses or None, one_voice(note)
+    houses, note = config.training_houses or None, rank_zero(note)
     training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
     words, encoder = vocabulary_of(lessons.data, houses), lessons.encoder

@@ -66,7 +66,8 @@ def refined(
     limit = len(faces) + most
     while True:
         number, pairs = _edges(faces)
-        hangs = (_vertex_normals(vertices, faces)[:, 2] < LIES)[pairs].any(1)
+        hangs = np.zeros(len(pairs), bool)  # edges of faces that hang by a corner: all three, or slivers are left
+        hangs[number[(_vertex_normals(vertices, faces)[:, 2] < LIES)[faces].any(1)]] = True
         length = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1) * hangs
         wanted = np.flatnonzero(length > max(longest, 0.6 * float(length.max())))
         chosen = wanted[np.argsort(-length[wanted], kind="stable")[: max((limit - len(faces)) // 2, 0)]]
@@ -108,9 +109,10 @@ def _vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(m, 3) the number of the edge from each corner to the next, and (e, 2) the ends of each edge."""
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    pairs, number = np.unique(ends, axis=0, return_inverse=True)
-    return number.reshape(-1, 3), pairs
+    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64), axis=1)
+    many = int(faces.max(initial=0)) + 1
+    keys, number = np.unique(ends[:, 0] * many + ends[:, 1], return_inverse=True)
+    return number.reshape(-1, 3), np.stack(np.divmod(keys, many), axis=1)
 
 
 def _rises(vertices: np.ndarray, faces: np.ndarray, number: np.ndarray, edges: int, crease: float) -> np.ndarray:

@@ -20,7 +20,7 @@ from embodied import gl
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, from_values, measure
 from embodied.errors import UnableError
-from embodied.generate import generate_house
+from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
@@ -32,6 +32,8 @@ CONTEXTS = (1, 4, 8)
 SIZES, WORLDS = (64, 128, 256), (64, 256, 1024)
 """Sides of square pictures, pixels, and how many Warp draws at once."""
 SEES = (("rgb",), ("rgb", "depth", "ids"))
+SMALL = HouseConfig(area=(34.0, 44.0))
+"""The flat of the check on the CPU."""
 SECONDS = 3.0
 """How long a process draws."""
 REPEATS = 5
@@ -58,7 +60,7 @@ def gpu(
     if card is None:
         progress("There is no CUDA device here: a small check on the CPU, whose numbers say nothing about a GPU.")
     contexts, sizes, worlds = (CONTEXTS, SIZES, WORLDS) if card else (CONTEXTS[:1], SIZES[:1], (8,))
-    house = generate_house(seed, FLAT, catalogue)
+    house = generate_house(seed, FLAT if card else SMALL, catalogue)
     with open_world(house, catalogue, cache, pictures=f"{light}-matte") as world:
         assert world.lit is not None
         for count, size in itertools.product(contexts, sizes):

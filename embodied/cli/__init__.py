@@ -14,7 +14,7 @@ import io
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import NoReturn
@@ -65,6 +65,7 @@ EXTRAS = {
     **dict.fromkeys(("rerun", "rerun_cli", "av", "matplotlib"), "viz"),
     **dict.fromkeys(("pyarrow", "networkx"), "data"),
     **dict.fromkeys(("dm_control", "dm_env"), "drive"),
+    "shtab": "completion",
 }
 """Which extra of the distribution brings a library that a small installation lacks."""
 
@@ -75,6 +76,34 @@ KILLED = (
 """What a killed worker leaves to be said."""
 
 
+class PrintCompletion(argparse.Action):
+    """--print-completion: a script for a shell, from the options of all commands."""
+
+    def __call__(self, parser: object, namespace: object, values: object, option_string: str | None = None) -> NoReturn:
+        import shtab  # of the extra `completion`
+
+        whole = globals()["parser"](*COMMANDS)
+        for action in _actions(whole):
+            if (getattr(action.type, "__module__", "") or "").endswith("cli.options") and action.metavar in FILES:
+                action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE  # type: ignore[attr-defined]
+        print(shtab.complete(whole, str(values)))
+        raise SystemExit(0)
+
+
+FILES = ("DIR", "FILE", "PATH", "PNG", "MP4", "RUN", "STUDY.toml")
+"""Metavariables of options whose values are files or folders."""
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """The actions of a parser and of its subcommands."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for sub in dict.fromkeys(action.choices.values()):
+                yield from _actions(sub)
+        else:
+            yield action
+
+
 class Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, as all commands do, instead of the whole usage."""
 
@@ -82,8 +111,8 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"error: {message}; `{self.prog} --help` explains\n")
 
 
-def parser(chosen: str | None = None) -> argparse.ArgumentParser:
-    """The argument parser; of the subcommands, only `chosen` gets its options (and is imported)."""
+def parser(*chosen: str) -> argparse.ArgumentParser:
+    """The argument parser; of the subcommands, only those `chosen` get their options (and are imported)."""
     top = Parser(
         prog="embodied",
         description="Generated houses in MuJoCo, panoramas, and agents that ask people for help.",
@@ -91,6 +120,13 @@ def parser(chosen: str | None = None) -> argparse.ArgumentParser:
     )
     top.add_argument(
         "--traceback", action="store_true", help="show where in the code an error comes from (before COMMAND)"
+    )
+    top.add_argument(
+        "--print-completion",
+        action=PrintCompletion,
+        choices=("bash", "zsh", "tcsh"),
+        help="print a script that completes commands and options in a shell: embodied --print-completion bash "
+        "> ~/.local/share/bash-completion/completions/embodied",
     )
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
@@ -103,7 +139,7 @@ def parser(chosen: str | None = None) -> argparse.ArgumentParser:
             description=text,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        if name == chosen:
+        if name in chosen:
             module = importlib.import_module(f"embodied.cli.{name}")
             module.add(sub)
             sub.set_defaults(run=module.run)
@@ -117,7 +153,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(out, io.TextIOWrapper):  # "±" on a terminal without it is a "?", not an error at the end
             out.reconfigure(errors="replace")
     try:
-        args = parser(next((a for a in argv if a in COMMANDS), None)).parse_args(argv)
+        args = parser(*[a for a in argv if a in COMMANDS][:1]).parse_args(argv)
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
             return args.run(args) or 0

@@ -47,14 +47,22 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)"
     )
-    parser.add_argument("--seed", type=int, default=7, help="which houses (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=7, help="seed of the houses (default: %(default)s)")
     add_pictures(parser, DRAWN, "unlit", what="how pictures, seen and drive draw the house")
-    parser.add_argument("--houses", type=whole(), default=1000, help="memory loads and drops so many (default: 1000)")
     parser.add_argument(
-        "--out", type=folder_to_write, default=Path("out/bench"), metavar="DIR", help="light and growth write here"
+        "--houses", type=whole(), default=1000, help="memory: load and release this many houses (default: 1000)"
     )
-    parser.add_argument("--people", type=whole(2), default=50, help="who take part at once, for serve (default: 50)")
-    parser.add_argument("--seconds", type=whole(), default=60, help="how long, for serve (default: 60)")
+    parser.add_argument(
+        "--out",
+        type=folder_to_write,
+        default=Path("out/bench"),
+        metavar="DIR",
+        help="folder for the files of light, growth and serve",
+    )
+    parser.add_argument(
+        "--people", type=whole(2), default=50, help="serve: this many people take part at once (default: 50)"
+    )
+    parser.add_argument("--seconds", type=whole(), default=60, help="serve: the study runs for this long (default: 60)")
     add_cache(parser)
     add_packs(parser)
     add_json(parser)

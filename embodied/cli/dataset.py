@@ -28,7 +28,7 @@ and 4.8) need no pictures, and lighting the houses would be most of the work."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("kind", choices=(*KINDS, FROM_PEOPLE), help="what is to be done in the houses")
+    parser.add_argument("kind", choices=(*KINDS, FROM_PEOPLE), help="the kind of task")
     parser.add_argument("--out", type=folder_to_write, required=True, metavar="DIR", help="folder of the data set")
     sizes = "; ".join(f"{name}: {described(name)}" for name in SCALES)
     parser.add_argument(
@@ -52,7 +52,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="with --houses: houses to test in, with as many tasks each",
     )
-    parser.add_argument("--seed", type=int, default=0, help="all of it follows from this number (default: %(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="random seed; the same seed gives the same data set (default: %(default)s)"
+    )
     parser.add_argument(
         "--area",
         type=float,
@@ -93,7 +95,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--export", type=folder_to_write, metavar="DIR", help="also write the files that the published programs read"
     )
     parser.add_argument(
-        "--workers", type=whole(), default=2, metavar="N", help="processes on this machine (default: %(default)s)"
+        "--workers", type=whole(), default=2, metavar="N", help="build with N processes (default: %(default)s)"
     )
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
     add_cache(parser)

@@ -32,8 +32,10 @@ SEED = 3
 
 
 def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=SEED, help="which house (default: %(default)s)")
-    parser.add_argument("--task", type=whole(0), default=0, help="which of the house's tasks (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=SEED, help="seed of the house (default: %(default)s)")
+    parser.add_argument(
+        "--task", type=whole(0), default=0, help="number of the task in the house (default: %(default)s)"
+    )
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )

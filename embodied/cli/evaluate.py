@@ -76,6 +76,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help=f"evaluate on at most N tasks of a split, spread over its houses (default: all, or {FEW_TASKS} for a "
         "language model or without --data)",
     )
+    tasks.add_argument("--steps", type=whole(), metavar="N", help="longest episode in steps (default: its task's)")
     tasks.add_argument("--seed", type=int, default=0, help="random seed (default: %(default)s)")
     tasks.add_argument(
         "--assistant",
@@ -140,8 +141,10 @@ def run(args: argparse.Namespace) -> int:
     names, files = _agents(args)
     if files and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
-    for split in (splits := _splits(args)) if data is not None else ():
-        data.names(split)  # refuses unknown ones
+    splits = _splits(args)
+    if data is not None:
+        for split in splits:
+            data.names(split)  # refuses unknown ones
     with locked(args.out) if args.out else contextlib.nullcontext():
         return _evaluate(args, data, names, files, splits)
 
@@ -207,8 +210,8 @@ def _evaluate(
             clients.append(client_of(args))
         return clients[0]
 
-    answering = _Answering(args, client)
-    rows, heard = _play(args, data, names, splits, answering, client, keep) if names else ([], {})
+    changes = _Changes(args, client)
+    rows, heard = _play(args, data, names, splits, changes, client, keep) if names else ([], {})
     about: dict[str, object] = {"data": data and data.digest, "seed": args.seed, "tasks": args.tasks, "agents": names}
     about |= {"splits": splits, "rules": args.rules, "hari": dataclasses.asdict(hari_rules_of(args))}
     about["assistant"] = args.assistant
@@ -216,7 +219,7 @@ def _evaluate(
         from embodied.cli.evaluate_trained import evaluate_trained
 
         rows_wanted = args.rows or (["learned"] if names else ())
-        more, facts = evaluate_trained(args, files[0], splits, rows_wanted, keep, answering.instead)
+        more, facts = evaluate_trained(args, files[0], splits, rows_wanted, keep, changes.applied)
         rows, about = [*rows, *more], about | facts
     if args.out:
         tables.save(rows, args.out, "table")
@@ -226,7 +229,7 @@ def _evaluate(
             write_json(args.out / "behaviour.json", found, indent=1)
         write_json(args.out / "run.json", fingerprint(**about), indent=1)
         note(f"table and episodes in {args.out}")
-    text = tables.markdown(rows, [c for c in _columns(args.kind, files) if all(c in r.values for r in rows)])
+    text = tables.markdown(rows, [c for c in _columns(args.kind, files) if any(c in r.values for r in rows)])
     if found:
         text += f"\n{json.dumps(found, indent=1)}"
     result: dict[str, object] = {"data": data and data.digest, "rows": json.loads(tables.as_json(rows))}
@@ -259,8 +262,8 @@ def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
     return [*COLUMNS.get(kind, ("success", "spl", "navigation error", "requests", "steps")), *metrics.USAGE]
 
 
-class _Answering:
-    """Who answers requests instead of a kind's own assistant."""
+class _Changes:
+    """What the command line changes about a split: who answers requests, and how long episodes are."""
 
     def __init__(self, args: argparse.Namespace, client: Callable[[], Any]) -> None:
         from agents.language_models.assistant import assistant_maker
@@ -269,14 +272,18 @@ class _Answering:
         self.own: Assistant | None = None
         """An assistant of the user's."""
         self._reword = None
+        self._steps: int | None = args.steps
         if ":" in args.assistant:
             sys.path.insert(0, "")  # a module in the current folder
             self.own = assistant_of(args.assistant)
         elif args.assistant != TEMPLATE:
             self._reword = assistant_maker(args.assistant, client, args.prompts)
 
-    def instead(self, split: SplitData) -> SplitData:
-        """The split with this assistant."""
+    def applied(self, split: SplitData) -> SplitData:
+        """The split with this assistant and with episodes of at most --steps."""
+        if self._steps:
+            tasks = tuple(dataclasses.replace(t, horizon=min(t.horizon, self._steps)) for t in split.tasks)
+            split = dataclasses.replace(split, tasks=tasks)
 
         def make_env() -> HelpEnv:
             env = split.make_env()
@@ -292,7 +299,7 @@ def _play(
     data: Dataset | None,
     names: Sequence[str],
     splits: Sequence[str],
-    answering: _Answering,
+    changes: _Changes,
     client: Callable[[], Any],
     keep: Callable[[str, str, Sequence[Episode]], None],
 ) -> tuple[list[Row], dict[str, tuple[int, int]]]:
@@ -307,7 +314,7 @@ def _play(
     def watch(agents: Iterable[str]) -> Iterable[str]:
         return bar(agents, "agents", "agent")
 
-    for split in _stages(args, data, splits, answering.own, limit, looks=looks):
+    for split in _stages(args, data, splits, changes.own, limit, looks=looks):
 
         def kept(name: str, episodes: Sequence[Episode], split: SplitData = split) -> None:
             keep(split.name, name, episodes)
@@ -317,7 +324,7 @@ def _play(
         worlds = _seen(split.worlds) if looks else None
         agents = {Path(n).name if "/" in n else n: _agent(args, n, split, worlds, client) for n in names}
         how = {"seed": args.seed, "limit": limit, "batch": args.batch or 8}
-        rows += evaluate(answering.instead(split), agents, keep=kept, watch=watch, **how)
+        rows += evaluate(changes.applied(split), agents, keep=kept, watch=watch, **how)
     return rows, heard
 
 

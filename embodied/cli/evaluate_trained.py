@@ -51,8 +51,8 @@ def evaluate_trained(
 
     use_threads(args.threads)
     data = Dataset(args.data)
-    how = {"seed": args.seed, "limit": args.tasks, "batch": args.batch or 32, "only": rows, "keep": keep}
-    how |= {"watch": lambda agents: bar(agents, "agents", "agent"), "instead": instead}
+    how: dict[str, Any] = {"seed": args.seed, "limit": args.tasks, "batch": args.batch or 32}
+    how |= {"only": rows, "keep": keep, "watch": lambda agents: bar(agents, "agents", "agent"), "instead": instead}
     found, looking = {"hari": _hari, "vnla": _vnla, "hanna": _hanna}[args.kind](args, file, splits, how)
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}

@@ -3,7 +3,8 @@
   hanna, vnla, r2r, iliad-nav   folders to lay over copies of the programs of these names
   duet                          the same for VLN-DUET and HAMT; EnvDrop and Recurrent-VLN-BERT read r2r
   matterport                    graphs and skyboxes for the Matterport3D simulator
-  vlnce, streamvln, uninavid, internnav   continuous walks of an expert in `vln` data: images, actions, instructions
+  vlnce, streamvln, uninavid, internnav, lerobot-vlnce
+                                continuous walks of an expert in `vln` data: images, actions, instructions
   parquet                       tables and a card, for `datasets.load_dataset`
   lerobot                       episodes with video, poses, actions and instructions, for `LeRobotDataset`
   glb, mjcf, usd                a house for web viewers and Blender, for MuJoCo's viewer, for USD programs
@@ -41,7 +42,13 @@ if TYPE_CHECKING:
 
 PROGRAMS = ("hanna", "vnla", "r2r", "duet", "iliad-nav", "matterport")
 """As in embodied.datasets.folders, which --help should not import."""
-WALKS = {"vlnce": "vlnce", "streamvln": "streamvln", "uninavid": "uninavid", "internnav": "streamvln"}
+WALKS = {
+    "vlnce": "vlnce",
+    "streamvln": "streamvln",
+    "uninavid": "uninavid",
+    "internnav": "streamvln",
+    "lerobot-vlnce": "vlnce",
+}
 """As embodied.datasets.vlnce.FORMATS, with the preset of body and camera (embodied.gym.continuous) of each."""
 FORMATS = ("glb", "mjcf", "usd")
 WIDTH = 2048
@@ -85,6 +92,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         sub.add_argument(
             "--width", type=video_side, metavar="PIXELS", help="width of pictures (default: that of the program)"
         )
+        if name == "lerobot-vlnce":
+            sub.add_argument("--depth", action="store_true", help="also write videos of depth")
         add_cache(sub)
     for name in FORMATS:
         sub = what.add_parser(name, help=f"a house as {name}")
@@ -118,6 +127,7 @@ def _add_lerobot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=video_side, default=224, help="side of the picture, pixels (default: %(default)s)"
     )
+    parser.add_argument("--depth", action="store_true", help="also write videos of depth")
 
 
 def _add_data(parser: argparse.ArgumentParser) -> None:
@@ -225,6 +235,7 @@ def run_lerobot(args: argparse.Namespace) -> int:
         bar(episodes, "episodes", "episode"),
         succeeded=succeeded,
         camera=RecordedCamera(args.size, args.size),
+        depth=args.depth,
     )
     show(
         args,
@@ -257,6 +268,7 @@ def run_walks(args: argparse.Namespace) -> int:
         shot=shot,
         wander=args.wander,
         split=args.split,
+        depth=args.what == "lerobot-vlnce" and args.depth,
         watch=lambda episodes: bar(episodes, "walks", "walk"),
     )
     for world in worlds.values():

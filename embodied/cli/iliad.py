@@ -39,7 +39,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="words, or houses (default: regex)")
     parser.add_argument("--shared", type=any_folder, metavar="DIR", help="folder with data and teacher of its study")
-    parser.add_argument("--episodes", type=whole(), default=3, metavar="N", help="how many (default: %(default)s)")
+    parser.add_argument(
+        "--episodes", type=whole(), default=3, metavar="N", help="show N episodes (default: %(default)s)"
+    )
     parser.add_argument("--split", choices=("train", "validation", "test"), default="test", help="whose requests")
     parser.add_argument("--greedy", action="store_true", help="the likeliest rule instead of a sampled one")
     parser.add_argument("--seed", type=int, default=0, help="of which episodes, and what is drawn (default: 0)")

@@ -31,7 +31,11 @@ from embodied.cli.options import REPEATS, add_fields, add_pictures, any_path, fo
 def add_common(parser: argparse.ArgumentParser, threads: int = 2) -> None:
     """Options that all of them share."""
     parser.add_argument(
-        "--data", type=any_path, required=True, metavar="DIR", help="folder that `embodied dataset hanna` built"
+        "--data",
+        type=any_path,
+        required=True,
+        metavar="DIR",
+        help="the data set, a folder that `embodied dataset` built",
     )
     add_cache(parser)
     add_threads(parser, threads)
@@ -81,10 +85,10 @@ def add_run(parser: argparse.ArgumentParser, scales: Mapping[str, object]) -> No
         type=folder_to_write,
         required=True,
         metavar="DIR",
-        help="run folder; an interrupted run goes on from it",
+        help="run folder; rerun the command to resume an interrupted run",
     )
     add_scale(parser, scales)
-    parser.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
+    parser.add_argument("--minutes", type=positive, help="stop after so many minutes; rerun the command to resume")
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:
@@ -93,7 +97,7 @@ def add_device(parser: argparse.ArgumentParser) -> None:
 
 def add_judged_tasks(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--tasks", type=whole(), metavar="N", help="judge on at most so many tasks of a split, from all houses alike"
+        "--tasks", type=whole(), metavar="N", help="evaluate on at most N tasks of a split, spread over its houses"
     )
 
 
@@ -108,7 +112,7 @@ def add_study(
       data: help of --data, where the study has one of another kind.
     """
     if tables:
-        parser.add_argument("tables", nargs="+", metavar="TABLE", help=f"tables to make: {tables}")
+        parser.add_argument("tables", nargs="+", metavar="TABLE", help=f"make these tables: {tables}")
     if data:
         parser.add_argument("--data", type=any_path, required=True, metavar="DIR", help=data)
     parser.add_argument(
@@ -116,7 +120,7 @@ def add_study(
         type=folder_to_write,
         required=True,
         metavar="DIR",
-        help="folder of the study: runs, episodes and tables; the same command goes on",
+        help="folder of the study: runs, episodes and tables; rerun the command to resume",
     )
     if seeds:
         parser.add_argument(
@@ -126,22 +130,26 @@ def add_study(
             metavar="N",
             help="training seeds of each row, from --seed on (default: %(default)s)",
         )
+    parser.add_argument("--rows", nargs="+", metavar="LABEL", help="run only the rows with these labels")
     parser.add_argument(
-        "--rows", nargs="+", metavar="LABEL", help="run only the rows of these labels; tables say which they lack"
+        "--workers", type=whole(), default=1, metavar="N", help="train N runs in parallel (default: %(default)s)"
     )
     parser.add_argument(
-        "--workers", type=whole(), default=1, metavar="N", help="runs side by side (default: %(default)s)"
+        "--report", action="store_true", help="train and evaluate nothing; write tables of the stored results"
     )
-    parser.add_argument("--report", action="store_true", help="run nothing; write tables of what is there")
     if threads:
         parser.add_argument(
-            "--threads", type=whole(), default=1, metavar="N", help="of PyTorch, per run (default: %(default)s)"
+            "--threads",
+            type=whole(),
+            default=1,
+            metavar="N",
+            help="CPU threads of PyTorch per run (default: %(default)s)",
         )
 
 
 def add_judge_seed(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--judge-seed", type=int, default=0, metavar="N", help="of what is drawn in judging (default: %(default)s)"
+        "--judge-seed", type=int, default=0, metavar="N", help="random seed of the evaluation (default: %(default)s)"
     )
 
 
@@ -149,15 +157,15 @@ def add_train_vision(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     _add_strips(parser)
     parser.add_argument(
-        "--workers", type=whole(), default=1, metavar="N", help="houses drawn side by side (default: %(default)s)"
+        "--workers", type=whole(), default=1, metavar="N", help="render N houses in parallel (default: %(default)s)"
     )
     parser.add_argument(
-        "--like",
+        "--distil-from",
         type=any_path,
         dest="example",
         metavar="FILE",
-        help="begin with this encoder, go on seeing places drawn without light as it does, and see these pictures of "
-        "them alike: agents that know its features may then be shown either (no labels but for probes)",
+        help="distil from this encoder: start from its weights, and map the new pictures to the features that it gives "
+        "for the same places without light, so that agents trained on its features can use either encoder",
     )
     add_fields(parser, VisionConfig, skip=("like",))
 
@@ -166,7 +174,7 @@ def _add_strips(parser: argparse.ArgumentParser) -> None:
     """Where an encoder is made, and from which pictures."""
     add_device(parser)
     parser.add_argument(
-        "--out", type=folder_to_write, required=True, metavar="DIR", help="where strips, weights and numbers go"
+        "--out", type=folder_to_write, required=True, metavar="DIR", help="folder for strips, weights and metrics"
     )
     _add_lights(parser)
     _add_strips_folder(parser)
@@ -175,7 +183,10 @@ def _add_strips(parser: argparse.ArgumentParser) -> None:
 
 def _add_strips_folder(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--strips", type=folder_to_write, metavar="DIR", help="where strips go, to share them (default: OUT/strips)"
+        "--strips",
+        type=folder_to_write,
+        metavar="DIR",
+        help="folder for strips, to share them between runs (default: OUT/strips)",
     )
 
 
@@ -185,7 +196,7 @@ def _add_lights(parser: argparse.ArgumentParser) -> None:
         type=whole(),
         default=1,
         metavar="K",
-        help="lightings that every house is seen in: as it is, and with hour, weather and lamps drawn from its seed "
+        help="render every house under K lightings: its own, and random hours, weathers and lamps "
         "(default: %(default)s)",
     )
 
@@ -208,10 +219,12 @@ def add_study_vision(parser: argparse.ArgumentParser) -> None:
         choices=tuple(RENDER_PRESETS),
         default=tuple(RENDER_PRESETS),
         metavar="KIND",
-        help="what the table of pictures judges on (default: all)",
+        help="the kinds of pictures that the table of pictures evaluates on (default: all)",
     )
     parser.add_argument(
-        "--split", default="val_unseen", help="whose houses encoders are judged on (default: %(default)s)"
+        "--split",
+        default="val_unseen",
+        help="encoders are evaluated on the houses of this split (default: %(default)s)",
     )
     add_fields(parser, VisionConfig, skip=("network", "begin", "frozen", "like"))
 
@@ -220,12 +233,12 @@ def add_features(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_encoder(parser)
     parser.add_argument(
-        "--workers", type=whole(), default=1, metavar="N", help="houses side by side (default: %(default)s)"
+        "--workers", type=whole(), default=1, metavar="N", help="process N houses in parallel (default: %(default)s)"
     )
-    parser.add_argument("--split", nargs="+", metavar="SPLIT", help="of the houses of these splits (default: all)")
+    parser.add_argument("--split", nargs="+", metavar="SPLIT", help="use the houses of these splits (default: all)")
     _add_lights(parser)
     parser.add_argument(
-        "--houses", type=whole(), metavar="N", help="of the first so many houses of each split (default: all)"
+        "--houses", type=whole(), metavar="N", help="use the first N houses of each split (default: all)"
     )
     add_shown(parser, several=True)
     parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
@@ -242,9 +255,9 @@ def add_shown(parser: argparse._ActionsContainer, *, several: bool = False) -> N
         choices=SHOWN,
         nargs="+" if several else None,
         default=() if several else SHOWN[0],
-        help="when the pictures that helpers show were taken: as the agent sees the place (same), by a robot's camera, "
+        help="how goal images differ from what the agent sees: not at all (same), by a robot's camera, taken "
         "at another hour, on another day with people elsewhere and small things moved, later (hour and day); by that "
-        "camera, and one view of 60 degrees of that" + ("; makes features of such pictures" if several else ""),
+        "camera, and one view of 60 degrees of that" + ("; makes features of these pictures" if several else ""),
     )
 
 
@@ -259,9 +272,7 @@ def add_train_hanna(parser: argparse.ArgumentParser) -> None:
 
 
 def add_begin(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--begin", type=any_path, metavar="FILE", help="begin with the weights of this agent instead of random ones"
-    )
+    parser.add_argument("--begin", type=any_path, metavar="FILE", help="initialise with the weights of this agent")
 
 
 VNLA_WORDS = {"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
@@ -302,10 +313,7 @@ def add_train_hari(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     _add_hari(execution, EXECUTION_SCALES)
     add_encoder(execution)
     execution.add_argument(
-        "--begin",
-        type=any_path,
-        metavar="FILE",
-        help="begin with this execution policy's weights, not with random ones",
+        "--begin", type=any_path, metavar="FILE", help="initialise with the weights of this execution policy"
     )
     add_fields(execution, ExecutionConfig, scales=EXECUTION_SCALES, words={"sees": SEES})
     intention = phases.add_parser("intention", help="then: which question to ask when (actor-critic)")
@@ -360,7 +368,7 @@ def add_study_hanna(parser: argparse.ArgumentParser) -> None:
         "--judged-in",
         type=any_path,
         metavar="DIR",
-        help="another data set, with features, in whose unseen houses agents are judged (default: in those of --data)",
+        help="evaluate in the unseen houses of another data set that has features (default: of --data)",
     )
     add_drawn(parser)
     add_device(parser)
@@ -382,7 +390,7 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
     )
     _add_named_encoders(
         parser,
-        "what the agents of a name look through, one file for all or one for each (default: the encoder that they "
+        "encoders of the agents of a name, one file for all or one for each (default: the encoder that they "
         "learned with)",
     )
     parser.add_argument(
@@ -391,13 +399,13 @@ def add_study_realism(parser: argparse.ArgumentParser) -> None:
         choices=tuple(RENDER_PRESETS),
         default=("unlit", "fast-matte", "fast", "reference"),
         metavar="KIND",
-        help="how the houses are drawn that they are judged in, of which `embodied features --pictures` made "
+        help="kinds of pictures that they are evaluated in, of which `embodied features --pictures` made "
         "features; the last is what the others are ranked against (default: %(default)s)",
     )
-    parser.add_argument("--split", default="test_unseen", help="whose tasks (default: %(default)s)")
     parser.add_argument(
-        "--houses", type=whole(), metavar="N", help="only those in its first so many houses (default: all)"
+        "--split", default="test_unseen", help="evaluate on the tasks of this split (default: %(default)s)"
     )
+    parser.add_argument("--houses", type=whole(), metavar="N", help="use only its first N houses (default: all)")
     add_judged_tasks(parser)
     add_judge_seed(parser)
 
@@ -430,20 +438,25 @@ def add_train_iliad(parser: argparse.ArgumentParser) -> None:
     regex = worlds.add_parser("regex", help="change words as a request says, by regular expressions")
     _add_iliad(regex)
     _add_regex_files(regex)
-    regex.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
+    regex.add_argument("--minutes", type=positive, help="stop after so many minutes; rerun the command to resume")
     add_fields(regex, LearnerConfig, scales=LEARNER_SCALES)
     add_fields(regex, RegexConfig, scales=REGEX_SCALES)
     nav = worlds.add_parser("nav", help="follow routes through houses, on a data set `vln` or `hanna` with features")
     _add_iliad(nav)
     add_nav_data(nav, required=True)
-    nav.add_argument("--minutes", type=positive, help="stop after this long; the same command goes on")
+    nav.add_argument("--minutes", type=positive, help="stop after so many minutes; rerun the command to resume")
     add_fields(nav, LearnerConfig, scales=NAV_LEARNER_SCALES)
     add_fields(nav, NavConfig, scales=NAV_SCALES)
 
 
 def add_study_iliad(parser: argparse.ArgumentParser) -> None:
     add_study(parser, "3.4, 3.5, C.1, 'figure 3.7', algorithms, describer or speakers")
-    parser.add_argument("--world", choices=("regex", "nav"), default="regex", help="which one (default: %(default)s)")
+    parser.add_argument(
+        "--world",
+        choices=("regex", "nav"),
+        default="regex",
+        help="'regex': words to change; 'nav': houses (default: %(default)s)",
+    )
     add_scale(parser, REGEX_SCALES)
     _add_regex_files(parser)
     add_nav_data(parser, required=False)
@@ -471,13 +484,13 @@ def _add_iliad(parser: argparse.ArgumentParser) -> None:
         type=folder_to_write,
         required=True,
         metavar="DIR",
-        help="data, teacher and students; the same command goes on",
+        help="data, teacher and students; rerun the command to resume",
     )
     parser.add_argument(
         "--scale", choices=sorted(REGEX_SCALES), default="mini", help="settings to start from (default: %(default)s)"
     )
     parser.add_argument(
-        "--threads", type=whole(), default=1, metavar="N", help="of PyTorch on the CPU (default: %(default)s)"
+        "--threads", type=whole(), default=1, metavar="N", help="CPU threads of PyTorch (default: %(default)s)"
     )
 
 
@@ -498,8 +511,15 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--agent", type=any_path, default=SHIPPED_AGENT, metavar="FILE", help="agent to begin with (default: shipped)"
     )
-    parser.add_argument("--split", default="test_unseen", help="judge in its houses (default: %(default)s)")
-    parser.add_argument("--rated", default="train", metavar="SPLIT", help="rate in its houses (default: %(default)s)")
+    parser.add_argument(
+        "--split", default="test_unseen", help="evaluate in the houses of this split (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--rated",
+        default="train",
+        metavar="SPLIT",
+        help="collect ratings in the houses of this split (default: %(default)s)",
+    )
     parser.add_argument(
         "--decisions",
         choices=DECISIONS,
@@ -508,13 +528,13 @@ def add_study_stars(parser: argparse.ArgumentParser) -> None:
         "them (default: %(default)s)",
     )
     parser.add_argument(
-        "--tasks", type=whole(), metavar="N", help="judge on at most so many tasks, from all houses alike"
+        "--tasks", type=whole(), metavar="N", help="evaluate on at most N tasks, spread over all houses"
     )
     parser.add_argument(
         "--judgings",
         type=whole(),
         default=3,
         metavar="N",
-        help="judge every task so often, each time with another seed (default: %(default)s)",
+        help="evaluate every task N times with different seeds (default: %(default)s)",
     )
     add_fields(parser, RatingConfig)

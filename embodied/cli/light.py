@@ -1,7 +1,7 @@
 """Light a generated house once, so that looking at it is fast and photo-realistic.
 
 Bakes global illumination (sky, sun and lamps, several bounces) into textures, kept in the cache
-under the house's digest. Stopped bakes go on where they were. With --lights the house is lit at other hours, too, at
+under the house's digest. An interrupted bake resumes. With --lights the house is lit at other hours, too, at
 a part of the price: lights.json in its folder lists them.
 """
 
@@ -39,7 +39,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lamps", choices=("on", "off"), help="switch all lamps; written into house.json")
     parser.add_argument(
         "--quality", choices=("fast", "normal", "high"), default="normal",
-        help="fast for data sets, normal for looking, high for single pictures (default: %(default)s)",
+        help="quality of the light: fast for data sets, normal for videos, high for single pictures "
+        "(default: %(default)s)",
     )  # fmt: skip
     parser.add_argument(
         "--lights", type=whole(1, 100), default=1, metavar="K",

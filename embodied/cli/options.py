@@ -209,18 +209,26 @@ STATES = ("none", "sparse", "dense")
 def add_hari_rules(parser: argparse.ArgumentParser) -> None:
     """HARI's variants; `hari_rules_of` reads them."""
     group = parser.add_argument_group("HARI's variants (defaults: Table E.2 of the dissertation)")
-    group.add_argument("--stack", type=whole(), default=2, metavar="L", help="most goals on the stack (default: 2)")
-    group.add_argument("--longest", type=whole(), default=3, metavar="N", help="most nodes to a sub-goal (default: 3)")
-    group.add_argument("--cost", type=not_negative, default=0.01, metavar="X", help="of each action (default: 0.01)")
     group.add_argument(
-        "--horizon", type=whole(), metavar="H", help="most steps of an episode (default: its task's, 30)"
+        "--stack", type=whole(), default=2, metavar="L", help="largest number of goals on the stack (default: 2)"
     )
-    group.add_argument("--uncooperative", action="store_true", help="the assistant answers another question than asked")
+    group.add_argument(
+        "--longest", type=whole(), default=3, metavar="N", help="longest path to a sub-goal, in nodes (default: 3)"
+    )
+    group.add_argument(
+        "--cost", type=not_negative, default=0.01, metavar="X", help="cost of each action (default: 0.01)"
+    )
+    group.add_argument(
+        "--horizon", type=whole(), metavar="H", help="longest episode in steps (default: its task's, 30)"
+    )
+    group.add_argument(
+        "--uncooperative", action="store_true", help="the assistant answers a different question from the one asked"
+    )
     group.add_argument(
         "--states",
         choices=STATES,
         default=STATES[1],
-        help="how the agent's own place is described without asking (default: %(default)s)",
+        help="how the agent's own place is described without a request (default: %(default)s)",
     )
     group.add_argument(
         "--kept",

@@ -34,10 +34,12 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--camera",
         choices=CAMERAS,
         default="ideal",
-        help="what takes the picture of --node; panorama files hold what the ideal one sees, since a camera is exposed "
-        "for a view and not for a place (default: %(default)s)",
+        help="camera that takes the picture of --node; panorama files are always taken by the ideal one "
+        "(default: %(default)s)",
     )
-    parser.add_argument("--device", type=int, default=0, help="seed: which device of that kind (default: %(default)s)")
+    parser.add_argument(
+        "--device", type=int, default=0, help="seed of the camera's imperfections (default: %(default)s)"
+    )
     add_cache(parser)
     add_packs(parser)
     add_json(parser)

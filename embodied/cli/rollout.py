@@ -26,21 +26,16 @@ AGENTS = ("shortest", "random", "forward10")
 def add(parser: argparse.ArgumentParser) -> None:
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--house", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
-    where.add_argument("--seed", type=int, default=0, help="or generate the house of this seed (default: %(default)s)")
-    parser.add_argument("--agent", choices=AGENTS, default="shortest", help="who acts (default: %(default)s)")
-    parser.add_argument(
-        "--episodes", type=whole(), default=1, metavar="N", help="how many tasks (default: %(default)s)"
-    )
+    where.add_argument("--seed", type=int, default=0, help="or generate a house from this seed (default: %(default)s)")
+    parser.add_argument("--agent", choices=AGENTS, default="shortest", help="the agent (default: %(default)s)")
+    parser.add_argument("--episodes", type=whole(), default=1, metavar="N", help="play N tasks (default: %(default)s)")
     add_pictures(parser, DRAWN, "normal")
     parser.add_argument(
         "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
     )
     add_video(parser)
     parser.add_argument(
-        "--camera",
-        choices=CAMERAS,
-        default="ideal",
-        help="what films: the view in videos and recordings (default: %(default)s)",
+        "--camera", choices=CAMERAS, default="ideal", help="camera of videos and recordings (default: %(default)s)"
     )
     add_sinks(parser)
     add_cache(parser)

@@ -1,4 +1,4 @@
-"""Train agents for each row of a table of the dissertation, judge them, and write the table.
+"""Train agents for each row of a table of the dissertation, evaluate them, and write the table.
 
     embodied study hanna 4.5 houses --data DATA --out STUDY --iterations 600
     embodied study hanna houses --data DATA --judged-in OTHER --out STUDY --seeds 3

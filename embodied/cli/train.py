@@ -1,9 +1,8 @@
-"""Teach: the encoder that sees, agents that ask for help (hanna, vnla, hari), one that hears what it did (iliad).
+"""Train the encoder, an agent (hanna, vnla, hari), or the ILIAD student.
 
-Interrupt it whenever you like: the same command goes on from the run folder, exactly as if it had
-not been stopped. Look at the curves with `tensorboard --logdir DIR`, at validation episodes with
---rrd. On several GPUs: `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`,
-and on several cores the same without --device.
+Rerun the command to resume an interrupted run; the result is the same. `tensorboard --logdir DIR` shows the curves, and
+--rrd records validation episodes. On several GPUs run `torchrun --nproc-per-node N --no-python embodied train hanna
+--device cuda ...`, and on several cores the same without --device.
 """
 
 from __future__ import annotations

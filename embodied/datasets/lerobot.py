@@ -379,6 +379,8 @@ class _Video:
         if self.depth:
             facts |= {"depth_min": NEAREST, "depth_max": FARTHEST, "shift": SHIFT, "use_log": True}
         info = {**{f"video.{k}": v for k, v in facts.items()}, "is_depth_map": self.depth, "has_audio": False}
+        if self.depth:
+            info["depth_unit"] = "mm"
         names = ["height", "width", "channels"]
         return {"dtype": "video", "shape": [c.height, c.width, channels], "names": names, "info": info}
 

@@ -3,6 +3,7 @@
   vlnce        samples.jsonl with a line per step, images/, and the episodes in Habitat's files
   streamvln    annotations.json with the actions of each walk, images/<walk>/rgb/000.jpg
   uninavid     conversations that ask for the next four actions, with a video of what was seen until then
+  lerobot-vlnce    LeRobot v3.0, for policies that `lerobot-eval` judges in embodied.gym.lerobot
   internnav    InternData-N1's vln_ce: a LeRobot v2.1 folder per house, cameras level and 30 degrees down, pixel goals
 
 A walk may leave the expert's way: what is written as the action is always what the expert does there (DAgger).
@@ -25,12 +26,13 @@ from PIL import Image
 
 from assets.cache import write_bytes, write_json
 from embodied.datasets.habitat import with_experts, write_vlnce
-from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Move, Walk
+from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
+from embodied.envs.continuous import POSITION, Body, ContinuousEnv, Excursion, Follower, Grounds, Move, Walk, own_way
 from embodied.render.camera import camera_at
 from embodied.seeds import stream
 from embodied.world import World
 
-FORMATS = ("vlnce", "streamvln", "uninavid", "internnav")
+FORMATS = ("vlnce", "streamvln", "uninavid", "internnav", "lerobot-vlnce")
 WORDS = {Move.STOP: "stop", Move.FORWARD: "forward", Move.LEFT: "left", Move.RIGHT: "right"}
 """Actions in Uni-NaVid's answers."""
 PROMPT = (
@@ -49,6 +51,13 @@ HIDDEN = 0.15
 """A pixel goal is seen where nothing is nearer than it by more than this, metres."""
 NO_GOAL = (-1, -1)
 VLNCE = Body()
+STEPS = 4
+"""Steps a second of LeRobot's data."""
+CARD = """$COUNT$ of continuous walks in generated, lit houses, written by `embodied export lerobot-vlnce`.
+
+`observation.image` is what is seen before an action, `observation.state` the way since the start, `action` scores stop,
+forward, left, right: 1 for what an expert does there. `lerobot-eval` judges policies in embodied.gym.lerobot.
+"""
 FPS = 10
 """Frames a second of videos."""
 
@@ -130,6 +139,7 @@ def export_walks(
     shot: Shot = Shot(),
     wander: float = 0.0,
     split: str = "train",
+    depth: bool = False,
     watch: Callable[[Iterable[Excursion]], Iterable[Excursion]] = iter,
 ) -> int:
     """Play episodes and write them in one of FORMATS; returns how many steps there are.
@@ -137,6 +147,7 @@ def export_walks(
     Args:
       folder: new or empty.
       wander: the share of actions, below 1, that are drawn instead of the expert's; what is written stays the expert's.
+      depth: whether 'lerobot-vlnce' has videos of depth; policies that want colours alone cannot read them.
       watch: goes through the episodes, as a progress bar does.
 
     Raises:
@@ -158,9 +169,11 @@ def export_walks(
     taught = (teach(env, e, worlds[e.world], chosen) for e in watch(episodes))
     if form == "vlnce":
         write_vlnce(folder, split, with_experts(episodes, worlds, ContinuousEnv(body, Grounds())))
-    return {"vlnce": _samples, "streamvln": _streamvln, "uninavid": _uninavid, "internnav": _internnav}[form](
-        folder, taught, shot
-    )
+    if form == "lerobot-vlnce":
+        with whole_folder(folder) as draft:
+            return _lerobot(draft, taught, shot, depth)
+    writers = {"vlnce": _samples, "streamvln": _streamvln, "uninavid": _uninavid, "internnav": _internnav}
+    return writers[form](folder, taught, shot)
 
 
 def _samples(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
@@ -212,6 +225,32 @@ def _uninavid(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
         steps += len(t.labels)
     write_json(folder / "conversations.json", rows)
     return steps
+
+
+SCORES = ("stop", "forward", "left", "right")
+"""action: 1 for what the expert does, 0 for the others."""
+LEROBOT: Columns = {
+    **COLUMNS,
+    "observation.state": (pa.list_(pa.float32(), len(POSITION)), POSITION),
+    "action": (pa.list_(pa.float32(), len(SCORES)), SCORES),
+}
+
+
+def _lerobot(folder: Path, walks: Iterable[Taught], shot: Shot, with_depth: bool) -> int:
+    camera = RecordedCamera(shot.height, shot.width, shot.vfov)
+    writer = Writer(folder, camera, LEROBOT, key="observation.image", fps=STEPS, depth=with_depth)
+    for t in walks:
+        walk, n = t.walk, len(t.labels)
+        poses = zip(walk.positions[:-1], walk.yaws[:-1], walk.pitches[:-1], strict=True)
+        rows = {
+            "observation.state": np.stack([own_way(walk.excursion, p, y, math.radians(tilt)) for p, y, tilt in poses]),
+            "action": np.eye(len(SCORES), dtype=np.float32)[list(t.labels)],
+        }
+        rgb, depth = zip(*frames(t, shot), strict=True)
+        facts = {"embodied/task": walk.excursion.id, "embodied/house": walk.excursion.world, "embodied/agent": "expert"}
+        reached = walk.stopped and bool(walk.distances[-1] < walk.excursion.radius)
+        writer.add(rows, rgb, depth, [walk.excursion.instruction] * n, [""] * n, reached, facts)
+    return writer.finish("embodied vlnce", CARD)
 
 
 # InternData-N1 -----------------------------------------------------------------------------------

@@ -241,6 +241,18 @@ class ContinuousEnv:
         )
 
 
+POSITION = ("ahead", "left", "sin", "cos", "tilt")
+"""What an agent can know of its own way: metres from the start in its frame, the turn since then, radians of the
+camera's tilt."""
+
+
+def own_way(excursion: Excursion, position: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
+    """(5,) float32, POSITION, at (x, y); yaw and pitch in radians."""
+    dx, dy = np.asarray(position)[:2] - np.array(excursion.start[:2])
+    c, s, turned = math.cos(excursion.yaw), math.sin(excursion.yaw), yaw - excursion.yaw
+    return np.array([c * dx + s * dy, c * dy - s * dx, math.sin(turned), math.cos(turned), pitch], np.float32)
+
+
 def aimed_cells(excursion: Excursion, ground: FloorWays) -> np.ndarray:
     """Indices of the floor's cells at the aims."""
     points = [p for aim in excursion.aims for p in (aim.views or (aim.position,))]

@@ -25,7 +25,7 @@ from gymnasium import spaces
 from assets.cache import default_cache
 from embodied.datasets.habitat import object_excursions, read_objectnav, read_vlnce, route_excursions
 from embodied.datasets.store import Dataset
-from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Move
+from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Move, own_way
 from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import data_worlds, flat_worlds
@@ -202,19 +202,15 @@ class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
 
     def gps(self) -> np.ndarray:
         """(2,) float32 metres ahead and to the left of the start, in the start's frame."""
-        excursion = self.play.excursion
-        dx, dy = self.play.position - np.array(excursion.start[:2])
-        c, s = math.cos(excursion.yaw), math.sin(excursion.yaw)
-        return np.array([c * dx + s * dy, c * dy - s * dx], np.float32)
+        return self.own_way()[:2]
 
     def turned(self) -> float:
         """Radians turned to the left since the start, in [-pi, pi)."""
         return float(wrap(self.play.yaw - self.play.excursion.yaw))
 
-    def moved(self) -> np.ndarray:
-        """(5,) float32: gps, sine and cosine of `turned`, the camera's tilt in radians."""
-        turned = self.turned()
-        return np.array([*self.gps(), math.sin(turned), math.cos(turned), self.play.pitch], np.float32)
+    def own_way(self) -> np.ndarray:
+        """(5,) float32 of embodied.envs.continuous.POSITION."""
+        return own_way(self.play.excursion, self.play.position, self.play.yaw, self.play.pitch)
 
     def expert(self, *, along: bool = False) -> Follower:
         """Who knows the way from wherever the body is, for training."""

@@ -43,7 +43,7 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.in_step import InStep, refuse_too_many
+from embodied.gym.in_step import SharedSyncVectorEnv, refuse_too_many
 from embodied.gym.playground import Playground, Variants, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
@@ -376,7 +376,7 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     )
 
 
-def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> InStep:
+def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> SharedSyncVectorEnv:
     """So many environments that share one stage: houses, pages and decoded panoramas are held once.
 
     Each has its own task, target, instruction and generator.
@@ -398,7 +398,7 @@ def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **
         return HelpGymEnv(stage.make_env, stage.tasks, Closed(), layout=stage.layout, render_mode=render_mode, **own)
 
     refuse_too_many(num_envs, observation_space(stage.layout, stage.eyes))
-    return InStep(one, int(num_envs), stage.eyes, threads=threads, opened=stage.opened)
+    return SharedSyncVectorEnv(one, int(num_envs), stage.eyes, threads=threads, opened=stage.opened)
 
 
 @dataclass(frozen=True, eq=False)
@@ -475,11 +475,11 @@ def _eyes_of(play: Playground, seen: Sequence[str], wanted: StageSettings) -> Ey
     drawn = {name: w for name, w in play.worlds.items() if isinstance(w, World)}
     store = PanoramaStore(drawn)
     if pixels := [name for name in PIXELS if name in seen]:
-        refuse_blind(play.worlds, drawn)
+        require_rendered(play.worlds, drawn)
         eyes.append(PictureEyes(store, pixels, wanted.view))
     if "features" in seen:
         if wanted.source is None:
-            refuse_blind(play.worlds, drawn)
+            require_rendered(play.worlds, drawn)
         source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
         eyes.append(FeatureEyes("features", source))
     if "oracle" in seen:
@@ -487,7 +487,7 @@ def _eyes_of(play: Playground, seen: Sequence[str], wanted: StageSettings) -> Ey
     return AllEyes(eyes)
 
 
-def refuse_blind(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]) -> None:
+def require_rendered(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]) -> None:
     """Raises ValueError where pixels are asked of places that nobody can draw."""
     if blind := sorted(set(worlds) - set(drawn)):
         raise ValueError(

@@ -1,4 +1,4 @@
-"""InStep: many environments that take their steps together in one process and look together, on all cores.
+"""SharedSyncVectorEnv: many environments that take their steps together in one process and look together, on all cores.
 
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
 
@@ -31,7 +31,7 @@ COPIES = 2
 """Of an observation that a batch holds per slot: what was handed out last, and what is being filled."""
 
 
-class InStep(VectorEnv[dict[str, Any], Any, np.ndarray]):
+class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
     """A batch of environments whose slots have closed eyes: the batch looks for them.
 
     Observations are new arrays each time. A slot that has ended is reset by the next step.

@@ -21,16 +21,15 @@ import numpy as np
 from gymnasium import spaces
 
 from assets.cache import write_bytes
+from embodied.envs.continuous import POSITION
 from embodied.gym import continuous, drive
 from embodied.gym.spaces import LARGE
 
 ENVS = ("VLNCE", "ObjectNav", "Drive")
-POSITION = ("ahead", "left", "sin", "cos", "tilt")
-"""agent_pos of continuous navigation: metres from the start in its frame, the turn since then, radians of the tilt."""
 
 
 class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
-    """VLNCE-v0 or ObjectNav-v0 for LeRobot's policies."""
+    """VLNCE-v0 or ObjectNav-v0 for LeRobot's policies; agent_pos is embodied.envs.continuous.POSITION."""
 
     metadata = continuous.ContinuousGymEnv.metadata
 
@@ -75,7 +74,7 @@ class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         self.env.close()
 
     def _seen(self) -> dict[str, Any]:
-        return {"pixels": self.env.pixels()["rgb"], "agent_pos": self.env.moved()}
+        return {"pixels": self.env.pixels()["rgb"], "agent_pos": self.env.own_way()}
 
 
 class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
@@ -84,7 +83,9 @@ class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
     metadata = drive.DriveEnv.metadata
 
     def __init__(self, env: drive.DriveEnv) -> None:
-        self.env, known = env, env.observation_space
+        known = env.observation_space
+        assert isinstance(known, spaces.Dict), "as drive.seen_space gives it"
+        self.env = env
         self.action_space, self.render_mode = env.action_space, env.render_mode
         self._parts = [name for name in ("motion", "touched", "goal") if name in known.spaces]
         numbers = sum(int(np.prod(known[name].shape or ())) for name in self._parts)

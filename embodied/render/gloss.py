@@ -43,21 +43,21 @@ BRIGHTEST = 12.0
 COARSER = 4
 """Texels of a page, in one direction, that are averaged for what rough surfaces mirror."""
 PANE_STEP = 4
-"""Panes are looked for in every so manieth pixel; thinner ones mirror nothing."""
+"""Panes are looked for in every n-th pixel; thinner ones mirror nothing."""
 CLOUDY = 0.5
 """Opacity from which on things hide what lies behind them, as shades of lamps and sheer curtains do."""
 LIFT = 1e-3
 """Metres that a ray begins above its surface."""
-ROOKS = ((-0.25, -0.25), (0.25, 0.25))
+SUBPIXEL_OFFSETS = ((-0.25, -0.25), (0.25, 0.25))
 """Where in a pixel smooth surfaces are looked at, from its centre: no two in a row or column."""
-LONELY = 24.0
+MIN_SAMPLES = 24.0
 """Rays averaged on a surface below which each of its pixels sends MORE: on thin bars what few rays find would jump from
 frame to frame of a video, as the pattern of directions lies still in the picture."""
 NOTED = 0.02
 """Mirrored light, of that of a white sheet, below which that goes unnoticed."""
 MORE = 8
 BRUSHED = 4
-"""Rays of each pixel of polished metal that is not smooth, in each of ROOKS."""
+"""Rays of each pixel of polished metal that is not smooth, in each of SUBPIXEL_OFFSETS."""
 WHITE = 5.0
 """Light that is shown as full white: no more of it counts where a pixel is averaged, or edges would be ragged."""
 GLASS = 0.81
@@ -286,7 +286,7 @@ class Gloss:
         values = self._averaged(camera, seen, k, TILE * TILE, 1, sharp=False)
         rays = np.ones(len(k), np.float32)
         grid.smooth(values[:, :3].mean(1), values[:, 3:], rays)
-        lonely = (grid.averaged < LONELY) & (grid.values[1:].reshape(3, -1)[:, seen.pixel].max(0) > NOTED)
+        lonely = (grid.averaged < MIN_SAMPLES) & (grid.values[1:].reshape(3, -1)[:, seen.pixel].max(0) > NOTED)
         if lonely.any():
             values[lonely] = self._averaged(camera, seen.of(lonely), k[lonely], TILE * TILE, MORE, sharp=False)
             rays[lonely] = MORE
@@ -326,14 +326,14 @@ class Gloss:
     def _lay_smooth(self, out: np.ndarray, rgb: np.ndarray, camera: Camera, where: np.ndarray) -> None:
         """Write what mirrors and polished things show into `out`, looking once for every pixel in `where` (h, w)."""
         pixels = np.flatnonzero(where)
-        all_pixels = np.tile(pixels, len(ROOKS))
-        aside = np.repeat(np.array(ROOKS, np.float32), len(pixels), axis=0)
+        all_pixels = np.tile(pixels, len(SUBPIXEL_OFFSETS))
+        aside = np.repeat(np.array(SUBPIXEL_OFFSETS, np.float32), len(pixels), axis=0)
         ahead = _directions(camera, rgb.shape[:2], all_pixels, aside=aside)
         seen = self._seen(ahead, *self._met(camera, ahead), all_pixels)
-        turn = np.repeat(np.arange(len(ROOKS)), len(pixels))
+        turn = np.repeat(np.arange(len(SUBPIXEL_OFFSETS)), len(pixels))
         row, column = np.divmod(all_pixels, rgb.shape[1])
         rows, columns = FINE_TILE
-        k = ((row % rows) * columns + column % columns) * len(ROOKS) + turn
+        k = ((row % rows) * columns + column % columns) * len(SUBPIXEL_OFFSETS) + turn
         k = k[seen.which[seen.sharp]]
         seen = seen.of(seen.sharp)
         if not len(seen.pixel):
@@ -342,12 +342,12 @@ class Gloss:
         both = np.empty((len(k), 6), np.float32)
         clear = seen.of(polished)
         both[polished] = np.concatenate(self._mirrored(camera, clear, clear.normal, sharp=True), axis=1)
-        count = rows * columns * len(ROOKS)
+        count = rows * columns * len(SUBPIXEL_OFFSETS)
         both[~polished] = self._averaged(camera, seen.of(~polished), k[~polished], count, BRUSHED, sharp=True)
         lost, mirrored = both[:, :3], both[:, 3:]
         which = seen.which % len(pixels)
         there = np.bincount(which, minlength=len(pixels)) > 0
-        mean = lambda a: np.bincount(which, a, len(pixels))[there] / len(ROOKS)
+        mean = lambda a: np.bincount(which, a, len(pixels))[there] / len(SUBPIXEL_OFFSETS)
         values = np.stack([mean(a) for a in (*lost.T, *np.minimum(mirrored, WHITE).T)], axis=1)
         where, rough = pixels[there], mean(seen.rough >= SMOOTH) > 0.5
         if rough.any():

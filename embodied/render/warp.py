@@ -35,7 +35,7 @@ from embodied.scene.model import VISUAL, build_spec, compile_spec, owner_of_name
 try:
     import warp as wp
 
-    wp.config.quiet = True  # it tells of devices and compilers on standard output
+    wp.config.log_level = wp.LOG_WARNING  # else it tells of devices and compilers on standard output
     import mujoco_warp as mjw
 except ImportError as e:
     raise UnableError(
@@ -48,6 +48,8 @@ if TYPE_CHECKING:
 NEAR, FAR = 0.03, 200.0
 """Nothing nearer or farther is seen, metres; part of the compiled kernel, so one for all houses."""
 SEEN = ("rgb", "depth", "ids")
+APART = 5e-4
+"""How far the two faces of a thin thing are moved apart, metres: of two faces in one place a ray meets either."""
 FACE_YAWS = tuple(math.atan2(f[1], f[0]) if f[2] == 0 else 0.0 for f, _ in FACES)
 FACE_PITCHES = tuple(math.asin(f[2]) for f, _ in FACES)
 """Where the faces of a panorama look, radians."""
@@ -212,7 +214,7 @@ class WarpRenderer:
     def view(self, position: Sequence[float] | np.ndarray, yaw: float, pitch: float = 0.0) -> View:
         """The picture from `position` (x, y, z) along (yaw, pitch), radians."""
         batch = self.views([position], [yaw], [pitch])
-        return View(batch.rgb.numpy()[0], batch.depth.numpy()[0], batch.ids.numpy()[0])
+        return View(*(a.numpy()[0].copy() for a in (batch.rgb, batch.depth, batch.ids)))
 
     def panorama(self, position: Sequence[float] | np.ndarray) -> Panorama:
         """Six cube faces of rgb, depth and ids around `position` (x, y, z).
@@ -225,7 +227,7 @@ class WarpRenderer:
                 f"faces of a panorama are square and see 90 degrees, not {self.size} and {math.degrees(self.vfov):g}"
             )
         batch = self.views([position] * 6, FACE_YAWS, FACE_PITCHES)
-        return Panorama(batch.rgb.numpy(), batch.depth.numpy(), batch.ids.numpy())
+        return Panorama(*(a.numpy().copy() for a in (batch.rgb, batch.depth, batch.ids)))
 
     def wait(self) -> None:
         """Return when the device has drawn what was asked for; `views` only asks."""
@@ -268,12 +270,29 @@ def _compiled(
     """The lit house with one camera, and of every geom its opacity (float32) and its instance id (int32)."""
     spec = build_spec(house, catalogue, collisions=False, lit=lit)
     spec.worldbody.add_camera(name="eye", fovy=math.degrees(vfov))
-    model, number = compile_spec(spec), {name: i + 1 for i, name in enumerate(owners(house))}
+    model = compile_spec(spec)
+    _part_faces(model)
+    number = {name: i + 1 for i, name in enumerate(owners(house))}
     layers = {g.name: glass_surfaces(lit.meshes[int(g.meshname.partition("_")[0])]) // 2 for g in spec.geoms}
     names = [model.geom(g).name for g in range(model.ngeom)]
     opacities = 1 - (1 - model.geom_rgba[:, 3]) ** np.array([max(1, layers[name]) for name in names])
     owned = np.array([number.get(owner_of_name(name), 0) for name in names], np.int32)
     return model, opacities.astype(np.float32), owned
+
+
+def _part_faces(model: mujoco.MjModel) -> None:
+    """Move faces of one mesh that lie in one place apart, each along its normal."""
+    mesh = np.repeat(np.arange(model.nmesh), model.mesh_facenum)
+    faces = model.mesh_face + model.mesh_vertadr[mesh][:, None]
+    corners = model.mesh_vert[faces].astype(np.float64)
+    place = np.column_stack([mesh, np.rint(corners.mean(axis=1) * 1e4)]).astype(np.int64)
+    _, which, count = np.unique(place, axis=0, return_inverse=True, return_counts=True)
+    twins = count[which.reshape(-1)] > 1
+    normals = np.cross(corners[twins, 1] - corners[twins, 0], corners[twins, 2] - corners[twins, 0])
+    shift = np.zeros(model.mesh_vert.shape)
+    np.add.at(shift, faces[twins].reshape(-1), np.repeat(normals, 3, axis=0))
+    shift /= np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), 1e-12)
+    model.mesh_vert[:] += APART * shift
 
 
 def _texture(model: mujoco.MjModel, index: int) -> Any:
