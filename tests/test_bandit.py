@@ -11,7 +11,8 @@ import torch
 
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
 from agents.bandit.ratings import CLEAN, Rater, deviation, granular, skewed
-from agents.common.actor_critic import Decisions, DivergedError, actor_loss, advantages, critic_loss, descend
+from agents.common.actor_critic import Decisions, actor_loss, advantages, critic_loss, descend
+from agents.common.session import DivergedError
 from embodied.seeds import stream
 
 

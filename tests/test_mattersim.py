@@ -386,7 +386,7 @@ LISTS = [
 """What the C++ module refuses with TypeError, found with pybind11 2.13."""
 
 
-@pytest.mark.parametrize("wrong", LISTS, ids=str)
+@pytest.mark.parametrize("wrong", LISTS)
 def test_values_that_the_module_refuses_are_refused(wrong, folder):
     sim = simulator(folder)
     sim.newEpisode([SCANS[0]], [RECORD["graphs"][SCANS[0]]["ids"][0]], [0], [0])
