@@ -71,7 +71,7 @@ def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
     from embodied.gym import drive
 
     data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=small_house)
-    unlit = PictureSettings(quality="unlit", size=64)
+    unlit = PictureSettings(64, "unlit")
     found = drive.data_worlds
     monkeypatch.setattr(drive, "load_catalogue", lambda _: HandCatalogue())
     monkeypatch.setattr(drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, unlit))
