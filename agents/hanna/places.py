@@ -218,7 +218,7 @@ def main() -> None:
         "command": f"python -m agents.hanna.places --validation VAL --data TEST --pictures {args.pictures} "
         f"--split {' '.join(args.split)} --out docs/results/data",
         "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} houses that nothing learned from (data seed {Dataset(judged).config.seed}), "
+        "settings": f"{houses} houses used for no training (data seed {Dataset(judged).config.seed}), "
         f"pictures {args.pictures or 'of the data set'}; "
         f"{WALKS} walks of {MOVES} moves in each",
         "columns": COLUMNS,

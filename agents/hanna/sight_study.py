@@ -101,9 +101,9 @@ def main() -> None:
                     "encoder": load_encoder().digest,
                     "seed": args.seed,
                 },
-                "settings": f"{len(episodes)} tasks in {len(graphs)} houses that nothing learned from (data seed "
+                "settings": f"{len(episodes)} tasks in {len(graphs)} houses used for no training (data seed "
                 f"{data.config.seed}, {data.config.area[0]:g} to {data.config.area[1]:g} m²), pictures "
-                f"{args.pictures or 'of the data set'}; in brackets when the pictures were taken that helpers show",
+                f"{args.pictures or 'of the data set'}; in brackets: how the goal image was taken",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
@@ -136,7 +136,7 @@ def episodes_of(data: Dataset, name: str, shown: str, agent_name: str, args: arg
 def lead(learned: Samples, other: Samples, name: str) -> str:
     """How far the learned agent is ahead, task by task."""
     ahead = interval([less(learned, other)])
-    return f"learned, less {name}: {100 * ahead.mean:.1f} ± {100 * ahead.half:.1f} points of success."
+    return f"learned minus {name}: {100 * ahead.mean:.1f} ± {100 * ahead.half:.1f} points of success."
 
 
 def numbers(made: Row) -> dict[str, dict[str, float | int]]:
