@@ -30,6 +30,7 @@ def test_without_mujoco_warp_the_error_says_what_to_install(monkeypatch):
 
 @pytest.fixture(scope="module")
 def house():
+    pytest.importorskip("mujoco_warp", reason="needs the extra [warp]")
     return furnished(two_rooms())
 
 
@@ -54,7 +55,6 @@ def classic(house, lit):
 
 @pytest.fixture(scope="module")
 def warped(house, lit):
-    pytest.importorskip("mujoco_warp", reason="needs the extra [warp]")
     from embodied.render.warp import WarpRenderer
 
     with WarpRenderer(house, HandCatalogue(), lit, size=(SIZE, SIZE), device="cpu") as renderer:

@@ -49,14 +49,13 @@ def gpu(
 
     Args:
       light: by name, 'fast' or 'normal'.
+
+    Raises:
+      UnableError: the extra 'warp' is missing, or a process cannot draw.
     """
-    warp: Any
-    try:
-        from embodied.render import warp
-    except UnableError as e:
-        progress(str(e))
-        warp = None
-    card = None if warp is None else warp.card()
+    from embodied.render import warp  # late: an extra
+
+    card = warp.card()
     if card is None:
         progress("There is no CUDA device here: a small check on the CPU, whose numbers say nothing about a GPU.")
     contexts, sizes, worlds = (CONTEXTS, SIZES, WORLDS) if card else (CONTEXTS[:1], SIZES[:1], (8,))
@@ -69,7 +68,7 @@ def gpu(
                 _by_processes(count, house, catalogue, cache, light, size, seed),
                 "1/s",
             )
-        for size, count in itertools.product(sizes if warp else (), worlds):
+        for size, count in itertools.product(sizes, worlds):
             with warp.WarpRenderer(house, catalogue, world.lit, worlds=count, size=(size, size)) as renderer:
                 poses = _poses(world, count, seed)
                 for sees in SEES:
