@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import logging
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -94,6 +95,7 @@ class Catalogue:
         furniture models are installed, only what code builds, the simple furniture included."""
         if self._recipes.keys() <= self._own.keys() or find_packs(self.packs):
             return self.only(self.assets.keys() - BASICS) if BASICS & self.assets.keys() else self
+        _tell_once()
         return self.only(key for key in self.assets if key not in self._recipes or key in self._own)
 
     def mesh(
@@ -166,6 +168,15 @@ class Catalogue:
     def finish(self, material_key: str) -> Finish:
         """The finish of a procedural material; its maps are written to the cache on first use."""
         return materials.finish(material_key, self.cache)
+
+
+@functools.cache
+def _tell_once() -> None:
+    warnings.warn(
+        "no furniture models are installed: houses hold the simple furniture that code builds, of fewer classes; "
+        "`embodied doctor --fix` installs the models",
+        stacklevel=2,
+    )
 
 
 def load_catalogue(

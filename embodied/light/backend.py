@@ -36,7 +36,7 @@ OLDEST_LLVM = 15
 VARIANTS = (("cuda_ad_rgb", "CUDA"), ("llvm_ad_rgb", "LLVM"))
 """Mitsuba's variants with arrays, best first, and what Dr.Jit needs for each."""
 SCALAR = "scalar_rgb"
-SLOWER = "one ray at a time and some ten times slower"
+SLOWER = "one ray at a time and some ten times slower, about ten minutes for a small flat"
 
 
 class LightError(UnableError):
