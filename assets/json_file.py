@@ -22,7 +22,7 @@ T = typing.TypeVar("T")
 DEEPEST = 40
 """Most lists and objects inside each other; nothing here needs ten."""
 LARGEST = 1e12
-"""Numbers beyond this are no measure of anything here."""
+"""No measure of anything here is beyond this; whole numbers, such as seeds, may be."""
 LONGEST = 40
 """Most digits of a whole number."""
 WORDS = {float: "a number", int: "an integer", str: "a text", bool: "true or false"}
@@ -180,7 +180,7 @@ def _build(kind: typing.Any, value: object, where: str) -> typing.Any:
     if dataclasses.is_dataclass(kind):
         return _build_record(typing.cast(type, kind), value, where)
     if kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
-        if not abs(value) <= LARGEST:  # NaN too
+        if kind is float and not abs(value) <= LARGEST:  # NaN too
             raise RecordError(f"{where} should be a finite number of at most {LARGEST:g}, got {shown(value)}")
         value = float(value) if kind is float else value
     if not isinstance(kind, type) or type(value) is not kind:

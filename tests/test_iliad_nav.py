@@ -153,6 +153,6 @@ def test_a_small_student_learns_its_way_from_descriptions(tmp_path):
         NavWorld(places), teacher, NearMarginal(), walker, explorer, trips * 20, trips, {"world": "grid"}
     )
     config = LearnerConfig(iterations=80, batch=12, learning_rate=5e-3, cooldown=0.4, validate_every=40)
-    found = train(problem, config, tmp_path, lambda path: None, note=lambda line: None)
+    found = train(problem, config, tmp_path, lambda path, identity: None, note=lambda line: None)
     assert found[-1]["success"] > 0.9, found
     assert success_rate(problem.world, walker, trips) == found[-1]["success"]

@@ -209,7 +209,7 @@ def test_the_papers_columns_take_the_likeliest_action_and_ours_stand_apart(study
     draws = [np.random.default_rng(k) for k in range(50)]
     assert {plain.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {1} and not plain.use_goal_image
     assert {shipped.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {0, 1} and shipped.use_goal_image
-    assert plain.again == 1 and shipped.again < 1
+    assert plain.revisit_weight == 1 and shipped.revisit_weight < 1
     assert plain.ask_rule(0.6, None, -1, rng=draws[0]) and not plain.ask_rule(0.4, None, -1, rng=draws[0])
 
 
@@ -282,7 +282,7 @@ def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tm
     learner, out = study
     other = build(tmp_path / "other", tmp_path / "cache", routes="spanning")
     there = dataclasses.replace(learner, elsewhere=other.folder)
-    assert there.tables()["4.5"].splits == ("test_unseen",), "nobody has seen its houses, none are out of distribution"
+    assert there.tables()["4.5"].splits == ("test_unseen", "test_unseen as shipped"), "nobody has seen its houses, none are out of distribution"
     before = times(out, "best.safetensors")
     with pytest.raises(FileNotFoundError, match="embodied features"):
         run_study(there, ["4.4"], out, note=print)

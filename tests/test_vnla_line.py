@@ -70,7 +70,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert {r["agent"] for r in facts["rows"]} > {"learned", "learned, asks never", "learned, direct intervention"}
     by = {r["agent"]: r["values"] for r in facts["rows"]}
     assert by["shortest"]["success"]["mean"] == 1 and by["learned, asks never"]["requests"]["mean"] == 0
-    assert "learned from pictures unlit_192" in said_by_judge.err and (tmp_path / "judged/table.md").exists()
+    assert "trained on pictures unlit_192" in said_by_judge.err and (tmp_path / "judged/table.md").exists()
     run_json = json.loads((tmp_path / "judged/run.json").read_text())
     assert "learned" in run_json["looking"] and "shortest" not in run_json["looking"] and run_json["pictures"]
     assert run(*judge, "--rrd", 1) == 2 and "--rrd wants --out" in capsys.readouterr().err
