@@ -282,7 +282,8 @@ def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tm
     learner, out = study
     other = build(tmp_path / "other", tmp_path / "cache", routes="spanning")
     there = dataclasses.replace(learner, elsewhere=other.folder)
-    assert there.tables()["4.5"].splits == ("test_unseen", "test_unseen as shipped"), "nobody has seen its houses, none are out of distribution"
+    splits = ("test_unseen", "test_unseen as shipped")
+    assert there.tables()["4.5"].splits == splits, "nobody has seen its houses, none are out of distribution"
     before = times(out, "best.safetensors")
     with pytest.raises(FileNotFoundError, match="embodied features"):
         run_study(there, ["4.4"], out, note=print)
