@@ -24,7 +24,6 @@ def furnishable(catalogue: Catalogue, novelty: str | None) -> Catalogue:
     A quarter of the models of each object class, and a quarter of the kitchen lines, are novel. Classes of few models
     have them in both: what is new is what things look like, not what there is.
     """
-    catalogue = catalogue.furnishing
     if novelty is None:
         return catalogue
     new = _novel_models(catalogue)
