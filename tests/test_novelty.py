@@ -52,8 +52,8 @@ def test_who_knows_no_novel_thing_says_the_familiar_ones():
 
 
 def test_no_model_of_a_divided_class_is_in_houses_of_both_kinds(catalogue, houses):
-    familiar, novel = (set(furnishable(catalogue, n).assets) for n in ("familiar", "novel"))
     catalogue = catalogue.furnishing
+    familiar, novel = (set(furnishable(catalogue, n).assets) for n in ("familiar", "novel"))
     assert familiar | novel == set(catalogue.assets)
     divided = {catalogue.assets[k].object_class for k in set(catalogue.assets) - familiar}
     seen = {n: {p.asset for h in houses[n] for p in h.placements} for n in houses}
