@@ -12,7 +12,7 @@ import functools
 import importlib
 import importlib.util
 from pathlib import Path
-from unittest import mock
+from typing import Any
 
 FOLDER = "lavavu_osmesa.libs"
 WHEEL = "lavavu"
@@ -54,7 +54,11 @@ def _try(path: Path) -> bool:
 def bind_osmesa() -> None:
     """Let PyOpenGL, and so MuJoCo, use the wheel's OSMesa where the system has none; call it before importing them."""
     library, load = bundled("OSMesa"), ctypes.CDLL
-    if library is not None and ctypes.util.find_library("OSMesa") is None:
-        found = lambda name, mode: load(str(library) if "OSMesa" in str(name) else name, mode)
-        with mock.patch.object(ctypes.cdll, "_dlltype", found):
-            importlib.import_module("OpenGL.platform")
+    if library is None or ctypes.util.find_library("OSMesa") is not None:
+        return
+    loader: Any = ctypes.cdll  # what PyOpenGL loads libraries with, by names that the linker does not find
+    loader._dlltype = lambda name, mode: load(str(library) if "OSMesa" in str(name) else name, mode)
+    try:
+        importlib.import_module("OpenGL.platform")
+    finally:
+        loader._dlltype = load
