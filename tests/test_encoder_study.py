@@ -16,7 +16,9 @@ from agents.vision.encoder import random_encoder, save_encoder
 from agents.vision.labels import HouseStrips
 from agents.vision.resnet import ARCHITECTURES
 from agents.vision.study import EncoderStudy
-from embodied.cli import learning, study
+from embodied.cli.learning import by_name
+from embodied.cli.options import add_options, read_options
+from embodied.cli.study import VisionOptions
 from embodied.records import read_json
 
 
@@ -88,7 +90,7 @@ def test_an_encoder_that_the_study_trains_keeps_its_name(setting):
 
 def test_files_of_one_name_are_training_seeds(tmp_path):
     parser = argparse.ArgumentParser()
-    learning.add_study_vision(parser)
+    add_options(parser, VisionOptions)
     words = ["pictures", "--data", str(tmp_path), "--out", str(tmp_path / "o"), "--encoders", "a=x", "b=y", "a=z"]
-    arms = study.by_name(parser.parse_args(words).encoders)
+    arms = by_name(read_options(parser.parse_args(words), VisionOptions).encoders)
     assert {name: [p.name for p in paths] for name, paths in arms.items()} == {"a": ["x", "z"], "b": ["y"]}

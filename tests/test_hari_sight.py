@@ -29,7 +29,7 @@ from agents.hari.study import Covered
 from agents.hari.words import collate, feature_words, percept
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer
-from embodied.cli import options
+from embodied.cli import evaluate
 from embodied.envs import hari
 from embodied.envs.hari import HariEnv, HariRules
 from embodied.envs.make import environment_maker
@@ -146,7 +146,7 @@ def test_hidden_channels_are_made_up_for():
 
 
 def test_what_is_told_unasked_can_be_chosen_and_is_named_alike_everywhere():
-    assert STATES == hari.STATES == options.STATES
+    assert STATES == hari.STATES == evaluate.STATES
     told = {}
     for states in STATES:
         env = environment_maker("hari", WORLDS, describer=Describer(("mug",)), hari=HariRules(states=states))()

@@ -158,5 +158,3 @@ def test_commands_train_and_show(source, tmp_path, capsys):
     assert "--data" in capsys.readouterr().err
     assert main(["iliad", "--rrd", str(tmp_path / "x.rrd"), "--request", "drop every vowel"]) == 2
     assert "--world nav" in capsys.readouterr().err
-    assert main(["study", "iliad", "3.4", "--world", "nav", *where, "--out", str(tmp_path), "--items", "3"]) == 2
-    assert "--items" in capsys.readouterr().err

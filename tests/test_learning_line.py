@@ -21,14 +21,13 @@ from agents.hanna.evaluation import behaviour, hanna_policies
 from agents.hanna.realism import RealismStudy, rank_correlation, ranks
 from agents.hanna.run import train_agent, vocabulary_of
 from agents.hanna.study import HannaStudy
-from agents.hanna.training_config import EVALUATIONS, SCALES
 from agents.studies.engine import run_study
 from agents.vision.config import PLAIN, RENDER_PRESETS
 from agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
 from agents.vision.run import encoder_of
-from embodied.cli import learning, main
-from embodied.cli.options import chosen
+from embodied.cli import features, main, options
+from embodied.cli.train import TrainHanna
 from embodied.cli.view import looked_at
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
@@ -66,10 +65,10 @@ SMALL = [
 ]
 
 
-def parsed(add, *words):
+def parsed(kind, *words):
     parser = argparse.ArgumentParser()
-    add(parser)
-    return parser.parse_args([str(w) for w in words])
+    options.add_options(parser, kind)
+    return options.read_options(parser.parse_args([str(w) for w in words]), kind)
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +126,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
 
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
-    config = chosen(parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL), SCALES["mini"])
+    config = parsed(TrainHanna, "--data", ".", "--out", ".", *SMALL).config
     bank = split_of(data, "test_unseen", random_encoder(seed=0).digest).bank
     agent = new_agent(config, vocabulary_of(data), bank.digest, bank.size)
     agent.network.eval()
@@ -154,15 +153,10 @@ def study(data, tmp_path_factory):
     save_encoder(random_encoder(seed=1), folder / "encoder.safetensors")
     encoder = load_encoder(folder / "encoder.safetensors")
     give_features(data, {n for s in data.splits for n in data.names(s)}, encoder)
-    words = parsed(learning.add_train_hanna, "--data", ".", "--out", ".", *SMALL)
-    config = dataclasses.replace(chosen(words, SCALES["mini"]), iterations=2)
+    words = parsed(TrainHanna, "--data", ".", "--out", ".", *SMALL)
+    config = dataclasses.replace(words.config, iterations=2)
     learner = HannaStudy(
-        data.folder,
-        (0, 1),
-        tasks=3,
-        encoder=folder / "encoder.safetensors",
-        config=config,
-        evaluation=chosen(words, EVALUATIONS["mini"]),
+        data.folder, (0, 1), tasks=3, encoder=folder / "encoder.safetensors", config=config, evaluation=words.evaluation
     )
     run_study(learner, ["4.4"], folder / "out", note=print)
     return learner, folder / "out"
@@ -335,7 +329,7 @@ def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
 def test_weights_of_another_network_are_named(data, tmp_path):
     words = ("--data", data.folder, "--encoder", _empty(tmp_path), "--network")
     with pytest.raises(SystemExit):
-        parsed(learning.add_features, *words, "resnet1")
+        parsed(features.Options, *words, "resnet1")
     with pytest.raises(ValueError, match="not the weights of resnet18"):
         encoder_of(_empty(tmp_path), "resnet18")
 

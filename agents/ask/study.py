@@ -1,12 +1,11 @@
 """All baselines of Ask-v0 in houses never seen: one table with intervals, and curves of success against price.
 
-python -m agents.ask.study --out docs            # writes ask.json, ask.md and figure_ask.png
-python -m agents.ask.study --out docs --draw     # only draws the figure from ask.json again
+embodied study ask --out docs            # writes ask.json, ask_table.md and figure_ask.png
+embodied study ask --out docs --draw     # only draws the figure from ask.json again
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from matplotlib.figure import Figure
 
 from agents.ask.foresight import CHOICES, Foresight
 from agents.ask.learned import LearnedAsker, facts, train
-from assets.cache import atomic_path, default_cache, write_bytes
+from assets.cache import atomic_path, write_bytes
 from assets.catalogue import Catalogue, load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
@@ -151,17 +150,3 @@ def draw(out: Path) -> None:
     axes.legend(fontsize=8, loc="lower right")
     with atomic_path(out / "figure_ask.png") as path:
         figure.savefig(path, metadata={"Software": None})
-
-
-def main(words: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description="Ask-v0's table and figure.")
-    parser.add_argument("--out", type=Path, required=True, help="folder of ask.json, ask_table.md and figure_ask.png")
-    parser.add_argument("--draw", action="store_true", help="only draw the figure again")
-    parser.add_argument("--small", action="store_true", help="two houses of each kind, to see that it runs")
-    args = parser.parse_args(words)
-    plan = StudySize(2, 4, 2, 5, 4) if args.small else StudySize()
-    draw(args.out) if args.draw else run(args.out, plan, default_cache())
-
-
-if __name__ == "__main__":
-    main()

@@ -188,9 +188,7 @@ class NavStudyWorld:
 
     def changed(self, **teacher: Any) -> NavStudyWorld:
         if teacher:
-            raise ValueError(
-                f"{', '.join(teacher)} is told apart in REGEX only; leave {ONLY_REGEX} out with --world nav"
-            )
+            raise ValueError(f"{', '.join(teacher)} is told apart in REGEX only; leave {ONLY_REGEX} out with nav")
         return self
 
     def prepare(self, folder: Path, note: Note) -> nav.NavGrounds:

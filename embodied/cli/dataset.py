@@ -11,12 +11,13 @@ stars, rater.json, which says what rater of BANDIT they resemble.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Annotated
 
-from embodied.cli.common import add_cache, add_json, add_packs, note, pause, show
-from embodied.cli.options import HOUSES, add_pictures, any_path, face, folder_to_write, whole
+from embodied.cli.common import Furnished, Printed, note, pause, show
+from embodied.cli.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
 from embodied.render.pictures import KINDS as PICTURE_KINDS
 from embodied.render.pictures import PictureSettings
@@ -27,91 +28,58 @@ WORDS_ONLY = ("hari",)
 and 4.8) need no pictures, and lighting the houses would be most of the work."""
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("kind", choices=(*KINDS, FROM_PEOPLE), help="the kind of task")
-    parser.add_argument("--out", type=folder_to_write, required=True, metavar="DIR", help="folder of the data set")
-    sizes = "; ".join(f"{name}: {described(name)}" for name in SCALES)
-    parser.add_argument(
-        "--scale",
-        choices=SCALES,
-        help=f"how much of it, as houses to learn from + validate in + test in and training tasks: {sizes} "
-        "(HANNA's; default: mini)",
-    )
-    parser.add_argument(
-        "--houses",
-        type=whole(1, HOUSES),
-        metavar="N",
-        help="instead of --scale: houses to learn from; a tenth to validate, a fifth to test in",
-    )
-    parser.add_argument(
-        "--tasks", type=whole(), metavar="N", help="with --houses: training tasks (default: 100 per house)"
-    )
-    parser.add_argument(
-        "--test-houses",
-        type=whole(1, HOUSES),
-        metavar="N",
-        help="with --houses: houses to test in, with as many tasks each",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, help="random seed; the same seed gives the same data set (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--area",
-        type=float,
-        nargs=2,
-        default=(150.0, 420.0),
-        metavar=("LOW", "HIGH"),
-        help="size of the houses in square metres (default: 150 420)",
-    )
-    parser.add_argument(
-        "--routes",
-        choices=("sampled", "spanning"),
-        default="sampled",
-        help="what assistants know: random stretches, or a spanning tree's (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--language",
-        choices=("people", "plain"),
-        default="people",
-        help="who words the routes: people with habits and landmarks, or plain turns and rooms (default: people)",
-    )
-    parser.add_argument(
-        "--no-rooms", action="store_true", help="requests name no room: any such thing in the house will do (VNLA)"
-    )
-    parser.add_argument(
-        "--ood",
-        type=whole(0, HOUSES),
-        default=0,
-        metavar="N",
-        help="houses out of distribution besides (split 'test_ood'), with furniture, looks, speakers and words that "
-        "all other houses then lack (default: %(default)s)",
-    )
-    parser.add_argument("--no-people", action="store_true", help="assistants are heard but not seen (HANNA)")
-    parser.add_argument("--people", type=any_path, metavar="DIR", help="from-people: the folder of a study")
-    parser.add_argument("--data", type=any_path, metavar="DIR", help="from-people: the data set it was played in")
-    parser.add_argument("--people-only", action="store_true", help="from-people: leave out all routes but people's")
-    _add_drawing(parser)
-    parser.add_argument(
-        "--export", type=folder_to_write, metavar="DIR", help="also write the files that the published programs read"
-    )
-    parser.add_argument(
-        "--workers", type=whole(), default=2, metavar="N", help="build with N processes (default: %(default)s)"
-    )
-    parser.add_argument("--ray", metavar="ADDRESS", help="use a Ray cluster instead: its address, or 'local'")
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+SIZES = {name: described(name) for name in SCALES}
 
 
-def _add_drawing(parser: argparse.ArgumentParser) -> None:
-    otherwise = "as the pictures that are there already, else fast; hari: none"
-    add_pictures(parser, PICTURE_KINDS, what="how the panorama of every viewpoint is drawn", otherwise=otherwise)
-    parser.add_argument(
-        "--size", type=face, metavar="PIXELS", help="side of a panorama's cube face (default: as are there, else 256)"
-    )
+@dataclass(frozen=True, kw_only=True)
+class Options(Furnished, Printed):
+    kind: Annotated[str, Option(words=(*KINDS, FROM_PEOPLE), name="kind")]
+    """The kind of task."""
+    out: OutputFolder
+    """Folder of the data set."""
+    scale: Annotated[str | None, Option(words=tuple(SCALES), helps=SIZES)] = None
+    """Size of the data set: houses to train + validate + test in, and training tasks (HANNA's; default: mini)."""
+    houses: Annotated[int | None, Option(whole(1, HOUSES), "N")] = None
+    """Instead of --scale: N houses to train in, a tenth to validate and a fifth to test in."""
+    tasks: Count | None = None
+    """With --houses: N training tasks (default: 100 per house)."""
+    test_houses: Annotated[int | None, Option(whole(1, HOUSES), "N")] = None
+    """With --houses: N houses to test in, with as many tasks each."""
+    seed: int = 0
+    """Random seed; the same seed gives the same data set."""
+    area: Annotated[tuple[float, float], Option(metavar=("LOW", "HIGH"))] = (150.0, 420.0)
+    """Size of the houses in square metres."""
+    routes: Annotated[str, Option(words=("sampled", "spanning"))] = "sampled"
+    """Routes that assistants know: random ones, or those of a spanning tree."""
+    language: Annotated[str, Option(words=("people", "plain"))] = "people"
+    """Who words the routes: people with habits and landmarks, or plain turns and rooms."""
+    no_rooms: bool = False
+    """Requests name no room: any such object in the house will do (VNLA)."""
+    ood: Annotated[int, Option(whole(0, HOUSES), "N")] = 0
+    """N further houses out of distribution (split 'test_ood'), with furniture, looks, speakers and words that all other
+    houses then lack."""
+    no_people: bool = False
+    """Assistants are heard but not seen (HANNA)."""
+    people: InputFolder | None = None
+    """from-people: the folder of a study."""
+    data: InputFolder | None = None
+    """from-people: the data set that the study used."""
+    people_only: bool = False
+    """from-people: leave out all routes but people's."""
+    pictures: Annotated[str | None, drawn_as(PICTURE_KINDS)] = None
+    """How the panorama of every viewpoint is drawn (default: as the pictures that are there already, else fast; hari:
+    none)."""
+    size: CubeFace | None = None
+    """Side of a panorama's cube face (default: as are there, else 256)."""
+    export: OutputFolder | None = None
+    """Also write the files that the published programs read."""
+    workers: Count = 2
+    """Build with N processes."""
+    ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
+    """Use a Ray cluster instead: its address, or 'local'."""
 
 
-def from_people(args: argparse.Namespace) -> int:
+def from_people(args: Options) -> int:
     """A data set with what people said."""
     from agents.bandit.ratings import fitted
     from assets.cache import write_json
@@ -135,7 +103,7 @@ def from_people(args: argparse.Namespace) -> int:
     return 0
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     if args.kind == FROM_PEOPLE:
         return from_people(args)
     from tqdm import tqdm
@@ -150,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
             "--own: data sets are made of the furniture that everybody has, since whoever reads one must find the "
             "same; leave it out, or use it with `embodied house`, `light`, `render` and `rollout`"
         )
-    HouseConfig(area=tuple(args.area))  # refuses what no house can have, before a folder is made
+    HouseConfig(area=args.area)  # refuses what no house can have, before a folder is made
     programs = [name for name, p in PROGRAMS.items() if p.kind == args.kind and not p.needs]
     if args.export and not programs:
         raise ValueError(f"no published program reads {args.kind!r} tasks; leave --export out")
@@ -158,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
         args.kind,
         chosen_scale(args),
         args.seed,
-        tuple(args.area),
+        args.area,
         args.routes,
         not args.no_people,
         args.language,
@@ -170,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
         return tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
 
     build_dataset(
-        config, args.out, args.cache, workers=args.workers, watch=watch, packs=tuple(args.pack), ray_address=args.ray
+        config, args.out, args.cache, workers=args.workers, watch=watch, packs=args.pack, ray_address=args.ray
     )
     data = Dataset(args.out)
     pictures = chosen_pictures(args.kind, args.pictures, args.size, data.pictures)
@@ -183,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
             pictures=pictures,
             workers=args.workers,
             watch=watch,
-            packs=tuple(args.pack),
+            packs=args.pack,
             ray_address=args.ray,
         )
     if args.export:
@@ -211,7 +179,7 @@ def chosen_pictures(kind: str, pictures: str | None, size: int | None, held: Pic
     return PictureSettings(size or PictureSettings().size, pictures or ("none" if kind in WORDS_ONLY else "fast"))
 
 
-def chosen_scale(args: argparse.Namespace) -> str:
+def chosen_scale(args: Options) -> str:
     """The scale that --scale, or --houses and --tasks, name.
 
     Raises:

@@ -8,16 +8,16 @@ second one with --video as a film.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, note, show
-from embodied.cli.options import add_pictures, face, folder_to_write, whole
-from embodied.cli.recording import add_sinks, add_video, film, viewers_of
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, fetch, note, show
+from embodied.cli.options import CubeFace, Option, OutputFolder, OutputRrd, drawn_as, whole
+from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
@@ -31,40 +31,32 @@ SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seed", type=int, default=SEED, help="seed of the house (default: %(default)s)")
-    parser.add_argument(
-        "--task", type=whole(0), default=0, help="number of the task in the house (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
-    )
-    add_pictures(parser, DRAWN, "normal")
-    parser.add_argument(
-        "--out",
-        type=folder_to_write,
-        default=Path("out/demo"),
-        metavar="DIR",
-        help="folder to write (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--small", action="store_true", help="only light one small flat and show a room of it, as DIR/room.png"
-    )
-    add_video(parser)
-    add_sinks(parser, "DIR/episode.rrd")
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Filmed, Viewers, Furnished, Printed):
+    seed: int = SEED
+    """Seed of the house."""
+    task: Annotated[int, Option(whole(0), "N")] = 0
+    """Number of the task in the house."""
+    size: CubeFace = 384
+    """Side of a panorama's cube face in pixels."""
+    pictures: Annotated[str, drawn_as(DRAWN)] = "normal"
+    """How the house is drawn."""
+    out: OutputFolder = Path("out/demo")
+    """Folder to write."""
+    small: bool = False
+    """Only light one small flat and show a room of it, as DIR/room.png."""
+    rrd: OutputRrd | None = None
+    """Write the Rerun recording here (default: DIR/episode.rrd)."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     if args.small:
         return show_a_room(args)
     with viewers_of(args) as viewers:
         return demonstrate(args, viewers)
 
 
-def demonstrate(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
+def demonstrate(args: Options, viewers: tuple[str, ...]) -> int:
     """The whole line; both episodes also go to `viewers`."""
     from embodied.generate import generate_house
     from embodied.house.floor_plan import save_plan
@@ -114,7 +106,7 @@ SMALL = (32.0, 36.0)
 """Area of the flat of --small, square metres."""
 
 
-def show_a_room(args: argparse.Namespace) -> int:
+def show_a_room(args: Options) -> int:
     """A small flat from the seed, lit, and the view of it that shows most objects; needs neither torch nor Rerun."""
     import cv2
     import numpy as np
@@ -145,9 +137,7 @@ def show_a_room(args: argparse.Namespace) -> int:
     return 0
 
 
-def inhabited(
-    house: House, catalogue: Catalogue, args: argparse.Namespace
-) -> tuple[House, NavGraph, tuple[Route, ...]]:
+def inhabited(house: House, catalogue: Catalogue, args: Options) -> tuple[House, NavGraph, tuple[Route, ...]]:
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
     from embodied.assistants.route_system import WORDINGS, route_paths, worded
     from embodied.generate.people import add_people, meet
@@ -163,7 +153,7 @@ def inhabited(
         return house, graph, worded(world, paths, WORDINGS["test"], seed=args.seed, language=People())
 
 
-def find_something(args: argparse.Namespace, world: World, viewers: tuple[str, ...]) -> dict:
+def find_something(args: Options, world: World, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
@@ -178,7 +168,7 @@ def find_something(args: argparse.Namespace, world: World, viewers: tuple[str, .
     return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
 
 
-def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
+def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
     from agents.hanna.agent import load_agent
@@ -200,7 +190,7 @@ def ask_for_help(args: argparse.Namespace, world: World, routes: Sequence[Route]
     make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
     if args.video:
-        film(world, episode, args.video, tuple(args.video_size))
+        film(world, episode, args.video, args.video_size)
     return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world)
 
 

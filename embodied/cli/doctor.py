@@ -6,7 +6,6 @@ versions and free disk. Exits 1, with the remedy, when houses cannot be generate
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import importlib.metadata
 import platform
@@ -20,7 +19,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from embodied.cli import message_of
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
+from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.cli.origins import REMEDY, strangers
 from embodied.distribution import DISTRIBUTION
 
@@ -44,21 +43,16 @@ class Finding:
     """Whether the main job fails without it."""
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--fix",
-        action="store_true",
-        help="install by pip, without root, what is missing: furniture models, and software OpenGL and LLVM",
-    )
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Furnished, Printed):
+    fix: bool = False
+    """Install by pip, without root, what is missing: furniture models, software OpenGL and LLVM."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     findings = []
     if args.fix:
-        for line_of in fix(catalogue_packs=tuple(args.pack)):
+        for line_of in fix(catalogue_packs=args.pack):
             note(line_of)
     for look in (versions, extras, packages, renderer, packs, path_tracer, vulkan, body, disk):
         findings.append(look(args))
@@ -99,7 +93,7 @@ def fix(catalogue_packs: tuple[Path, ...]) -> Iterator[str]:
         yield "nothing is missing that pip could bring"
 
 
-def versions(_: argparse.Namespace) -> Finding:
+def versions(_: Options) -> Finding:
     """Python and library versions; every one listed is needed."""
     found, missing = _installed(LIBRARIES)
     text = ", ".join([f"Python {platform.python_version()}", *found])
@@ -107,7 +101,7 @@ def versions(_: argparse.Namespace) -> Finding:
     return Finding("versions", not missing, text, f"pip install {DISTRIBUTION}")
 
 
-def extras(_: argparse.Namespace) -> Finding:
+def extras(_: Options) -> Finding:
     """Libraries that only some commands need."""
     parts, lacking = [], []
     for extra, names in EXTRAS.items():
@@ -128,13 +122,13 @@ def _installed(names: Sequence[str]) -> tuple[list[str], list[str]]:
     return found, missing
 
 
-def packages(_: argparse.Namespace) -> Finding:
+def packages(_: Options) -> Finding:
     """Whether embodied, agents, assets and viz are ours wherever Python is started."""
     found = strangers()
     return Finding("packages", not found, "; ".join(found) or "embodied, agents, assets and viz are ours", REMEDY)
 
 
-def renderer(_: argparse.Namespace) -> Finding:
+def renderer(_: Options) -> Finding:
     """The off-screen renderer that MuJoCo gets."""
     from embodied import gl
 
@@ -145,7 +139,7 @@ def renderer(_: argparse.Namespace) -> Finding:
     return Finding("renderer", True, str(device))
 
 
-def packs(args: argparse.Namespace) -> Finding:
+def packs(args: Options) -> Finding:
     """The furniture libraries, and whether they hold every model of the catalogue."""
     from assets.importing.packs import find_packs
 
@@ -154,7 +148,7 @@ def packs(args: argparse.Namespace) -> Finding:
         "until then houses hold the simple furniture that is built in code"
     )
     try:
-        found, missing = find_packs(tuple(args.pack)), catalogue_of(args).missing()
+        found, missing = find_packs(args.pack), catalogue_of(args).missing()
     except (ValueError, OSError) as e:
         return Finding("furniture", False, message_of(e), remedy, False)
     text = ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in found) or "no furniture library found"
@@ -163,7 +157,7 @@ def packs(args: argparse.Namespace) -> Finding:
     return Finding("furniture", not missing, text, remedy, False)
 
 
-def path_tracer(_: argparse.Namespace) -> Finding:
+def path_tracer(_: Options) -> Finding:
     """Mitsuba's back end: CUDA or LLVM; slow without them; houses are drawn unlit without Mitsuba."""
     from embodied.light.backend import SLOWER, VARIANTS, LightError, device
 
@@ -178,7 +172,7 @@ def path_tracer(_: argparse.Namespace) -> Finding:
     return Finding("path tracer", True, f"Mitsuba on {found} (variant {variant})", needed=False)
 
 
-def vulkan(_: argparse.Namespace) -> Finding:
+def vulkan(_: Options) -> Finding:
     """The loader that the Filament back end needs."""
     import ctypes.util
 
@@ -192,7 +186,7 @@ def vulkan(_: argparse.Namespace) -> Finding:
     )
 
 
-def body(_: argparse.Namespace) -> Finding:
+def body(_: Options) -> Finding:
     """dm-control, which the driven body needs; its dependency labmaze has no wheel for Python 3.13."""
     try:
         text, found = f"dm-control {importlib.metadata.version('dm-control')}", True
@@ -207,7 +201,7 @@ def body(_: argparse.Namespace) -> Finding:
     )
 
 
-def disk(args: argparse.Namespace) -> Finding:
+def disk(args: Options) -> Finding:
     """Free space where the cache lives, and whether it can be written."""
     place = args.cache.absolute()
     while not place.exists():

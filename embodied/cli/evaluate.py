@@ -13,26 +13,33 @@ same command resumes an interrupted run without asking twice.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import dataclasses
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
-from embodied.cli.options import add_hari_rules, add_rules, any_path, folder_to_write, hari_rules_of, whole
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
+from embodied.cli.learning import SHOWN, Encoded, Threaded
+from embodied.cli.model import WithModel, client_of
+from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, not_negative
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, SplitData
     from embodied.envs.base import HelpEnv
+    from embodied.envs.hari import HariRules
     from embodied.evaluation.tables import Row
     from embodied.interface import Agent, Assistant, Episode, Place, SeenPlace
 
 HARI_SPLITS = ("test_unseen_start", "test_unseen_object", "test_unseen_env")
 KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
+VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
+"""As in embodied.envs.vnla, which --help should not import."""
+STATES = ("none", "sparse", "dense")
+"""As in embodied.envs.hari, which --help should not import."""
 SEES = ("names", "strip", "panorama", "nothing")
 LLM, TEMPLATE = "llm", "template"
 FEW_TASKS = 20
@@ -47,89 +54,100 @@ COLUMNS = {
 }
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    from agents.language_models.options import add_model
-    from embodied.cli.learning import add_encoder, add_shown, add_threads
+@dataclass(frozen=True, kw_only=True)
+class TaskOptions:
+    """Tasks."""
 
-    parser.add_argument("kind", choices=KINDS, help="the kind of task")
-    parser.add_argument(
-        "--agent",
-        nargs="+",
-        metavar="NAME",
-        help="agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', or "
-        "for ask a folder with an agent.py or the http:// address of an agent (default: shipped, else all baselines)",
-    )
-    tasks = parser.add_argument_group("tasks")
-    tasks.add_argument(
-        "--data",
-        type=any_path,
-        metavar="DIR",
-        help="the data set, a folder that `embodied dataset` built (default: one generated flat)",
-    )
-    tasks.add_argument(
-        "--split", nargs="+", help="splits of the data set (default: test_unseen; hari: its three test splits)"
-    )
-    tasks.add_argument(
-        "--tasks",
-        type=whole(),
-        metavar="N",
-        help=f"evaluate on at most N tasks of a split, spread over its houses (default: all, or {FEW_TASKS} for a "
-        "language model or without --data)",
-    )
-    tasks.add_argument("--steps", type=whole(), metavar="N", help="longest episode in steps (default: its task's)")
-    tasks.add_argument("--seed", type=int, default=0, help="random seed (default: %(default)s)")
-    tasks.add_argument(
-        "--assistant",
-        default=TEMPLATE,
-        metavar="WHO",
-        help="who answers requests: template (the kind's own assistant), llm, person, or MODULE:CLASS of your own "
-        "(default: template)",
-    )
-    tasks.add_argument(
-        "--batch",
-        type=whole(),
-        metavar="N",
-        help="play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)",
-    )
-    add_rules(tasks)
-    tasks.add_argument("--seeds", type=any_path, metavar="FILE", help="ask: seeds of the houses, one per line")
-    tasks.add_argument("--unseen-classes", action="store_true", help="ask: use only classes held out from training")
-    add_hari_rules(parser)
-    results = parser.add_argument_group("results")
-    results.add_argument("--out", type=folder_to_write, metavar="DIR", help="folder for the table and the episodes")
-    results.add_argument(
-        "--rrd", type=whole(), metavar="N", help="record the first N episodes of a trained agent into OUT/recordings"
-    )
-    results.add_argument(
-        "--as-programs",
-        action="store_true",
-        help="print a second table that is computed as in the authors' program where it differs (docs/sources.md, S3, "
-        "S5, S6)",
-    )
-    add_json(results)
-    trained = parser.add_argument_group("trained agents")
-    trained.add_argument(
-        "--rows",
-        nargs="+",
-        metavar="NAME",
-        help="rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' "
-        "where other agents are named)",
-    )
-    add_encoder(trained)
-    add_shown(trained)
-    add_threads(trained)
-    add_model(parser).add_argument(
-        "--sees",
-        choices=SEES,
-        default="names",
-        help="what the model is given: the true names of what is visible (an oracle), the candidate views as one "
-        "strip, the panorama with markers, or nothing (default: names)",
-    )
-    add_cache(parser)
-    add_packs(parser)
+    data: InputFolder | None = None
+    """The data set, a folder that `embodied dataset` built (default: one generated flat)."""
+    split: tuple[Annotated[str, Option(metavar="SPLIT")], ...] = ()
+    """Splits of the data set (default: test_unseen; hari: its three test splits)."""
+    tasks: Count | None = None
+    """Evaluate on at most N tasks of a split, spread over its houses (default: all, or 20 for a language model or
+    without --data)."""
+    steps: Count | None = None
+    """Longest episode in steps (default: its task's)."""
+    seed: int = 0
+    """Random seed."""
+    assistant: Annotated[str, Option(metavar="WHO")] = TEMPLATE
+    """Who answers requests: template (the kind's own assistant), llm, person, or MODULE:CLASS of your own."""
+    batch: Count | None = None
+    """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
+    rules: Annotated[str, Option(words=VNLA_RULES)] = VNLA_RULES[0]
+    """VNLA's rule of play: help in words (indirect), the advisor acts and says it (direct) or does not (direct-mute),
+    the program's 'forward' (goal-aware), Algorithm 6 as printed."""
+    seeds: InputPath | None = None
+    """ask: seeds of the houses, one per line."""
+    unseen_classes: bool = False
+    """ask: use only classes held out from training."""
 
 
-def run(args: argparse.Namespace) -> int:
+@dataclass(frozen=True, kw_only=True)
+class HariVariants:
+    """HARI's variants (defaults: Table E.2 of the dissertation)."""
+
+    stack: Count = 2
+    """Largest number of goals on the stack."""
+    longest: Count = 3
+    """Longest path to a sub-goal, in nodes."""
+    cost: Annotated[float, Option(not_negative, "X")] = 0.01
+    """Cost of each action."""
+    horizon: Count | None = None
+    """Longest episode in steps (default: its task's, 30)."""
+    uncooperative: bool = False
+    """The assistant answers a different question from the one asked."""
+    states: Annotated[str, Option(words=STATES)] = "sparse"
+    """How the agent's own place is described without a request."""
+    kept: Annotated[float, Option(metavar="SHARE")] = 0.1
+    """Share of the object classes, the most common first, that sparse descriptions keep."""
+
+    def hari_rules(self) -> HariRules:
+        from embodied.envs.hari import Costs, HariRules
+
+        costs, cooperative = Costs.alike(self.cost), not self.uncooperative
+        return HariRules(costs, self.stack, self.longest, cooperative, self.states, self.horizon, self.kept)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results(Printed):
+    """Results."""
+
+    out: OutputFolder | None = None
+    """Folder for the table and the episodes."""
+    rrd: Count | None = None
+    """Record the first N episodes of a trained agent into OUT/recordings."""
+    as_programs: bool = False
+    """Print a second table that is computed as in the authors' program, where that differs (docs/sources.md, S3, S5,
+    S6)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfTrained:
+    """Trained agents."""
+
+    rows: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
+    """Rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' where
+    other agents are named)."""
+    shown: Annotated[str, Option(words=SHOWN)] = "same"
+    """How goal images differ from what the agent sees: not at all (same), by a robot's camera, taken at another hour,
+    on another day with people elsewhere and small things moved, later (hour and day); by that camera, and one view of
+    60 degrees of that."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(TaskOptions, Results, OfTrained, HariVariants, WithModel, Encoded, Threaded, Furnished):
+    kind: Annotated[str, Option(words=KINDS, name="kind")]
+    """The kind of task."""
+    agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
+    """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', or for ask a
+    folder with an agent.py or the http:// address of an agent (default: shipped, else all baselines)."""
+    threads: Count = 2
+    sees: Annotated[str, Option(words=SEES)] = "names"
+    """What a language model is given: the true names of what is visible (an oracle), the candidate views as one strip,
+    the panorama with markers, or nothing."""
+
+
+def run(args: Options) -> int:
     from embodied.datasets.store import Dataset
     from embodied.locks import locked
 
@@ -149,7 +167,7 @@ def run(args: argparse.Namespace) -> int:
         return _evaluate(args, data, names, files, splits)
 
 
-def _agents(args: argparse.Namespace) -> tuple[list[str], list[Path]]:
+def _agents(args: Options) -> tuple[list[str], list[Path]]:
     """Names of agents, and the file of the trained one, that --agent lists.
 
     Raises:
@@ -177,12 +195,12 @@ def _agents(args: argparse.Namespace) -> tuple[list[str], list[Path]]:
     return names, files
 
 
-def _splits(args: argparse.Namespace) -> tuple[str, ...]:
-    return tuple(args.split or (HARI_SPLITS if args.kind == "hari" else ("test_unseen",)))
+def _splits(args: Options) -> tuple[str, ...]:
+    return args.split or (HARI_SPLITS if args.kind == "hari" else ("test_unseen",))
 
 
 def _evaluate(
-    args: argparse.Namespace, data: Dataset | None, names: Sequence[str], files: Sequence[Path], splits: Sequence[str]
+    args: Options, data: Dataset | None, names: Sequence[str], files: Sequence[Path], splits: Sequence[str]
 ) -> int:
     """Play, print the table, and write what goes into --out."""
     from agents.hanna.evaluation import behaviour
@@ -204,8 +222,6 @@ def _evaluate(
     clients: list[Any] = []
 
     def client() -> Any:
-        from agents.language_models.options import client_of
-
         if not clients:
             clients.append(client_of(args))
         return clients[0]
@@ -213,13 +229,13 @@ def _evaluate(
     changes = _Changes(args, client)
     rows, heard = _play(args, data, names, splits, changes, client, keep) if names else ([], {})
     about: dict[str, object] = {"data": data and data.digest, "seed": args.seed, "tasks": args.tasks, "agents": names}
-    about |= {"splits": splits, "rules": args.rules, "hari": dataclasses.asdict(hari_rules_of(args))}
+    about |= {"splits": splits, "rules": args.rules, "hari": dataclasses.asdict(args.hari_rules())}
     about["assistant"] = args.assistant
-    if files:
+    if files and data is not None:
         from embodied.cli.evaluate_trained import evaluate_trained
 
         rows_wanted = args.rows or (["learned"] if names else ())
-        more, facts = evaluate_trained(args, files[0], splits, rows_wanted, keep, changes.applied)
+        more, facts = evaluate_trained(args, data, files[0], splits, rows_wanted, keep, changes.applied)
         rows, about = [*rows, *more], about | facts
     if args.out:
         tables.save(rows, args.out, "table")
@@ -242,10 +258,10 @@ def _evaluate(
     if clients:
         text += f"\n{clients[0].sent} requests were sent; all other answers were in {args.answers}"
     show(args, result, text)
-    if args.rrd and files:
+    if args.rrd and args.out and files and data is not None:
         from embodied.cli.evaluate_trained import record_trained
 
-        record_trained(args)
+        record_trained(args, data, args.out, args.rrd)
     return 0
 
 
@@ -265,7 +281,7 @@ def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
 class _Changes:
     """What the command line changes about a split: who answers requests, and how long episodes are."""
 
-    def __init__(self, args: argparse.Namespace, client: Callable[[], Any]) -> None:
+    def __init__(self, args: Options, client: Callable[[], Any]) -> None:
         from agents.language_models.assistant import assistant_maker
         from embodied.envs.make import assistant_of
 
@@ -295,7 +311,7 @@ class _Changes:
 
 
 def _play(
-    args: argparse.Namespace,
+    args: Options,
     data: Dataset | None,
     names: Sequence[str],
     splits: Sequence[str],
@@ -323,13 +339,13 @@ def _play(
 
         worlds = _seen(split.worlds) if looks else None
         agents = {Path(n).name if "/" in n else n: _agent(args, n, split, worlds, client) for n in names}
-        how = {"seed": args.seed, "limit": limit, "batch": args.batch or 8}
-        rows += evaluate(changes.applied(split), agents, keep=kept, watch=watch, **how)
+        batch, changed = args.batch or 8, changes.applied(split)
+        rows += evaluate(changed, agents, keep=kept, watch=watch, seed=args.seed, limit=limit, batch=batch)
     return rows, heard
 
 
 def _stages(
-    args: argparse.Namespace,
+    args: Options,
     data: Dataset | None,
     splits: Sequence[str],
     assistant: Assistant | None,
@@ -342,10 +358,10 @@ def _stages(
     from embodied.gym.playground import Variants, flat_playground
 
     if data is None and args.seeds:
-        yield _hidden_houses(args, limit or FEW_TASKS)
+        yield _hidden_houses(args, args.seeds, limit or FEW_TASKS)
     elif data is None:
         seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
-        variants = Variants(args.rules, hari=hari_rules_of(args))
+        variants = Variants(args.rules, hari=args.hari_rules())
         flat = flat_playground(
             args.kind, args.seed, cache=args.cache, sees=seen, variants=variants, assistant=assistant
         )
@@ -356,10 +372,10 @@ def _stages(
             worlds = None
             if catalogue is not None:
                 worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
-            yield data.split(split, worlds=worlds, vnla=args.rules, hari=hari_rules_of(args), assistant=assistant)
+            yield data.split(split, worlds=worlds, vnla=args.rules, hari=args.hari_rules(), assistant=assistant)
 
 
-def _hidden_houses(args: argparse.Namespace, limit: int) -> SplitData:
+def _hidden_houses(args: Options, file: Path, limit: int) -> SplitData:
     """Ask-v0 in the houses of a list of seeds. What is written down names houses by their place in the list alone."""
     from embodied.datasets.build import make_dataset_house
     from embodied.datasets.store import SplitData
@@ -368,7 +384,7 @@ def _hidden_houses(args: argparse.Namespace, limit: int) -> SplitData:
     from embodied.generate import HouseConfig
     from embodied.world import open_world
 
-    seeds, catalogue = read_seeds(args.seeds), catalogue_of(args)
+    seeds, catalogue = read_seeds(file), catalogue_of(args)
     worlds = {}
     for k, seed in enumerate(bar(seeds, "houses", "house", len(seeds))):
         house, graph = make_dataset_house(seed, f"ask_{k}", HouseConfig(area=AREA), catalogue)
@@ -380,11 +396,7 @@ def _hidden_houses(args: argparse.Namespace, limit: int) -> SplitData:
 
 
 def _agent(
-    args: argparse.Namespace,
-    name: str,
-    split: SplitData,
-    worlds: Mapping[str, SeenPlace] | None,
-    client: Callable[[], Any],
+    args: Options, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None, client: Callable[[], Any]
 ) -> Agent:
     from embodied.evaluation.ask import submitted
     from embodied.evaluation.evaluate import agent
@@ -398,7 +410,7 @@ def _agent(
     return known[name] if name in known else submitted(name)
 
 
-def _model_agent(args: argparse.Namespace, split: SplitData, client: Any) -> Agent:
+def _model_agent(args: Options, split: SplitData, client: Any) -> Agent:
     from agents.language_models.agent import LanguageModelAgent
     from agents.language_models.telling import Teller, agent_prompt
     from agents.language_models.words import SeenNames

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -12,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 from embodied.cli.common import bar, note
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import SplitData
+    from embodied.cli.evaluate import Options
+    from embodied.datasets.store import Dataset, SplitData
     from embodied.evaluation.tables import Row
     from embodied.interface import Episode
 
@@ -27,7 +27,8 @@ def columns_of(kind: str) -> Sequence[str]:
 
 
 def evaluate_trained(
-    args: argparse.Namespace,
+    args: Options,
+    data: Dataset,
     file: Path,
     splits: Sequence[str],
     rows: Sequence[str],
@@ -46,14 +47,12 @@ def evaluate_trained(
     from agents.studies.episodes import JUDGES
     from agents.vision.drawn import pictures_of
     from agents.vision.occasions import OCCASIONS
-    from embodied.datasets.store import Dataset
     from embodied.identity import identity_of
 
     use_threads(args.threads)
-    data = Dataset(args.data)
     how: dict[str, Any] = {"seed": args.seed, "limit": args.tasks, "batch": args.batch or 32}
     how |= {"only": rows, "keep": keep, "watch": lambda agents: bar(agents, "agents", "agent"), "instead": instead}
-    found, looking = {"hari": _hari, "vnla": _vnla, "hanna": _hanna}[args.kind](args, file, splits, how)
+    found, looking = {"hari": _hari, "vnla": _vnla, "hanna": _hanna}[args.kind](args, data.folder, file, splits, how)
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}
     facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
@@ -65,7 +64,7 @@ Found = tuple["list[Row]", list[str]]
 """Rows, and names of those whose agents see pictures."""
 
 
-def _hanna(args: argparse.Namespace, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
+def _hanna(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
     """Tables 4.3 to 4.5."""
     from agents.common.lessons import Lessons
     from agents.hanna.agent import load_agent
@@ -75,12 +74,12 @@ def _hanna(args: argparse.Namespace, file: Path, splits: Sequence[str], how: dic
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
-    lessons = Lessons(dataset_of(args.data, "hanna"), encoder_of(args.encoder, args.network), args.pictures)
+    lessons = Lessons(dataset_of(data, "hanna"), encoder_of(args.encoder, args.network), args.pictures)
     rows = judge(lessons, load_agent(file), splits, shown=OCCASIONS[args.shown], cache=args.cache, **how)
     return rows, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
 
 
-def _vnla(args: argparse.Namespace, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
+def _vnla(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
     """The learned asker beside other askers, direct intervention and agents without learning."""
     from agents.common.lessons import Lessons
     from agents.vision.run import encoder_of
@@ -89,36 +88,34 @@ def _vnla(args: argparse.Namespace, file: Path, splits: Sequence[str], how: dict
     from agents.vnla.run import vnla_data
 
     agent = load_agent(file)
-    lessons = Lessons(vnla_data(args.data), encoder_of(args.encoder, args.network), args.pictures)
+    lessons = Lessons(vnla_data(data), encoder_of(args.encoder, args.network), args.pictures)
     note(f"rules of play: {agent.config.rules}; trained on pictures {agent.pictures}")
     rows = judge(lessons, agent, splits, **how)
     return rows, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
 
 
-def _hari(args: argparse.Namespace, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
+def _hari(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
     """Rows of Table 4.7 for one agent."""
     from agents.hari.agent import load_agent
     from agents.hari.judging import judge
     from agents.hari.run import hari_data, with_eyes
 
-    data, agent = hari_data(args.data), load_agent(file)
-    agent = dataclasses.replace(agent, executor=with_eyes(agent.executor, data, args.pictures))
-    rows = judge(data, agent, splits, **how)
+    houses, agent = hari_data(data), load_agent(file)
+    agent = dataclasses.replace(agent, executor=with_eyes(agent.executor, houses, args.pictures))
+    rows = judge(houses, agent, splits, **how)
     return rows, sorted({r.agent for r in rows}) if agent.executor.seeing else []
 
 
-def record_trained(args: argparse.Namespace) -> None:
-    """Record the first episodes of the trained agent of each split, in their houses as the data set holds them."""
+def record_trained(args: Options, data: Dataset, run: Path, first: int) -> None:
+    """Record the `first` episodes of the trained agent on each split, in their houses as the data set holds them."""
     from assets.catalogue import load_catalogue
     from embodied.cli.view import record_again
-    from embodied.datasets.store import Dataset
     from viz.report import load_run
     from viz.sinks import Sinks
 
-    data, catalogue, counts = Dataset(args.data), load_catalogue(args.cache), Counter[str]()
-    args.pictures, args.video = args.pictures or "unlit", None
-    for number, listed in enumerate(load_run(args.out)):
-        if listed.agent.endswith(" learned") and counts[listed.agent] < args.rrd:
+    catalogue, counts, pictures = load_catalogue(args.cache), Counter[str](), args.pictures or "unlit"
+    for number, listed in enumerate(load_run(run)):
+        if listed.agent.endswith(" learned") and counts[listed.agent] < first:
             counts[listed.agent] += 1
-            sinks = Sinks(args.out / "recordings" / f"{number}.rrd", ())
-            record_again(args.out, data, listed.episode, sinks, catalogue, args)
+            sinks = Sinks(run / "recordings" / f"{number}.rrd", ())
+            record_again(run, data, listed.episode, sinks, catalogue, args.cache, pictures=pictures)

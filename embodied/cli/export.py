@@ -15,21 +15,25 @@ needs changed. `python -m embodied.mattersim` then runs the programs without a c
 
 from __future__ import annotations
 
-import argparse
-import contextlib
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+import functools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
+from embodied.cli.common import Cached, Furnished, Printed, bar, catalogue_of, note, show
+from embodied.cli.learning import Encoded
 from embodied.cli.options import (
-    any_path,
+    Count,
+    HouseFolder,
+    InputFolder,
+    InputPath,
+    Option,
+    OutputFolder,
     file_ending_in,
     file_to_write,
-    folder_to_write,
-    house_folder,
     not_negative,
     video_side,
-    whole,
 )
 
 if TYPE_CHECKING:
@@ -50,122 +54,123 @@ WALKS = {
     "lerobot-vlnce": "vlnce",
 }
 """As embodied.datasets.vlnce.FORMATS, with the preset of body and camera (embodied.gym.continuous) of each."""
-FORMATS = ("glb", "mjcf", "usd")
 WIDTH = 2048
 """The length of a feature that the published programs are written for."""
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    from embodied.cli.learning import add_encoder
-
-    what = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
-    for name in PROGRAMS:
-        sub = what.add_parser(name, help=f"the folder that {name} reads")
-        _add_data(sub)
-        sub.add_argument("--features", action="store_true", help="also write the features of `embodied features`")
-        sub.add_argument(
-            "--pad", type=whole(), default=WIDTH, metavar="N",
-            help="fill features with zeros up to this length, which the programs count on (default: %(default)s)",
-        )  # fmt: skip
-        add_encoder(sub)
-    sub = what.add_parser("parquet", help="Parquet tables with a card")
-    _add_data(sub)
-    sub.add_argument(
-        "--episodes",
-        type=any_path,
-        nargs="+",
-        default=[],
-        metavar="FILE",
-        help="episodes (.jsonl) to write as tables, too",
-    )
-    _add_lerobot(what.add_parser("lerobot", help="episodes as a LeRobot data set (v3.0)"))
-    for name in WALKS:
-        sub = what.add_parser(name, help=f"continuous walks as {name} trains on them")
-        _add_data(sub)
-        sub.add_argument("--split", default="train", help="whose tasks are walked (default: %(default)s)")
-        sub.add_argument("--tasks", type=whole(), metavar="N", help="walk the first so many tasks (default: all)")
-        sub.add_argument(
-            "--wander", type=not_negative, default=0.0, metavar="SHARE",
-            help="draw this share of the steps and turns instead, and write what the expert does there "
-            "(default: %(default)s)",
-        )  # fmt: skip
-        sub.add_argument(
-            "--width", type=video_side, metavar="PIXELS", help="width of pictures (default: that of the program)"
-        )
-        if name == "lerobot-vlnce":
-            sub.add_argument("--depth", action="store_true", help="also write videos of depth")
-        add_cache(sub)
-    for name in FORMATS:
-        sub = what.add_parser(name, help=f"a house as {name}")
-        sub.add_argument(
-            "--house", type=house_folder, required=True, metavar="DIR", help="folder that `embodied house` wrote"
-        )
-        place = {"mjcf": folder_to_write, "glb": file_ending_in(".glb"), "usd": file_to_write}[name]
-        sub.add_argument("--out", type=place, required=True, metavar="PATH", help="file to write (mjcf: folder)")
-        sub.add_argument(
-            "--light", choices=("none", "fast", "normal", "high"), default="normal",
-            help="bake light of this quality into it, or leave its materials as they are (default: %(default)s)",
-        )  # fmt: skip
-        if name == "glb":
-            sub.add_argument(
-                "--no-ceilings", action="store_true", help="leave ceilings and roof out, for a look from above"
-            )
-            sub.add_argument("--sky", action="store_true", help="keep the dome of far scenery, for a look from inside")
-        add_cache(sub)
-        add_packs(sub)
-        add_json(sub)
+@dataclass(frozen=True, kw_only=True)
+class OfData(Printed):
+    data: InputFolder
+    """The data set, a folder that `embodied dataset` built."""
+    out: OutputFolder
+    """Folder to write, made if missing."""
 
 
-def _add_lerobot(parser: argparse.ArgumentParser) -> None:
-    _add_data(parser)
-    parser.add_argument(
-        "--episodes", type=any_path, nargs="+", metavar="FILE",
-        help="episodes (.jsonl) of `embodied evaluate` (default: an expert plays --split)",
-    )  # fmt: skip
-    parser.add_argument("--split", default="train", help="what the expert plays (default: %(default)s)")
-    parser.add_argument("--tasks", type=whole(), metavar="N", help="the expert plays the first so many tasks")
-    parser.add_argument(
-        "--size", type=video_side, default=224, help="side of the picture, pixels (default: %(default)s)"
-    )
-    parser.add_argument("--depth", action="store_true", help="also write videos of depth")
+@dataclass(frozen=True, kw_only=True)
+class ProgramOptions(OfData, Encoded):
+    """Folders that published programs read."""
+
+    features: bool = False
+    """Also write the features of `embodied features`."""
+    pad: Count = WIDTH
+    """Fill features with zeros up to N numbers, which the programs count on."""
 
 
-def _add_data(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--data", type=any_path, required=True, metavar="DIR", help="a data set of `embodied dataset`")
-    parser.add_argument(
-        "--out", type=folder_to_write, required=True, metavar="DIR", help="folder to write, made if missing"
-    )
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class ParquetOptions(OfData):
+    """Parquet tables with a card."""
+
+    episodes: tuple[InputPath, ...] = ()
+    """Episodes (.jsonl) to write as tables, too."""
 
 
-def run(args: argparse.Namespace) -> int:
-    from embodied.locks import locked
+@dataclass(frozen=True, kw_only=True)
+class LeRobotOptions(OfData):
+    """Episodes as a LeRobot data set (v3.0)."""
 
-    runs = {
-        "parquet": run_parquet,
-        "lerobot": run_lerobot,
-        **dict.fromkeys(PROGRAMS, run_program),
-        **dict.fromkeys(WALKS, run_walks),
-    }
-    with locked(args.out) if args.what in (*PROGRAMS, "parquet", "mjcf") else contextlib.nullcontext():
-        return runs.get(args.what, run_house)(args)
+    episodes: tuple[InputPath, ...] = ()
+    """Episodes (.jsonl) of `embodied evaluate` (default: an expert plays --split)."""
+    split: str = "train"
+    """The split whose tasks the expert plays."""
+    tasks: Count | None = None
+    """The expert plays the first N tasks (default: all)."""
+    size: Annotated[int, Option(video_side, "PIXELS")] = 224
+    """Side of the pictures."""
+    depth: bool = False
+    """Also write videos of depth."""
 
 
-def run_program(args: argparse.Namespace) -> int:
+@dataclass(frozen=True, kw_only=True)
+class WalkOptions(OfData, Cached):
+    """Continuous walks of an expert in `vln` data: images, actions, instructions."""
+
+    split: str = "train"
+    """The split whose tasks are walked."""
+    tasks: Count | None = None
+    """Walk the first N tasks (default: all)."""
+    wander: Annotated[float, Option(not_negative, "SHARE")] = 0.0
+    """Replace this share of the steps and turns by random ones, and write what the expert does there."""
+    width: Annotated[int | None, Option(video_side, "PIXELS")] = None
+    """Width of the pictures (default: that of the program)."""
+    depth: bool = False
+    """Also write videos of depth (lerobot-vlnce)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HouseOptions(Furnished, Printed):
+    """A house, for MuJoCo's viewer or for USD programs."""
+
+    house: HouseFolder
+    """Folder that `embodied house` wrote."""
+    light: Annotated[str, Option(words=("none", "fast", "normal", "high"))] = "normal"
+    """Bake light of this quality into it, or leave its materials as they are."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GlbOptions(HouseOptions):
+    """A house, for web viewers and Blender."""
+
+    out: Annotated[Path, Option(file_ending_in(".glb"), "FILE")]
+    """File to write."""
+    no_ceilings: bool = False
+    """Leave ceilings and roof out, for a look from above."""
+    sky: bool = False
+    """Keep the dome of far scenery, for a look from inside."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MjcfOptions(HouseOptions):
+    """A house, for MuJoCo's viewer."""
+
+    out: OutputFolder
+    """Folder to write."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UsdOptions(HouseOptions):
+    """A house, for USD programs."""
+
+    out: Annotated[Path, Option(file_to_write, "FILE")]
+    """File to write."""
+
+
+def run_program(what: str, args: ProgramOptions) -> int:
     from embodied.datasets.folders import export_folder
     from embodied.datasets.store import Dataset
+    from embodied.locks import locked
 
     data = Dataset(args.data)
     features = feature_rows(data, args) if args.features else None
-    if features is None and args.what != "matterport":
+    if features is None and what != "matterport":
         note("no features are written; the program needs them: add --features")
-    files = export_folder(args.what, data, args.out, features)
-    facts = {"program": args.what, "files": len(files), "out": str(args.out), "readme": str(files[-1])}
-    show(args, facts, f"{len(files)} files for {args.what} in {args.out}; read {files[-1].name} there")
+    with locked(args.out):
+        files = export_folder(what, data, args.out, features)
+    facts = {"program": what, "files": len(files), "out": str(args.out), "readme": str(files[-1])}
+    show(args, facts, f"{len(files)} files for {what} in {args.out}; read {files[-1].name} there")
     return 0
 
 
-def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str, str, np.ndarray]]:
+def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str, np.ndarray]]:
     """(house, viewpoint id, (36, D) features in our order) of every viewpoint, filled up to --pad.
 
     Raises:
@@ -198,16 +203,18 @@ def feature_rows(data: Dataset, args: argparse.Namespace) -> Iterator[tuple[str,
     return ((name, key, rows) for name in files for key, rows in zip(*read(name), strict=True))
 
 
-def run_parquet(args: argparse.Namespace) -> int:
+def run_parquet(args: ParquetOptions) -> int:
     from embodied.datasets.parquet import export_parquet
     from embodied.datasets.store import Dataset
+    from embodied.locks import locked
 
-    files = export_parquet(Dataset(args.data), args.out, args.episodes)
+    with locked(args.out):
+        files = export_parquet(Dataset(args.data), args.out, args.episodes)
     show(args, {"files": len(files), "out": str(args.out)}, f"{len(files)} files in {args.out}; README.md is its card")
     return 0
 
 
-def run_lerobot(args: argparse.Namespace) -> int:
+def run_lerobot(args: LeRobotOptions) -> int:
     from embodied.datasets.lerobot import RecordedCamera, export_lerobot
     from embodied.datasets.store import Dataset
     from embodied.evaluation.evaluate import agent
@@ -245,7 +252,7 @@ def run_lerobot(args: argparse.Namespace) -> int:
     return 0
 
 
-def run_walks(args: argparse.Namespace) -> int:
+def run_walks(what: str, args: WalkOptions) -> int:
     from embodied.datasets.habitat import route_excursions
     from embodied.datasets.store import dataset_of
     from embodied.datasets.vlnce import Shot, export_walks
@@ -253,13 +260,13 @@ def run_walks(args: argparse.Namespace) -> int:
     from embodied.gym.drive import data_worlds
 
     data = dataset_of(args.data, "vln")
-    body, lens = PRESETS[WALKS[args.what]]
+    body, lens = PRESETS[WALKS[what]]
     width = args.width or lens.width
     shot = Shot(2 * round(lens.height * width / lens.width / 2), width, lens.hfov)
     worlds = data_worlds(args.data, args.split, args.cache, None)
     walks = route_excursions(data.tasks(args.split), worlds)[: args.tasks]
     steps = export_walks(
-        args.what,
+        what,
         args.out,
         walks,
         worlds,
@@ -268,7 +275,7 @@ def run_walks(args: argparse.Namespace) -> int:
         shot=shot,
         wander=args.wander,
         split=args.split,
-        depth=args.what == "lerobot-vlnce" and args.depth,
+        depth=args.depth,
         watch=lambda episodes: bar(episodes, "walks", "walk"),
     )
     for world in worlds.values():
@@ -278,33 +285,36 @@ def run_walks(args: argparse.Namespace) -> int:
     return 0
 
 
-def run_house(args: argparse.Namespace) -> int:
+def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> int:
     from embodied.house.validation import load_house
+    from embodied.locks import locked
     from embodied.scene.export import export_glb, export_mjcf
     from embodied.scene.usd import check_usd, export_usd
     from embodied.scene.web import export_lit_glb
 
-    if args.what == "usd":
+    if what == "usd":
         check_usd(args.out)
         if args.light == "none":
             raise ValueError("USD is written of a lit house; leave --light none out")
     catalogue = catalogue_of(args)
     house = load_house(args.house / "house.json", catalogue)
     lit = light(args, house, catalogue)
-    if args.what == "mjcf":
-        path = export_mjcf(house, catalogue, args.out, lit=lit)
-    elif args.what == "usd" and lit is not None:
+    if isinstance(args, MjcfOptions):
+        with locked(args.out):
+            path = export_mjcf(house, catalogue, args.out, lit=lit)
+    elif not isinstance(args, GlbOptions):
+        assert lit is not None, "refused above"
         path = export_usd(house, lit, args.out)
     elif lit is None:
         path = export_glb(house, catalogue, args.out, ceilings=not args.no_ceilings)
     else:
         path = export_lit_glb(house, lit, args.out, ceilings=not args.no_ceilings, sky=args.sky)
-    facts = {"house": house.digest, "format": args.what, "light": lit.digest if lit else None, "path": str(path)}
-    show(args, facts, f"{house.name} as {args.what}: {path}, {path.stat().st_size / 1e6:.1f} MB")
+    facts = {"house": house.digest, "format": what, "light": lit.digest if lit else None, "path": str(path)}
+    show(args, facts, f"{house.name} as {what}: {path}, {path.stat().st_size / 1e6:.1f} MB")
     return 0
 
 
-def light(args: argparse.Namespace, house: House, catalogue: Catalogue) -> LitPages | None:
+def light(args: HouseOptions, house: House, catalogue: Catalogue) -> LitPages | None:
     """The house's baked light, from the cache where it is there; None without."""
     if args.light == "none":
         return None
@@ -312,3 +322,14 @@ def light(args: argparse.Namespace, house: House, catalogue: Catalogue) -> LitPa
 
     with progress_bar() as progress:
         return bake(house, catalogue, args.cache, args.light, progress=progress).lit
+
+
+COMMANDS: Mapping[str, Any] = {
+    **{name: (ProgramOptions, functools.partial(run_program, name)) for name in PROGRAMS},
+    "parquet": (ParquetOptions, run_parquet),
+    "lerobot": (LeRobotOptions, run_lerobot),
+    **{name: (WalkOptions, functools.partial(run_walks, name)) for name in WALKS},
+    "glb": (GlbOptions, functools.partial(run_house, "glb")),
+    "mjcf": (MjcfOptions, functools.partial(run_house, "mjcf")),
+    "usd": (UsdOptions, functools.partial(run_house, "usd")),
+}

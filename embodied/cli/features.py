@@ -6,30 +6,43 @@ repository, one of `embodied train vision`, or a torchvision network whose weigh
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
+from typing import Annotated
 
 from embodied.cli.common import note
+from embodied.cli.learning import SHOWN, Encoded, Lit, WithData, WithDevice
+from embodied.cli.options import Count, Option
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    from embodied.cli import learning
+@dataclass(frozen=True, kw_only=True)
+class Options(WithData, Encoded, Lit, WithDevice):
+    threads: Count = 2
+    workers: Count = 1
+    """Process N houses in parallel."""
+    split: tuple[Annotated[str, Option(metavar="SPLIT")], ...] = ()
+    """Use the houses of these splits (default: all)."""
+    houses: Count | None = None
+    """Use the first N houses of each split (default: all)."""
+    shown: tuple[Annotated[str, Option(words=SHOWN)], ...] = ()
+    """Make features of pictures that were taken at another time, by which goal images differ from what the agent sees:
+    the same, by a robot's camera, at another hour, on another day with people elsewhere and small things moved, later
+    (hour and day); by that camera, and one view of 60 degrees of that."""
+    ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
+    """Use a Ray cluster instead: its address, or 'local'."""
 
-    learning.add_features(parser)
 
-
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     from agents.common.device import check_device
     from agents.vision.occasions import OCCASIONS
     from agents.vision.run import encoder_of, make_features
 
     check_device(args.device)
-    encoder = encoder_of(args.encoder, args.network).to(args.device)
     make_features(
         args.data,
-        encoder,
+        encoder_of(args.encoder, args.network).to(args.device),
         args.cache,
         picture_kind=args.pictures,
-        splits=args.split or (),
+        splits=args.split,
         first=args.houses,
         lights=args.lights,
         threads=args.threads,

@@ -6,11 +6,12 @@ own viewer), connectivity.json (the navigation graph in Matterport's format) and
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
+from dataclasses import dataclass
+from typing import Annotated
 
-from embodied.cli.common import Stages, add_cache, add_json, add_packs, catalogue_of, fetch, note, show
-from embodied.cli.options import add_fields, any_path, chosen, folder_to_write
+from embodied.cli.common import Furnished, Printed, Stages, catalogue_of, fetch, note, show
+from embodied.cli.options import InputPath, OutputFolder, Settings
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
 from embodied.generate.plan_file import house_of_plan, load_plan
@@ -18,32 +19,36 @@ from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.house.validation import STYLES
 from embodied.novelty import NOVELTIES
 
-
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--seed", type=int, default=0, help="which house; the same seed gives the same house (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--out", type=folder_to_write, required=True, metavar="DIR", help="folder to write, made if missing"
-    )
-    parser.add_argument(
-        "--plan", type=any_path, metavar="FILE", help="JSON file with the rooms of your own floor plan (docs/houses.md)"
-    )
-    parser.add_argument("--no-mjcf", action="store_true", help="leave out house.xml and its files")
-    parser.add_argument("--glb", action="store_true", help="also write house.glb, for Blender and the web")
-    group = parser.add_argument_group("what kind of house", "what is not given is drawn from the seed")
-    words = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}
-    add_fields(group, HouseConfig, words=words | {"novelty": NOVELTIES})
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+WORDS = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}
 
 
-def run(args: argparse.Namespace) -> int:
+@dataclass(frozen=True, kw_only=True)
+class Options(Furnished, Printed):
+    out: OutputFolder
+    """Folder to write, made if missing."""
+    seed: int = 0
+    """Which house; the same seed gives the same house."""
+    plan: InputPath | None = None
+    """JSON file with the rooms of your own floor plan (docs/houses.md)."""
+    no_mjcf: bool = False
+    """Leave out house.xml and its files."""
+    glb: bool = False
+    """Also write house.glb, for Blender and the web."""
+    config: Annotated[
+        HouseConfig,
+        Settings(
+            "kind of house (what is not given is drawn from the seed)",
+            HouseConfig(),
+            words=WORDS | {"novelty": NOVELTIES},
+        ),
+    ]
+
+
+def run(args: Options) -> int:
     from embodied.navigation.graph import build_graph, to_matterport
     from embodied.scene.export import export_glb, export_mjcf
 
-    catalogue, config = catalogue_of(args), chosen(args, HouseConfig())
+    catalogue, config = catalogue_of(args), args.config
     with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:
         if args.plan:
             house = house_of_plan(load_plan(args.plan), args.seed, config, catalogue)

@@ -11,12 +11,14 @@ import argparse
 import contextlib
 import dataclasses
 import re
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 from assets.cache import write_json
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, show
-from embodied.cli.options import house_folder, whole
-from embodied.house.house import LANDSCAPES, SEASONS
+from embodied.cli.common import Furnished, Printed, catalogue_of, show
+from embodied.cli.options import Option, house_folder, whole
+from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 
 if TYPE_CHECKING:
     from embodied.house.house import House
@@ -25,33 +27,42 @@ TIMES = {"dawn": 6.5, "morning": 9.0, "noon": 12.5, "afternoon": 15.5, "dusk": 1
 """Words for --time, as local solar hours."""
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
-    parser.add_argument(
-        "--time",
-        type=hour,
-        metavar="TIME",
-        help=f"one of {', '.join(TIMES)}, or an hour such as 17:30 or 17.5; written into house.json",
-    )
-    parser.add_argument("--weather", choices=("clear", "hazy", "overcast"), help="written into house.json")
-    parser.add_argument("--landscape", choices=LANDSCAPES, help="what windows show; written into house.json")
-    parser.add_argument("--season", choices=SEASONS, help="of the landscape; written into house.json")
-    parser.add_argument("--lamps", choices=("on", "off"), help="switch all lamps; written into house.json")
-    parser.add_argument(
-        "--quality", choices=("fast", "normal", "high"), default="normal",
-        help="quality of the light: fast for data sets, normal for videos, high for single pictures "
-        "(default: %(default)s)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--lights", type=whole(1, 100), default=1, metavar="K",
-        help="light it K times: as it is, and with hour, weather and lamps drawn from its seed (default: %(default)s)",
-    )  # fmt: skip
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+def hour(text: str) -> float:
+    """Hours in [0, 24) of a word, a number, or hours and minutes."""
+    try:
+        clock = re.fullmatch(r"(\d{1,2}):([0-5]\d)", text)
+        found = int(clock[1]) + int(clock[2]) / 60 if clock else TIMES[text] if text in TIMES else float(text)
+    except ValueError:
+        found = -1.0
+    if not 0 <= found < 24:
+        raise argparse.ArgumentTypeError(
+            f"should be one of {', '.join(TIMES)} or an hour from 0 to 24 such as 17:30 or 17.5, got {text[:40]!r}"
+        )
+    return found
 
 
-def run(args: argparse.Namespace) -> int:
+@dataclass(frozen=True, kw_only=True)
+class Options(Furnished, Printed):
+    folder: Annotated[Path, Option(house_folder, "DIR", name="folder")]
+    """Folder that `embodied house` wrote."""
+    time: Annotated[float | None, Option(hour, "TIME")] = None
+    """Hour of the day: dawn, morning, noon, afternoon, dusk, night, or one such as 17:30 or 17.5. This and the four
+    options below are written into house.json."""
+    weather: Annotated[str | None, Option(words=WEATHERS)] = None
+    """The sky."""
+    landscape: Annotated[str | None, Option(words=LANDSCAPES)] = None
+    """What the windows show."""
+    season: Annotated[str | None, Option(words=SEASONS)] = None
+    """The season of the landscape."""
+    lamps: Annotated[str | None, Option(words=("on", "off"))] = None
+    """Switch all lamps."""
+    quality: Annotated[str, Option(words=("fast", "normal", "high"))] = "normal"
+    """Quality of the light: fast for data sets, normal for videos, high for single pictures."""
+    lights: Annotated[int, Option(whole(1, 100), "K")] = 1
+    """Light it K times: as it is, and with hour, weather and lamps drawn from its seed."""
+
+
+def run(args: Options) -> int:
     from embodied.locks import locked
 
     if not (args.folder / "house.json").exists():
@@ -62,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         return light(args)
 
 
-def light(args: argparse.Namespace) -> int:
+def light(args: Options) -> int:
     """Write the house anew where its sky changes, and light it."""
     from embodied.house.validation import load_house
     from embodied.light import bake_all, lightings_of, progress_bar
@@ -117,17 +128,3 @@ def with_sky(
     if lamps is not None:
         lights = tuple(dataclasses.replace(light, on=lamps == "on") for light in lights)
     return dataclasses.replace(house, sky=sky, lights=lights)
-
-
-def hour(text: str) -> float:
-    """Hours in [0, 24) of a word, a number, or hours and minutes."""
-    try:
-        clock = re.fullmatch(r"(\d{1,2}):([0-5]\d)", text)
-        found = int(clock[1]) + int(clock[2]) / 60 if clock else TIMES[text] if text in TIMES else float(text)
-    except ValueError:
-        found = -1.0
-    if not 0 <= found < 24:
-        raise argparse.ArgumentTypeError(
-            f"should be one of {', '.join(TIMES)} or an hour from 0 to 24 such as 17:30 or 17.5, got {text[:40]!r}"
-        )
-    return found

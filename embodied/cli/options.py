@@ -1,7 +1,8 @@
-"""Command-line options: the types of arguments, checked before any work begins, and options made from settings.
+"""Command-line options from dataclasses: a field is an option, the docstring below it is its help.
 
-A type here is what `type=` of argparse wants: it turns a word into a value or says, in one line,
-what it should be.
+A command is a record of options and a function that takes it. A field's annotation says what may be given:
+`Annotated[int, Option(whole(), "N")]` names the function that reads a word, or says in one line what it should be.
+A field that is a record of settings (`Settings`) is a group of options, one for each of its own fields.
 """
 
 from __future__ import annotations
@@ -18,12 +19,10 @@ import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-
-if typing.TYPE_CHECKING:
-    from embodied.envs.hari import HariRules
+from typing import Annotated, Any
 
 C = typing.TypeVar("C")
-METAVARS: Mapping[type, str] = {int: "N", float: "X", str: "WORD"}
+METAVARS: Mapping[type, str] = {int: "N", float: "X", str: "WORD", Path: "FILE"}
 MOST = 10**7
 """Largest count that any option takes."""
 HOUSES = 100_000
@@ -157,25 +156,6 @@ def _refuse_unwritable(wanted: Path) -> None:
         raise argparse.ArgumentTypeError(f"{there} may not be written by you; choose another place than {wanted}")
 
 
-def add_pictures(
-    parser: argparse._ActionsContainer,
-    kinds: Sequence[str],
-    default: str | None = None,
-    *,
-    what: str = "how the house is drawn",
-    otherwise: str = "",
-) -> None:
-    """--pictures: one of `kinds`, in the words of embodied.render.pictures.
-
-    Args:
-      what: is drawn, for the help.
-      otherwise: what happens without the option, where there is no default.
-    """
-    texts = [f"{k}: {PICTURE_HELP[k]}" for k in kinds if k in PICTURE_HELP]
-    ends = f"(default: {default or otherwise})"
-    parser.add_argument("--pictures", choices=kinds, default=default, help=f"{what}; {'; '.join(texts)} {ends}")
-
-
 PICTURE_HELP = {
     "none": "nothing is drawn",
     "unlit": "no light is computed",
@@ -188,130 +168,215 @@ PICTURE_HELP = {
     "traced": "rays are traced into the baked light",
     "reference": "path tracing, slow",
 }
-VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
-"""As in embodied.envs.vnla, which --help should not import."""
 
 
-def add_rules(parser: argparse._ActionsContainer) -> None:
-    parser.add_argument(
-        "--rules",
-        choices=VNLA_RULES,
-        default=VNLA_RULES[0],
-        help="VNLA's rule of play: help in words (indirect), the advisor acts and says it (direct) or does not "
-        "(direct-mute), the program's 'forward' (goal-aware), Algorithm 6 as printed (default: %(default)s)",
-    )
+# Options from records -----------------------------------------------------------------------------
 
 
-STATES = ("none", "sparse", "dense")
-"""As in embodied.envs.hari, which --help should not import."""
+@dataclasses.dataclass(frozen=True, eq=False)  # annotations are hashed
+class Option:
+    """How a field is given on the command line, as metadata of its annotation."""
+
+    read: Callable[[str], Any] | None = None
+    """Turns a word into a value; None: the annotated type does."""
+    metavar: str | tuple[str, ...] | None = None
+    words: Sequence[str] = ()
+    """What may be given."""
+    helps: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """What these words mean."""
+    name: str = ""
+    """The option's name where it is not the field's; without dashes for an argument by position."""
+    repeated: bool = False
+    """Whether it is given once for each item, instead of once with all items."""
 
 
-def add_hari_rules(parser: argparse.ArgumentParser) -> None:
-    """HARI's variants; `hari_rules_of` reads them."""
-    group = parser.add_argument_group("HARI's variants (defaults: Table E.2 of the dissertation)")
-    group.add_argument(
-        "--stack", type=whole(), default=2, metavar="L", help="largest number of goals on the stack (default: 2)"
-    )
-    group.add_argument(
-        "--longest", type=whole(), default=3, metavar="N", help="longest path to a sub-goal, in nodes (default: 3)"
-    )
-    group.add_argument(
-        "--cost", type=not_negative, default=0.01, metavar="X", help="cost of each action (default: 0.01)"
-    )
-    group.add_argument(
-        "--horizon", type=whole(), metavar="H", help="longest episode in steps (default: its task's, 30)"
-    )
-    group.add_argument(
-        "--uncooperative", action="store_true", help="the assistant answers a different question from the one asked"
-    )
-    group.add_argument(
-        "--states",
-        choices=STATES,
-        default=STATES[1],
-        help="how the agent's own place is described without a request (default: %(default)s)",
-    )
-    group.add_argument(
-        "--kept",
-        type=float,
-        default=0.1,
-        metavar="SHARE",
-        help="share of the object classes, the commonest, that sparse descriptions keep (default: %(default)s)",
-    )
+@dataclasses.dataclass(frozen=True, eq=False)  # annotations are hashed
+class Settings:
+    """A field that is a record of settings; an option that is not given leaves its field as it is in `base`."""
+
+    title: str
+    """Of the group of their options."""
+    base: Any
+    """The settings to start from; a mapping: those of the name that --scale gives."""
+    skip: Sequence[str] = ()
+    """Fields without an option."""
+    words: Mapping[str, Sequence[str]] = dataclasses.field(default_factory=dict)
+    """What may be given for a field, listed in its help; the settings check themselves."""
+
+    @property
+    def of_scale(self) -> bool:
+        return isinstance(self.base, Mapping)
 
 
-def hari_rules_of(args: argparse.Namespace) -> HariRules:
-    """The variants of `add_hari_rules`."""
-    from embodied.envs.hari import Costs, HariRules
+Count = Annotated[int, Option(whole(), "N")]
+CubeFace = Annotated[int, Option(face, "PIXELS")]
+InputPath = Annotated[Path, Option(any_path, "FILE")]
+InputFolder = Annotated[Path, Option(any_path, "DIR")]
+AnyFolder = Annotated[Path, Option(any_folder, "DIR")]
+HouseFolder = Annotated[Path, Option(house_folder, "DIR")]
+OutputFolder = Annotated[Path, Option(folder_to_write, "DIR")]
+OutputPng = Annotated[Path, Option(file_ending_in(".png"), "PNG")]
+OutputRrd = Annotated[Path, Option(file_ending_in(".rrd"), "FILE")]
 
-    costs, cooperative = Costs.alike(args.cost), not args.uncooperative
-    return HariRules(costs, args.stack, args.longest, cooperative, args.states, args.horizon, args.kept)
+
+def drawn_as(kinds: Sequence[str]) -> Option:
+    """--pictures, in the words of embodied.render.pictures."""
+    return Option(words=kinds, helps=PICTURE_HELP)
 
 
-# Options made from settings ---------------------------------------------------------------------
+Command = tuple[type, Callable[[Any], int]]
+"""The record of its options, whose docstring describes it, and what it does."""
 
 
-def add_fields(
-    parser: argparse._ActionsContainer,
-    config: type,
-    skip: Sequence[str] = (),
-    *,
-    words: Mapping[str, Sequence[str]] | None = None,
-    scales: Mapping[str, object] | None = None,
-) -> None:
-    """One option per field of the frozen dataclass `config`; the sentence below a field is its help.
-
-    An option that is not given leaves the field as it is in the settings that `chosen` starts from.
-
-    Args:
-      words: what may be given for a field, to be listed in the help.
-      scales: named settings that `chosen` may start from, for the help.
-    """
-    hints, helps = typing.get_type_hints(config), field_docs(config)
-    for f in dataclasses.fields(config):
-        if f.name in skip:
-            continue
-        option, text = "--" + f.name.replace("_", "-"), helps.get(f.name, "")
-        if default := _default(config, f, scales or {}):
-            text = f"{text} (default: {default})"
-        text = text.replace("%", "%%")
-        item, many = _scalar(hints[f.name])
-        listed = (words or {}).get(f.name)
-        name = "{" + ",".join(listed) + "}" if listed else METAVARS.get(item)
-        if item is bool:
-            parser.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
-        elif many:
-            parser.add_argument(option, type=item, nargs=many, default=None, help=text, metavar=name)
+def add_commands(parser: argparse.ArgumentParser, commands: Mapping[str, Any], metavar: str, dest: str) -> None:
+    """Subcommands: name to a `Command`, or to (help, subcommands) where there are further ones."""
+    subs = parser.add_subparsers(dest=dest, metavar=metavar, required=True)
+    for name, (about, what) in commands.items():
+        text = about if isinstance(about, str) else inspect.cleandoc(about.__doc__ or "")
+        summary = text.split("\n\n")[0].rstrip(".").replace("%", "%%")
+        summary = _lower(summary)
+        formatter = argparse.RawDescriptionHelpFormatter
+        sub = subs.add_parser(name, help=summary, description=text, formatter_class=formatter)
+        if isinstance(about, str):
+            add_commands(sub, what, name.upper(), f"{dest}_of_{name}")
         else:
-            parser.add_argument(option, type=item, default=None, help=text, metavar=name)
+            add_command(sub, about, what)
 
 
-def chosen(args: argparse.Namespace, config: C) -> C:
-    """The settings `config` with the fields that were given on the command line; they check themselves.
+def add_command(parser: argparse.ArgumentParser, options: type, run: Callable[[Any], int]) -> None:
+    """The options of one command; `args.run(args)` reads and runs it."""
+    add_options(parser, options)
+    parser.set_defaults(run=lambda args: run(read_options(args, options)))
+
+
+def add_options(parser: argparse._ActionsContainer, kind: type) -> None:
+    """One option per field of the record `kind`: what is required first, then its own fields before those of the
+    records it extends. A record with a docstring that is extended is a group of that title."""
+    hints, helps = typing.get_type_hints(kind, include_extras=True), field_docs(kind)
+    fields = {f.name: f for f in dataclasses.fields(kind)}
+    owners: dict[str, type] = {}
+    for base in kind.__mro__:
+        for name in vars(base).get("__annotations__", ()):
+            owners.setdefault(name, base)
+    groups: dict[str, argparse._ActionsContainer] = {"": parser}
+    for name in sorted(owners, key=lambda n: not _required(fields[n]) or _settings(hints[n]) is not None):
+        owner, settings = owners[name], _settings(hints[name])
+        about = "" if owner is kind else inspect.cleandoc(owner.__doc__ or "")
+        title = settings.title if settings else "" if about.startswith(owner.__name__) else _lower(about.rstrip("."))
+        group = groups[title] if title in groups else groups.setdefault(title, parser.add_argument_group(title))
+        if settings:
+            _add_settings(group, typing.get_args(hints[name])[0], settings)
+        else:
+            _add(group, fields[name], hints[name], helps.get(name, ""))
+
+
+def read_options(args: argparse.Namespace, kind: type[C]) -> C:
+    """The record `kind` of what was given.
 
     Raises:
-      ValueError: a value that the settings refuse.
+      ValueError: a value that settings refuse.
     """
-    given = {f.name: getattr(args, f.name, None) for f in dataclasses.fields(config)}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, hint in typing.get_type_hints(kind, include_extras=True).items():
+        if settings := _settings(hint):
+            values[name] = _changed(args, settings.base[args.scale] if settings.of_scale else settings.base)
+        else:
+            given = getattr(args, name)
+            values[name] = tuple(given) if isinstance(given, list) else given
+    return kind(**values)
+
+
+def _changed(args: argparse.Namespace, config: Any) -> Any:
+    given = {f.name: getattr(args, f.name, None) for f in dataclasses.fields(config)}
     values = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items() if v is not None}
-    return dataclasses.replace(config, **values)  # type: ignore[type-var]
+    return dataclasses.replace(config, **values)
 
 
-def _default(config: type, field: dataclasses.Field, scales: Mapping[str, object]) -> str:
-    """The field's default in words, for every scale where they differ; '' for none."""
-    of_scale = {name: getattr(c, field.name) for name, c in sorted(scales.items()) if isinstance(c, config)}
-    if len(set(of_scale.values())) > 1:
-        return ", ".join(f"{name}: {value}" for name, value in of_scale.items())
-    return "" if field.default in (None, dataclasses.MISSING) else str(field.default)
+def _add(parser: argparse._ActionsContainer, field: dataclasses.Field, hint: Any, text: str) -> None:
+    """One option of a record of options."""
+    kind, many, how = _scalar(hint)
+    required = _required(field)
+    default = None if required else field.default
+    if field.default_factory is not dataclasses.MISSING:
+        default = field.default_factory()
+    text = "; ".join([text.rstrip("."), *(f"{w}: {how.helps[w]}" for w in how.words if w in how.helps)])
+    if "(default" not in text:
+        text = _with_default(text, {"": default})
+    told: dict[str, Any] = {"help": text.replace("%", "%%")}
+    name = how.name or "--" + field.name.replace("_", "-")
+    if kind is bool:
+        parser.add_argument(name, dest=field.name, action="store_true", **told)
+        return
+    told |= {"type": how.read or kind, "choices": tuple(how.words) or None}
+    told["default"] = str(default) if isinstance(default, Path) else default  # argparse reads strings as if given
+    told["metavar"] = how.metavar or (None if how.words else METAVARS.get(kind))
+    if how.repeated:
+        told |= {"action": "append", "default": []}
+    elif many:
+        told["nargs"] = many
+    if name.startswith("-"):
+        parser.add_argument(name, dest=field.name, required=required, **told)
+    else:
+        told |= {} if required else {"nargs": "*" if many else "?"}
+        parser.add_argument(field.name, **told)
 
 
-def _scalar(hint: typing.Any) -> tuple[type, str | int | None]:
-    """The type of one value and how many: None (one), a number, or '+'."""
-    if typing.get_origin(hint) in (types.UnionType, typing.Union):
-        hint = next(a for a in typing.get_args(hint) if a is not type(None))
-    if typing.get_origin(hint) is tuple:
-        items = typing.get_args(hint)
-        return items[0], "+" if Ellipsis in items else len(items)
-    return hint, None
+def _add_settings(parser: argparse._ActionsContainer, kind: type, settings: Settings) -> None:
+    """One option per field of the settings `kind`."""
+    hints, helps = typing.get_type_hints(kind), field_docs(kind)
+    scales = settings.base if settings.of_scale else {"": settings.base}
+    for f in dataclasses.fields(kind):
+        if f.name in settings.skip:
+            continue
+        text = _with_default(
+            helps.get(f.name, "").rstrip("."), {name: getattr(c, f.name) for name, c in sorted(scales.items())}
+        )
+        item, many, _ = _scalar(hints[f.name])
+        listed = settings.words.get(f.name)
+        told: dict[str, Any] = {"default": None, "help": text.replace("%", "%%")}
+        if item is bool:
+            told["action"] = argparse.BooleanOptionalAction
+        else:
+            told |= {"type": item, "nargs": many}
+            told["metavar"] = "{" + ",".join(listed) + "}" if listed else METAVARS.get(item)
+        parser.add_argument("--" + f.name.replace("_", "-"), **told)
+
+
+def _with_default(text: str, defaults: Mapping[str, Any]) -> str:
+    """A help text with the default, or with that of every scale where they differ."""
+    shown = {k: " ".join(map(str, v)) if isinstance(v, tuple) else str(v) for k, v in defaults.items()}
+    different = len(set(shown.values())) > 1
+    told = ", ".join(f"{name}: {value}" for name, value in shown.items()) if different else [*shown.values()][0]
+    return text if told in ("", "None", "False") else f"{text} (default: {told})"
+
+
+def _settings(hint: Any) -> Settings | None:
+    return next((m for m in getattr(hint, "__metadata__", ()) if isinstance(m, Settings)), None)
+
+
+def _lower(text: str) -> str:
+    """With a small first letter, unless it is an abbreviation."""
+    return text[0].lower() + text[1:] if text[1:2].islower() else text
+
+
+def _required(field: dataclasses.Field) -> bool:
+    return field.default is field.default_factory is dataclasses.MISSING
+
+
+def _scalar(hint: Any) -> tuple[type, str | int | None, Option]:
+    """The type of one value, how many (None: one; a number, or '+'), and how it is given."""
+    how: Option | None = None
+    many: str | int | None = None
+    while typing.get_args(hint):
+        parts = typing.get_args(hint)
+        if typing.get_origin(hint) is Annotated:
+            how = how or next((m for m in parts[1:] if isinstance(m, Option)), None)
+            hint = parts[0]
+        elif typing.get_origin(hint) in (types.UnionType, typing.Union):
+            hint = next(a for a in parts if a is not type(None))
+        else:
+            hint, many = parts[0], "+" if Ellipsis in parts else len(parts)
+    return hint, many, how or Option()
 
 
 def field_docs(kind: type) -> dict[str, str]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import bar, note
-from embodied.cli.options import file_ending_in, video_side
+from embodied.cli.options import Option, OutputRrd, file_ending_in, video_side
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,47 +18,37 @@ if TYPE_CHECKING:
     from embodied.render.photograph import PhotoCamera
     from embodied.world import World
 
+Side = Annotated[int, Option(video_side, "PIXELS")]
 VIDEO_ANGLE = 1.2
 """Vertical field of view of videos, radians."""
 
 
-def add_sinks(parser: argparse.ArgumentParser, default: str | None = None) -> None:
-    """--rrd, --spawn, --connect, --serve.
+@dataclass(frozen=True, kw_only=True)
+class Viewers:
+    """Recording."""
 
-    Args:
-      default: what --rrd is when it is not given, for the help text.
-    """
-    group = parser.add_argument_group("recording")
-    group.add_argument(
-        "--rrd",
-        type=file_ending_in(".rrd"),
-        metavar="FILE",
-        help="write the Rerun recording here" + (f" (default: {default})" if default else ""),
-    )
-    add_viewers(group)
+    rrd: OutputRrd | None = None
+    """Write the Rerun recording here."""
+    spawn: bool = False
+    """Open the Rerun viewer, which needs a screen, and watch live."""
+    connect: Annotated[str | None, Option(metavar="URL")] = None
+    """Send to a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy."""
+    serve: bool = False
+    """Serve the web viewer, watch in the browser, end with Ctrl-C."""
+    bind: Annotated[str, Option(metavar="ADDRESS")] = "127.0.0.1"
+    """Where --serve listens; the default is this machine only, 0.0.0.0 lets everybody look and write."""
 
 
-def add_viewers(group: argparse._ActionsContainer) -> None:
-    """--spawn, --connect, --serve."""
-    group.add_argument(
-        "--spawn", action="store_true", help="open the Rerun viewer, which needs a screen, and watch live"
-    )
-    group.add_argument(
-        "--connect", metavar="URL", help="send to a running viewer, e.g. rerun+http://127.0.0.1:9876/proxy"
-    )
-    group.add_argument(
-        "--serve", action="store_true", help="serve the web viewer, watch in the browser, end with Ctrl-C"
-    )
-    group.add_argument(
-        "--bind",
-        default="127.0.0.1",
-        metavar="ADDRESS",
-        help="where --serve listens (default: %(default)s, this machine only; 0.0.0.0 lets everybody look and write)",
-    )
+@dataclass(frozen=True, kw_only=True)
+class Filmed:
+    video: Annotated[Path | None, Option(file_ending_in(".mp4"), "MP4")] = None
+    """Write what the agent sees and what is said as a video."""
+    video_size: tuple[Side, Side] = (480, 640)
+    """Height and width of the video in pixels, both even."""
 
 
 @contextlib.contextmanager
-def viewers_of(args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
+def viewers_of(args: Viewers) -> Iterator[tuple[str, ...]]:
     """The viewers that the options ask for; open them before the work begins. --serve goes on until Ctrl-C."""
     if not (args.spawn or args.connect is not None or args.serve):
         yield ()
@@ -73,24 +63,6 @@ def viewers_of(args: argparse.Namespace) -> Iterator[tuple[str, ...]]:
                 "better --serve"
             )
         yield viewers
-
-
-def add_video(parser: argparse.ArgumentParser) -> None:
-    """The options of `film`."""
-    parser.add_argument(
-        "--video",
-        type=file_ending_in(".mp4"),
-        metavar="MP4",
-        help="write what the agent sees and what is said as a video",
-    )
-    parser.add_argument(
-        "--video-size",
-        type=video_side,
-        nargs=2,
-        default=(480, 640),
-        metavar=("H", "W"),
-        help="pixels of the video, both even (default: 480 640)",
-    )
 
 
 def film(world: World, episode: Episode, path: Path, size: tuple[int, int], camera: PhotoCamera | None = None) -> Path:

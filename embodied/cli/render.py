@@ -6,12 +6,13 @@ With --node, one panorama is drawn, as an equirectangular picture or a view out 
 
 from __future__ import annotations
 
-import argparse
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, fetch, note, show
-from embodied.cli.options import add_pictures, face, file_ending_in, house_folder, whole
+from embodied.cli.common import Furnished, Printed, catalogue_of, fetch, note, show
+from embodied.cli.options import CubeFace, Option, OutputPng, drawn_as, house_folder, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import PICTURES, PictureSettings
@@ -20,32 +21,29 @@ if TYPE_CHECKING:
     from embodied.world import World
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
-    parser.add_argument("--size", type=face, default=512, help="side of a cube face in pixels (default: %(default)s)")
-    add_pictures(parser, PICTURES, "normal")
-    parser.add_argument("--node", type=whole(0), help="draw only this viewpoint")
-    parser.add_argument(
-        "--equirect", type=file_ending_in(".png"), metavar="PNG", help="where to write the picture of --node"
-    )
-    parser.add_argument("--view", type=file_ending_in(".png"), metavar="PNG", help="where to write a view from --node")
-    parser.add_argument("--yaw", type=float, default=0.0, help="degrees of --view, counter-clockwise (default: 0)")
-    parser.add_argument(
-        "--camera",
-        choices=CAMERAS,
-        default="ideal",
-        help="camera that takes the picture of --node; panorama files are always taken by the ideal one "
-        "(default: %(default)s)",
-    )
-    parser.add_argument(
-        "--device", type=int, default=0, help="seed of the camera's imperfections (default: %(default)s)"
-    )
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Furnished, Printed):
+    folder: Annotated[Path, Option(house_folder, "DIR", name="folder")]
+    """Folder that `embodied house` wrote."""
+    size: CubeFace = 512
+    """Side of a cube face in pixels."""
+    pictures: Annotated[str, drawn_as(PICTURES)] = "normal"
+    """How the house is drawn."""
+    node: Annotated[int | None, Option(whole(0), "N")] = None
+    """Draw only this viewpoint."""
+    equirect: OutputPng | None = None
+    """Write the picture of --node here."""
+    view: OutputPng | None = None
+    """Write a view from --node here."""
+    yaw: float = 0.0
+    """Direction of --view, degrees counter-clockwise."""
+    camera: Annotated[str, Option(words=CAMERAS)] = "ideal"
+    """Camera that takes the picture of --node; panorama files are always taken by the ideal one."""
+    device: int = 0
+    """Random seed of the camera's imperfections."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     from embodied.world import open_folder
 
     if (args.node is None) != (args.equirect is None and args.view is None):
@@ -56,11 +54,11 @@ def run(args: argparse.Namespace) -> int:
             "ideal, and environments and training photograph what they show of them"
         )
     catalogue = catalogue_of(args)
-    pictures = PictureSettings(args.size, args.pictures)
-    with open_folder(args.folder, catalogue, args.cache, pictures) as world:
+    drawn = PictureSettings(args.size, args.pictures)
+    with open_folder(args.folder, catalogue, args.cache, drawn) as world:
         fetch(catalogue, world.house)
         if args.node is not None:
-            return one(args, world)
+            return one(args, args.node, world)
         path = world.render_all(progress=True)
         facts = {
             "nodes": len(world.graph.ids),
@@ -72,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def one(args: argparse.Namespace, world: World) -> int:
+def one(args: Options, node: int, world: World) -> int:
     """Draw one viewpoint as an equirectangular PNG, or a view from it, or both."""
     import cv2
 
@@ -80,11 +78,11 @@ def one(args: argparse.Namespace, world: World) -> int:
     from embodied.render.photograph import PhotoCamera
 
     nodes = len(world.graph.ids)
-    if not 0 <= args.node < nodes:
-        raise ValueError(f"--node {args.node} does not exist; this house has the nodes 0 to {nodes - 1}")
-    camera, panorama = PhotoCamera(args.camera, args.device), world.panorama(args.node)
-    place = (world.name, args.node)
-    dark = world.darkness(world.graph.positions[args.node]) if camera.traits else 1.0
+    if not 0 <= node < nodes:
+        raise ValueError(f"--node {node} does not exist; this house has the nodes 0 to {nodes - 1}")
+    camera, panorama = PhotoCamera(args.camera, args.device), world.panorama(node)
+    place = (world.name, node)
+    dark = world.darkness(world.graph.positions[node]) if camera.traits else 1.0
     pictures = {}
     if args.equirect:
         pictures[args.equirect] = camera.photographed(panorama.equirect(2 * args.size), None, *place, light=dark)
@@ -93,7 +91,7 @@ def one(args: argparse.Namespace, world: World) -> int:
         pictures[args.view] = camera.photographed(rgb, VFOV36, *place, light=dark)
     for path, rgb in pictures.items():
         write_bytes(path, cv2.imencode(".png", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))[1].tobytes())
-    note(f"node {args.node} in {world.graph.room_of_node[args.node]}, {args.camera} camera")
+    note(f"node {node} in {world.graph.room_of_node[node]}, {args.camera} camera")
     words = ", ".join(map(str, pictures))
-    show(args, {"node": args.node, "camera": args.camera, "pictures": list(map(str, pictures))}, f"wrote {words}")
+    show(args, {"node": node, "camera": args.camera, "pictures": list(map(str, pictures))}, f"wrote {words}")
     return 0

@@ -6,13 +6,13 @@ photographs. With several episodes, %d in a file name stands for the number of t
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, fetch, show
-from embodied.cli.options import add_pictures, face, house_folder, whole
-from embodied.cli.recording import add_sinks, add_video, film, viewers_of
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, fetch, show
+from embodied.cli.options import Count, CubeFace, HouseFolder, Option, drawn_as
+from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, PictureSettings
 
@@ -23,32 +23,30 @@ if TYPE_CHECKING:
 AGENTS = ("shortest", "random", "forward10")
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument("--house", type=house_folder, metavar="DIR", help="folder that `embodied house` wrote")
-    where.add_argument("--seed", type=int, default=0, help="or generate a house from this seed (default: %(default)s)")
-    parser.add_argument("--agent", choices=AGENTS, default="shortest", help="the agent (default: %(default)s)")
-    parser.add_argument("--episodes", type=whole(), default=1, metavar="N", help="play N tasks (default: %(default)s)")
-    add_pictures(parser, DRAWN, "normal")
-    parser.add_argument(
-        "--size", type=face, default=384, help="side of a panorama's cube face in pixels (default: %(default)s)"
-    )
-    add_video(parser)
-    parser.add_argument(
-        "--camera", choices=CAMERAS, default="ideal", help="camera of videos and recordings (default: %(default)s)"
-    )
-    add_sinks(parser)
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Filmed, Viewers, Furnished, Printed):
+    house: HouseFolder | None = None
+    """Folder that `embodied house` wrote (default: a house generated from --seed)."""
+    seed: int = 0
+    """Random seed of the house and its tasks."""
+    agent: Annotated[str, Option(words=AGENTS)] = "shortest"
+    """The agent."""
+    episodes: Count = 1
+    """Play N tasks."""
+    pictures: Annotated[str, drawn_as(DRAWN)] = "normal"
+    """How the house is drawn."""
+    size: CubeFace = 384
+    """Side of a panorama's cube face in pixels."""
+    camera: Annotated[str, Option(words=CAMERAS)] = "ideal"
+    """Camera of videos and recordings."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     with viewers_of(args) as viewers:
         return roll_out(args, viewers)
 
 
-def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
+def roll_out(args: Options, viewers: tuple[str, ...]) -> int:
     """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.metrics import PER_EPISODE
@@ -81,7 +79,7 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
             row |= {name: float(f(episode, world.graph)) for name, f in PER_EPISODE.items()}
             if args.video:
                 path = numbered(args.video, number, args.episodes)
-                row["video"] = str(film(world, episode, path, tuple(args.video_size), camera))
+                row["video"] = str(film(world, episode, path, args.video_size, camera))
             if args.rrd or viewers:
                 rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
                 watch = lambda steps: bar(steps, "recording", "step")
@@ -101,16 +99,16 @@ def roll_out(args: argparse.Namespace, viewers: tuple[str, ...]) -> int:
     return 0
 
 
-def world_of(args: argparse.Namespace) -> World:
+def world_of(args: Options) -> World:
     """The world of --house, or of the generated house of --seed."""
     from embodied.generate import generate_house
     from embodied.world import open_folder, open_world
 
-    catalogue, pictures = catalogue_of(args), PictureSettings(args.size, args.pictures)
+    catalogue, drawn = catalogue_of(args), PictureSettings(args.size, args.pictures)
     if args.house:
-        return open_folder(args.house, catalogue, args.cache, pictures)
+        return open_folder(args.house, catalogue, args.cache, drawn)
     house = generate_house(args.seed, catalogue=catalogue)
-    return open_world(house, catalogue, args.cache, pictures)
+    return open_world(house, catalogue, args.cache, drawn)
 
 
 def policy_of(name: str) -> Agent:

@@ -8,7 +8,6 @@ are made. `embodied dataset from-people` makes a data set of it.
 
 from __future__ import annotations
 
-import argparse
 import functools
 import importlib.util
 import json
@@ -16,11 +15,13 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import add_cache, add_json, add_packs, catalogue_of, note, show
-from embodied.cli.options import any_path, folder_to_write, whole
+from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
+from embodied.cli.model import WithModel, client_of
+from embodied.cli.options import Count, Option, OutputFolder, any_path, whole
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 
@@ -35,41 +36,30 @@ LOOPBACK = "127.0.0.1"
 LOOPBACKS = (LOOPBACK, "localhost", "::1")
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("study", type=any_path, metavar="STUDY.toml", help="the study")
-    parser.add_argument(
-        "--out", type=folder_to_write, metavar="DIR", help="where answers are kept (default: STUDY.people beside it)"
-    )
-    parser.add_argument(
-        "--host",
-        default=LOOPBACK,
-        metavar="ADDRESS",
-        help="where the server listens (default: %(default)s, this machine only; put a proxy with TLS in front of it "
-        "rather than 0.0.0.0)",
-    )
-    parser.add_argument("--port", type=whole(0, 65535), default=8080, help="default: %(default)s")
-    parser.add_argument(
-        "--address",
-        metavar="URL",
-        help="address of the page as people see it, such as https://study.example.org; links are made with it and "
-        "connections from it are accepted",
-    )
-    parser.add_argument(
-        "--invitations", type=whole(), metavar="N", help="make N single-use links instead of one for everybody"
-    )
-    parser.add_argument("--summary", action="store_true", help="print the summary of what was done so far, and end")
-    from agents.language_models.options import add_model
-
-    add_model(parser)
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(WithModel, Furnished, Printed):
+    study: Annotated[Path, Option(any_path, "STUDY.toml", name="study")]
+    """The study."""
+    out: OutputFolder | None = None
+    """Folder that keeps the answers (default: STUDY.people beside the study)."""
+    host: Annotated[str, Option(metavar="ADDRESS")] = LOOPBACK
+    """Address to listen on; the default is this machine only. Put a proxy with TLS in front of it rather than listen on
+    0.0.0.0."""
+    port: Annotated[int, Option(whole(0, 65535), "N")] = 8080
+    """Port to listen on."""
+    address: Annotated[str | None, Option(metavar="URL")] = None
+    """Address of the page as people see it, such as https://study.example.org; links are made with it and connections
+    from it are accepted."""
+    invitations: Count | None = None
+    """Make N single-use links instead of one for everybody."""
+    summary: bool = False
+    """Print the summary of what was done so far, and end."""
 
 
 NEEDED = ("starlette", "uvicorn", "websockets")
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
         raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
     from embodied.serve.run import open_study, serve
@@ -81,8 +71,6 @@ def run(args: argparse.Namespace) -> int:
 
     def draw(data: Dataset, name: str) -> Path:
         return drawn(data, name, study, args)
-
-    from agents.language_models.options import client_of
 
     client = functools.cache(lambda: client_of(args))
     opened = open_study(
@@ -110,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def drawn(data: Dataset, name: str, study: Study, args: argparse.Namespace) -> Path:
+def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
     """The panoramas of a house: the data set's, else drawn into the cache."""
     if data.drawn_pictures(name) is not None:
         return data.folder / "houses" / name / "panoramas.pano"
@@ -124,7 +112,7 @@ def drawn(data: Dataset, name: str, study: Study, args: argparse.Namespace) -> P
         return world.render_all(progress=True)
 
 
-def origins_of(args: argparse.Namespace) -> tuple[str, ...] | None:
+def origins_of(args: Options) -> tuple[str, ...] | None:
     """Addresses of the page that may connect; None where the server listens to all and nobody said its address."""
     own = tuple(f"http://{name}:{args.port}" for name in ("127.0.0.1", "localhost", "[::1]"))
     if args.address:

@@ -8,79 +8,278 @@
     embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
     embodied study stars --data DATA --out STUDY
-    embodied study iliad 3.4 3.5 C.1 --out STUDY
-    embodied study iliad 3.4 3.5 --world nav --data DATA --out STUDY
-    embodied study --check STUDY
+    embodied study iliad regex 3.4 3.5 C.1 --out STUDY
+    embodied study iliad nav 3.4 3.5 --data DATA --out STUDY
+    embodied study check STUDY
 
 HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `houses`, `lights` (needs `embodied features --lights 3`),
 `departures` and `requests`. HARI's are 4.7, 4.8, `moves`, `sight` (needs `embodied features`), 'figure 4.5', 'figure
 4.5b' and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms) and
 `rules`. `bandit` has Table 3.2, Figures 3.4 and 3.5, and `held-out`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7',
-`describer` and `speakers`. --check says which stored tables no longer belong to this code. Rows that tables share are
+`describer` and `speakers`. `check` says which stored tables no longer belong to this code. Rows that tables share are
 trained once, each table is written as JSON, Markdown and, where it has one, as a figure. Interrupt it whenever you
 like: the same command goes on.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.cli.common import note
-from embodied.cli.options import any_folder, chosen
+from agents.bandit.config import SCALES as BANDIT_SCALES
+from agents.bandit.config import BanditConfig
+from agents.bandit.rating_config import DECISIONS, RatingConfig
+from agents.common.settings import EvaluationSettings
+from agents.common.shipped import SHIPPED_AGENT
+from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
+from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, STATES, IntentionConfig
+from agents.iliad.config import LearnerConfig
+from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
+from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
+from agents.vision.config import RENDER_PRESETS, VisionConfig
+from agents.vnla.config import SCALES as VNLA_SCALES
+from agents.vnla.config import VnlaSettings
+from embodied.cli.common import Cached, note
+from embodied.cli.learning import (
+    PRESETS,
+    SCALE,
+    SMALL_SCALE,
+    Encoded,
+    EncoderFile,
+    NamedFiles,
+    Nav,
+    Threaded,
+    WithData,
+    WithDevice,
+    by_name,
+)
+from embodied.cli.options import (
+    REPEATS,
+    AnyFolder,
+    Count,
+    InputFolder,
+    InputPath,
+    Option,
+    OutputFolder,
+    Settings,
+    whole,
+)
+from embodied.cli.train import EVALUATION, TRAINING, RegexFiles, Strips
 
 if TYPE_CHECKING:
     from agents.studies.engine import StudyLearner
 
-
-def add(parser: argparse.ArgumentParser) -> None:
-    from embodied.cli import learning
-
-    parser.add_argument(
-        "--check", type=any_folder, metavar="DIR", help="say which tables stored in DIR no longer belong to this code"
-    )
-    kinds = parser.add_subparsers(dest="what", metavar="WHAT")
-    learning.add_study_hanna(kinds.add_parser("hanna", help="agents that ask people for help and follow their routes"))
-    learning.add_study_realism(
-        kinds.add_parser("realism", help="HANNA agents that learned from some pictures, in others")
-    )
-    learning.add_study_vision(kinds.add_parser("vision", help="encoders that turn pictures into features"))
-    learning.add_study_hari(kinds.add_parser("hari", help="agents that learn which question to ask"))
-    learning.add_study_vnla(kinds.add_parser("vnla", help="agents that ask an advisor within a budget"))
-    learning.add_study_bandit(kinds.add_parser("bandit", help="a translator that learns from ratings"))
-    learning.add_study_stars(kinds.add_parser("stars", help="HANNA agents that learn from ratings of their walks"))
-    learning.add_study_iliad(kinds.add_parser("iliad", help="students that learn from descriptions"))
+Tables = Annotated[tuple[str, ...], Option(metavar="TABLE", name="TABLE")]
+Seeds = Annotated[int, Option(whole(1, REPEATS), "N")]
 
 
-def run(args: argparse.Namespace) -> int:
-    from agents.studies.engine import check, run_study
+@dataclass(frozen=True, kw_only=True)
+class Study(Threaded):
+    """What every study has."""
 
-    if args.check is not None:
-        print("\n".join(check(args.check)) or f"no stored tables in {args.check}")
-        return 0
-    if args.what is None:
-        raise ValueError("say which study, such as `embodied study hanna 4.5`, or --check DIR; --help lists them")
-    makers = {
-        "hanna": hanna,
-        "realism": realism,
-        "vision": vision,
-        "hari": hari,
-        "vnla": vnla,
-        "bandit": bandit,
-        "stars": stars,
-        "iliad": iliad,
-    }
-    learner: StudyLearner = makers[args.what](args)
-    names = getattr(args, "tables", None) or list(learner.tables())
+    out: OutputFolder
+    """Folder of the study: runs, episodes and tables; rerun the command to resume."""
+    rows: tuple[Annotated[str, Option(metavar="LABEL")], ...] = ()
+    """Run only the rows with these labels."""
+    workers: Count = 1
+    """Train N runs in parallel."""
+    report: bool = False
+    """Train and evaluate nothing; write tables of the stored results."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trained:
+    seeds: Seeds = 3
+    """Train every row with N random seeds, from --seed on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    tasks: Count | None = None
+    """Evaluate on at most N tasks of a split, spread over its houses (default: all)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgeSeed:
+    judge_seed: int = 0
+    """Random seed of the evaluation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, WithDevice):
+    """Agents that ask people for help and follow their routes."""
+
+    tables: Tables
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, houses, lights, departures or requests."""
+    seeds: Seeds = 1
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    judged_in: InputFolder | None = None
+    """Evaluate in the unseen houses of another data set that has features (default: of --data)."""
+    begin: InputPath | None = None
+    """Initialise with the weights of this agent."""
+    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES, skip=("training_houses", "lights"))]
+    evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RealismOptions(Study, Judged, JudgeSeed, WithData):
+    """HANNA agents that learned from some pictures, evaluated in others."""
+
+    threads: Count = 2
+    agents: NamedFiles
+    """Trained agents; those of one name are training seeds of one kind."""
+    encoders: NamedFiles = ()
+    """Encoders of the agents of a name, one file for all or one for each (default: those that they learned with)."""
+    test_pictures: tuple[Annotated[str, PRESETS], ...] = ("unlit", "fast-matte", "fast", "reference")
+    """Kinds of pictures to evaluate in, of which `embodied features --pictures` made features; all kinds are ranked
+    against the last."""
+    split: str = "test_unseen"
+    """Evaluate on the tasks of this split."""
+    houses: Count | None = None
+    """Use only the first N houses of the split (default: all)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class VisionOptions(Study, Trained, Strips, WithData):
+    """Encoders that turn pictures into features."""
+
+    tables: Tables
+    """Make these tables: encoders or pictures."""
+    seeds: Seeds = 1
+    encoders: NamedFiles = ()
+    """Evaluate these encoders instead of training those that --rows names; those of one name are training seeds of one
+    kind."""
+    test_pictures: tuple[Annotated[str, PRESETS], ...] = tuple(RENDER_PRESETS)
+    """Kinds of pictures that the table `pictures` evaluates on (default: all)."""
+    split: str = "val_unseen"
+    """Evaluate on the houses of this split."""
+    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig(), skip=("network", "begin", "frozen", "like"))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HariOptions(Study, Trained, Judged, WithData, Encoded):
+    """Agents that learn which question to ask."""
+
+    tables: Tables
+    """Make these tables: 4.7, 4.8, moves, sight, 'figure 4.5', 'figure 4.5b' or 'figure 4.6'."""
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    execution: InputPath | None = None
+    """A trained execution policy (default: trained in --out first)."""
+    config: Annotated[
+        IntentionConfig,
+        Settings(TRAINING, INTENTION_SCALES, skip=("stack", "cooperative", "perfect"), words={"states": STATES}),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VnlaOptions(Study, Trained, Judged, WithData, Encoded):
+    """Agents that ask an advisor within a budget."""
+
+    tables: Tables
+    """Make these tables: askers, interventions, algorithm-6, rooms or rules."""
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    without_rooms: InputFolder | None = None
+    """A data set of --no-rooms, for the table `rooms`."""
+    others: Count | None = None
+    """Training seeds of all rows but the learned asker's (default: --seeds)."""
+    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "ask_rules", "rules"))]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BanditOptions(Study, Trained):
+    """A translator that learns from ratings."""
+
+    tables: Tables
+    """Make these tables: 3.2, 3.4, 3.5, rates or held-out."""
+    data: InputFolder
+    """The corpus, a folder that `embodied corpus` made."""
+    scale: Annotated[str, SMALL_SCALE] = "mini"
+    """The settings to start from."""
+    config: Annotated[BanditConfig, Settings(TRAINING, BANDIT_SCALES)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StarsOptions(Study, Trained, Judged, WithData, Encoded):
+    """HANNA agents that learn from ratings of their episodes."""
+
+    agent: InputPath = SHIPPED_AGENT
+    """The agent to begin with (default: shipped)."""
+    split: str = "test_unseen"
+    """Evaluate in the houses of this split."""
+    rated: Annotated[str, Option(metavar="SPLIT")] = "train"
+    """Collect ratings in the houses of this split."""
+    decisions: Annotated[str, Option(words=DECISIONS)] = "drawn"
+    """Evaluate with moves and questions sampled, as they are while they are rated (drawn), or as `embodied evaluate`
+    chooses them (usual)."""
+    judgings: Count = 3
+    """Evaluate every task N times with different seeds."""
+    config: Annotated[RatingConfig, Settings(TRAINING, RatingConfig())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class IliadOptions(Study, Trained):
+    tables: Tables
+    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7', algorithms, describer or speakers."""
+    scale: Annotated[str, SMALL_SCALE] = "mini"
+    """The settings to start from."""
+
+
+LEARNED = ("learner", "mixing", "anneal_every")
+"""Settings that the rows of ILIAD's tables decide."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegexOptions(IliadOptions, RegexFiles):
+    """Students that learn to change words from descriptions."""
+
+    learner: Annotated[LearnerConfig, Settings("settings of the student's training", LEARNER_SCALES, skip=LEARNED)]
+    world: Annotated[RegexConfig, Settings("settings of data and teacher", REGEX_SCALES, skip=("wrong", "unheard"))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NavOptions(IliadOptions, Nav):
+    """Students that learn to follow routes from descriptions."""
+
+    data: InputFolder
+    learner: Annotated[LearnerConfig, Settings("settings of the student's training", NAV_LEARNER_SCALES, skip=LEARNED)]
+    world: Annotated[NavConfig, Settings("settings of data and teacher", NAV_SCALES)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AskOptions(Cached):
+    """Ask-v0's table and figure: success of scripted agents against the price of their questions."""
+
+    out: OutputFolder
+    """Folder of ask.json, ask_table.md and figure_ask.png."""
+    draw: bool = False
+    """Only draw the figure of a stored ask.json."""
+    small: bool = False
+    """Use two houses of each kind, to see that it runs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckOptions:
+    """Say which stored tables no longer belong to this code."""
+
+    folder: Annotated[AnyFolder, Option(name="STUDY")]
+
+
+def run_table(args: Any, learner: StudyLearner, **names: Any) -> int:
+    """Make the tables of a study and print them."""
+    from agents.studies.engine import run_study
+
     made = run_study(
         learner,
-        names,
+        getattr(args, "tables", None) or list(learner.tables()),
         args.out,
-        rows=getattr(args, "rows", None),
+        rows=names.get("rows") or args.rows or None,
         workers=args.workers,
         report=args.report,
         command=" ".join(["embodied", *sys.argv[1:]]),
@@ -88,186 +287,177 @@ def run(args: argparse.Namespace) -> int:
     )
     for path in made.values():
         print(path.read_text(encoding="utf-8"))
-    if args.what == "realism":
-        from agents.hanna.realism import ranks
-
-        print("\n".join(ranks(json.loads((args.out / "realism-realism.json").read_text()), args.pictures)))
     return 0
 
 
-def by_name(files: Sequence[tuple[str, Path]]) -> dict[str, list[Path]]:
-    """The files of each name, in the order in which they were given."""
-    arms: dict[str, list[Path]] = {}
-    for name, path in files:
-        arms.setdefault(name, []).append(path)
-    return arms
-
-
-def seeds_of(args: argparse.Namespace, first: int) -> tuple[int, ...]:
+def seeds_of(args: Trained, first: int) -> tuple[int, ...]:
     """Training seeds: as many as --seeds says, from the first one on."""
     return tuple(range(first, first + args.seeds))
 
 
-def hanna(args: argparse.Namespace) -> StudyLearner:
+def hanna(args: HannaOptions) -> int:
     from agents.hanna.study import HannaStudy
-    from agents.hanna.training_config import EVALUATIONS, SCALES
 
-    config = chosen(args, SCALES[args.scale])
-    return HannaStudy(
+    learner = HannaStudy(
         args.data,
-        seeds_of(args, config.seed),
+        seeds_of(args, args.config.seed),
         args.tasks,
         (args.judge_seed,),
         args.threads,
         encoder=args.encoder,
-        config=config,
-        evaluation=chosen(args, EVALUATIONS[args.scale]),
+        config=args.config,
+        evaluation=args.evaluation,
         device=args.device,
         picture_kind=args.pictures,
         begin=args.begin,
         elsewhere=args.judged_in,
     )
+    return run_table(args, learner)
 
 
-def realism(args: argparse.Namespace) -> StudyLearner:
-    from agents.hanna.realism import RealismStudy
+def realism(args: RealismOptions) -> int:
+    from agents.hanna.realism import RealismStudy, ranks
 
-    return RealismStudy(
+    learner = RealismStudy(
         args.data,
         (0,),
         args.tasks,
         (args.judge_seed,),
         args.threads,
         arms=by_name(args.agents),
-        pictures=tuple(args.pictures),
+        pictures=args.test_pictures,
         split=args.split,
         houses=args.houses,
         encoders=by_name(args.encoders),
     )
+    run_table(args, learner)
+    stored = json.loads((args.out / "realism-realism.json").read_text(encoding="utf-8"))
+    print("\n".join(ranks(stored, args.test_pictures)))
+    return 0
 
 
-def vision(args: argparse.Namespace) -> StudyLearner:
+def vision(args: VisionOptions) -> int:
     from agents.common.device import check_device
-    from agents.vision.config import VisionConfig
     from agents.vision.drawn import StripSource
     from agents.vision.study import EncoderStudy
 
     check_device(args.device)
-    config = chosen(args, VisionConfig())
-    args.rows = args.rows or (list(by_name(args.encoders)) or None)
-    return EncoderStudy(
+    ready = by_name(args.encoders)
+    learner = EncoderStudy(
         StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights),
-        config,
-        seeds_of(args, config.seed),
+        args.config,
+        seeds_of(args, args.config.seed),
         args.split,
-        tuple(args.pictures),
+        args.test_pictures,
         args.threads,
         args.device,
         args.workers,
-        by_name(args.encoders),
+        ready,
     )
+    return run_table(args, learner, rows=args.rows or tuple(ready))
 
 
-def hari(args: argparse.Namespace) -> StudyLearner:
-    from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
+def hari(args: HariOptions) -> int:
     from agents.hari.study import HariStudy
-    from agents.vision.run import encoder_of
 
-    config = chosen(args, INTENTION_SCALES[args.scale])
-    return HariStudy(
+    learner = HariStudy(
         args.data,
-        seeds_of(args, config.seed),
+        seeds_of(args, args.config.seed),
         args.tasks,
-        (config.seed,),
+        (args.config.seed,),
         args.threads,
         execution=EXECUTION_SCALES[args.scale],
-        intention=config,
+        intention=args.config,
         executor=args.execution,
-        encoder=encoder_of(args.encoder, args.network).digest if "sight" in args.tables else "",
+        encoder=args.encoder_digest() if "sight" in args.tables else "",
         picture_kind=args.pictures,
     )
+    return run_table(args, learner)
 
 
-def vnla(args: argparse.Namespace) -> StudyLearner:
-    from agents.common.settings import EvaluationSettings
-    from agents.vnla.config import SCALES
+def vnla(args: VnlaOptions) -> int:
     from agents.vnla.study import VnlaStudy
 
-    config = chosen(args, SCALES[args.scale])
-    return VnlaStudy(
+    learner = VnlaStudy(
         args.data,
-        seeds_of(args, config.seed),
+        seeds_of(args, args.config.seed),
         args.tasks,
         threads=args.threads,
         encoder=args.encoder,
         network=args.network,
-        config=config,
-        evaluation=chosen(args, EvaluationSettings()),
+        config=args.config,
+        evaluation=args.evaluation,
         without_rooms=args.without_rooms,
         others=args.others or args.seeds,
         picture_kind=args.pictures,
     )
+    return run_table(args, learner)
 
 
-def bandit(args: argparse.Namespace) -> StudyLearner:
-    from agents.bandit.config import SCALES
+def bandit(args: BanditOptions) -> int:
     from agents.bandit.study import BanditStudy
 
-    config = chosen(args, SCALES[args.scale])
-    return BanditStudy(args.data, config, seeds_of(args, config.seed), args.threads)
+    return run_table(args, BanditStudy(args.data, args.config, seeds_of(args, args.config.seed), args.threads))
 
 
-def stars(args: argparse.Namespace) -> StudyLearner:
-    from agents.bandit.rating_config import RatingConfig
+def stars(args: StarsOptions) -> int:
     from agents.bandit.stars_study import StarsStudy
-    from agents.vision.run import encoder_of
 
-    config = chosen(args, RatingConfig())
-    return StarsStudy(
+    learner = StarsStudy(
         args.data,
-        seeds_of(args, config.seed),
+        seeds_of(args, args.config.seed),
         args.tasks,
         tuple(range(args.judgings)),
         args.threads,
         agent=args.agent,
-        encoder=encoder_of(args.encoder, args.network).digest,
-        config=config,
+        encoder=args.encoder_digest(),
+        config=args.config,
         split=args.split,
         rated=args.rated,
         decisions=args.decisions,
     )
+    return run_table(args, learner)
 
 
-def iliad(args: argparse.Namespace) -> StudyLearner:
-    from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES
+def iliad(args: RegexOptions | NavOptions) -> int:
     from agents.iliad.nav.run import NavSource
-    from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES
     from agents.iliad.study import IliadStudy, NavStudyWorld, RegexStudyWorld, StudyWorld
-    from agents.vision.run import encoder_of
 
     world: StudyWorld
-    if args.world == "nav":
-        refuse_regex_settings(args)
-        learner = chosen(args, NAV_LEARNER_SCALES[args.scale])
-        source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.pictures, args.cache)
-        world = NavStudyWorld(chosen(args, NAV_SCALES[args.scale]), source)
+    if isinstance(args, NavOptions):
+        world = NavStudyWorld(args.world, NavSource(args.data, args.encoder_digest(), args.pictures, args.cache))
     else:
-        learner = chosen(args, LEARNER_SCALES[args.scale])
-        world = RegexStudyWorld(chosen(args, REGEX_SCALES[args.scale]), args.words, args.templates)
-    return IliadStudy(world, learner, seeds_of(args, learner.seed), args.threads)
+        world = RegexStudyWorld(args.world, args.words, args.templates)
+    return run_table(args, IliadStudy(world, args.learner, seeds_of(args, args.learner.seed), args.threads))
 
 
-def refuse_regex_settings(args: argparse.Namespace) -> None:
-    """
-    Raises:
-      ValueError: settings of REGEX, or no data set, for NAV.
-    """
-    from embodied.cli.learning import ONLY_REGEX
+def check(args: CheckOptions) -> int:
+    from agents.studies.engine import check
 
-    given = [n for n in (*ONLY_REGEX, "words", "templates") if getattr(args, n, None) is not None]
-    if given:
-        raise ValueError(f"--{given[0].replace('_', '-')} belongs to --world regex; leave it out with --world nav")
-    if args.data is None:
-        raise ValueError(
-            "--world nav wants --data, a folder that `embodied dataset vln` or `hanna` built, with features"
-        )
+    print("\n".join(check(args.folder)) or f"no stored tables in {args.folder}")
+    return 0
+
+
+def ask(args: AskOptions) -> int:
+    from agents.ask.study import StudySize, draw, run
+
+    size = StudySize(2, 4, 2, 5, 4) if args.small else StudySize()
+    draw(args.out) if args.draw else run(args.out, size, args.cache)
+    return 0
+
+
+COMMANDS: Mapping[str, Any] = {
+    "hanna": (HannaOptions, hanna),
+    "realism": (RealismOptions, realism),
+    "vision": (VisionOptions, vision),
+    "hari": (HariOptions, hari),
+    "vnla": (VnlaOptions, vnla),
+    "bandit": (BanditOptions, bandit),
+    "stars": (StarsOptions, stars),
+    "iliad": (
+        "Students that learn from descriptions of what they did.",
+        {"regex": (RegexOptions, iliad), "nav": (NavOptions, iliad)},
+    ),
+    "ask": (AskOptions, ask),
+    "check": (CheckOptions, check),
+}

@@ -7,11 +7,22 @@ Rerun the command to resume an interrupted run; the result is the same. `tensorb
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
+from agents.common.settings import EvaluationSettings
+from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
+from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES, ExecutionConfig, IntentionConfig
+from agents.iliad.config import LearnerConfig
+from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
+from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
+from agents.vision.config import VisionConfig
+from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
+from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import note
+from embodied.cli.learning import SMALL_SCALE, Drawn, Encoded, Lit, Nav, Run, Threaded, Timed, WithData, WithDevice
+from embodied.cli.options import Count, InputFolder, InputPath, OutputFolder, Settings
 
 if TYPE_CHECKING:
     from agents.common.lessons import Lessons
@@ -19,85 +30,157 @@ if TYPE_CHECKING:
 
 WATCHED = 2
 """Validation episodes that --rrd records each time."""
+TRAINING, EVALUATION = "settings of training", "settings of evaluation"
+VNLA_WORDS = {"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    from embodied.cli import learning
-
-    kinds = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
-    vision = kinds.add_parser(
-        "vision", help="the encoder, on renders of a data set's training houses", description=run_vision.__doc__
-    )
-    learning.add_train_vision(vision)
-    hanna = kinds.add_parser(
-        "hanna", help="the agent, on a HANNA data set with features", description=run_hanna.__doc__
-    )
-    learning.add_train_hanna(hanna)
-    vnla = kinds.add_parser(
-        "vnla", help="the agent that asks an advisor, on a VNLA data set with features", description=run_vnla.__doc__
-    )
-    learning.add_train_vnla(vnla)
-    hari = kinds.add_parser("hari", help="the agent that learns which question to ask", description=run_hari.__doc__)
-    intention = learning.add_train_hari(hari)
-    iliad = kinds.add_parser(
-        "iliad", help="a student that learns from descriptions of what it did", description=run_iliad.__doc__
-    )
-    learning.add_train_iliad(iliad)
-    for parser in (hanna, vnla, intention):
-        parser.add_argument(
-            "--rrd", action="store_true", help=f"record {WATCHED} validation episodes each time, into the run folder"
-        )
+@dataclass(frozen=True, kw_only=True)
+class Strips(Lit, Drawn, WithDevice):
+    strips: OutputFolder | None = None
+    """Folder for strips of views, to share them between runs (default: OUT/strips)."""
 
 
-def run(args: argparse.Namespace) -> int:
-    return {"vision": run_vision, "hanna": run_hanna, "vnla": run_vnla, "hari": run_hari, "iliad": run_iliad}[
-        args.what
-    ](args)
+@dataclass(frozen=True, kw_only=True)
+class TrainVision(Strips, WithData):
+    """The encoder, on renders of a data set's training houses.
+
+    Renders the houses of a data set, trains an encoder to name and locate the objects in them, and measures on unseen
+    houses how well it does.
+    """
+
+    out: OutputFolder
+    """Folder for strips of views, weights and metrics."""
+    threads: Count = 2
+    workers: Count = 1
+    """Render N houses in parallel."""
+    distil_from: InputPath | None = None
+    """Distil from this encoder: start from its weights, and map the new pictures to the features that it gives for the
+    same places without light, so that agents trained on its features can use either encoder."""
+    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig(), skip=("like",))]
 
 
-def run_vision(args: argparse.Namespace) -> int:
-    """Draw the houses of a data set, teach an encoder to name and place what is in them, and read how well it sees."""
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    rrd: bool = False
+    """Record two validation episodes at each validation, into the run folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainHanna(Recorded, Run, Encoded, WithDevice):
+    """The agent, on a HANNA data set with features.
+
+    Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
+    """
+
+    threads: Count = 2
+    begin: InputPath | None = None
+    """Initialise with the weights of this agent."""
+    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES)]
+    evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainVnla(Recorded, Run, Encoded, WithDevice):
+    """The agent that asks an advisor, on a VNLA data set with features.
+
+    Trains an agent by imitation to navigate by one view, to ask an advisor within a budget and to follow the advice.
+    """
+
+    threads: Count = 2
+    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, words=VNLA_WORDS)]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainExecution(Run, Encoded):
+    """First phase: to understand descriptions and to navigate by them (DAgger)."""
+
+    begin: InputPath | None = None
+    """Initialise with the weights of this execution policy."""
+    config: Annotated[ExecutionConfig, Settings(TRAINING, EXECUTION_SCALES, words={"sees": SEES})]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainIntention(Recorded, Run, Drawn):
+    """Second phase: which question to ask when (actor-critic)."""
+
+    execution: InputPath
+    """A trained execution policy (best.safetensors)."""
+    config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES, words={"states": STATES})]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainIliad(Timed, Threaded):
+    out: OutputFolder
+    """Folder for data, teacher and students; rerun the command to resume."""
+    scale: Annotated[str, SMALL_SCALE] = "mini"
+    """The settings to start from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegexFiles:
+    words: InputPath | None = None
+    """REGEX: a file with one word per line (default: made-up words)."""
+    templates: InputPath | None = None
+    """REGEX: a JSON file with your own requests: rule -> texts with BEFORE and AFTER (default: the grammar's)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainRegex(TrainIliad, RegexFiles):
+    """Change words as a request says, by regular expressions."""
+
+    learner: Annotated[LearnerConfig, Settings("settings of the student's training", LEARNER_SCALES)]
+    world: Annotated[RegexConfig, Settings("settings of data and teacher", REGEX_SCALES)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainNav(TrainIliad, Nav):
+    """Follow routes through houses, on a `vln` or `hanna` data set with features."""
+
+    data: InputFolder
+    learner: Annotated[LearnerConfig, Settings("settings of the student's training", NAV_LEARNER_SCALES)]
+    world: Annotated[NavConfig, Settings("settings of data and teacher", NAV_SCALES)]
+
+
+def train_vision(args: TrainVision) -> int:
     from agents.common.device import use_threads
-    from agents.vision.config import VisionConfig
     from agents.vision.drawn import StripSource
     from agents.vision.run import train_vision
-    from embodied.cli.options import chosen
 
     use_threads(args.threads)
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
-    how = {"like": args.example, "device": args.device, "workers": args.workers}
-    train_vision(source, chosen(args, VisionConfig()), args.out, **how, note=note)
+    like, device, workers = args.distil_from, args.device, args.workers
+    train_vision(source, args.config, args.out, like=like, device=device, workers=workers, note=note)
     return 0
 
 
-def run_hanna(args: argparse.Namespace) -> int:
-    """Teach an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`."""
+def train_hanna(args: TrainHanna) -> int:
     from agents.hanna.run import train_agent
-    from agents.hanna.training_config import EVALUATIONS, SCALES
-    from embodied.cli.options import chosen
 
-    config, evaluation = chosen(args, SCALES[args.scale]), chosen(args, EVALUATIONS[args.scale])
     watch = _recorder(args) if args.rrd else None
-    how = {"minutes": args.minutes, "begin": args.begin, "note": note, "on_validation": watch}
-    train_agent(_lessons(args, "hanna"), config, evaluation, args.out, **how)
+    train_agent(
+        _lessons(args, "hanna"),
+        args.config,
+        args.evaluation,
+        args.out,
+        minutes=args.minutes,
+        begin=args.begin,
+        note=note,
+        on_validation=watch,
+    )
     return 0
 
 
-def run_vnla(args: argparse.Namespace) -> int:
-    """Teach an agent by imitation to navigate by one view, to ask an advisor within a budget and to do what it says."""
-    from agents.common.settings import EvaluationSettings
-    from agents.vnla.config import SCALES
+def train_vnla(args: TrainVnla) -> int:
     from agents.vnla.run import train_agent
-    from embodied.cli.options import chosen
 
-    config, evaluation = chosen(args, SCALES[args.scale]), chosen(args, EvaluationSettings())
     watch = _recorder(args) if args.rrd else None
-    how = {"minutes": args.minutes, "note": note, "on_validation": watch}
-    train_agent(_lessons(args, "vnla"), config, evaluation, args.out, **how)
+    lessons, minutes = _lessons(args, "vnla"), args.minutes
+    train_agent(lessons, args.config, args.evaluation, args.out, minutes=minutes, note=note, on_validation=watch)
     return 0
 
 
-def _lessons(args: argparse.Namespace, kind: str) -> Lessons:
+def _lessons(args: TrainHanna | TrainVnla, kind: str) -> Lessons:
     """What an agent by imitation learns from; PyTorch has its threads and, under torchrun, its device."""
     from agents.common.device import use_threads
     from agents.common.lessons import Lessons
@@ -110,68 +193,69 @@ def _lessons(args: argparse.Namespace, kind: str) -> Lessons:
     return Lessons(dataset_of(args.data, kind), encoder, args.pictures, join_launcher(args.device))
 
 
-def run_hari(args: argparse.Namespace) -> int:
-    """Teach an agent to walk by descriptions (execution), then which question to ask when (intention)."""
+def train_execution(args: TrainExecution) -> int:
     from agents.common.device import use_threads
-    from agents.hari.agent import load_executor
-    from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES
-    from agents.hari.run import hari_data, train_execution, train_intention, with_eyes
-    from agents.vision.run import encoder_of
-    from embodied.cli.options import chosen
+    from agents.hari.run import hari_data, train_execution
 
     use_threads(args.threads)
-    data = hari_data(args.data)
-    if args.phase == "execution":
-        config = chosen(args, EXECUTION_SCALES[args.scale])
-        encoder = encoder_of(args.encoder, args.network).digest if config.sees == "features" else ""
-        how = {"picture_kind": args.pictures, "begin": args.begin, "minutes": args.minutes}
-        train_execution(data, config, args.out, encoder=encoder, note=note, **how)
-    else:
-        asking = chosen(args, INTENTION_SCALES[args.scale])
-        walking = with_eyes(load_executor(args.execution), data, args.pictures)
-        watch = _recorder(args, sees=walking.seeing is not None) if args.rrd else None
-        train_intention(data, walking, asking, args.out, minutes=args.minutes, note=note, on_validation=watch)
+    encoder = args.encoder_digest() if args.config.sees == "features" else ""
+    train_execution(
+        hari_data(args.data),
+        args.config,
+        args.out,
+        encoder=encoder,
+        picture_kind=args.pictures,
+        begin=args.begin,
+        minutes=args.minutes,
+        note=note,
+    )
     return 0
 
 
-def run_iliad(args: argparse.Namespace) -> int:
-    """Teach a student to change words or to follow routes as a request says, by descriptions (ADEL), demonstrations or
-    rewards."""
+def train_intention(args: TrainIntention) -> int:
     from agents.common.device import use_threads
+    from agents.hari.agent import load_executor
+    from agents.hari.run import hari_data, train_intention, with_eyes
 
     use_threads(args.threads)
-    return {"regex": run_regex, "nav": run_nav}[args.world](args)
+    data = hari_data(args.data)
+    walking = with_eyes(load_executor(args.execution), data, args.pictures)
+    watch = _recorder(args, sees=walking.seeing is not None) if args.rrd else None
+    train_intention(data, walking, args.config, args.out, minutes=args.minutes, note=note, on_validation=watch)
+    return 0
 
 
-def run_regex(args: argparse.Namespace) -> int:
+def train_regex(args: TrainRegex) -> int:
+    from agents.common.device import use_threads
     from agents.iliad.config import folder_name
-    from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, students_of
+    from agents.iliad.regex.config import students_of
     from agents.iliad.regex.run import learn, prepare
-    from embodied.cli.options import chosen
 
-    regex, learner = chosen(args, REGEX_SCALES[args.scale]), chosen(args, LEARNER_SCALES[args.scale])
+    use_threads(args.threads)
+    regex, learner = args.world, args.learner
     grounds = prepare(regex, args.out / "shared", words=args.words, templates=args.templates, note=note)
     home = args.out / "students" / students_of(regex) / f"seed_{learner.seed}"
     learn(grounds, learner, home / folder_name(learner), home / "pretraining", minutes=args.minutes, note=note)
     return 0
 
 
-def run_nav(args: argparse.Namespace) -> int:
+def train_nav(args: TrainNav) -> int:
+    from agents.common.device import use_threads
     from agents.iliad.config import folder_name
-    from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES
     from agents.iliad.nav.run import NavSource, learn, prepare
-    from agents.vision.run import encoder_of
-    from embodied.cli.options import chosen
 
-    nav, learner = chosen(args, NAV_SCALES[args.scale]), chosen(args, NAV_LEARNER_SCALES[args.scale])
-    source = NavSource(args.data, encoder_of(args.encoder, args.network).digest, args.pictures, args.cache)
+    use_threads(args.threads)
+    nav, learner = args.world, args.learner
+    source = NavSource(args.data, args.encoder_digest(), args.pictures, args.cache)
     grounds = prepare(nav, source, args.out / "shared", note=note)
     home = args.out / "students" / nav.teacher / f"seed_{learner.seed}" / folder_name(learner)
     learn(grounds, learner, home, minutes=args.minutes, note=note)
     return 0
 
 
-def _recorder(args: argparse.Namespace, *, sees: bool = True) -> Callable[[int, Sequence[Episode]], None]:
+def _recorder(
+    args: TrainHanna | TrainVnla | TrainIntention, *, sees: bool = True
+) -> Callable[[int, Sequence[Episode]], None]:
     """Writes the first validation episodes of each validation as Rerun recordings, with what it saw if it sees."""
     from agents.vision.drawn import drawn_world, pictures_of
     from embodied.datasets.store import Dataset
@@ -188,3 +272,18 @@ def _recorder(args: argparse.Namespace, *, sees: bool = True) -> Callable[[int, 
                 record_episode(world, episode, Sinks(file), eyes=world if sees else None)
 
     return keep
+
+
+COMMANDS: Mapping[str, Any] = {
+    "vision": (TrainVision, train_vision),
+    "hanna": (TrainHanna, train_hanna),
+    "vnla": (TrainVnla, train_vnla),
+    "hari": (
+        "The agent that learns which question to ask, in two phases.",
+        {"execution": (TrainExecution, train_execution), "intention": (TrainIntention, train_intention)},
+    ),
+    "iliad": (
+        "A student that learns to do what a request says from descriptions (ADEL), demonstrations or rewards.",
+        {"regex": (TrainRegex, train_regex), "nav": (TrainNav, train_nav)},
+    ),
+}

@@ -9,15 +9,15 @@ recording is drawn as it was for the agent.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import add_cache, add_json, add_packs, bar, catalogue_of, note, show
-from embodied.cli.options import add_pictures, any_path, whole
-from embodied.cli.recording import add_sinks, add_video, film, viewers_of
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
+from embodied.cli.options import InputFolder, Option, OutputRrd, any_path, drawn_as, whole
+from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
@@ -29,29 +29,30 @@ if TYPE_CHECKING:
     from viz.sinks import Sinks
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=any_path, metavar="RUN", help="a .rrd file, or a folder with episodes*.jsonl")
-    parser.add_argument("--episode", type=whole(0), metavar="N", help="record episode N of the list and open it")
-    parser.add_argument("--data", type=any_path, metavar="DIR", help="data set of the run, for --episode")
-    parser.add_argument(
-        "--page", action="store_true", help="write RUN/index.html: plots, all episodes, links to recordings"
-    )
-    add_pictures(parser, DRAWN, "unlit", what="how --episode draws the house")
-    add_video(parser)
-    add_sinks(parser, "RUN/recordings/N.rrd")
-    add_cache(parser)
-    add_packs(parser)
-    add_json(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Filmed, Viewers, Furnished, Printed):
+    folder: Annotated[Path, Option(any_path, "RUN", name="folder")]
+    """A .rrd file, or a folder with episodes*.jsonl."""
+    episode: Annotated[int | None, Option(whole(0), "N")] = None
+    """Record episode N of the list and open it."""
+    data: InputFolder | None = None
+    """The data set of the run, for --episode."""
+    page: bool = False
+    """Write RUN/index.html: plots, all episodes, links to recordings."""
+    pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
+    """How --episode draws the house."""
+    rrd: OutputRrd | None = None
+    """Write the Rerun recording here (default: RUN/recordings/N.rrd)."""
 
 
-def run(args: argparse.Namespace) -> int:
+def run(args: Options) -> int:
     if args.folder.suffix == ".rrd":
         return show_file(args)
     from viz.report import load_run, summary_line, write_page
 
     found = load_run(args.folder)
     if args.episode is not None:
-        return record_one(args, found)
+        return record_one(args, found, args.episode)
     if args.page:
         page = write_page(args.folder, found)
         show(args, {"page": str(page), "episodes": len(found)}, f"wrote {page}")
@@ -65,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def show_file(args: argparse.Namespace) -> int:
+def show_file(args: Options) -> int:
     """Open a .rrd file in a new viewer, in the browser or in a viewer that runs."""
     if not args.folder.exists():
         raise FileNotFoundError(
@@ -80,29 +81,43 @@ def show_file(args: argparse.Namespace) -> int:
     return 0
 
 
-def record_one(args: argparse.Namespace, found: Sequence[Listed]) -> int:
+def record_one(args: Options, found: Sequence[Listed], number: int) -> int:
     """Draw one episode of a run again, into a recording."""
     from embodied.datasets.store import Dataset
     from viz.sinks import Sinks
 
-    if not 0 <= args.episode < len(found):
-        raise ValueError(f"--episode {args.episode} does not exist; this run has the episodes 0 to {len(found) - 1}")
+    if not 0 <= number < len(found):
+        raise ValueError(f"--episode {number} does not exist; this run has the episodes 0 to {len(found) - 1}")
     if args.data is None:
         raise ValueError(
             "--episode needs --data DIR, the data set that the run was made on: its houses are drawn again"
         )
-    episode = found[args.episode].episode
-    file = args.rrd or args.folder / "recordings" / f"{args.episode}.rrd"
+    episode = found[number].episode
+    file = args.rrd or args.folder / "recordings" / f"{number}.rrd"
     with viewers_of(args) as viewers:
-        record_again(args.folder, Dataset(args.data), episode, Sinks(file, viewers), catalogue_of(args), args)
+        video = (args.video, args.video_size) if args.video else None
+        sinks, catalogue, data = Sinks(file, viewers), catalogue_of(args), Dataset(args.data)
+        record_again(args.folder, data, episode, sinks, catalogue, args.cache, pictures=args.pictures, video=video)
         show(args, {"recording": str(file)}, f"wrote {file}; open it with: embodied view {file}")
     return 0
 
 
 def record_again(
-    run: Path, data: Dataset, episode: Episode, sinks: Sinks, catalogue: Catalogue, args: argparse.Namespace
+    run: Path,
+    data: Dataset,
+    episode: Episode,
+    sinks: Sinks,
+    catalogue: Catalogue,
+    cache: Path,
+    *,
+    pictures: str,
+    video: tuple[Path, tuple[int, int]] | None = None,
 ) -> None:
-    """Record an episode of a run in its house, drawn again as `args.pictures`, and with what its agent saw.
+    """Record an episode of a run in its house, drawn again, and with what its agent saw.
+
+    Args:
+      pictures: how the house is drawn.
+      video: a film to write, too, and its height and width in pixels.
 
     Raises:
       DatasetError: it was played in a house that is not in the data set.
@@ -117,12 +132,12 @@ def record_again(
         if seen is not None:
             from agents.vision.drawn import drawn_world  # loads torch
 
-            eyes = stack.enter_context(drawn_world(data, name, args.cache, seen))
-        world = stack.enter_context(data.open_world(name, catalogue, args.cache, args.pictures, size=384))
+            eyes = stack.enter_context(drawn_world(data, name, cache, seen))
+        world = stack.enter_context(data.open_world(name, catalogue, cache, pictures, size=384))
         watch = lambda steps: bar(steps, "recording", "step")
         record_episode(world, episode, sinks, eyes=eyes, watch=watch)
-        if args.video:
-            film(world, episode, args.video, tuple(args.video_size))
+        if video:
+            film(world, episode, *video)
     note(f"recorded {episode.task.id}")
 
 
