@@ -1,11 +1,13 @@
-"""Writes the tables of docs/results/data/*.json into the pages that show them, and a page with all tables.
+"""Writes the tables of docs/results/data/*.json into the pages that show them and into README.md, and a page with all
+tables, and draws the figures made of them.
 
     python docs/build_results.py            # writes
     python docs/build_results.py --check    # exits 1 where a page is not what the data say
 
-A page shows a table between two comments; `columns` chooses some of its columns by key:
+A page shows a table between two comments; `columns` chooses columns by key, `rows` chooses rows and may rename them,
+and `brief` leaves out notes and command:
 
-    <!-- table: hanna-4.5 columns: success_unseen_houses, requests_unseen_houses -->
+    <!-- table: hanna-4.5 columns: success_unseen_houses rows: Learned | No ask = No help brief -->
     <!-- end -->
 """
 
@@ -20,8 +22,11 @@ from pathlib import Path
 HERE = Path(__file__).parent
 DATA = HERE / "results" / "data"
 DETAILS = HERE / "results" / "details.md"
+README = HERE.parent / "README.md"
 PLACE = re.compile(
-    r"(<!-- table: (?P<name>[\w.-]+)(?: columns: (?P<columns>[^>]*?))? -->\n).*?(<!-- end -->)", re.DOTALL
+    r"(<!-- table: (?P<name>[\w.-]+)(?: columns: (?P<columns>[^>]*?))?(?: rows: (?P<rows>[^>]*?))?(?P<brief> brief)?"
+    r" -->\n).*?<!-- end -->",
+    re.DOTALL,
 )
 OLDER = "Measured with an earlier version."
 
@@ -39,25 +44,30 @@ def number(value: float, digits: int) -> str:
     return f"{value:,.{digits}f}".replace("-", "−")
 
 
+def most_digits(table: dict, column: dict) -> int:
+    """Most decimals that a column is written with: one for per cent, three for numbers without an interval."""
+    intervals = any(v.get("half_width") is not None for row in table["rows"] if (v := row["values"].get(column["key"])))
+    return 1 if column.get("unit") == "%" else 2 if intervals else 3
+
+
 def digits_of(table: dict, key: str) -> int:
-    """How many decimals most numbers of a column were written with."""
-    values = [row["values"].get(key, {}) for row in table["rows"]]
-    written = [decimals(v) for v in values if v.get("mean") is not None]
+    """How many decimals most numbers of a column are stored with."""
+    written = [decimals(v) for row in table["rows"] if (v := row["values"].get(key)) and v.get("mean") is not None]
     return max(set(written), key=lambda n: (written.count(n), n), default=0)
 
 
 def decimals(value: dict) -> int:
-    """How many decimals a number needs, at most three."""
+    """How many decimals a number is stored with."""
     numbers = [x for part in ("mean", "half_width") if (x := value.get(part)) is not None and x != int(x)]
-    return max((min(len(repr(x).partition(".")[2]), 3) for x in numbers), default=0)
+    return max((len(repr(x).partition(".")[2]) for x in numbers), default=0)
 
 
-def cell(row: dict, key: str, digits: int) -> str:
+def cell(row: dict, key: str, digits: int, most: int) -> str:
     """'56.4 ± 6.2 (45.43)': the mean, half of its 95 % interval, and what was printed in the paper."""
     value = row["values"].get(key)
     if value is None:
         return ""
-    digits = max(digits, decimals(value))
+    digits = min(max(digits, decimals(value)), most)
     text = value["text"] if "text" in value else number(value["mean"], digits)
     if value.get("half_width") is not None:
         text += f" ± {number(value['half_width'], digits)}"
@@ -65,16 +75,18 @@ def cell(row: dict, key: str, digits: int) -> str:
     return text if printed is None else f"{text} ({printed:g})"
 
 
-def markdown(table: dict, columns: str | None = None) -> str:
+def markdown(table: dict, columns: str | None = None, rows: str | None = None, *, brief: bool = False) -> str:
     """The table and what one must know to read it."""
     keys = [c.strip() for c in columns.split(",")] if columns else [c["key"] for c in table["columns"]]
     shown = {c["key"]: c for c in table["columns"]}
     chosen = [shown[key] for key in keys]
     titles = [c["title"] + (f", {c['unit']}" if c.get("unit") else "") for c in chosen]
     lines = [f"| {table.get('row_title', '')} | " + " | ".join(titles) + " |", "|" + "---|" * (len(chosen) + 1)]
-    digits = {c["key"]: digits_of(table, c["key"]) for c in chosen}
-    for row in table["rows"]:
-        lines.append(f"| {row['label']} | " + " | ".join(cell(row, k, digits[k]) for k in digits) + " |")
+    digits = {c["key"]: (digits_of(table, c["key"]), most_digits(table, c)) for c in chosen}
+    named = {row["label"]: row for row in table["rows"]}
+    wanted = [part.strip().partition(" = ") for part in rows.split(" | ")] if rows else []
+    for row, title in [(named[x], y or x) for x, _, y in wanted] or [(row, row["label"]) for row in table["rows"]]:
+        lines.append(f"| {title} | " + " | ".join(cell(row, k, *digits[k]) for k in digits) + " |")
     caption = [f"*{table['title']}" + (f" ({table['paper']})" if table["paper"] else "") + f".* {table['settings']}"]
     if any(row.get("printed") for row in table["rows"]):
         caption.append("In brackets: the paper's number.")
@@ -82,12 +94,18 @@ def markdown(table: dict, columns: str | None = None) -> str:
         caption.append(OLDER)
     notes = "".join(f"- {note}\n" for note in table["notes"])
     command = f"```\n{table['command']}\n```\n" if table["command"] else ""
-    return "\n".join(lines) + "\n\n" + " ".join(caption) + "\n" + (f"\n{notes}" if notes else "") + f"\n{command}"
+    text = "\n".join(lines) + "\n\n" + " ".join(caption) + "\n"
+    return text if brief else text + (f"\n{notes}" if notes else "") + f"\n{command}"
 
 
 def filled(text: str) -> str:
     """A page with its tables."""
-    return PLACE.sub(lambda m: f"{m[1]}\n{markdown(load(m['name']), m['columns'])}\n{m[4]}", text)
+
+    def table(m: re.Match[str]) -> str:
+        made = markdown(load(m["name"]), m["columns"], m["rows"], brief=bool(m["brief"]))
+        return f"{m[1]}{made}<!-- end -->" if m["brief"] else f"{m[1]}\n{made}\n<!-- end -->"
+
+    return PLACE.sub(table, text)
 
 
 def details() -> str:
@@ -99,12 +117,45 @@ def details() -> str:
     return "\n".join(parts)
 
 
+SERIES = {
+    "above": "learned, by threshold",
+    "every": "every k steps",
+    "with": "at random",
+    "trained": "trained with a price",
+}
+WIDE = 20.0
+"""Points of success; where an interval is wider, the training seeds disagree and no bar is drawn."""
+
+
+def draw_requests(table: dict, path: Path) -> None:
+    """Success against the number of requests; bars are 95 % intervals."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6, 3.6), layout="constrained")
+    axes = figure.subplots()
+    for color, (first, title) in enumerate(SERIES.items()):
+        values = [r["values"] for r in table["rows"] if r["label"].split()[0] == first]
+        points = [(v["requests_unseen_houses"]["mean"], v["success_unseen_houses"]) for v in values]
+        points.sort(key=lambda point: point[0])
+        x, y = [p for p, _ in points], [v["mean"] for _, v in points]
+        half = [v["half_width"] if v["half_width"] <= WIDE else 0.0 for _, v in points]
+        axes.errorbar(x, y, half, marker="o", markersize=4, capsize=2, color=f"C{color}", label=title)
+        wide = [(p, v["mean"]) for p, v in points if v["half_width"] > WIDE]
+        axes.plot(
+            *zip(*wide) if wide else ((), ()), "o", markersize=6, markerfacecolor="white", color=f"C{color}", zorder=3
+        )
+    axes.set(xlabel="requests per task", ylabel="success in unseen houses (%)", ylim=(0, 75), xlim=(0, None))
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    figure.savefig(path, dpi=110, metadata={"Software": None})
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="write nothing, exit 1 where a page is out of date")
     args = parser.parse_args()
     stale = []
-    for page in sorted(HERE.rglob("*.md")):
+    for page in (README, *sorted(HERE.rglob("*.md"))):
         text = page.read_text(encoding="utf-8")
         if page != DETAILS and (new := filled(text)) != text:
             stale.append(page)
@@ -115,6 +166,7 @@ def main() -> int:
             print(f"{page} is not what docs/results/data says; run python docs/build_results.py", file=sys.stderr)
         return int(bool(stale))
     DETAILS.write_text(details(), encoding="utf-8")
+    draw_requests(load("hanna-requests"), HERE / "images" / "requests.png")
     return 0
 
 

@@ -91,7 +91,7 @@ def main() -> None:
             args.out / f"{args.table}.json",
             {
                 "table": args.table,
-                "title": "HANNA with sight, without, and by its rules alone",
+                "title": "HANNA agents with sight, blind, and with the decoding rules alone",
                 "paper": None,
                 "command": f"python -m agents.hanna.sight_study --data TEST --pictures {args.pictures} --split "
                 f"{' '.join(args.split)} --shown {' '.join(args.shown)} --episodes STUDY --table {args.table}"
@@ -104,13 +104,13 @@ def main() -> None:
                 },
                 "settings": f"{len(episodes)} tasks in {len(graphs)} house{'s' * (len(graphs) > 1)} "
                 f"used for no training (data seed {data.config.seed}, {data.config.area[0]:g} to "
-                f"{data.config.area[1]:g} m²), pictures {args.pictures or 'of the data set'}; "
-                "in brackets: how the goal image was taken",
+                f"{data.config.area[1]:g} m²), pictures {args.pictures or 'of the data set'}.",
                 "columns": COLUMNS,
                 "rows": rows,
                 "notes": [
-                    "blind: all features zero, for the networks and for the matcher of pictures.",
-                    "rules only: no learned network; moves are drawn evenly under the same rules, help every 5 steps.",
+                    "In brackets: how the goal image was taken.",
+                    "blind: all visual features are zero.",
+                    "rules only: random moves under the same decoding rules, with help every 5 steps.",
                     *(lead(taken["learned"], taken[other], other) for other in taken if other != "learned"),
                 ],
             },
