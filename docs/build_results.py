@@ -90,8 +90,8 @@ def markdown(table: dict, columns: str | None = None, rows: str | None = None, *
     caption = [f"*{table['title']}" + (f" ({table['paper']})" if table["paper"] else "") + f".* {table['settings']}"]
     if any(row.get("printed") for row in table["rows"]):
         caption.append("In brackets: the paper's number.")
-    if table["identity"] is None:
-        caption.append(OLDER)
+    code = (table["identity"] or {}).get("judged", {}).get("code")
+    caption.append(f"Code {code}." if code else OLDER)
     notes = "".join(f"- {note}\n" for note in table["notes"])
     command = f"```\n{table['command']}\n```\n" if table["command"] else ""
     text = "\n".join(lines) + "\n\n" + " ".join(caption) + "\n"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import struct
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from agents.bandit.store import load_translator
 from agents.bandit.study import BanditStudy
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, greedy, padded, perplexity
-from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_pieces, build_words, lexicon_from_json
+from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_words
 from agents.common.checkpoint import CheckpointError, read_checkpoint
 from agents.common.decoding import drawn_with
 from agents.common.session import Session
@@ -210,7 +209,6 @@ def test_words_are_numbered_by_frequency_and_come_back():
     assert lexicon.vocabulary.words[3:] == ("b", "a")
     assert lexicon.encode(["a", "c", "b"]) == [4, 1, 3, END_NUMBER]
     assert lexicon.decode([4, 3, END_NUMBER, 4]) == ("a", "b")
-    assert lexicon_from_json(json.loads(json.dumps(lexicon.to_json()))) == lexicon
 
 
 def networks() -> tuple[Translator, Critic]:
@@ -420,22 +418,6 @@ def test_a_corpus_that_was_stopped_in_between_is_not_believed(tmp_path, monkeypa
         corpus.load(tmp_path, ["supervised", "test"])
     with locked(tmp_path), pytest.raises(LockedError):
         make(0)
-
-
-def test_pieces_leave_no_word_unknown_and_come_back_whole():
-    sentences = [p.source.split() for p in toy_pairs(100)]
-    lexicon = build_pieces(sentences, 40)
-    again = lexicon_from_json(json.loads(json.dumps(lexicon.to_json())))
-    for words in sentences[:10]:
-        numbers = lexicon.encode(words)
-        assert numbers[-1] == END_NUMBER and 1 not in numbers
-        assert again.decode(numbers) == tuple(words)
-
-
-def test_without_sentencepiece_words_are_recommended(monkeypatch):
-    monkeypatch.setitem(sys.modules, "sentencepiece", None)
-    with pytest.raises(UnableError, match="pip install sentencepiece.*--units words"):
-        build_pieces([["a"]], 40)
 
 
 def test_the_command_makes_a_corpus_of_own_text(tmp_path, capsys):

@@ -369,10 +369,9 @@ BESIDE = [
     (hari.load_agent, "hari", '{"names": [], "execution": {}}', "execution policy alone"),
     (hari.load_agent, "vnla", "{}", "holds 'vnla', 'hari' is wanted"),
     (load_translator, "bandit", '{"config": {}}', "missing fields"),
-    (load_translator, "bandit", '{"config": [], "lexicons": ["", ""]}', "should be an object"),
-    (load_translator, "bandit", '{"config": {"units": "bytes"}, "lexicons": ["", ""]}', "units must be one of"),
-    (load_translator, "bandit", '{"config": {}, "lexicons": [1, 2]}', "should be"),
-    (load_translator, "bandit", '{"config": {}, "lexicons": ["1", "2"]}', "cannot be read"),
+    (load_translator, "bandit", '{"config": [], "source": [], "target": []}', "should be an object"),
+    (load_translator, "bandit", '{"config": {"batch": 0}, "source": [], "target": []}', "at least 1"),
+    (load_translator, "bandit", '{"config": {}, "source": [1], "target": []}', r"source\[0\] should be"),
     (load_student, "regex", '{"config": {"stages": 3}, "words": []}', "unknown fields"),
     (config_of, "nav", '{"config": {}}', "missing fields"),
 ]

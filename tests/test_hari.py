@@ -134,6 +134,10 @@ def test_an_agent_that_stands_on_its_goal_at_the_horizon_without_done_has_not_su
     env.reset(dataclasses.replace(TASK, start=Pose(3), horizon=2))
     env.step(Stop())
     assert metrics.success(env.episode(), line_world().graph) == 1
+    env.reset(dataclasses.replace(TASK, horizon=3))
+    for node in (1, 2, 3):
+        env.step(Move(env.situation.candidate_nodes.index(node)))
+    assert env.episode().steps[-1].cost == 3.01, "as if it had stayed at the start"
 
 
 def test_sparse_descriptions_keep_a_tenth_of_the_classes():

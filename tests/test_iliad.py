@@ -11,10 +11,10 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.checkpoint import CheckpointError
-from agents.common.session import Session
+from agents.common.session import Session, descend
 from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.describing import by_the_program, by_the_text, kept
-from agents.iliad.learners import RunningMean, adel, adel_loss, dagger, mixture, reinforce, reinforce_loss
+from agents.iliad.learners import Asked, RunningMean, adel, adel_loss, dagger, mixture, reinforce, reinforce_loss
 from agents.iliad.protocol import NOTHING, ExecutionScores
 from agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from embodied.seeds import stream
@@ -147,19 +147,18 @@ def test_reinforce_by_hand():
 
 def test_the_baseline_is_the_mean_of_all_rewards_this_batch_included():
     mean, student = RunningMean(3.0, 3), flat([0.25] * 4)
-    optimizer = torch.optim.SGD(student.table.parameters(), 0.0)
     rewards = lambda tasks, executions: [0.0]
-    lesson = reinforce([Wish(0)], ["0"], rewards, mean, student, optimizer, 0.0, 9.0, rng=stream(0, "r"))
+    lesson = reinforce(Asked([Wish(0)], ["0"], stream(0, "r")), rewards, mean, student, 0.0)
     assert mean.value == pytest.approx(3 / 4)
-    assert lesson.loss == pytest.approx((0 - 3 / 4) * math.log(4))
+    assert lesson.loss.item() == pytest.approx((0 - 3 / 4) * math.log(4))
 
 
 def test_dagger_shows_the_best_action_in_states_that_the_student_came_to():
     student = flat([0.1, 0.7, 0.1, 0.1])
-    optimizer = torch.optim.SGD(student.table.parameters(), 1.0)
-    lesson = dagger([Wish(0)], ["0"], Buttons(), student, optimizer, 9.0)
-    assert list(lesson.executions) == [1] and lesson.loss == pytest.approx(-math.log(0.1))
-    assert student.table.weight[0, 0] > math.log(0.1)
+    lesson = dagger(Asked([Wish(0)], ["0"], stream(0, "d")), Buttons(), student)
+    assert list(lesson.executions) == [1] and lesson.loss.item() == pytest.approx(-math.log(0.1))
+    lesson.loss.backward()
+    assert student.table.weight.grad[0, 0] < 0, "what was shown becomes likelier"
 
 
 class Button2:
@@ -173,15 +172,12 @@ class Button2:
 def test_the_mixture_executes_the_marginal_as_often_as_lambda_says(mixing, least, most):
     """Eq 3.14: the student here always presses 0, the marginal 2; what is described as it is, is learned as it is."""
     student = flat([1 - 3e-9, 1e-9, 1e-9, 1e-9])
-    before = student.table.weight.detach().clone()
-    optimizer = torch.optim.SGD(student.table.parameters(), 1.0)
-    some = [Wish(0)] * 1000
-    lesson = mixture(
-        some, ["0"] * 1000, Watcher(), Button2(), student, optimizer, mixing, 9.0, rng=stream(0, "mixture")
-    )
+    asked = Asked([Wish(0)] * 1000, ["0"] * 1000, stream(0, "mixture"))
+    lesson = mixture(asked, Watcher(), Button2(), student, mixing)
+    lesson.loss.backward()
     assert least <= sum(e == 2 for e in lesson.executions) / 1000 <= most
     assert list(lesson.descriptions) == [str(e) for e in lesson.executions]
-    assert bool((student.table.weight[2] != before[2]).any()) == (mixing > 0), "learned under what was said"
+    assert bool(student.table.weight.grad[2].any()) == (mixing > 0), "learned under what was said"
 
 
 # Eq 3.15 and 3.16 ----------------------------------------------------------------------------------
@@ -284,9 +280,9 @@ def test_adel_comes_to_the_true_marginal():
     rng, explorer, student = stream(0, "t"), Presser(1), Presser(0)
     weights = [*explorer.table.parameters(), *student.table.parameters()]
     optimizer = torch.optim.Adam(weights, 0.1)
-    tasks = [Wish(0)] * 16
+    asked = Asked([Wish(0)] * 16, ["0"] * 16, rng)
     for _ in range(80):
-        adel(tasks, ["0"] * 16, Watcher(), AnyButton(), explorer, student, optimizer, 0.25, 9.0, rng=rng)
+        descend(adel(asked, Watcher(), AnyButton(), explorer, student, 0.25).loss, optimizer, "ADEL", 9.0)
     with torch.no_grad():
         pressed = explorer.logits(["0"]).softmax(-1)[0]
     assert pressed[0] > 0.6 and (pressed[1:] > 0.01).all(), "mostly what was asked for, everything now and then"

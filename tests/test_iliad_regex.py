@@ -17,17 +17,8 @@ from agents.common.decoding import likeliest
 from agents.iliad.config import LearnerConfig
 from agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
 from agents.iliad.regex.config import MARGINALS, RegexConfig
-from agents.iliad.regex.data import (
-    LEAST_CHANGED,
-    WordTask,
-    grammar_of,
-    known,
-    make_data,
-    random_asked,
-    read_templates,
-    rules_without_requests,
-)
-from agents.iliad.regex.language import PARTS, templates, templates_by_manner
+from agents.iliad.regex.data import LEAST_CHANGED, WordTask, known, make_data, read_templates, rules_without_requests
+from agents.iliad.regex.language import PARTS, templates
 from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import (
     ALPHABET,
@@ -367,16 +358,13 @@ def test_the_threshold_is_all_words():
 
 
 @pytest.mark.slow
-def test_the_grammar_describes_what_was_done_and_errs_as_often_as_it_should(data):
-    teacher, item = GrammarTeacher(data, RegexConfig(wrong=0.0)), data.splits["train"][0]
+def test_the_grammar_describes_what_was_done(data):
+    teacher, item = GrammarTeacher(RegexConfig()), data.splits["train"][0]
     some = rules_without_requests(data, RegexConfig(), 500, rng=stream(0, "o"))
     other = next(r for r in some if outputs(r, item.words) not in (None, item.words, item.outputs))
     shape, before, after = parse(other)
     fills = {t.fill(before, after) for t in data.templates["train"] if t.shape == shape}
     assert set(teacher.describe([item] * 20, [carried_out(other, item)] * 20, rng=stream(0, "g"))) <= fills
-    erring, done = GrammarTeacher(data, RegexConfig(wrong=0.5)), carried_out(other, item)
-    wrong = erring.describe([item] * 400, [done] * 400, rng=stream(0, "w"))
-    assert 140 < sum(d not in fills for d in wrong) < 260
 
 
 # Learning ------------------------------------------------------------------------------------------
@@ -426,10 +414,10 @@ def test_a_small_student_learns_to_change_words_from_descriptions(data, tmp_path
     assert found[-1]["success"] > 0.9, found
 
 
-# Marginals and speakers ----------------------------------------------------------------------------
+# Marginals -----------------------------------------------------------------------------------------
 
 
-def test_a_narrow_marginal_knows_half_of_the_shapes_and_a_wide_one_more_than_are_asked_for(data):
+def test_a_narrow_marginal_knows_half_of_the_shapes(data):
     found = {}
     for marginal in MARGINALS:
         config = dataclasses.replace(SMALL, marginal=marginal)
@@ -437,24 +425,6 @@ def test_a_narrow_marginal_knows_half_of_the_shapes_and_a_wide_one_more_than_are
     shapes = {m: {made[0] for r in rules if (made := parse(r)) is not None} for m, rules in found.items()}
     assert len(shapes["asked"]) > 240 and shapes["narrow"] == {s for s in shapes["narrow"] if known(s, 0)}
     assert 80 < len(shapes["narrow"]) < 190
-    assert 0.1 < sum(parse(r) is not None for r in found["wide"]) / 1500 < 0.5, "most are never asked for"
-
-
-@pytest.mark.slow
-def test_who_is_left_out_makes_no_request_and_describes_nothing():
-    everybody = templates_by_manner(seed=0)
-    for part, of in everybody.items():
-        assert all(t.manner == m for m, several in of.items() for t in several), part
-    texts_of = {p: {t.text for several in of.values() for t in several} for p, of in everybody.items()}
-    assert not texts_of["train"] & texts_of["test"] and not texts_of["train"] & texts_of["validation"]
-    config = dataclasses.replace(SMALL, teacher="grammar", unheard="terse")
-    data = make_data(config)
-    asked = [r for part in ("train", "validation", "test") for q in data.splits[part] for r in q.requests]
-    assert not any("->" in r for r in asked) and any(" , " in r for r in asked)
-    assert all("->" in q.requests[0] for q in data.splits["test terse"]), "but in its own test"
-    grammar = grammar_of(config)
-    said = [random_asked(grammar, "train", data.words, rng=stream(k, "s")) for k in range(50)]
-    assert not any("->" in text for text in said)
 
 
 # Runs ----------------------------------------------------------------------------------------------

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import math
 
 import numpy as np
 import pytest
@@ -18,11 +17,10 @@ from agents.common.shipped import WEIGHTS
 from agents.common.weights import origin_of, weights_digest
 from agents.hanna.agent import load_agent, new_agent
 from agents.hanna.evaluation import behaviour, hanna_policies
-from agents.hanna.realism import RealismStudy, rank_correlation, ranks
 from agents.hanna.run import train_agent, vocabulary_of
 from agents.hanna.study import HannaStudy
 from agents.studies.engine import run_study
-from agents.vision.config import PLAIN, RENDER_PRESETS
+from agents.vision.config import PLAIN
 from agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
 from agents.vision.run import encoder_of
@@ -229,49 +227,6 @@ def test_agents_that_are_compared_differ_in_one_setting(study):
             assert len([k for k in a if a[k] != b[k]]) == 1, pair
 
 
-def test_agents_are_judged_in_houses_drawn_in_other_ways(study, data, tmp_path):
-    learner, out = study
-    files = sorted(times(out, "best.safetensors"))
-    through = dataclasses.replace(random_encoder(seed=2), like=load_encoder(learner.encoder).digest)
-    save_encoder(through, tmp_path / "alike.safetensors")
-    arms = {"all": files[:2], "alike": files[2:3]}
-    ways, encoders = ("unlit", "fast-matte"), {"alike": [tmp_path / "alike.safetensors"]}
-    realism = RealismStudy(data.folder, (0,), 3, arms=arms, pictures=ways, encoders=encoders)
-    with pytest.raises(FileNotFoundError, match="embodied features"):
-        run_study(realism, ["realism"], tmp_path / "out", note=print)
-    for encoder in (through, load_encoder(learner.encoder)):
-        for way in ("unlit", "fast-matte"):
-            give_features(data, data.names("test_unseen"), encoder, RENDER_PRESETS[way], seed=1)
-    run_study(realism, ["realism"], tmp_path / "out", note=print)
-    body = read_json(tmp_path / "out" / "realism-realism.json")
-    assert [r["label"] for r in body["rows"]] == ["all", "alike"] and "success_fast-matte" in body["rows"][0]["values"]
-    assert ranks(body, ("unlit", "fast-matte")) == [], "two kinds of agents cannot be ranked"
-    with pytest.raises(ValueError, match="encoders are given for"):
-        dataclasses.replace(realism, encoders={"b": files})
-    with pytest.raises(ValueError, match="'all' has 2 agents and 3 encoders"):
-        dataclasses.replace(realism, encoders={"all": files[:1] * 3})
-
-
-def test_rank_correlation_is_spearmans():
-    assert rank_correlation([0.1, 0.5, 0.3, 0.4], [0.2, 0.3, 0.1, 0.6]) == pytest.approx(1 - 6 * 4 / (4 * 15))
-    assert math.isnan(rank_correlation([0.1, 0.5], [0.2, 0.3])) and math.isnan(rank_correlation([1] * 3, [1, 2, 3]))
-
-
-def test_a_study_of_houses_takes_the_numbers_that_there_are(study, monkeypatch):
-    learner, _ = study
-    monkeypatch.setattr("agents.hanna.study.HOUSES", (1, 8))  # of the two of the hand-made data set
-    rows = learner.tables()["houses"].rows
-    assert [r.label for r in rows] == [
-        "1 houses",
-        "all houses",
-        "1 houses, equal passes",
-        "1 houses, without a trail",
-        "all houses, without a trail",
-    ]
-    long, short = (learner.settings(rows[k].train, 0) for k in (0, 2))
-    assert (long.iterations, short.iterations) == (2, 1) and short.training_houses == 1
-
-
 def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tmp_path):
     learner, out = study
     other = build(tmp_path / "other", tmp_path / "cache", routes="spanning")
@@ -305,8 +260,6 @@ def test_missing_features_are_told_before_anything_is_trained(study, data, tmp_p
         run_study(learner, ["4.4"], tmp_path / "out", note=print)
     held.rename(path)
     assert not (tmp_path / "out" / "runs").exists()
-    with pytest.raises(FileNotFoundError, match="@1.safetensors does not exist; .*embodied features --lights 3"):
-        run_study(learner, ["lights"], tmp_path / "out", rows=["3 lightings"], note=print)
 
 
 def test_more_training_houses_than_there_are_are_refused(study, tmp_path):

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require, require_word
-
-UNITS = ("words", "pieces")
+from agents.common.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,14 +13,12 @@ class BanditConfig(RunSettings):
 
     hidden_size: int = 500
     """Width of word embeddings and LSTMs of the translator and of the critic."""
-    units: str = "words"
-    """'words', as in the dissertation, or 'pieces' of words (needs the library sentencepiece)."""
     source_words: int = 50_000
-    """Most frequent units of the source language that are known."""
+    """Most frequent words of the source language that are known."""
     target_words: int = 50_000
-    """Most frequent units of the target language that are known."""
+    """Most frequent words of the target language that are known."""
     longest: int = 50
-    """Units of the longest translation; corpora leave out sentences of more words."""
+    """Words of the longest translation; corpora leave out sentences of more words."""
     batch: int = 64
     """Sentences per update."""
     pretraining_passes: int = 10
@@ -44,7 +40,6 @@ class BanditConfig(RunSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_word(self, "units", UNITS)
         require(self, AT_LEAST_ONE, "hidden_size", "longest", "pretraining_passes", "critic_passes", "decay_from")
         require(self, POSITIVE, "pretraining_rate", "bandit_rate", "clip")
         for name in ("source_words", "target_words"):

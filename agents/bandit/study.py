@@ -167,7 +167,7 @@ class BanditStudy:
     def about(self) -> str:
         c, seeds = self.config, ", ".join(map(str, self.repeats))
         return (
-            f"Hidden size {c.hidden_size}, {c.source_words:,} and {c.target_words:,} {c.units}, "
+            f"Hidden size {c.hidden_size}, {c.source_words:,} and {c.target_words:,} words, "
             f"{c.pretraining_passes} passes of pre-training at {c.pretraining_rate:g}, {c.critic_passes} of the "
             f"critic, learning rate {c.bandit_rate:g} with ratings. Seeds {seeds}, each with its own pre-training; "
             "differences are taken seed by seed."

@@ -27,7 +27,7 @@ from agents.bandit.network import Critic, Translator, begin
 from agents.bandit.ratings import CLEAN, Rater
 from agents.bandit.store import load_network, save_network
 from agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
-from agents.bandit.words import BUILDERS, WordNumbers
+from agents.bandit.words import Words, build_words
 from agents.common.actor_critic import Decisions, actor_loss, critic_loss
 from agents.common.checkpoint import Stateful
 from agents.common.decoding import drawn_with
@@ -44,7 +44,6 @@ LEARNERS = ("reference", "supervised", "a2c")
 REFERENCES = ("full", "weak")
 _PRETRAINING = (
     "hidden_size",
-    "units",
     "source_words",
     "target_words",
     "longest",
@@ -64,7 +63,7 @@ class NumberedCorpus:
 
     config: BanditConfig
     splits: Mapping[str, Numbered]
-    lexicons: tuple[WordNumbers, WordNumbers]
+    lexicons: tuple[Words, Words]
     digest: str
     """Of the sets for pre-training and judging."""
     bandit_digest: str
@@ -97,9 +96,8 @@ def material(folder: Path, config: BanditConfig) -> NumberedCorpus:
     """
     names = ("supervised", "dev", "test")
     corpus = load(folder, (*names, config.bandit_set), longest=config.longest)
-    build = BUILDERS[config.units]
-    source = build([a for a, _ in corpus["supervised"]], config.source_words)
-    target = build([b for _, b in corpus["supervised"]], config.target_words)
+    source = build_words([a for a, _ in corpus["supervised"]], config.source_words)
+    target = build_words([b for _, b in corpus["supervised"]], config.target_words)
     splits = {name: numbered(pairs, source, target) for name, pairs in corpus.items()}
     return NumberedCorpus(
         config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,))

@@ -15,7 +15,7 @@ from torch import nn
 
 from agents.common.choosing import choose_at
 from agents.hanna.agent import HannaAgent
-from agents.hanna.asking import RULES, HannaAskRule, ask_above, ask_every, ask_with
+from agents.hanna.asking import RULES, ask_every
 from agents.hanna.config import HannaSizes
 from agents.hanna.network import Scores
 from agents.hanna.percept import Percept, slot_distribution
@@ -31,12 +31,6 @@ REASONS = ("lost", "uncertain_wrong", "never_asked")
 WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
 """Agents of embodied.evaluation.evaluate that are judged beside the learned one; they need no pictures."""
 COLUMNS = ("success", "spl", "navigation error", "requests", "oracle success", "mistake repeat", "request repeat")
-ASK_THRESHOLDS: Mapping[str, Mapping[str, HannaAskRule]] = {
-    "learned": {f"learned, above {x:g}": ask_above(x) for x in (0.9, 0.75, 0.5, 0.35, 0.2, 0.1)},
-    "every k steps": {f"learned, every {k}": ask_every(k) for k in (20, 12, 8, 5, 3, 2)},
-    "at random": {f"learned, with {p:g}": ask_with(p) for p in (0.03, 0.06, 0.12, 0.2, 0.35, 0.6)},
-}
-"""Rules of asking put before one pair of networks, from few requests to many, by kind of rule."""
 EVAL_ABLATIONS: Mapping[str, Mapping[str, Any]] = {
     "learned, without search": {"frontier_discount": 0.0},
     "learned, not by image": {"use_goal_image": False},
@@ -86,13 +80,10 @@ def by_the_text(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
 
 
 def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
-    """Those of `hanna_policies` and `sight_policies`, and the agent with each rule of ASK_THRESHOLDS and in each way of
-    EVAL_ABLATIONS."""
+    """Those of `hanna_policies` and `sight_policies`, and the agent in each way of EVAL_ABLATIONS."""
     learned = of(agent, bank)
-    rules = {name: rule for kind in ASK_THRESHOLDS.values() for name, rule in kind.items()}
-    asking = {name: dataclasses.replace(learned, ask_rule=rule) for name, rule in rules.items()}
     plainer = {name: dataclasses.replace(learned, **changed) for name, changed in EVAL_ABLATIONS.items()}
-    return {**hanna_policies(agent, bank, of), **asking, **plainer, **sight_policies(agent, bank)}
+    return {**hanna_policies(agent, bank, of), **plainer, **sight_policies(agent, bank)}
 
 
 UNWILLING = 20.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +12,10 @@ from agents.common.lessons import Lessons, drawings, split_of
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.evaluation import ASK_THRESHOLDS, EVAL_ABLATIONS, all_policies, as_shipped, by_the_text, counted
+from agents.hanna.evaluation import all_policies, as_shipped, by_the_text, counted
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
+from agents.studies.engine import Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
 from embodied.datasets.store import Dataset, SplitData, dataset_of
@@ -55,51 +54,9 @@ ABLATIONS: Mapping[str, Mapping[str, Any]] = {
     "No cosine-similarity attention": {"similarity_attention": False},
     "No curiosity loss": {"alpha": 0.0},
 }
-RECIPE: Mapping[str, Mapping[str, Any]] = {
-    "no guided asking": {"guided_asking": 0.0},
-    "no curiosity floor": {"curiosity_floor": 0.0},
-    "no environment dropout": {"environment_dropout": 0.0},
-    "no falling rate": {"cooldown": 0.0},
-    "no reasons": {"predict_reasons": False},
-}
-"""One thing less that `mini` does otherwise than Table D.1 (docs/sources.md, S32 to S35)."""
-HOUSES = (8, 32, 128, 256)
 REASONS = tuple(
     f"{r} {what}" for r in ("lost", "uncertain wrong", "never asked") for what in ("accuracy", "precision", "recall")
 )
-SHORTER = "equal_passes"
-"""In a row's settings: trained on fewer houses for as many passes as the agent of all houses, not as many updates."""
-
-
-def _houses_table(every: int) -> StudyTable:
-    """Success against training houses, of those numbers that are fewer than `every`."""
-    counts = [n for n in HOUSES if n < every]
-    updates = {n: learned(f"{n} houses", training_houses=n) for n in counts}
-    passes = [learned(f"{n} houses, equal passes", training_houses=n, equal_passes=True) for n in counts]
-    plain = [learned(f"{n} houses, without a trail", "learned, without a trail", training_houses=n) for n in counts]
-    every_house = learned("all houses")
-    rows = [
-        *(dataclasses.replace(r, x=n, series="equal updates") for n, r in updates.items()),
-        dataclasses.replace(every_house, x=every, series="equal updates"),
-        *(dataclasses.replace(r, x=n, series="equal passes") for n, r in zip(counts, passes, strict=True)),
-        *plain,
-        learned("all houses, without a trail", "learned, without a trail"),
-    ]
-    steps = [(updates[b], updates[a]) for a, b in itertools.pairwise(counts)]
-    return StudyTable(
-        "Success and the number of training houses (no counterpart in the dissertation)",
-        tuple(rows), FULL, TEST, (*steps, *((every_house, r) for r in updates.values())),
-        Figure(("success",), "training houses", "success (%)", log=True),
-    )  # fmt: skip
-
-
-def _requests_table() -> StudyTable:
-    asked = [learned(name.removeprefix("learned, "), name) for kind in ASK_THRESHOLDS.values() for name in kind]
-    priced = [learned(f"trained at price {p:g}", ask_price=p) for p in (0.25, 4.0)]
-    title = "Success and the number of requests (no counterpart in the dissertation)"
-    return StudyTable(title, (*asked, *priced), ("success", "spl", "requests"), ("test_unseen",))
-
-
 TABLES: Mapping[str, StudyTable] = {
     "4.3": StudyTable(
         "Results on the test splits",
@@ -139,26 +96,6 @@ TABLES: Mapping[str, StudyTable] = {
         VALIDATION,
         tuple((learned("Final agent"), learned(name, **off)) for name, off in ABLATIONS.items()),
     ),
-    "lights": StudyTable(
-        "Success and the number of lightings of each training house (no counterpart in the dissertation)",
-        (learned("1 lighting"), learned("3 lightings", lights=3)),
-        FULL,
-        TEST,
-        ((learned("3 lightings", lights=3), learned("1 lighting")),),
-    ),
-    "departures": StudyTable(
-        "What mini does otherwise than Table D.1, one thing less at a time (no counterpart in the dissertation)",
-        (
-            learned("as mini is"),
-            *(learned(name, **off) for name, off in RECIPE.items()),
-            *(learned(name.removeprefix("learned, "), name) for name in EVAL_ABLATIONS),
-        ),
-        (*FULL, "mistake repeat", "request repeat"),
-        TEST,
-        tuple((learned("as mini is"), learned(name, **off)) for name, off in RECIPE.items()),
-    ),
-    "requests": _requests_table(),
-    "houses": _houses_table(max(HOUSES) + 1),
 }
 """The studies by name. D.2 is on the validation splits, as in the dissertation. Pairs that are compared differ in one
 thing: half curiosity is learned asking with the alpha of heuristic askers (Table D.1, note)."""
@@ -183,7 +120,7 @@ def in_both_ways(table: StudyTable) -> StudyTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(EpisodeStudy):
-    """Tables 4.3 to 4.6 and D.2, and success against houses, lightings and requests."""
+    """Tables 4.3 to 4.6, D.1 and D.2."""
 
     encoder: Path
     config: TrainingConfig
@@ -203,10 +140,9 @@ class HannaStudy(EpisodeStudy):
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
-        every = len(self._lessons().data.names("train"))
         ood = Dataset(self.elsewhere or self.data).ood
         found = {}
-        for name, table in {**TABLES, "houses": _houses_table(every)}.items():
+        for name, table in TABLES.items():
             splits = [s for s in table.splits if self.elsewhere is None or not s.endswith("_seen")]
             splits += ood if table.splits == TEST else ()
             found[name] = dataclasses.replace(table, splits=tuple(splits))
@@ -215,13 +151,7 @@ class HannaStudy(EpisodeStudy):
         return found
 
     def settings(self, train: Mapping[str, Any], seed: int) -> TrainingConfig:
-        changes = {k: v for k, v in train.items() if k != SHORTER}
-        config = dataclasses.replace(self.config, seed=seed, **changes)
-        if SHORTER not in train:
-            return config
-        share = min(1.0, config.training_houses / len(self._lessons().data.names("train")))
-        updates = max(1, round(config.iterations * share))
-        return dataclasses.replace(config, iterations=updates, validate_every=min(config.validate_every, updates))
+        return dataclasses.replace(self.config, seed=seed, **train)
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         data = dataset_of(self.data, "hanna")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import nn
 
@@ -14,10 +13,8 @@ from agents.common.tensor_file import put
 from agents.common.weights import load_weights, save_weights
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
-from agents.hari.sight import FeatureSpec
 from agents.hari.words import FeatureWords
 from embodied.identity import Identity
-from embodied.interface import FeatureSource, Sight
 
 REMEDY = "train it again with `embodied train hari`"
 
@@ -32,8 +29,6 @@ class HariAbout:
     execution: ExecutionConfig
     intention: IntentionConfig | None = None
     """None for an execution policy alone."""
-    sight: FeatureSpec | None = None
-    """None for an execution policy that reads words alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,22 +38,6 @@ class Executor:
     network: ExecutionNetwork
     words: FeatureWords
     config: ExecutionConfig
-    seeing: FeatureSpec | None = None
-    """Whose features it learned from; None: it reads words alone."""
-    eyes: FeatureSource | None = None
-    """Where the features come from; not part of its file."""
-
-    def look(self, sights: Sequence[Sight]) -> list[np.ndarray] | list[None]:
-        """(36, D) float32 of each sight; None of each where it does not see.
-
-        Raises:
-          ValueError: it sees, and nobody gave it eyes.
-        """
-        if self.seeing is None:
-            return [None] * len(sights)
-        if self.eyes is None:
-            raise ValueError("this execution policy sees; give it its houses' features (agents.hari.run.with_eyes)")
-        return [self.eyes.features(s) for s in sights]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +49,11 @@ class HariAgent:
     config: IntentionConfig
 
 
-def new_executor(
-    config: ExecutionConfig, words: FeatureWords, seeing: FeatureSpec | None = None, eyes: FeatureSource | None = None
-) -> Executor:
-    """Random weights that follow from the seed; of a policy that sees where `seeing` says whose features."""
+def new_executor(config: ExecutionConfig, words: FeatureWords) -> Executor:
+    """Random weights that follow from the seed."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
-        network = ExecutionNetwork(config, len(words), seeing.size if seeing else 0)
-        return Executor(network, words, config, seeing, eyes)
+        return Executor(ExecutionNetwork(config, len(words)), words, config)
 
 
 def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, RecurrentHead]:
@@ -88,32 +64,30 @@ def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, Recu
         return actor, RecurrentHead(belief, config.hidden_size, 1, knows_stack=config.knows_stack)
 
 
-def begun_with(executor: Executor, other: Executor) -> Executor:
-    """`executor` with the words and weights of another; one that reads alone may so be taught to see.
+def begun_with(config: ExecutionConfig, other: Executor) -> Executor:
+    """An execution policy with the words and weights of another.
 
     Raises:
-      ValueError: the other has other sizes, or sees what this one does not.
+      ValueError: the other has other sizes.
     """
-    new = new_executor(executor.config, other.words, executor.seeing, executor.eyes)
+    new = new_executor(config, other.words)
     try:
-        lost = new.network.load_state_dict(other.network.state_dict(), strict=False)
+        new.network.load_state_dict(other.network.state_dict())
     except RuntimeError as e:
         raise ValueError(f"an execution policy of other sizes cannot be begun with ({e})") from e
-    if lost.unexpected_keys or any(not k.startswith("sight.") for k in lost.missing_keys):
-        raise ValueError(f"cannot begin with a policy that has {lost.unexpected_keys} and lacks {lost.missing_keys}")
     return new
 
 
 def save_executor(executor: Executor, path: Path, identity: Identity | None = None) -> None:
     """Write an execution policy and what it was trained with, atomically."""
-    about = HariAbout(executor.words.names, executor.config, sight=executor.seeing)
+    about = HariAbout(executor.words.names, executor.config)
     save_weights(path, "hari", _named("execution", executor.network), about, identity)
 
 
 def save_agent(agent: HariAgent, path: Path, identity: Identity | None = None) -> None:
     """Write an agent with its execution policy and what it was trained with, atomically."""
     executor = agent.executor
-    about = HariAbout(executor.words.names, executor.config, agent.config, executor.seeing)
+    about = HariAbout(executor.words.names, executor.config, agent.config)
     tensors = _named("execution", executor.network) | _named("actor", agent.actor)
     save_weights(path, "hari", tensors, about, identity)
 
@@ -125,7 +99,7 @@ def load_executor(path: Path) -> Executor:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
     tensors, told = load_weights(path, "hari", HariAbout, REMEDY)
-    executor = new_executor(told.execution, FeatureWords(told.names), told.sight)
+    executor = new_executor(told.execution, FeatureWords(told.names))
     put(executor.network, _of("execution", tensors), path)
     executor.network.eval()
     return executor

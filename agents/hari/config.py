@@ -4,21 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import (
-    AT_LEAST_ONE,
-    NOT_ALL,
-    NOT_NEGATIVE,
-    POSITIVE,
-    SHARE,
-    ValidatedRunSettings,
-    require,
-    require_word,
-)
-
-SEES = ("words", "features")
-"""What an execution policy knows its own place by."""
-STATES = ("none", "sparse", "dense")
-"""As in embodied.envs.hari."""
+from agents.common.settings import AT_LEAST_ONE, NOT_ALL, NOT_NEGATIVE, POSITIVE, SHARE, ValidatedRunSettings, require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,32 +26,27 @@ class ExecutionConfig(ValidatedRunSettings):
     guided: float = 0.0
     """Share of the updates, the first ones, over which the shortest path takes ever fewer of the steps: DAgger's beta
     falls linearly from 1 to 0 over them (docs/sources.md, S81)."""
-    redirected: float = 0.0
-    """Share of the training episodes that are given a sub-goal on their way, as SUB does (docs/sources.md, S132)."""
     subgoals: float = 0.0
     """Share of the training episodes that have a sub-goal of one to three nodes from the beginning, worded as SUB's
     answer is (docs/sources.md, S144)."""
+    standing: float = 0.0
+    """Share of the training steps at which it stands still and is told what it is told unasked, as an agent that asks
+    does (docs/sources.md, S172)."""
+    kept: float = 0.1
+    """Share of the object classes that descriptions keep while it stands still (docs/sources.md, S170)."""
     afresh: bool = False
     """Whether its belief begins anew when the goal on top of the stack is another one (docs/sources.md, S145)."""
     clip: float = 1.0
     """Norm to which gradients are cut (docs/sources.md, S76)."""
     cooldown: float = 0.0
     """Share of the updates, the last ones, over which the learning rate falls linearly (docs/sources.md, S79)."""
-    sees: str = "words"
-    """'words': d^s alone, as in the dissertation; 'features': CNN features of the panorama always, d^s where there is
-    one (docs/sources.md, S130)."""
-    described: float = 0.5
-    """With features: share of the training episodes with words for d^s, at a share of their steps that is drawn."""
-    environment_dropout: float = 0.0
-    """With features: share of their channels that are hidden for a whole training episode (docs/sources.md, S131)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require(self, AT_LEAST_ONE, "hidden_size", "layers", "heads", "horizon")
         require(self, POSITIVE, "clip")
-        require(self, NOT_ALL, "dropout", "environment_dropout")
-        require(self, SHARE, "cooldown", "guided", "described", "redirected", "subgoals")
-        require_word(self, "sees", SEES)
+        require(self, NOT_ALL, "dropout", "standing")
+        require(self, SHARE, "cooldown", "guided", "subgoals", "kept")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")
 
@@ -89,8 +70,6 @@ class IntentionConfig(ValidatedRunSettings):
     knows_stack: bool = True
     """Whether it is told how many goals are on the stack, which it put there itself; the dissertation's is not, and
     blames that for its critic's mistakes (4.3.6; docs/sources.md, S77)."""
-    move_temperature: float | None = None
-    """At which DO draws its move from the execution policy; None takes the likeliest (docs/sources.md, S82)."""
     stack: int = 2
     """L, the most goals on the stack."""
     longest: int = 3
@@ -101,8 +80,6 @@ class IntentionConfig(ValidatedRunSettings):
     """H, the most steps of an episode."""
     cooperative: bool = True
     """False: the assistant answers another question than was asked (Table 4.7)."""
-    states: str = "sparse"
-    """How the agent's own place is described without asking: 'none', 'sparse' (as in the dissertation) or 'dense'."""
     kept: float = 0.1
     """Share of the object classes that sparse descriptions keep (docs/sources.md, S170)."""
     perfect: bool = False
@@ -118,11 +95,6 @@ class IntentionConfig(ValidatedRunSettings):
         require(self, POSITIVE, "clip")
         require(self, NOT_NEGATIVE, "critic_iterations", "cost", "entropy")
         require(self, SHARE, "kept")
-        require_word(self, "states", STATES)
-        if self.move_temperature is not None and not 0 < self.move_temperature < float("inf"):
-            raise ValueError(
-                f"move_temperature should be above 0, got {self.move_temperature}; leave it out for likeliest"
-            )
 
     @property
     def updates(self) -> int:
@@ -138,12 +110,14 @@ EXECUTION_SCALES: dict[str, ExecutionConfig] = {
         iterations=3_000,
         guided=0.5,
         cooldown=0.4,
-        environment_dropout=0.4,
+        subgoals=0.5,
+        standing=0.3,
+        afresh=True,
         validate_every=250,
     ),
     "paper": ExecutionConfig(),
 }
-"""'mini': about half an hour of one core in flats of 60 to 100 m2; 'paper': Table E.2, for a GPU."""
+"""'mini': about half an hour of one core; 'paper': Table E.2, for a GPU."""
 INTENTION_SCALES: dict[str, IntentionConfig] = {
     "mini": IntentionConfig(
         hidden_size=128, learning_rate=1e-3, batch=64, critic_iterations=30, iterations=200, validate_every=50

@@ -29,10 +29,9 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
     Args:
       means: X_a of "random + rules": the agent's mean number of each intention on validation tasks.
     """
-    drawn = agent.config.move_temperature
     return {
-        **{name: RuleAgent(agent.executor, rule, drawn) for name, rule in RULES.items()},
-        RANDOM: RuleAgent(agent.executor, RandomWithBudgets(means), drawn),
+        **{name: RuleAgent(agent.executor, rule) for name, rule in RULES.items()},
+        RANDOM: RuleAgent(agent.executor, RandomWithBudgets(means)),
         "learned": policy_of(agent),
         "learned, likeliest": policy_of(agent, sample=False),
     }

@@ -10,7 +10,6 @@ import torch
 from torch import Tensor, nn
 
 from agents.hari.config import ExecutionConfig
-from agents.hari.sight import Headings
 from agents.hari.transformer import Packing, Transformer
 from agents.hari.words import SIZES, Inputs
 
@@ -52,7 +51,7 @@ class Encoded:
 
 
 class ExecutionNetwork(nn.Module):
-    """pi-hat: (b^s_{t-1}, d^s, d^g) -> b^s_t and a distribution over moves; one that sees reads panoramas, too.
+    """pi-hat: (b^s_{t-1}, d^s, d^g) -> b^s_t and a distribution over moves.
 
     "We adapt the V&L BERT architecture": an encoder reads each description by itself, a decoder
     attends from the previous hidden vector over both. What the text leaves open and is decided
@@ -61,12 +60,8 @@ class ExecutionNetwork(nn.Module):
     neighbour to the north are near each other from the start.
     """
 
-    def __init__(self, config: ExecutionConfig, names: int, sight: int = 0) -> None:
-        """
-        Args:
-          names: how many words it knows.
-          sight: D of the features that it sees; 0: it reads words alone.
-        """
+    def __init__(self, config: ExecutionConfig, names: int) -> None:
+        """`names`: how many words it knows."""
         super().__init__()
         h = config.hidden_size
         self.names = nn.Embedding(names, h, padding_idx=0)
@@ -88,7 +83,6 @@ class ExecutionNetwork(nn.Module):
         self.query = nn.Linear(h, h)
         self.key = nn.Linear(h, h)
         self.norm = nn.LayerNorm(h)
-        self.sight = Headings(sight, h) if sight else None
 
     def begin(self, batch: int) -> Tensor:
         """(B, h): b^s_0."""
@@ -115,28 +109,14 @@ class ExecutionNetwork(nn.Module):
         )
         state_rows = state.rows + self.roles[1] + state_shared
         goal_rows = goal.rows + self.roles[2] + goal_shared
-        seen_rows, along = self.look(inputs, device)  # (B, 12 or 0, h), (B, C + 1, h) or 0
-        rows = torch.cat([(before + self.roles[0])[:, None], state_rows, goal_rows, seen_rows], 1)  # (B, 1+S+G+12, h)
+        rows = torch.cat([(before + self.roles[0])[:, None], state_rows, goal_rows], 1)  # (B, 1 + S + G, h)
         there = torch.ones_like(state.present[:, :1])
-        seen = there.expand(-1, seen_rows.shape[1])
-        packing = Packing.of(torch.cat([there, state.present, goal.present, seen], 1))
+        packing = Packing.of(torch.cat([there, state.present, goal.present], 1))
         belief = self.norm(self.decoder(packing.pack(rows), packing, firsts_only=True))  # (B, h)
         moves, angles, allowed = (torch.from_numpy(x).to(device) for x in (inputs.moves, inputs.angles, inputs.allowed))
-        keys = self.key(self.embed(moves) + self.angles(angles) + along)  # (B, C + 1, h)
+        keys = self.key(self.embed(moves) + self.angles(angles))  # (B, C + 1, h)
         scores = torch.einsum("bh,bch->bc", self.query(belief), keys) / math.sqrt(keys.shape[-1])
         return belief, scores.masked_fill(~allowed, -torch.inf).log_softmax(-1)
-
-    def look(self, inputs: Inputs, device: torch.device) -> tuple[Tensor, Tensor | float]:
-        """(B, 12, h) rows of what is seen and (B, C + 1, h) of what is seen along each move; nothing without sight."""
-        if self.sight is None:
-            return self.first.new_zeros(len(inputs.state), 0, self.first.shape[0]), 0.0
-        if inputs.sight is None:
-            raise ValueError("this execution policy sees; it needs features of the panoramas (agents.hari.sight)")
-        views = torch.from_numpy(inputs.sight).to(device)
-        horizontal = self.others[1]
-        assert isinstance(horizontal, nn.Embedding)
-        moves = self.sight.moves(views, torch.from_numpy(inputs.views).to(device))
-        return self.sight.rows(views, horizontal), moves
 
     def encode(self, rows: Tensor) -> Encoded:
         """(B, M, 5) int64 of descriptions, each of one row or more -> what the encoder makes of them."""

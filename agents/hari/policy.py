@@ -79,13 +79,9 @@ class Considered:
     log_moves: Tensor
     """(b, C + 1) log-probabilities, stopping last."""
 
-    def move(self, k: int, temperature: float | None, rng: np.random.Generator) -> int:
-        """Where the k-th agent would go, stopping aside: the likeliest move, or one drawn at a temperature."""
-        logits = self.log_moves[k, :-1]
-        if temperature is None:
-            return int(logits.argmax())
-        p = (logits.double() / temperature).softmax(0).numpy()
-        return int(rng.choice(len(p), p=p))
+    def move(self, k: int) -> int:
+        """Where the k-th agent most probably goes, stopping aside."""
+        return int(self.log_moves[k, :-1].argmax())
 
     @property
     def would_stop(self) -> np.ndarray:
@@ -107,8 +103,8 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     goals = [reader("goal", o.goal_descriptions[-1]) for o in seen]
     inputs = collate(
         [
-            percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn, view)
-            for s, g, o, view in zip(states, goals, seen, reader.executor.look([o.sight for o in seen]), strict=True)
+            percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn)
+            for s, g, o in zip(states, goals, seen, strict=True)
         ]
     )
     state, goal = (Encoded.together([r.encoded for r in some]) for some in (states, goals))
@@ -181,8 +177,6 @@ class HariPolicy:
     actor: RecurrentHead
     sample: bool = True
     """Intentions are drawn from psi; False takes the likeliest. Open in the text: docs/sources.md, S78."""
-    temperature: float | None = None
-    """At which DO draws its move; None: it takes the likeliest (docs/sources.md, S82)."""
     choices: list[Choice] | None = field(default=None, repr=False)
     """Where each step is written down for training; None: nowhere."""
 
@@ -237,7 +231,7 @@ class HariPolicy:
             elif stops[k]:
                 move = None
             else:
-                move = considered.move(k, self.temperature, rngs[i])
+                move = considered.move(k)
             actions[i] = action_of(drawn[k], move, thought)
         intentions = torch.tensor(drawn)
         if self.choices is not None:
@@ -274,4 +268,4 @@ class PerfectOnSubgoals(HariPolicy):
 def policy_of(agent: HariAgent, *, sample: bool = True) -> HariPolicy:
     """A trained agent as it is judged."""
     kind = PerfectOnSubgoals if agent.config.perfect else HariPolicy
-    return kind(agent.executor, agent.actor, sample, agent.config.move_temperature)
+    return kind(agent.executor, agent.actor, sample)

@@ -5,8 +5,7 @@
         ask the shortest path what would have been right at each step
         cross-entropy, Adam step                                           (appendix E)
 
-A simulator supplies dense descriptions here, so no assistant takes part (the pre-training phase of 4.3.5). A policy
-that sees is shown the panorama at every step and told d^s at some, as if it had asked (docs/sources.md, S130).
+A simulator supplies dense descriptions here, so no assistant takes part (the pre-training phase of 4.3.5).
 """
 
 from __future__ import annotations
@@ -23,21 +22,17 @@ from torch import Tensor
 from agents.common.session import Note, Progress, Session, descend, dropout_of, falling_rate, set_rate, tasks_of_update
 from agents.hari.agent import Executor, save_executor
 from agents.hari.config import ExecutionConfig
-from agents.hari.networks import Encoded
-from agents.hari.sight import hidden_channels
 from agents.hari.words import Inputs, collate, padded, percept
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.assistants.hari import LONGEST, described_subgoal
 from embodied.identity import Identity
-from embodied.interface import Candidates, Description, FindObject, Move, Place, Pose, Sight, Task
+from embodied.interface import Candidates, Description, FindObject, Move, Place, Pose, Task
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action
 
 MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "validate_every", "validation_tasks")
 """Settings that may differ on resuming."""
-REDIRECTED = 5
-"""Steps after which a walk has been given its sub-goal, if it is to have one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +56,6 @@ class Walk:
     goal: Description
     rng: np.random.Generator
     ended: bool = False
-    described: float = 1.0
-    """Share of its steps at which it is told d^s."""
-    channels: np.ndarray | None = None
-    """(D,) float32 that hides channels of what it sees, in training."""
-    redirected_at: int | None = None
-    """The step before which it is given a sub-goal; None for never."""
 
 
 def pretrain(
@@ -127,18 +116,10 @@ def learn_once(
     config = executor.config
     tasks = tasks_of_update(lessons.training, update, config.batch, config.seed)
     walks = [_begin(lessons, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
-    if executor.seeing is not None:
-        for walk in walks:
-            walk.described = max(0.0, 1 - walk.rng.random() / config.described) if config.described else 0.0
-            walk.channels = hidden_channels(executor.seeing.size, config.environment_dropout, walk.rng)
     if config.subgoals:
         for walk in walks:
             if walk.rng.random() < config.subgoals:
                 give_subgoal(walk, lessons.describer, longest=int(walk.rng.integers(1, LONGEST + 1)))
-    if config.redirected:
-        for walk in walks:
-            if walk.rng.random() < config.redirected:
-                walk.redirected_at = int(walk.rng.integers(REDIRECTED))
     executor.network.train()
     with dropout_of(config.seed, update):
         losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
@@ -162,19 +143,20 @@ def _play(
     Args:
       beta: share of the steps that go where the shortest path goes instead.
     """
+    config, describer = executor.config, lessons.describer
     beliefs = executor.network.begin(len(walks))  # (B, h)
     goals = executor.network.encode(torch.from_numpy(padded([executor.words.rows(w.goal, "goal") for w in walks])))
     losses, right = [], []
-    for t in range(horizon):
+    for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
         if not alive:
             break
-        redirected = [i for i in alive if walks[i].redirected_at == t]
-        goals = redirect(executor, lessons.describer, walks, redirected, goals)
-        if executor.config.afresh and redirected:
-            beliefs = beliefs.index_put((torch.tensor(redirected),), executor.network.begin(len(redirected)))
+        standing = [config.standing > 0 and walks[i].rng.random() < config.standing for i in alive]
         reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
-        told = [_thinned(lessons.describer, walks[i]) for i in alive]
+        told = [
+            describer.sparse(walks[i].place, walks[i].pose.node) if still else _thinned(describer, walks[i])
+            for i, still in zip(alive, standing, strict=True)
+        ]
         batch = perceived(executor, [walks[i] for i in alive], told, [candidates for candidates, _ in reach])
         new, log_moves = executor.network(beliefs[alive], batch, goal=goals[alive])  # (b, h), (b, C + 1)
         stop = log_moves.shape[1] - 1
@@ -184,8 +166,9 @@ def _play(
         beliefs = beliefs.index_put((torch.tensor(alive),), new)
         p = log_moves.detach().exp().double().numpy()
         for row, i in enumerate(alive):
-            drawn = int(walks[i].rng.choice(stop + 1, p=p[row] / p[row].sum()))
-            _go(walks[i], int(wanted[row]) if walks[i].rng.random() < beta else drawn, reach[row][1], stop)
+            if not standing[row]:
+                drawn = int(walks[i].rng.choice(stop + 1, p=p[row] / p[row].sum()))
+                _go(walks[i], int(wanted[row]) if walks[i].rng.random() < beta else drawn, reach[row][1], stop)
     return losses, right
 
 
@@ -204,38 +187,15 @@ def give_subgoal(walk: Walk, describer: Describer, longest: int = LONGEST) -> No
     walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
 
 
-def redirect(
-    executor: Executor, describer: Describer, walks: Sequence[Walk], which: Sequence[int], goals: Encoded
-) -> Encoded:
-    """Give some walks the sub-goal that the assistant would name where they are; all walks' goals as encoded.
-
-    Beliefs are not touched: they are carried on, as when SUB is asked in the middle of an episode.
-    """
-    if not which:
-        return goals
-    for i in which:
-        give_subgoal(walks[i], describer)
-    rows = torch.from_numpy(padded([executor.words.rows(walks[i].goal, "goal") for i in which]))
-    alone = dict(enumerate(goals.alone())) | dict(zip(which, executor.network.encode(rows).alone(), strict=True))
-    return Encoded.together([alone[i] for i in range(len(walks))])
-
-
 def perceived(
     executor: Executor, walks: Sequence[Walk], told: Sequence[Description], candidates: Sequence[Candidates]
 ) -> Inputs:
-    """What some walks are told of where they are and, of a policy that sees, what is seen there."""
-    views = executor.look([Sight(w.task.world, w.pose.node) for w in walks])
-    return collate(
-        [
-            percept(executor.words, d, w.goal, c, w.pose.turn, v if v is None or w.channels is None else v * w.channels)
-            for w, d, c, v in zip(walks, told, candidates, views, strict=True)
-        ]
-    )
+    """What some walks are told of where they are."""
+    some = zip(walks, told, candidates, strict=True)
+    return collate([percept(executor.words, d, w.goal, c, w.pose.turn) for w, d, c in some])
 
 
 def _thinned(describer: Describer, walk: Walk) -> Description:
-    if walk.described < 1 and walk.rng.random() >= walk.described:
-        return ()
     return dropped(describer.dense(walk.place, walk.pose.node), rng=walk.rng)
 
 
@@ -253,8 +213,7 @@ def _go(walk: Walk, column: int, poses: Sequence[Pose], stop: int) -> None:
 
 
 def pretraining_success(executor: Executor, lessons: PretrainingData, tasks: Sequence[Task]) -> float:
-    """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state; by sight
-    alone where the policy sees."""
+    """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state."""
     config = executor.config
     executor.network.eval()
     walks = [_begin(lessons, t, stream(config.seed, "validation", t.id)) for t in tasks]
@@ -271,9 +230,9 @@ def _play_greedily(executor: Executor, lessons: PretrainingData, walks: Sequence
         if not alive:
             return
         reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
-        dense = lambda walk: () if executor.seeing else lessons.describer.dense(walk.place, walk.pose.node)
         some = [walks[i] for i in alive]
-        batch = perceived(executor, some, [dense(w) for w in some], [candidates for candidates, _ in reach])
+        told = [lessons.describer.dense(w.place, w.pose.node) for w in some]
+        batch = perceived(executor, some, told, [candidates for candidates, _ in reach])
         beliefs[alive], log_moves = executor.network(beliefs[alive], batch)
         for i, column, (_, poses) in zip(alive, log_moves.argmax(1).tolist(), reach, strict=True):
             _go(walks[i], column, poses, log_moves.shape[1] - 1)

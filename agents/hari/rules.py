@@ -146,8 +146,6 @@ class RuleAgent:
 
     executor: Executor
     rule: Rule
-    temperature: float | None = None
-    """At which DO draws its move; None: it takes the likeliest."""
 
     def __post_init__(self) -> None:
         self._reader = Reader(self.executor)
@@ -166,7 +164,7 @@ class RuleAgent:
             stop = bool(considered.would_stop[k])
             moment = RuleMoment(taken[i].copy(), bool(described[i]), stop, available(seen), mind.budgets[i])
             chosen = self.rule.choose(moment, rngs[i])
-            move = considered.move(k, self.temperature, rngs[i]) if chosen == DO else None
+            move = considered.move(k) if chosen == DO else None
             actions[i] = action_of(chosen, move)
             taken[i, chosen] += 1
             described[i] = chosen == CUR or (described[i] and chosen != DO)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,6 @@ from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, ne
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import TaskSplit, train
 from agents.hari.pretraining import PretrainingData, pretrain
-from agents.hari.sight import FeatureSpec, eyes_of
 from agents.hari.words import feature_words
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.envs.base import HelpEnv
@@ -36,19 +34,18 @@ def hari_data(folder: Path) -> Dataset:
     return dataset_of(folder, "hari")
 
 
-def lessons_of(data: Dataset) -> PretrainingData:
-    """The pre-training splits."""
+def lessons_of(data: Dataset, kept: float) -> PretrainingData:
+    """The pre-training splits; sparse descriptions keep a share of the object classes."""
     places: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
     validation = spread(data.tasks("pretrain_val"), None)
-    return PretrainingData(places, data.describer(), data.tasks("pretrain"), validation)
+    return PretrainingData(places, data.describer(kept), data.tasks("pretrain"), validation)
 
 
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
     costs = Costs.alike(config.cost)
-    return HariRules(
-        costs, config.stack, config.longest, config.cooperative, config.states, config.horizon, config.kept
-    )
+    some = {"stack": config.stack, "longest": config.longest, "cooperative": config.cooperative}
+    return HariRules(costs, horizon=config.horizon, kept=config.kept, **some)
 
 
 def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> TaskSplit:
@@ -71,24 +68,11 @@ def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[
     return made
 
 
-def with_eyes(executor: Executor, data: Dataset, picture_kind: str | None = None) -> Executor:
-    """An execution policy with the features of a data set's houses, if it is one that sees.
-
-    Args:
-      picture_kind: of the pictures that they were made from, as in agents.vision.run.pictures_of.
-    """
-    if executor.seeing is None:
-        return executor
-    return dataclasses.replace(executor, eyes=eyes_of(data, executor.seeing.encoder, picture_kind=picture_kind)[0])
-
-
 def train_execution(
     data: Dataset,
     config: ExecutionConfig,
     folder: Path,
     *,
-    encoder: str = "",
-    picture_kind: str | None = None,
     begin: Path | None = None,
     minutes: float | None = None,
     note: Note = print,
@@ -96,34 +80,23 @@ def train_execution(
     """Train, or go on training, the execution policy of a run folder.
 
     Args:
-      encoder: digest of the one whose features a policy sees that does.
-      picture_kind: of the pictures that these were made from, as in agents.vision.run.pictures_of.
-      begin: with the words and weights of this execution policy, not with random ones; one that reads learns to see so.
+      begin: with the words and weights of this execution policy, not with random ones.
     """
-    lessons = lessons_of(data)
+    lessons = lessons_of(data, config.kept)
     describe = lessons.describer.dense
     houses = {t.world for t in lessons.training}
     places = [lessons.places[name] for name in sorted(houses)]
     words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
-    eyes, seeing = None, None
-    if config.sees == "features":
-        eyes, seeing = eyes_of(data, encoder, splits=("pretrain", "pretrain_val"), picture_kind=picture_kind)
-        note(f"sees features of {seeing.size} numbers per view, pictures: {seeing.pictures}")
-    executor = new_executor(config, words, seeing, eyes)
-    if begin is not None:
-        executor = begun_with(executor, load_executor(begin))
+    executor = new_executor(config, words) if begin is None else begun_with(config, load_executor(begin))
     size = sum(p.numel() for p in executor.network.parameters())
-    note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(words)} names, {size:,} parameters")
-    identity = execution_identity(data, config, seeing, begin)
+    note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(executor.words)} names, {size:,} parameters")
+    identity = execution_identity(data, config, begin)
     return pretrain(executor, lessons, folder, identity, minutes=minutes, note=note)
 
 
-def execution_identity(
-    data: Dataset, config: ExecutionConfig, seeing: FeatureSpec | None, begin: Path | None = None
-) -> dict[str, Any]:
+def execution_identity(data: Dataset, config: ExecutionConfig, begin: Path | None = None) -> dict[str, Any]:
     """All that an execution policy depends on; `begin` as of train_execution."""
-    more: dict[str, object] = {} if seeing is None else {"sight": seeing}
-    more |= {} if begin is None else {"begin": weights_digest(begin)}
+    more = {} if begin is None else {"begin": weights_digest(begin)}
     return identity_of("agents.hari.run", settings=config, data=data.digest, **more)
 
 
@@ -137,8 +110,8 @@ def train_intention(
     note: Note = print,
     on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
 ) -> Progress:
-    """Train, or go on training, the intention policy of a run folder over a trained execution policy that has its eyes;
-    `on_validation` is given the episodes of each validation."""
+    """Train, or go on training, the intention policy of a run folder over a trained execution policy; `on_validation`
+    is given the episodes of each validation."""
     actor, critic = new_heads(config, executor.config.hidden_size)
     training = task_split_of(data, ["train"], config)
     validation = task_split_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)

@@ -99,10 +99,6 @@ class Inputs:
     """(B, S) int64: 1 where a feature set's name stands in the other description, too, 2 where the whole set does."""
     goal_shared: np.ndarray
     """(B, G) int64, likewise."""
-    views: np.ndarray
-    """(B, C + 1) int64: 1 + the view that each move leads into; 0 for stopping and padding."""
-    sight: np.ndarray | None = None
-    """(B, 36, D) float32: what is seen, in absolute order; None where nobody looks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,34 +110,21 @@ class PerceptRows:
     moves: np.ndarray
     angles: np.ndarray
     allowed: np.ndarray
-    views: np.ndarray
-    sight: np.ndarray | None = None
 
 
 def percept(
-    words: FeatureWords,
-    state: Description,
-    goal: Description,
-    candidates: Candidates,
-    turn: int,
-    sight: np.ndarray | None = None,
+    words: FeatureWords, state: Description, goal: Description, candidates: Candidates, turn: int
 ) -> PerceptRows:
-    """One agent's descriptions, moves and (36, D) features of what it sees as rows."""
-    return percept_of_rows(words, words.rows(state, "state"), words.rows(goal, "goal"), candidates, turn, sight)
+    """One agent's descriptions and moves as rows."""
+    return percept_of_rows(words, words.rows(state, "state"), words.rows(goal, "goal"), candidates, turn)
 
 
 def percept_of_rows(
-    words: FeatureWords,
-    state: np.ndarray,
-    goal: np.ndarray,
-    candidates: Candidates,
-    turn: int,
-    sight: np.ndarray | None = None,
+    words: FeatureWords, state: np.ndarray, goal: np.ndarray, candidates: Candidates, turn: int
 ) -> PerceptRows:
     """One agent's moves as rows beside those of its descriptions."""
     moves, angles = move_rows(words, candidates), move_angles(candidates, turn)
-    views = np.append(1 + candidates.view, 0).astype(np.int64)
-    return PerceptRows(state, goal, moves, angles, np.append(candidates.allowed, True), views, sight)
+    return PerceptRows(state, goal, moves, angles, np.append(candidates.allowed, True))
 
 
 def collate(percepts: Sequence[PerceptRows]) -> Inputs:
@@ -150,9 +133,6 @@ def collate(percepts: Sequence[PerceptRows]) -> Inputs:
     state, goal = padded([p.state for p in percepts]), padded([p.goal for p in percepts])
     named = (state[:, :, None, 0] == goal[:, None, :, 0]) & (goal[:, None, :, 0] > UNKNOWN)  # (B, S, G)
     same = named.astype(np.int64) + (named & (state[:, :, None] == goal[:, None]).all(-1))
-    seen = [p.sight for p in percepts if p.sight is not None]
-    if seen and len(seen) < len(percepts):
-        raise ValueError(f"{len(seen)} of {len(percepts)} agents see; all of a batch do, or none")
     return Inputs(
         state,
         goal,
@@ -161,8 +141,6 @@ def collate(percepts: Sequence[PerceptRows]) -> Inputs:
         np.stack([_stop_last(p.allowed, most) for p in percepts]),
         same.max(2),
         same.max(1),
-        np.stack([_stop_last(p.views, most) for p in percepts]),
-        np.stack(seen) if seen else None,
     )
 
 

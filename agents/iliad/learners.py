@@ -1,4 +1,4 @@
-"""Algorithm 9 (ADEL), DAgger and REINFORCE, one update each, over the protocol of a problem.
+"""Algorithm 9 (ADEL), Algorithm 5, DAgger and REINFORCE: the loss of one batch each, over the protocol of a problem.
 
 All three begin alike: the world gives tasks with requests, an agent carries them out. They differ in
 what they hear: a description, a demonstration, or a number.
@@ -15,15 +15,25 @@ import torch
 from torch import Tensor
 
 from agents.common.actor_critic import Decisions, actor_loss
-from agents.common.session import descend
 from agents.iliad.protocol import NOTHING, DescribingTeacher, E, ExecutionScores, Marginal, Q, RequestWorld, Student
 
 
 @dataclass(frozen=True, eq=False)
-class IliadLesson(Generic[Q, E]):
-    """What came of one update."""
+class Asked(Generic[Q]):
+    """One batch: what is to be done, in what words."""
 
-    loss: float
+    tasks: Sequence[Q]
+    requests: Sequence[str]
+    rng: np.random.Generator
+    """What is drawn of this batch."""
+
+
+@dataclass(frozen=True, eq=False)
+class IliadLesson(Generic[Q, E]):
+    """What came of one batch."""
+
+    loss: Tensor
+    """Whose gradient is followed; a scalar."""
     executions: Sequence[E]
     """What the agent did for the requests."""
     descriptions: Sequence[str | None] = ()
@@ -31,25 +41,19 @@ class IliadLesson(Generic[Q, E]):
 
 
 def adel(
-    tasks: Sequence[Q],
-    requests: Sequence[str],
+    asked: Asked[Q],
     teacher: DescribingTeacher[Q, E],
     marginal: Marginal[Q, E],
     explorer: Student[Q, E],
     student: Student[Q, E],
-    optimizer: torch.optim.Optimizer,
     mixing: float,
-    clip: float,
-    *,
-    rng: np.random.Generator,
 ) -> IliadLesson[Q, E]:
-    """Lines 6 to 11 of Algorithm 9; `explorer` is pi_beta, `student` pi_theta, `optimizer` has the weights of both."""
-    done = explorer.sample(tasks, requests, rng=rng)  # line 6
-    said = teacher.describe(tasks, done, rng=rng)  # line 7
-    unlabeled = marginal.draw(tasks, rng=rng)  # line 8
-    loss = adel_loss(tasks, done, said, unlabeled, explorer, student, mixing)  # lines 9 and 10
-    descend(loss, optimizer, "ADEL", clip)  # line 11
-    return IliadLesson(float(loss.detach()), done, said)
+    """Lines 6 to 10 of Algorithm 9; `explorer` is pi_beta, `student` pi_theta, the loss is of both."""
+    done = explorer.sample(asked.tasks, asked.requests, rng=asked.rng)  # line 6
+    said = teacher.describe(asked.tasks, done, rng=asked.rng)  # line 7
+    unlabeled = marginal.draw(asked.tasks, rng=asked.rng)  # line 8
+    loss = adel_loss(asked.tasks, done, said, unlabeled, explorer, student, mixing)  # lines 9 and 10
+    return IliadLesson(loss, done, said)
 
 
 def adel_loss(
@@ -90,65 +94,37 @@ def described_loss(tasks: Sequence[Q], done: Sequence[E], said: Sequence[str | N
 
 
 def mixture(
-    tasks: Sequence[Q],
-    requests: Sequence[str],
-    teacher: DescribingTeacher[Q, E],
-    marginal: Marginal[Q, E],
-    student: Student[Q, E],
-    optimizer: torch.optim.Optimizer,
-    mixing: float,
-    clip: float,
-    *,
-    rng: np.random.Generator,
+    asked: Asked[Q], teacher: DescribingTeacher[Q, E], marginal: Marginal[Q, E], student: Student[Q, E], mixing: float
 ) -> IliadLesson[Q, E]:
     """Algorithm 5: the execution of each task comes from the mixture of Eq 3.14, and the student learns what was said.
 
     With `mixing` 1 this is Algorithm 4, with 0 Algorithm 8 whose epochs are one batch long. What was said is learned
     from once, as it comes, not gathered in a buffer (docs/sources.md, S176).
     """
-    own, unlabeled = student.sample(tasks, requests, rng=rng), marginal.draw(tasks, rng=rng)
+    tasks, rng = asked.tasks, asked.rng
+    own, unlabeled = student.sample(tasks, asked.requests, rng=rng), marginal.draw(tasks, rng=rng)
     done = [u if rng.random() < mixing else o for u, o in zip(unlabeled, own, strict=True)]
     said = teacher.describe(tasks, done, rng=rng)
-    loss = described_loss(tasks, done, said, student) / len(tasks)
-    descend(loss, optimizer, "mixture", clip)
-    return IliadLesson(float(loss.detach()), done, said)
+    return IliadLesson(described_loss(tasks, done, said, student) / len(tasks), done, said)
 
 
-def dagger(
-    tasks: Sequence[Q],
-    requests: Sequence[str],
-    world: RequestWorld[Q, E],
-    student: Student[Q, E],
-    optimizer: torch.optim.Optimizer,
-    clip: float,
-) -> IliadLesson[Q, E]:
+def dagger(asked: Asked[Q], world: RequestWorld[Q, E], student: Student[Q, E]) -> IliadLesson[Q, E]:
     """Imitation: the student acts greedily and is shown the best action in every state that it came to."""
-    done = student.greedy(tasks, requests)
-    shown = [world.demonstrate(q, e) for q, e in zip(tasks, done, strict=True)]
-    loss = -student.scores(tasks, requests, done, shown).log_probabilities.sum() / len(tasks)
-    descend(loss, optimizer, "DAgger", clip)
-    return IliadLesson(float(loss.detach()), done)
+    done = student.greedy(asked.tasks, asked.requests)
+    shown = [world.demonstrate(q, e) for q, e in zip(asked.tasks, done, strict=True)]
+    scores = student.scores(asked.tasks, asked.requests, done, shown)
+    return IliadLesson(-scores.log_probabilities.sum() / len(asked.tasks), done)
 
 
 def reinforce(
-    tasks: Sequence[Q],
-    requests: Sequence[str],
-    rewards_of: RewardsOf[Q, E],
-    mean: RunningMean,
-    student: Student[Q, E],
-    optimizer: torch.optim.Optimizer,
-    entropy: float,
-    clip: float,
-    *,
-    rng: np.random.Generator,
+    asked: Asked[Q], rewards_of: RewardsOf[Q, E], mean: RunningMean, student: Student[Q, E], entropy: float
 ) -> IliadLesson[Q, E]:
     """REINFORCE against the mean of all rewards so far, those of this batch included."""
-    done = student.sample(tasks, requests, rng=rng)
-    rewards = rewards_of(tasks, done)
+    done = student.sample(asked.tasks, asked.requests, rng=asked.rng)
+    rewards = rewards_of(asked.tasks, done)
     mean.add(rewards)
-    loss = reinforce_loss(student.scores(tasks, requests, done), rewards, mean.value, entropy)
-    descend(loss, optimizer, "REINFORCE", clip)
-    return IliadLesson(float(loss.detach()), done)
+    scores = student.scores(asked.tasks, asked.requests, done)
+    return IliadLesson(reinforce_loss(scores, rewards, mean.value, entropy), done)
 
 
 def reinforce_loss(scores: ExecutionScores, rewards: Sequence[float], baseline: float, entropy: float) -> Tensor:

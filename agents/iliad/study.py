@@ -1,8 +1,4 @@
-"""Tables 3.4, 3.5 and C.1 and Figure 3.7 as data, REGEX and NAV; ILIAD as a learner of agents.studies.engine.
-
-`describer` and `speakers` are not in the dissertation: success against the share of wrong descriptions of a teacher
-that is otherwise consistent, and on requests of a speaker that was never heard.
-"""
+"""Tables 3.4, 3.5 and C.1 and Figure 3.7 as data, REGEX and NAV; ILIAD as a learner of agents.studies.engine."""
 
 from __future__ import annotations
 
@@ -23,7 +19,6 @@ from agents.iliad.nav.stages import load_follower
 from agents.iliad.nav.world import NavWorld
 from agents.iliad.regex import run as regex
 from agents.iliad.regex.config import RegexConfig
-from agents.iliad.regex.language import MANNERS
 from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
 from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
@@ -32,9 +27,6 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 
-WRONG = (0.0, 0.1, 0.25, 0.5)
-WORLD = ("wrong", "unheard")
-"""What of a row concerns the teacher, not the learner."""
 NEEDED = "thousand episodes to the threshold"
 LEARNERS = (
     StudyRow("DAgger", {"learner": "dagger"}),
@@ -81,21 +73,7 @@ TABLES: Mapping[str, StudyTable] = {
         splits=("validation",),
         figure=Figure(("success_at",), "training episodes", "success (share)"),
     ),
-    "describer": StudyTable(
-        "How good must the describer be? (no counterpart in the dissertation)",
-        tuple(StudyRow(f"{100 * w:g} % wrong", {"wrong": w}, x=100 * w) for w in WRONG),
-        ("success",),
-        ("test",),
-        figure=Figure(("success",), "wrong descriptions (%)", "test success (%)"),
-    ),
-    "speakers": StudyTable(
-        "Who heard three speakers, does it understand the fourth? (no counterpart in the dissertation)",
-        tuple(StudyRow(f"without {name}", {"unheard": name}) for name in ("none", *MANNERS)),
-        ("success",),
-        tuple(f"test {name}" for name in MANNERS),
-    ),
 }
-ONLY_REGEX = ("describer", "speakers")
 
 
 class StudyWorld(Hashable, Protocol):
@@ -110,9 +88,6 @@ class StudyWorld(Hashable, Protocol):
 
     def source(self) -> Mapping[str, object]:
         """What its data come from, as part of an identity."""
-
-    def changed(self, **teacher: Any) -> StudyWorld:
-        """The same with another teacher."""
 
     def prepare(self, folder: Path, note: Note) -> Any:
         """Data and teacher, made into `folder` unless they are there."""
@@ -144,11 +119,6 @@ class RegexStudyWorld:
     def source(self) -> Mapping[str, object]:
         own = {"words": self.words, "templates": self.templates}
         return {"teacher": self.config, **{k: digest(path) for k, path in own.items() if path}}
-
-    def changed(self, **teacher: Any) -> RegexStudyWorld:
-        if not teacher:
-            return self
-        return dataclasses.replace(self, config=dataclasses.replace(self.config, teacher="grammar", **teacher))
 
     def prepare(self, folder: Path, note: Note) -> regex.Grounds:
         return regex.prepare(self.config, folder, words=self.words, templates=self.templates, note=note)
@@ -185,11 +155,6 @@ class NavStudyWorld:
     def source(self) -> Mapping[str, object]:
         data, where = Dataset(self.houses.folder), self.houses
         return {"teacher": self.config, "data": data.digest, "encoder": where.encoder, "pictures": where.picture_kind}
-
-    def changed(self, **teacher: Any) -> NavStudyWorld:
-        if teacher:
-            raise ValueError(f"{', '.join(teacher)} is told apart in REGEX only; leave {ONLY_REGEX} out with nav")
-        return self
 
     def prepare(self, folder: Path, note: Note) -> nav.NavGrounds:
         return nav.prepare(self.config, self.houses, folder, note=note)
@@ -228,7 +193,7 @@ class IliadStudy:
     def tables(self) -> Mapping[str, StudyTable]:
         """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept."""
         if self.world.name == "nav":
-            return {name: table for name, table in TABLES.items() if name not in ONLY_REGEX}
+            return TABLES
         both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
         return {name: both(table) for name, table in TABLES.items()}
 
@@ -237,41 +202,38 @@ class IliadStudy:
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data and teachers."""
-        for world in dict.fromkeys(self._world(row) for row in rows):
-            world.prepare(_shared(world, folder), note)
+        self.world.prepare(_shared(self.world, folder), note)
 
     def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
         """What students are pretrained to be."""
-        for world in dict.fromkeys(self._world(row) for row in rows):
-            world.begin(_grounds(world, folder), seed, _shared(world, folder) / f"seed_{seed}", note)
+        world = self.world
+        world.begin(_grounds(world, folder), seed, _shared(world, folder) / f"seed_{seed}", note)
 
     def settings(self, train: Mapping[str, Any], seed: int) -> LearnerConfig:
-        changes = {k: v for k, v in train.items() if k not in WORLD}
+        changes = dict(train)
         annealed = changes.pop("annealed", 0)
         every = max(1, round(annealed / self.world.updates * self.config.iterations)) if annealed else 0
         return dataclasses.replace(self.config, seed=seed, anneal_every=every, **changes)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
-        world = self._world(StudyRow("", train))
-        return identity_of(f"agents.iliad.{world.name}.run", settings=self.settings(train, seed), **world.source())
+        makers, settings = f"agents.iliad.{self.world.name}.run", self.settings(train, seed)
+        return identity_of(makers, settings=settings, **self.world.source())
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        world = self._world(StudyRow("", train))
-        begun = _shared(world, folder) / f"seed_{seed}"
+        world, begun = self.world, _shared(self.world, folder) / f"seed_{seed}"
         world.learn(_grounds(world, folder), self.settings(train, seed), home, begun, note)
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {"threshold": self.config.threshold, **self._world(row).source()}
+        return {"threshold": self.config.threshold, **self.world.source()}
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         assert weights is not None, "every row learns"
         history = read_checkpoint(weights.parent / "checkpoint.pt")["history"]
         if row.judge.get("curve"):
             return {f"success at {h['episodes']:g}": Samples((h["success"],)) for h in history}
-        world = self._world(row)
         needed = episodes_to(history, self.config.threshold) / 1000
-        found = {"success": world.judge(_grounds(world, folder), weights, split)}
+        found = {"success": self.world.judge(_grounds(self.world, folder), weights, split)}
         return found | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
 
     def about(self) -> str:
@@ -281,9 +243,6 @@ class IliadStudy:
             f"(REINFORCE a tenth); seeds {', '.join(map(str, self.repeats))}. The threshold is a validation success of "
             f"{100 * x.threshold:g} %; n seeds reached it."
         )
-
-    def _world(self, row: StudyRow) -> StudyWorld:
-        return self.world.changed(**{k: v for k, v in (row.train or {}).items() if k in WORLD})
 
 
 def _shared(world: StudyWorld, folder: Path) -> Path:

@@ -10,9 +10,9 @@ from typing import Generic
 import numpy as np
 import torch
 
-from agents.common.session import Note, Session, falling_rate, set_rate, tasks_of_update
+from agents.common.session import Note, Session, descend, falling_rate, set_rate, tasks_of_update
 from agents.iliad.config import LearnerConfig, as_dict, mixing_at
-from agents.iliad.learners import IliadLesson, RewardsOf, RunningMean, adel, dagger, mixture, reinforce
+from agents.iliad.learners import Asked, IliadLesson, RewardsOf, RunningMean, adel, dagger, mixture, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
 from embodied.identity import Identity
 from embodied.seeds import stream
@@ -126,30 +126,26 @@ class _Learner(Generic[Q, E]):
         set_rate(self.optimizer, falling_rate(c.rate, update, c.iterations, c.cooldown))
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
-        requests = [world.request(q, rng=rng) for q in tasks]
+        asked = Asked(tasks, [world.request(q, rng=rng) for q in tasks], rng)
         before = self.mean.total
-        lesson = self._learn(update, tasks, requests, rng)
+        lesson = self._learn(asked, mixing_at(c, update))
+        descend(lesson.loss, self.optimizer, c.learner, c.clip)
         fulfilled = sum(world.success(q, e) for q, e in zip(tasks, lesson.executions, strict=True))
-        numbers = {"episodes": len(tasks), "fulfilled": fulfilled, "loss": lesson.loss, "updates": 1.0}
+        loss = float(lesson.loss.detach())
+        numbers = {"episodes": len(tasks), "fulfilled": fulfilled, "loss": loss, "updates": 1.0}
         if lesson.descriptions:
             numbers["described"] = sum(d is not None for d in lesson.descriptions) / len(tasks)
         return numbers | ({"reward": self.mean.total - before} if self.mean.count else {})
 
-    def _learn(
-        self, update: int, tasks: Sequence[Q], requests: Sequence[str], rng: np.random.Generator
-    ) -> IliadLesson[Q, E]:
-        p, c, optimizer = self.problem, self.config, self.optimizer
+    def _learn(self, asked: Asked[Q], mixing: float) -> IliadLesson[Q, E]:
+        p, c = self.problem, self.config
         if c.learner == "adel":
-            mixing = mixing_at(c, update)
-            return adel(
-                tasks, requests, p.teacher, p.marginal, p.explorer, p.student, optimizer, mixing, c.clip, rng=rng
-            )
+            return adel(asked, p.teacher, p.marginal, p.explorer, p.student, mixing)
         if c.learner == "mixture":
-            mixing = mixing_at(c, update)
-            return mixture(tasks, requests, p.teacher, p.marginal, p.student, optimizer, mixing, c.clip, rng=rng)
+            return mixture(asked, p.teacher, p.marginal, p.student, mixing)
         if c.learner == "dagger":
-            return dagger(tasks, requests, p.world, p.student, optimizer, c.clip)
-        return reinforce(tasks, requests, self.rewards, self.mean, p.student, optimizer, c.entropy, c.clip, rng=rng)
+            return dagger(asked, p.world, p.student)
+        return reinforce(asked, self.rewards, self.mean, p.student, c.entropy)
 
 
 def _found(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:

@@ -98,12 +98,9 @@ def _hari(args: Options, data: Path, file: Path, splits: Sequence[str], how: dic
     """Rows of Table 4.7 for one agent."""
     from agents.hari.agent import load_agent
     from agents.hari.judging import judge
-    from agents.hari.run import hari_data, with_eyes
+    from agents.hari.run import hari_data
 
-    houses, agent = hari_data(data), load_agent(file)
-    agent = dataclasses.replace(agent, executor=with_eyes(agent.executor, houses, args.pictures))
-    rows = judge(houses, agent, splits, **how)
-    return rows, sorted({r.agent for r in rows}) if agent.executor.seeing else []
+    return judge(hari_data(data), load_agent(file), splits, **how), []
 
 
 def record_trained(args: Options, data: Dataset, run: Path, first: int) -> None:

@@ -1,9 +1,7 @@
 """Train agents for each row of a table of the dissertation, evaluate them, and write the table.
 
-    embodied study hanna 4.5 houses --data DATA --out STUDY --iterations 600
-    embodied study hanna houses --data DATA --judged-in OTHER --out STUDY --seeds 3
+    embodied study hanna 4.5 --data DATA --judged-in OTHER --out STUDY --seeds 3
     embodied study vision encoders pictures --data DATA --out STUDY
-    embodied study realism --data DATA --out STUDY --agents unlit=A.safetensors lit=B.safetensors
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
@@ -12,18 +10,16 @@
     embodied study iliad nav 3.4 3.5 --data DATA --out STUDY
     embodied study check STUDY
 
-HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `houses`, `lights` (needs `embodied features --lights 3`),
-`departures` and `requests`. HARI's are 4.7, 4.8, `moves`, `sight` (needs `embodied features`), 'figure 4.5', 'figure
-4.5b' and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms) and
-`rules`. `bandit` has Table 3.2, Figures 3.4 and 3.5, and `held-out`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7',
-`describer` and `speakers`. `check` says which stored tables no longer belong to this code. Rows that tables share are
-trained once, each table is written as JSON, Markdown and, where it has one, as a figure. Interrupt it whenever you
-like: the same command goes on.
+HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1 and D.2. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b' and 'figure 4.6'.
+VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and `algorithm-6`.
+`bandit` has Table 3.2, Figures 3.4 and 3.5, `rates` and `held-out`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7'
+and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share are trained
+once, each table is written as JSON, Markdown and, where it has one, as a figure. Interrupt it whenever you like: the
+same command goes on.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +31,7 @@ from agents.bandit.rating_config import DECISIONS, RatingConfig
 from agents.common.settings import EvaluationSettings
 from agents.common.shipped import SHIPPED_AGENT
 from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
-from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, STATES, IntentionConfig
+from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, IntentionConfig
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
@@ -113,7 +109,7 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, houses, lights, departures or requests."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1 or D.2."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
@@ -123,24 +119,6 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Initialise with the weights of this agent."""
     config: Annotated[TrainingConfig, Settings(TRAINING, SCALES, skip=("training_houses", "lights"))]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class RealismOptions(Study, Judged, JudgeSeed, WithData):
-    """HANNA agents that learned from some pictures, evaluated in others."""
-
-    threads: Count = 2
-    agents: NamedFiles
-    """Trained agents; those of one name are training seeds of one kind."""
-    encoders: NamedFiles = ()
-    """Encoders of the agents of a name, one file for all or one for each (default: those that they learned with)."""
-    test_pictures: tuple[Annotated[str, PRESETS], ...] = ("unlit", "fast-matte", "fast", "reference")
-    """Kinds of pictures to evaluate in, of which `embodied features --pictures` made features; all kinds are ranked
-    against the last."""
-    split: str = "test_unseen"
-    """Evaluate on the tasks of this split."""
-    houses: Count | None = None
-    """Use only the first N houses of the split (default: all)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,19 +139,16 @@ class VisionOptions(Study, Trained, Strips, WithData):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HariOptions(Study, Trained, Judged, WithData, Encoded):
+class HariOptions(Study, Trained, Judged, WithData):
     """Agents that learn which question to ask."""
 
     tables: Tables
-    """Make these tables: 4.7, 4.8, moves, sight, 'figure 4.5', 'figure 4.5b' or 'figure 4.6'."""
+    """Make these tables: 4.7, 4.8, 'figure 4.5', 'figure 4.5b' or 'figure 4.6'."""
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
     execution: InputPath | None = None
     """A trained execution policy (default: trained in --out first)."""
-    config: Annotated[
-        IntentionConfig,
-        Settings(TRAINING, INTENTION_SCALES, skip=("stack", "cooperative", "perfect"), words={"states": STATES}),
-    ]
+    config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES, skip=("stack", "cooperative", "perfect"))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,7 +201,7 @@ class StarsOptions(Study, Trained, Judged, WithData, Encoded):
 @dataclass(frozen=True, kw_only=True)
 class IliadOptions(Study, Trained):
     tables: Tables
-    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7', algorithms, describer or speakers."""
+    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms."""
     scale: Annotated[str, SMALL_SCALE] = "mini"
     """The settings to start from."""
 
@@ -240,7 +215,7 @@ class RegexOptions(IliadOptions, RegexFiles):
     """Students that learn to change words from descriptions."""
 
     learner: Annotated[LearnerConfig, Settings("settings of the student's training", LEARNER_SCALES, skip=LEARNED)]
-    world: Annotated[RegexConfig, Settings("settings of data and teacher", REGEX_SCALES, skip=("wrong", "unheard"))]
+    world: Annotated[RegexConfig, Settings("settings of data and teacher", REGEX_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -315,27 +290,6 @@ def hanna(args: HannaOptions) -> int:
     return run_table(args, learner)
 
 
-def realism(args: RealismOptions) -> int:
-    from agents.hanna.realism import RealismStudy, ranks
-
-    learner = RealismStudy(
-        args.data,
-        (0,),
-        args.tasks,
-        (args.judge_seed,),
-        args.threads,
-        arms=by_name(args.agents),
-        pictures=args.test_pictures,
-        split=args.split,
-        houses=args.houses,
-        encoders=by_name(args.encoders),
-    )
-    run_table(args, learner)
-    stored = json.loads((args.out / "realism-realism.json").read_text(encoding="utf-8"))
-    print("\n".join(ranks(stored, args.test_pictures)))
-    return 0
-
-
 def vision(args: VisionOptions) -> int:
     from agents.common.device import check_device
     from agents.vision.drawn import StripSource
@@ -369,8 +323,6 @@ def hari(args: HariOptions) -> int:
         execution=EXECUTION_SCALES[args.scale],
         intention=args.config,
         executor=args.execution,
-        encoder=args.encoder_digest() if "sight" in args.tables else "",
-        picture_kind=args.pictures,
     )
     return run_table(args, learner)
 
@@ -448,7 +400,6 @@ def ask(args: AskOptions) -> int:
 
 COMMANDS: Mapping[str, Any] = {
     "hanna": (HannaOptions, hanna),
-    "realism": (RealismOptions, realism),
     "vision": (VisionOptions, vision),
     "hari": (HariOptions, hari),
     "vnla": (VnlaOptions, vnla),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from agents.common.settings import EvaluationSettings
 from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
-from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, SEES, STATES, ExecutionConfig, IntentionConfig
+from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
@@ -92,12 +92,12 @@ class TrainVnla(Recorded, Run, Encoded, WithDevice):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainExecution(Run, Encoded):
+class TrainExecution(Run):
     """First phase: to understand descriptions and to navigate by them (DAgger)."""
 
     begin: InputPath | None = None
     """Initialise with the weights of this execution policy."""
-    config: Annotated[ExecutionConfig, Settings(TRAINING, EXECUTION_SCALES, words={"sees": SEES})]
+    config: Annotated[ExecutionConfig, Settings(TRAINING, EXECUTION_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ class TrainIntention(Recorded, Run, Drawn):
 
     execution: InputPath
     """A trained execution policy (best.safetensors)."""
-    config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES, words={"states": STATES})]
+    config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,29 +198,20 @@ def train_execution(args: TrainExecution) -> int:
     from agents.hari.run import hari_data, train_execution
 
     use_threads(args.threads)
-    encoder = args.encoder_digest() if args.config.sees == "features" else ""
-    train_execution(
-        hari_data(args.data),
-        args.config,
-        args.out,
-        encoder=encoder,
-        picture_kind=args.pictures,
-        begin=args.begin,
-        minutes=args.minutes,
-        note=note,
-    )
+    data = hari_data(args.data)
+    train_execution(data, args.config, args.out, begin=args.begin, minutes=args.minutes, note=note)
     return 0
 
 
 def train_intention(args: TrainIntention) -> int:
     from agents.common.device import use_threads
     from agents.hari.agent import load_executor
-    from agents.hari.run import hari_data, train_intention, with_eyes
+    from agents.hari.run import hari_data, train_intention
 
     use_threads(args.threads)
     data = hari_data(args.data)
-    walking = with_eyes(load_executor(args.execution), data, args.pictures)
-    watch = _recorder(args, sees=walking.seeing is not None) if args.rrd else None
+    walking = load_executor(args.execution)
+    watch = _recorder(args, sees=False) if args.rrd else None
     train_intention(data, walking, args.config, args.out, minutes=args.minutes, note=note, on_validation=watch)
     return 0
 

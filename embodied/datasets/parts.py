@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Sequence
 
 from embodied.envs.make import look_of
@@ -73,8 +75,8 @@ def _hari(world: Place, part: str, n: int, *, seed: int, language: Language) -> 
     """HARI's conditions (4.3.5): unseen start room, unseen object class, unseen environment."""
     config = HariConfig(fewest_nodes=1) if part.startswith("pretrain") else HariConfig()
     pool = hari_pool(world, seed=seed, config=config)
-    chosen = [i for i in range(len(pool)) if _belongs(pool, i, part, world, seed)]
-    return [hari_task(pool, i, seed=seed, language=language, config=config) for i in chosen[:n]]
+    chosen = itertools.islice((i for i in range(len(pool)) if _belongs(pool, i, part, world, seed)), n)
+    return [hari_task(pool, i, seed=seed, language=language, config=config) for i in chosen]
 
 
 def _belongs(pool: Pool, i: int, part: str, world: Place, seed: int) -> bool:
@@ -92,6 +94,7 @@ def _belongs(pool: Pool, i: int, part: str, world: Place, seed: int) -> bool:
     return part == "main" or (i % 32 == 31) == (part == "pretrain_val")
 
 
+@functools.cache
 def object_part(object_class: str, *, seed: int) -> str | None:
     """'val' or 'test' for object classes that training never asks for, the same in all houses; else None."""
     draw = stream(seed, "held object", object_class).random()

@@ -99,7 +99,7 @@ class HariEnv(HelpEnv):
     """E-bar of 4.3.4.1. Decisions where the text is open:
 
     a sub-goal held for more than 3 times its shortest distance (in time steps) is popped by itself
-    and at no cost (docs/sources.md, S53); reaching the horizon pays the task error, so that shaping telescopes
+    and at no cost (docs/sources.md, S53); reaching the horizon without DONE pays the task error of the start
     (docs/sources.md, S54); sub-goals are described densely (docs/sources.md, S58).
     """
 
@@ -185,7 +185,7 @@ class HariEnv(HelpEnv):
         return self._costs.of(action)
 
     def _cost_of_limit(self) -> float:
-        return self.task_error(self.pose.node, self.task.goal_nodes[0])
+        return self.task_error(self.task.start.node, self.task.goal_nodes[0])
 
     def _stack(self) -> tuple[int, ...]:
         return tuple(g.node for g in self._goals)

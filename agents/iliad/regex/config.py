@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from agents.iliad.config import LearnerConfig
-from agents.iliad.regex.language import MANNERS
 
 TEACHERS = ("learned", "grammar")
 PRAGMATICS = ("program", "text")
-MARGINALS = ("asked", "narrow", "wide")
+MARGINALS = ("asked", "narrow")
 
 
 @dataclass(frozen=True)
@@ -32,18 +31,13 @@ class RegexConfig:
     """Width of the embeddings of letters and of a rule's characters."""
     teacher: str = "learned"
     """'learned': a describer and an executor of the data (3.2.4.1); 'grammar': whoever made the requests."""
-    wrong: float = 0.0
-    """Share of the grammar teacher's descriptions that tell of another rule."""
     pragmatics: str = "program"
     """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the best one ('program', docs/sources.md, S93)."""
     candidates: int = 10
     """|D_cand|: the likeliest description and sampled ones (Table C.2)."""
     marginal: str = "asked"
-    """Which rules the student knows without requests: drawn as requests are ('asked'), of half of their shapes only
-    ('narrow'), or of more shapes with any letters, most of which nobody asks for ('wide'; docs/sources.md, S140)."""
-    unheard: str = ""
-    """'': everybody asks in all manners. Else four speakers with a manner each make and describe requests, and this
-    one is heard in tests only; 'none': all four are heard (conditional, imperative, passive, terse)."""
+    """Which rules the student knows without requests: drawn as requests are ('asked'), or of half of their shapes only
+    ('narrow'; docs/sources.md, S140)."""
     unlabeled: int = 20_000
     """Rules of the marginal's list."""
     executor_iterations: int = 30_000
@@ -66,12 +60,10 @@ class RegexConfig:
             raise ValueError(
                 f"marginal must be one of {MARGINALS} and unlabeled at least 1, got {self.marginal!r}, {self.unlabeled}"
             )
-        if self.unheard and self.unheard not in ("none", *MANNERS):
-            raise ValueError(f"unheard must be '', 'none' or one of {MANNERS}, got {self.unheard!r}")
         if self.pragmatics not in PRAGMATICS:
             raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
-        if not (0 <= self.wrong <= 1 and self.teacher_rate > 0):
-            raise ValueError(f"wrong {self.wrong} must lie in [0, 1], teacher_rate {self.teacher_rate} above 0")
+        if not self.teacher_rate > 0:
+            raise ValueError(f"teacher_rate must be above 0, got {self.teacher_rate}")
         for name in ("items", "held_out_items", "examples", "hidden_size", "word_size", "character_size"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
@@ -121,13 +113,12 @@ LEARNER_SCALES: dict[str, LearnerConfig] = {
 
 def students_of(config: RegexConfig) -> str:
     """Folder of a teacher's students."""
-    teacher = f"grammar_{config.wrong:g}" if config.teacher == "grammar" else config.teacher
     few = "" if config.unlabeled == RegexConfig().unlabeled else f"_{config.unlabeled}"
     marginal = "" if config.marginal == "asked" else f"_{config.marginal}"
-    return teacher + few + marginal + (f"_without_{config.unheard}" if config.unheard else "")
+    return config.teacher + few + marginal
 
 
 def data_of(config: RegexConfig) -> dict[str, object]:
     """The settings that decide the data."""
     names = ("items", "held_out_items", "vocabulary", "examples", "data_seed")
-    return {name: getattr(config, name) for name in names} | ({"unheard": config.unheard} if config.unheard else {})
+    return {name: getattr(config, name) for name in names}

@@ -12,21 +12,8 @@ from typing import Any
 import numpy as np
 
 from agents.iliad.regex.config import RegexConfig
-from agents.iliad.regex.language import MANNERS, PARTS, RequestTemplate, templates, templates_by_manner
-from agents.iliad.regex.rules import (
-    ANCHORS,
-    ANY,
-    CONSONANT,
-    LETTER,
-    LETTERS,
-    SAME,
-    VOWEL,
-    RuleShape,
-    compiled,
-    outputs,
-    random_rule,
-    random_shape,
-)
+from agents.iliad.regex.language import PARTS, RequestTemplate, templates
+from agents.iliad.regex.rules import LETTERS, RuleShape, compiled, outputs, random_rule, random_shape
 from agents.iliad.regex.words import made_up
 from embodied.records import parse_file
 from embodied.seeds import stream
@@ -62,7 +49,7 @@ class RegexData:
     templates: Mapping[str, Sequence[Any]]
     """RequestTemplate of each part; their texts where they were read again."""
     splits: Mapping[str, Sequence[WordTask]]
-    """Of 'train', 'validation' and 'test'; with speakers, of 'test MANNER' too."""
+    """Of 'train', 'validation' and 'test'."""
 
 
 def make_data(
@@ -79,18 +66,13 @@ def make_data(
     """
     seed = config.data_seed
     known = tuple(words) or made_up(config.vocabulary, seed=seed)
-    source = _OwnTemplates(own, seed) if own else grammar_of(config)
+    source = _OwnTemplates(own, seed) if own else Grammar(seed)
     places = _Places(known)
     splits: dict[str, list[WordTask]] = {}
     for part in PARTS:
         count, requests = (config.items, REQUESTS) if part == "train" else (config.held_out_items, 1)
         rng = stream(seed, "regex", "items", part)
         splits[part] = [_item(source, part, places, requests, config.examples, rng=rng) for _ in range(count)]
-    if config.unheard:
-        for manner in MANNERS:
-            alone, rng = SpokenGrammar(seed, (manner,)), stream(seed, "regex", "items", "test", manner)
-            count = max(1, config.held_out_items // len(MANNERS))
-            splits[f"test {manner}"] = [_item(alone, "test", places, 1, config.examples, rng=rng) for _ in range(count)]
     return RegexData(known, source.by_part, splits)
 
 
@@ -135,35 +117,6 @@ class Grammar:
         vague = self._of.get((part, shape, True), [])
         several = vague if vague and rng.random() < VAGUE_SHARE else self._of[part, shape, False]
         return several[int(rng.integers(len(several)))].fill(before, after)
-
-
-class SpokenGrammar(Grammar):
-    """The same of speakers who keep to a manner each; shapes that nobody has words for are not asked for."""
-
-    def __init__(self, seed: int, manners: Sequence[str]) -> None:
-        by_manner = templates_by_manner(seed=seed)
-        self.by_part = {part: [t for m in manners for t in of[m]] for part, of in by_manner.items()}
-        self._spoken: dict[tuple[str, RuleShape], dict[str, list[RequestTemplate]]] = {}
-        for part, template in ((part, t) for part, several in self.by_part.items() for t in several):
-            self._spoken.setdefault((part, template.shape), {}).setdefault(template.manner, []).append(template)
-
-    def draw(self, part: str, places: _Places, count: int, *, rng: np.random.Generator) -> tuple[str, list[str]] | None:
-        shape = random_shape(rng=rng)
-        made = random_rule(shape, places.words, rng=rng) if (part, shape) in self._spoken else None
-        return made and (made[0], [self.request(part, shape, made[1], made[2], rng=rng) for _ in range(count)])
-
-    def request(self, part: str, shape: RuleShape, before: str, after: str, *, rng: np.random.Generator) -> str:
-        """By one of those who have words for it."""
-        speakers = sorted(self._spoken[part, shape].items())
-        several = speakers[int(rng.integers(len(speakers)))][1]
-        return several[int(rng.integers(len(several)))].fill(before, after)
-
-
-def grammar_of(config: RegexConfig) -> Grammar:
-    """Who makes the requests: everybody, or speakers of whom one may be left out."""
-    if not config.unheard:
-        return Grammar(config.data_seed)
-    return SpokenGrammar(config.data_seed, [m for m in MANNERS if m != config.unheard])
 
 
 class _OwnTemplates:
@@ -258,42 +211,19 @@ def _words_for(
     return tuple(found)
 
 
-def random_asked(grammar: Grammar, part: str, words: Sequence[str], *, rng: np.random.Generator) -> str:
-    """A request for some random rule."""
-    while True:
-        shape = random_shape(rng=rng)
-        made = random_rule(shape, words, rng=rng)
-        if made is not None:
-            return grammar.request(part, shape, made[1], made[2], rng=rng)
-
-
 def rules_without_requests(
     data: RegexData, config: RegexConfig, count: int, *, rng: np.random.Generator
 ) -> Iterator[str]:
     """`count` random rules: the unlabeled executions of the marginal (C.1.2), of its kind in the settings."""
     while count:
-        if config.marginal == "wide":
-            rule: str | None = wide_rule(rng=rng)
-        else:
-            shape = random_shape(rng=rng)
-            made = None if config.marginal == "narrow" and not known(shape, config.data_seed) else shape
-            found = None if made is None else random_rule(made, data.words, rng=rng)
-            rule = None if found is None else found[0]
-        if rule is not None:
+        shape = random_shape(rng=rng)
+        made = None if config.marginal == "narrow" and not known(shape, config.data_seed) else shape
+        found = None if made is None else random_rule(made, data.words, rng=rng)
+        if found is not None:
             count -= 1
-            yield rule
+            yield found[0]
 
 
 def known(shape: RuleShape, seed: int) -> bool:
     """Whether a shape belongs to the half that a 'narrow' marginal has."""
     return bool(stream(seed, "regex", "narrow", shape.name).random() < 0.5)
-
-
-def wide_rule(*, rng: np.random.Generator) -> str:
-    """A rule of one to three symbols and a replacement of none to three, with any letters, on any words or none."""
-    kinds = (LETTER, ANY, VOWEL, CONSONANT)
-    block = "".join(kinds[int(k)] for k in rng.integers(4, size=int(rng.integers(1, 4))))
-    new = "".join((LETTER, SAME)[int(k)] for k in rng.integers(2, size=int(rng.integers(4))))
-    shape = RuleShape(ANCHORS[int(rng.integers(len(ANCHORS)))], block, new)
-    letters = "".join(LETTERS[int(k)] for k in rng.integers(26, size=shape.before + shape.after))
-    return shape.rule(letters[: shape.before], letters[shape.before :])

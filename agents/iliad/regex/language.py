@@ -31,10 +31,6 @@ SLIPS: Mapping[str, str] = {
 }
 """What is meant, and what is written."""
 PARTS = ("train", "validation", "test")
-MANNERS = ("conditional", "imperative", "passive", "terse")
-"""'if the word ends with [x] , drop it', 'drop each [x]', 'each [x] must go', '[x] -> nothing'."""
-OF_A_MANNER = 6
-"""Templates of a shape in a manner, at most, where speakers are told apart by their manners."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +41,6 @@ class RequestTemplate:
     shape: RuleShape
     vague: bool = False
     """Whether other shapes would be asked for in the same words."""
-    manner: str = ""
-    """Which of MANNERS it is put in; '' where nobody asks."""
 
     def fill(self, before: str, after: str) -> str:
         """The request with these letters."""
@@ -77,7 +71,7 @@ def templates(*, seed: int) -> dict[str, list[RequestTemplate]]:
 def _specific(shape: RuleShape, *, seed: int) -> list[RequestTemplate]:
     """A shape's templates: a draw from all that the grammar can say, some with a slip."""
     rng, found = stream(seed, "regex", "templates", shape.name), {}
-    sayings = sorted({text for text, _ in _sayings(shape)})
+    sayings = sorted(set(_sayings(shape)))
     for k in rng.permutation(len(sayings))[:SPECIFIC]:
         text = sayings[int(k)]
         slips = [(right, wrong) for right, wrong in SLIPS.items() if right in text]
@@ -86,25 +80,6 @@ def _specific(shape: RuleShape, *, seed: int) -> list[RequestTemplate]:
             text = text.replace(right, wrong, 1)
         found[text] = RequestTemplate(text, shape)
     return list(found.values())
-
-
-def templates_by_manner(*, seed: int) -> dict[str, dict[str, list[RequestTemplate]]]:
-    """Part and manner to its templates, all specific; a text belongs to one shape, the first that it suits
-    (docs/sources.md, S143)."""
-    found: dict[str, dict[str, list[RequestTemplate]]] = {p: {m: [] for m in MANNERS} for p in PARTS}
-    taken: set[str] = set()
-    for shape in SHAPES:
-        several: dict[str, list[str]] = {m: [] for m in MANNERS}
-        for text, manner in sorted(dict(_sayings(shape)).items()):
-            if text not in taken:
-                several[manner].append(text)
-        for manner, texts in several.items():
-            order = stream(seed, "regex", "manner", manner, shape.name).permutation(len(texts))[:OF_A_MANNER]
-            for number, k in enumerate(order):
-                part = PARTS[number + 1] if number < 2 and len(order) > 2 else PARTS[0]
-                found[part][manner].append(RequestTemplate(texts[int(k)], shape, manner=manner))
-            taken |= {texts[int(k)] for k in order}
-    return found
 
 
 def _part_of(text: str, *, seed: int) -> str:
@@ -209,18 +184,17 @@ def _new(replacement: str) -> str:
 # Whole requests -----------------------------------------------------------------------------------
 
 
-def _sayings(shape: RuleShape) -> Iterator[tuple[str, str]]:
-    """Everything that the grammar can say for a shape, with its manner."""
-    conditional, imperative, passive, terse = MANNERS
+def _sayings(shape: RuleShape) -> Iterator[str]:
+    """Everything that the grammar can say for a shape."""
     ones, bares = _phrases(shape.block, True), _phrases(shape.block, False)
     for condition in _conditions(shape.anchor, ones):
         for operation in _operations(shape.replacement, "it" if len(shape.block) == 1 else "them"):
-            yield f"{condition} , {operation}", conditional
+            yield f"{condition} , {operation}"
     for place in _places(shape, ones, bares):
-        yield from ((text, imperative) for text in _operations(shape.replacement, place))
-        yield from ((text, passive) for text in _passives(shape.replacement, place))
+        yield from _operations(shape.replacement, place)
+        yield from _passives(shape.replacement, place)
     where = {ANYWHERE: "", START: "start : "}.get(shape.anchor, "end : ")
-    yield from ((f"{where}{x} -> {_result(shape.replacement)}", terse) for x in ones)
+    yield from (f"{where}{x} -> {_result(shape.replacement)}" for x in ones)
 
 
 def _vague_sayings(shape: RuleShape) -> Iterator[str]:

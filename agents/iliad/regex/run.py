@@ -56,7 +56,7 @@ def prepare(
     Raises:
       ValueError: files that cannot be used; data of other settings in the folder.
     """
-    folder = Path(folder) / f"without_{config.unheard}" if config.unheard else Path(folder)
+    folder = Path(folder)
     data = _data(config, folder / "data.json", words, templates)
     requests = request_words(r for q in data.splits["train"] for r in q.requests)
     count = sum(len(v) for v in data.templates.values())
@@ -64,7 +64,7 @@ def prepare(
     if config.teacher == "grammar":
         if templates:
             raise ValueError("the grammar knows no templates but its own; use --teacher learned with --templates")
-        teacher: DescribingTeacher[WordTask, Written] = GrammarTeacher(data, config)
+        teacher: DescribingTeacher[WordTask, Written] = GrammarTeacher(config)
     else:
         executor = teach_executor(data, config, requests, folder, note=note)
         describer = teach_describer(data, config, requests, folder, note=note)

@@ -12,7 +12,7 @@ from agents.iliad.describing import by_the_program, by_the_text, kept
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
 from agents.iliad.regex.config import RegexConfig
-from agents.iliad.regex.data import RegexData, WordTask, grammar_of, random_asked
+from agents.iliad.regex.data import Grammar, WordTask
 from agents.iliad.regex.networks import ChangeDescriber, Speller
 from agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
 from agents.iliad.regex.world import Written
@@ -124,14 +124,13 @@ class LearnedTeacher:
 
 
 class GrammarTeacher:
-    """Whoever made the requests of the data: it can read rules of our shapes and says what they do, or errs.
+    """Whoever made the requests of the data: it can read rules of our shapes and says what they do.
 
-    A second, consistent teacher (docs/sources.md, S101): P_T(d | e) is P*(d | e) but for a share of
-    wrong descriptions.
+    A second, consistent teacher (docs/sources.md, S101): P_T(d | e) is P*(d | e).
     """
 
-    def __init__(self, data: RegexData, config: RegexConfig) -> None:
-        self.grammar, self.words, self.wrong = grammar_of(config), data.words, config.wrong
+    def __init__(self, config: RegexConfig) -> None:
+        self.grammar = Grammar(config.data_seed)
 
     def describe(
         self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator
@@ -141,8 +140,6 @@ class GrammarTeacher:
     def _one(self, task: WordTask, execution: Written, *, rng: np.random.Generator) -> str | None:
         if not describable(task, execution):
             return None
-        if rng.random() < self.wrong:
-            return random_asked(self.grammar, "train", self.words, rng=rng)
         if near_optimal(task, execution):
             return human(task, rng=rng)
         parsed = parse(execution.rule)
