@@ -30,15 +30,7 @@ from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
 from agents.hanna.asking import RULES, ask_above
 from agents.hanna.collect import collect, imitation_loss
-from agents.hanna.losses import (
-    IGNORE,
-    curiosity,
-    help_loss,
-    navigation_loss,
-    negative_log_likelihood,
-    reason_loss,
-    relative_entropy,
-)
+from agents.hanna.losses import IGNORE, curiosity, help_loss, navigation_loss, negative_log_likelihood, reason_loss
 from agents.hanna.policy import for_training
 from agents.hanna.training import learn_once, train
 from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
@@ -158,11 +150,6 @@ def test_the_help_loss_is_that_of_equation_4_14():
     expected = torch.tensor([-math.log(0.75) + binary, 0.0])
     assert torch.allclose(help_loss(ask, labels, rho.logit(), reasons), expected)
     assert torch.allclose(help_loss(ask, labels, None, reasons), torch.tensor([-math.log(0.75), 0.0]))
-
-
-def test_entropy_in_base_37_of_37_equal_actions_is_one():
-    assert relative_entropy(torch.full((1, 37), 1 / 37), 37).item() == pytest.approx(1.0)
-    assert relative_entropy(torch.eye(37)[:1], 37).item() == 0.0
 
 
 # Words, draws, batches ---------------------------------------------------------------------------

@@ -63,11 +63,6 @@ def ask_every(steps: int) -> HannaAskRule:
     return lambda probability, observation, last_asked, *, rng: observation.time - last_asked >= steps
 
 
-def ask_with(share: float) -> HannaAskRule:
-    """Ask with this probability, whatever the network says."""
-    return lambda probability, observation, last_asked, *, rng: bool(rng.random() < share)
-
-
 RULES: dict[str, tuple[HannaAskRule, HannaAskRule]] = {
     "learned": (ask_sampled, ask_greedily),
     "never": (heuristic(baselines.never_ask),) * 2,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-import torch
 import torch.nn.functional as F
 from torch import Tensor
 
@@ -70,8 +69,3 @@ def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons
     weights = ask.new_tensor([price, 1.0]) * 2 / (1 + price)  # of what the teacher says: DO_NOTHING, REQUEST
     loss = negative_log_likelihood(ask, labels) * weights[labels.clamp(min=0)]
     return loss if reason_logits is None else loss + reason_loss(reason_logits, reasons, labels)
-
-
-def relative_entropy(probabilities: Tensor, base: int) -> Tensor:
-    """Entropy in base `base` ("efficiency", footnote 3): (N, n) -> (N,)."""
-    return torch.special.entr(probabilities).sum(-1) / torch.log(torch.tensor(float(base)))
