@@ -34,6 +34,8 @@ from assets.json_file import (
 from embodied import interface
 from embodied.distribution import DISTRIBUTION
 
+WIDEST = 100.0
+"""Largest radius of a goal, metres: that of a large building."""
 __all__ = ["RecordError", "from_json", "from_plain", "load_json", "parse", "parse_file", "read_json"]
 
 
@@ -123,6 +125,8 @@ def _task(t: interface.Task) -> str | None:
         return "goal_nodes should name at least one node"
     if t.radius < 0 or t.horizon < 1 or (t.budget is not None and t.budget < 0):
         return f"radius, horizon and budget should be at least 0, 1 and 0, got {t.radius}, {t.horizon} and {t.budget}"
+    if t.radius > WIDEST:
+        return f"radius should be at most {WIDEST:g} m, which no house is wide, got {t.radius:g}"
     return _nodes(*t.goal_nodes)
 
 

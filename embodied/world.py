@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from tqdm import tqdm
 
+from assets.archives import open_arrays
 from assets.cache import default_cache, digest
 from assets.catalogue import Catalogue, load_catalogue
 from assets.closure import code_digest
@@ -138,14 +139,14 @@ class World:
     @property
     def lit(self) -> LitPages | None:
         """The house with its baked light painted on; None where it is not lit. Bakes on first use."""
-        return self._baked().lit if self.pictures.lit else None
+        return self.baked().lit if self.pictures.lit else None
 
     def darkness(self, position: Sequence[float] | np.ndarray) -> float:
         """How much darker than one where white paper has 100 cd/m2 the room at `position` is, by its exposure; 1 where
         the house is not lit."""
         if not self.pictures.lit:
             return 1.0
-        return float(self._baked().exposure.at(np.asarray(position, float)[None]).mean())
+        return float(self.baked().exposure.at(np.asarray(position, float)[None]).mean())
 
     @property
     def renderer(self) -> Renderer:
@@ -159,7 +160,7 @@ class World:
                 raise ValueError(f"world {self.name!r} was opened without pictures; open it with pictures='unlit'")
             painter = overlay = None
             if self.pictures.gloss:
-                overlay = gloss_of(self._baked())
+                overlay = gloss_of(self.baked())
             if self.lit is not None and self.pictures.filament:
                 from embodied.render.filament import FilamentPainter  # late: loads Vulkan
 
@@ -169,24 +170,34 @@ class World:
             )
         return self._renderer
 
-    def _baked(self, progress: bool = False) -> Bake:
-        """The light of this world, baked on first use."""
+    def baked(self, progress: bool = False) -> Bake:
+        """The light of this world, baked on first use, after a warning that says how long it takes.
+
+        Args:
+          progress: show a progress bar.
+        """
         if self._bake is None:
             from embodied import light  # late: loads the path tracer
 
-            name = self.pictures.lit_by or "normal"
-            work = functools.partial(light.bake, self.house, self.catalogue, self.cache, name)
-            if progress:
-                with light.progress_bar() as tell:
-                    self._bake = work(progress=tell)
-            else:
-                self._bake = work()
+            name, told = self.pictures.lit_by or "normal", []
+            with light.progress_bar(shown=progress) as show:
+
+                def tell(stage: str, done: float) -> None:
+                    if not told:
+                        how_long = light.duration(self.house, name)
+                        log.warning("lighting %s takes %s, once; %s keeps it", self.name, how_long, self.cache)
+                    if stage not in told:
+                        told.append(stage)
+                        log.info("lighting %s: %s", self.name, stage)
+                    show(stage, done)
+
+                self._bake = light.bake(self.house, self.catalogue, self.cache, name, progress=tell)
         return self._bake
 
     def _source(self, progress: bool = False) -> Renderer | Tracer:
         """What draws the panoramas; what it needs is made first, with progress bars if wanted."""
         if self.pictures.lit:
-            self._baked(progress)
+            self.baked(progress)
         if not self.pictures.traced:
             return self.renderer
         if self._tracer is None:
@@ -194,7 +205,7 @@ class World:
 
             p = self.pictures
             quality = "glossy" if p.kind == "traced" else p.kind
-            self._tracer = Tracer(self._baked(), self.house, quality=quality, size=p.size, rays=p.rays)
+            self._tracer = Tracer(self.baked(), self.house, quality=quality, size=p.size, rays=p.rays)
         return self._tracer
 
     def panorama(self, node: int) -> Panorama:
@@ -370,13 +381,13 @@ def shine_of(bake: Bake) -> Shine:
     from embodied.render.gloss import Shine
 
     own, lit = bake.manifest["own_pages"], bake.lit
-    with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
+    with open_arrays(bake.folder / "meshes.npz") as z:
         faces = [z[f"g{i}"] if f"g{i}" in z.files and m.page < own else None for i, m in enumerate(lit.meshes)]
     gloss, detail = ([None if f is None else f[:, k] for f in faces] for k in (slice(3), 3))
     tint: list[np.ndarray | None] = []
     glow: list[np.ndarray | None] = [None] * len(lit.pages)
     for page in range(own):
-        with np.load(bake.folder / f"light_{page:03d}.npz", allow_pickle=False) as z:
+        with open_arrays(bake.folder / f"light_{page:03d}.npz") as z:
             glow[page] = z["glow"] if z["glow"].size else None
     colours: dict[int, np.ndarray] = {}
     for mesh, shine in zip(lit.meshes, gloss, strict=True):

@@ -14,8 +14,11 @@ import threading
 from pathlib import Path
 
 import pytest
+from conftest import two_rooms
+from hand_data import built, content
 
 from assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes
+from embodied import cli
 from embodied.errors import UnableError
 from embodied.locks import LOCK, LockedError, locked
 
@@ -147,6 +150,65 @@ def test_a_lock_touches_nothing_that_is_not_one(tmp_path, place):
         pass
     assert victim.read_text() == "dear" and lock.exists()
     assert place != "file" or lock.read_text() == "dear"
+
+
+ORDERS = {
+    "evaluate": ["evaluate", "hanna", "--agent", "shortest", "--data", "{data}", "--out", "{out}"],
+    "export hanna": ["export", "hanna", "--data", "{data}", "--out", "{out}"],
+    "export parquet": ["export", "parquet", "--data", "{data}", "--out", "{out}"],
+    "export streamvln": ["export", "streamvln", "--data", "{data}", "--out", "{out}"],
+    "export mjcf": ["export", "mjcf", "--house", "{out}", "--light", "none", "--out", "{out}"],
+    "light": ["light", "{out}", "--time", "9"],
+    "light more": ["light", "{out}", "--lights", "2"],
+}
+
+
+@pytest.mark.parametrize("name", ORDERS)
+def test_no_command_writes_where_another_process_does(name, tmp_path, capsys):
+    data, out = tmp_path / "data", tmp_path / "out"
+    if "{data}" in ORDERS[name]:
+        built(data, "vln" if "streamvln" in name else "hanna")
+    out.mkdir()
+    two_rooms().save(out / "house.json")
+    with locked(out):
+        there = content(out)
+        assert cli.main([word.format(data=data, out=out) for word in ORDERS[name]]) == 2
+        said = capsys.readouterr().err
+        assert f"{out} is being written by process {os.getpid()} on " in said and content(out) == there
+
+
+APART = ["unshare", "--user", "--map-root-user", "--pid", "--fork"]
+DRAW = """
+import os, sys, time
+from pathlib import Path
+from assets.cache import atomic_path
+with atomic_path(Path(sys.argv[1]) / "first.json") as temporary:
+    temporary.write_text("first")
+    print(os.getpid(), flush=True)
+    sys.stdin.readline()
+"""
+
+
+WRITE = """
+import sys
+from pathlib import Path
+from assets.cache import write_bytes
+write_bytes(Path(sys.argv[1]), b"second")
+"""
+
+
+def test_containers_that_share_a_folder_leave_each_others_drafts(tmp_path):
+    """Both are process 1 of a host of one name, as processes in containers are."""
+    if subprocess.run([*APART, "true"], capture_output=True).returncode:
+        pytest.skip("this system lets nobody make process namespaces")
+    first = subprocess.Popen(
+        [*APART, sys.executable, "-c", DRAW, str(tmp_path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert first.stdout is not None and first.stdout.readline() == "1\n"
+    subprocess.run([*APART, sys.executable, "-c", WRITE, str(tmp_path / "second.json")], check=True)
+    first.communicate("go on\n")
+    assert first.returncode == 0
+    assert content(tmp_path) == {"first.json": b"first", "second.json": b"second"}
 
 
 def test_files_and_folders_are_made_as_the_umask_says(tmp_path):

@@ -12,6 +12,7 @@ import numpy as np
 
 from agents.vision.features import EQUIRECT, margin, strip_of
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
+from assets.archives import open_arrays
 from assets.cache import DAMAGED, atomic_path
 from assets.records import ROOM_KINDS
 from embodied.house.house import OPENING_KINDS, House
@@ -27,6 +28,8 @@ NEAREST, FARTHEST = 0.1, 50.0
 """Metres; distances are clipped to this range before their logarithm is taken."""
 SHELL = ("floor", "ceiling", "skirting", "wall", "stairs", "outdoor")
 """Parts of a house that are no objects; doors and windows go by the kind of their opening."""
+MOST = 2**30
+"""Most bytes of one house, unpacked; those of 200 m² are a tenth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +71,7 @@ class HouseStrips:
           ValueError: damaged, or arrays that do not fit each other.
         """
         try:
-            with np.load(path, allow_pickle=False) as f:
+            with open_arrays(path, MOST) as f:
                 classes = tuple(str(c) for c in f["classes"])
                 arrays = {name: f[name] for name in ("rgb", "share", "rooms", "log_depth", "room")}
         except DAMAGED as e:

@@ -15,7 +15,7 @@ from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row
 from embodied.interface import Agent, Episode
 
-COLUMNS = ("success", "room success", "navigation error", "requests", "oracle success", "steps")
+COLUMNS = ("success", "strict success", "room success", "navigation error", "requests", "oracle success", "steps")
 """Those of the first paper, and how far the agents came."""
 WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
 TEACHER = "learned, asks as its teacher"

@@ -22,6 +22,7 @@ from PIL import Image, UnidentifiedImageError
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from assets.archives import open_arrays
 from assets.cache import atomic_path, digest, write_bytes, write_json
 from assets.closure import code_digest
 from assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
@@ -477,7 +478,7 @@ def _load(folder: Path, stem: str) -> tuple[tuple[MeshPart, ...], list[str]] | N
         if any(digest(data) != manifest["sha256"][name] for name, data in files.items()):
             return None
         finishes = [_finish(row, folder) for row in manifest["finishes"]]
-        with np.load(io.BytesIO(files[f"{stem}.npz"]), allow_pickle=False) as arrays:
+        with open_arrays(io.BytesIO(files[f"{stem}.npz"])) as arrays:
             parts = tuple(
                 MeshPart(arrays[f"v{i}"], arrays[f"f{i}"], arrays[f"n{i}"], arrays[f"t{i}"], finish)
                 for i, finish in enumerate(finishes)

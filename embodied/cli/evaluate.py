@@ -47,11 +47,14 @@ FEW_TASKS = 20
 AREA = (90.0, 140.0)
 """Size of Ask-v0's houses, square metres."""
 COLUMNS = {
-    "vln": ("success", "spl", "navigation error", "nDTW", "SDTW"),
-    "hanna": ("success", "spl", "navigation error", "requests"),
-    "vnla": ("success", "oracle success", "room success", "navigation error", "path length", "requests"),
+    "vln": ("success", "strict success", "spl", "navigation error", "nDTW", "SDTW"),
+    "hanna": ("success", "strict success", "spl", "navigation error", "requests"),
+    "vnla": (
+        "success", "strict success", "oracle success", "room success", "navigation error", "path length", "requests",
+    ),
     "hari": ("success", "navigation error", "requests", "steps"),
-}
+}  # fmt: skip
+"""Of agents without training; "strict success" wants a stop, as HARI's success does."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -275,7 +278,10 @@ def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
         return columns_of(kind)
     if kind == "ask":
         return [*ASK_COLUMNS, *metrics.USAGE]
-    return [*COLUMNS.get(kind, ("success", "spl", "navigation error", "requests", "steps")), *metrics.USAGE]
+    return [
+        *COLUMNS.get(kind, ("success", "strict success", "spl", "navigation error", "requests", "steps")),
+        *metrics.USAGE,
+    ]
 
 
 class _Changes:

@@ -15,6 +15,7 @@ needs changed. `python -m embodied.mattersim` then runs the programs without a c
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -258,28 +259,31 @@ def run_walks(what: str, args: WalkOptions) -> int:
     from embodied.datasets.vlnce import Shot, export_walks
     from embodied.gym.continuous import PRESETS
     from embodied.gym.drive import data_worlds
+    from embodied.locks import locked
 
     data = dataset_of(args.data, "vln")
     body, lens = PRESETS[WALKS[what]]
     width = args.width or lens.width
     shot = Shot(2 * round(lens.height * width / lens.width / 2), width, lens.hfov)
-    worlds = data_worlds(args.data, args.split, args.cache, None)
-    walks = route_excursions(data.tasks(args.split), worlds)[: args.tasks]
-    steps = export_walks(
-        what,
-        args.out,
-        walks,
-        worlds,
-        seed=data.config.seed,
-        body=body,
-        shot=shot,
-        wander=args.wander,
-        split=args.split,
-        depth=args.depth,
-        watch=lambda episodes: bar(episodes, "walks", "walk"),
-    )
-    for world in worlds.values():
-        world.close()
+    whole = what == "lerobot-vlnce"  # written under another name; the others are written file by file
+    with contextlib.nullcontext() if whole else locked(args.out):
+        worlds = data_worlds(args.data, args.split, args.cache, None)
+        walks = route_excursions(data.tasks(args.split), worlds)[: args.tasks]
+        steps = export_walks(
+            what,
+            args.out,
+            walks,
+            worlds,
+            seed=data.config.seed,
+            body=body,
+            shot=shot,
+            wander=args.wander,
+            split=args.split,
+            depth=args.depth,
+            watch=lambda episodes: bar(episodes, "walks", "walk"),
+        )
+        for world in worlds.values():
+            world.close()
     facts = {"walks": len(walks), "steps": steps, "out": str(args.out)}
     show(args, facts, f"{len(walks)} walks, {steps} steps in {args.out}")
     return 0

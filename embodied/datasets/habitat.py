@@ -13,6 +13,7 @@ import gzip
 import json
 import math
 import re
+import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -30,6 +31,8 @@ from embodied.seeds import stream
 
 LONGEST = 200
 """Tokens of an instruction in VLN-CE's files, filled up with zeros."""
+MOST = 2**30
+"""Most bytes of a file, unpacked; VLN-CE's largest has a fifth."""
 SPECIAL = ("<pad>", "<unk>")
 """Words 0 and 1 of the vocabulary."""
 REACH = 1.0
@@ -335,11 +338,15 @@ def _write(path: Path, value: object) -> Path:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        value = parse(gzip.decompress(Path(path).read_bytes()), f"{path}")
-    except (OSError, EOFError) as e:
+        with gzip.open(path) as f:
+            body = f.read(MOST + 1)
+    except (OSError, EOFError, zlib.error) as e:
         if isinstance(e, FileNotFoundError):
             raise
         raise RecordError(f"{path} is not a whole gzip file ({e})") from e
+    if len(body) > MOST:
+        raise RecordError(f"{path} unpacks to over {MOST} bytes; split it")
+    value = parse(body, f"{path}")
     if not isinstance(value, dict):
         raise RecordError(f"{path} should hold one JSON object, got {shown(value)}")
     return value

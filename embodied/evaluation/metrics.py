@@ -217,6 +217,7 @@ def success_progress(episode: Episode, graph: NavGraph) -> float:
 
 PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
     "success": success,
+    "strict success": strict_success,
     "spl": spl,
     "navigation error": navigation_error,
     "requests": requests,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 PERCENT = (
     "success",
+    "strict success",
     "spl",
     "oracle success",
     "room success",
@@ -37,7 +38,7 @@ PERCENT = (
     "oracle success (R2R)",
 )
 """Columns shown in per cent."""
-SHARES = ("success", "oracle success", "room success")
+SHARES = ("success", "strict success", "oracle success", "room success")
 """Those that are 0 or 1 of an episode."""
 
 

@@ -30,7 +30,7 @@ from embodied.assistants.ask import QUESTIONS
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.envs.make import AS_PUBLISHED, assistant_of
-from embodied.evaluation.metrics import PER_EPISODE, strict_success
+from embodied.evaluation.metrics import PER_EPISODE
 from embodied.gym.eyes import (
     PIXELS,
     AllEyes,
@@ -271,7 +271,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
     def _judged(self) -> dict[str, Any]:
         episode, graph = self._env.episode(), self._env.world.graph
         found: dict[str, Any] = {name.replace(" ", "_"): f(episode, graph) for name, f in PER_EPISODE.items()}
-        if self._needs_stop and not strict_success(episode, graph):
+        if self._needs_stop and not found["strict_success"]:
             found |= {"success": 0.0, "spl": 0.0}
         return found | {"is_success": found["success"] > 0}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,9 +32,7 @@ from embodied.world import makers, open_world
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
-    from embodied.world import World
 
-log = logging.getLogger(__name__)
 TASKS = 200
 """Tasks of a generated house."""
 AREA = (70.0, 110.0)
@@ -131,7 +128,7 @@ def flat_playground(
         drawn = PictureSettings.of(pictures or ("fast" if set(sees) - {"oracle"} else "unlit"))
         world = open_world(house, catalogue, cache, graph=graph, pictures=drawn)
         if drawn.lit:
-            _light(world)
+            world.baked(progress=True)
         worlds = {name: world}
     name, place = next(iter(worlds.items()))
     routes: tuple[Route, ...] = ()
@@ -145,24 +142,6 @@ def flat_playground(
     )
     played = tasks_under(kind, tasks, worlds, variants.vnla, variants.hari)
     return Playground(worlds, played, make_env, _oracle(worlds, catalogue, cache, sees))
-
-
-def _light(world: World) -> None:
-    """Bake the light of a world unless the cache has it, and say so: it takes minutes."""
-    from embodied.light import bake, progress_bar  # late: loads the path tracer
-
-    told: list[str] = []
-    with progress_bar() as show:
-
-        def tell(stage: str, done: float) -> None:
-            if not told:
-                log.warning("lighting %s, which takes some minutes, once: %s keeps it", world.name, world.cache)
-            if stage not in told:
-                told.append(stage)
-                log.info("lighting %s: %s", world.name, stage)
-            show(stage, done)
-
-        bake(world.house, world.catalogue, world.cache, world.pictures.lit_by or "normal", progress=tell)
 
 
 def _oracle(

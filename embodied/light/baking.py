@@ -72,10 +72,14 @@ STAGES = {
 
 
 @contextlib.contextmanager
-def progress_bar() -> Iterator[Progress]:
-    """A bar on stderr for `bake`; silent where stderr is no terminal."""
+def progress_bar(*, shown: bool = True) -> Iterator[Progress]:
+    """A bar on stderr for `bake`; silent where stderr is no terminal, or without `shown`."""
     with tqdm(
-        total=100, desc="light", unit="%", disable=None, bar_format="{desc:<20}{percentage:3.0f}%|{bar}| {elapsed}"
+        total=100,
+        desc="light",
+        unit="%",
+        disable=None if shown else True,
+        bar_format="{desc:<20}{percentage:3.0f}%|{bar}| {elapsed}",
     ) as bar:
 
         def tell(stage: str, done: float) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from assets.archives import open_arrays
 from assets.cache import atomic_path, digest, write_bytes
 from assets.json_file import read_json
 from embodied.house.house import House
@@ -53,7 +54,7 @@ class Bake:
     def lit(self) -> LitPages:
         """What renderers draw."""
         pages = tuple(_read_picture(self.folder / f"page_{i:03d}.jpg") for i in range(self.manifest["pages"]))
-        with np.load(self.folder / "meshes.npz", allow_pickle=False) as z:
+        with open_arrays(self.folder / "meshes.npz") as z:
             meshes = tuple(
                 LitMesh(
                     m["owner"],
@@ -82,7 +83,7 @@ class Bake:
 
     def ingredients(self, page: int) -> Ingredients:
         """One page before exposure."""
-        with np.load(self.folder / f"light_{page:03d}.npz", allow_pickle=False) as z:
+        with open_arrays(self.folder / f"light_{page:03d}.npz") as z:
             soft, glow = z["soft"], z["glow"]
         sun = np.asarray(cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE))
         shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
@@ -149,7 +150,7 @@ def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Ra
     names = [f.name for f in dataclasses.fields(Radiosity)]
     if path is not None and path.exists():
         try:
-            with np.load(path, allow_pickle=False) as z:
+            with open_arrays(path) as z:
                 known = Radiosity(*(z[name] for name in names))
             if all(len(getattr(known, name)) == n for name in names):
                 return known

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from assets.archives import open_arrays
 from embodied.house.house import House
 from embodied.light import radiosity
 from embodied.light.arrays import Array, Ray, RayScene
@@ -129,7 +130,7 @@ def _pages_of(bake: Bake, own: int, sun: np.ndarray) -> _Pages:
 def world_of(bake: Bake, house: House) -> BakedScene:
     """Upload a bake."""
     lit = bake.lit
-    with np.load(bake.folder / "meshes.npz", allow_pickle=False) as z:
+    with open_arrays(bake.folder / "meshes.npz") as z:
         gloss = [z[f"g{i}"][:, :3] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
     number = {o: i + 1 for i, o in enumerate(lit.owners)}
     solid = [(m, g) for m, g in zip(lit.meshes, gloss) if m.alpha >= 0.9 and g is not None and len(m.faces)]
@@ -223,7 +224,7 @@ def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
 
 
 def _lamps(bake: Bake) -> tuple[Lamp, ...]:
-    with np.load(bake.folder / "lamps.npz", allow_pickle=False) as z:
+    with open_arrays(bake.folder / "lamps.npz") as z:
         return tuple(
             Lamp(
                 x["id"],

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from assets.archives import open_arrays
 from assets.cache import DAMAGED, atomic_path, digest
 from assets.closure import code_digest
 from assets.records import MeshPart
@@ -277,7 +278,7 @@ def save_record(record: Any, path: Path) -> None:
 def load_record(kind: type[T], path: Path) -> T | None:
     """Read what `save_record` wrote; None when absent, cut short or of another shape."""
     try:
-        with np.load(path, allow_pickle=False) as z:
+        with open_arrays(path) as z:
             return kind(**{x.name: z[x.name] for x in fields(kind)})  # type: ignore[arg-type]  # a dataclass
     except (OSError, *DAMAGED):
         return None

@@ -16,6 +16,7 @@ Every picture carries a CRC-32 that is checked when it is read.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import struct
@@ -27,6 +28,7 @@ from typing import BinaryIO, Self
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from assets.cache import atomic_path
 from assets.json_file import RecordError, from_plain, parse
@@ -131,8 +133,10 @@ class PanoramaFile:
             raise PanoramaFileError(
                 f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again"
             )
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), flag)
-        if picture is None or picture.shape[:2] != (self.size, 6 * self.size):
+        picture = None
+        if _size_of(data) == (6 * self.size, self.size):
+            picture = cv2.imdecode(np.frombuffer(data, np.uint8), flag)
+        if picture is None:
             raise PanoramaFileError(
                 f"{self.path}: the {channel} of node {node} is no picture of its size; "
                 "delete the file, it is made again"
@@ -144,6 +148,15 @@ class PanoramaFile:
         offset, length, crc = self.index.nodes[node][channel]
         data = os.pread(self._file.fileno(), length, offset)  # whoever shares the file shares its position
         return data if len(data) == length and zlib.crc32(data) == crc else None
+
+
+def _size_of(data: bytes) -> tuple[int, int] | None:
+    """Width and height that a JPEG or PNG says to have, without decoding it; None where it is neither."""
+    try:
+        with Image.open(io.BytesIO(data), formats=("JPEG", "PNG")) as opened:
+            return opened.size
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        return None
 
 
 def write_panoramas(

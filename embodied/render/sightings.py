@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from assets.archives import open_arrays
 from assets.cache import DAMAGED, atomic_path
 from embodied.house.house import House
 from embodied.interface import Sighting
@@ -85,7 +86,7 @@ def save_table(path: Path, table: SightingTable) -> None:
 def load_table(path: Path) -> SightingTable | None:
     """What `save_table` wrote; None where there is no such file or it is damaged, so that it is made again."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with open_arrays(path) as file:
             columns = [file[name] for name in COLUMNS]
     except (OSError, *DAMAGED):
         return None
