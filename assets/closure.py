@@ -154,5 +154,5 @@ def _distributions() -> Mapping[str, list[str]]:
 
 
 def _version(library: str) -> str:
-    """Version of the distribution that a top name belongs to; '' where it is not installed."""
-    return " ".join(sorted({f"{d} {importlib.metadata.version(d)}" for d in _distributions().get(library, ())}))
+    """Version of the distributions that a top name belongs to, by whatever names; '' where none is installed."""
+    return " ".join(sorted({importlib.metadata.version(d) for d in _distributions().get(library, ())}))

@@ -77,7 +77,7 @@ def episodes_file(split: str, agent: str) -> str:
 def fingerprint(**facts: object) -> dict[str, object]:
     """What a run depends on: versions of Python and of the libraries that compute, the machine, and `facts`."""
     versions = {"embodied": importlib.metadata.version(DISTRIBUTION)}
-    versions |= {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "shapely", "mujoco")}
+    versions |= {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "shapely", "mujoco-core")}
     machine = f"{platform.machine()} {platform.system()}"
     return {"python": platform.python_version(), "versions": versions, "machine": machine, **facts}
 

@@ -16,29 +16,36 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from hand_data import build, content, paint, small_house
 from hand_worlds import grid_world
+from handmade import HandCatalogue
 from test_locks import own_files
 
-import embodied
+from agents.common.checkpoint import CheckpointError, read_checkpoint, restore, write_checkpoint
+from agents.common.session import Session
+from agents.common.tensor_file import save_tensors
 from assets.cache import DRAFTS
 from assets.catalogue import CatalogueError, load_catalogue
 from assets.closure import ROOT
-from embodied import cli
+from embodied import cli, light
+from embodied.bench.timing import Measure, Report
 from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
 from embodied.generate import generate_house
 from embodied.house.house import HouseError
+from embodied.interface import Episode
 from embodied.light import baking
 from embodied.mattersim.graphs import load_graphs
 from embodied.policies.baselines import Shortest
-from embodied.records import save_lines
+from embodied.records import RecordError, from_json, save_lines
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
+from embodied.world import open_world
 from viz import sinks
 
 
@@ -98,7 +105,7 @@ def test_nodes_that_the_house_has_not_are_refused(here, played):
     (line, *_) = played.read_text().splitlines()
     body = json.loads(line)
     body["task"]["goal_nodes"] = [10**6]
-    episode = embodied.records.from_json(embodied.interface.Episode, json.dumps(body))
+    episode = from_json(Episode, json.dumps(body))
     with pytest.raises(DatasetError, match=r"names the nodes \[1000000\], its house has 0 to 15"):
         here.place_of(episode)
 
@@ -186,13 +193,16 @@ def _is_os(node: ast.expr) -> bool:
 
 
 @pytest.mark.slow
-def test_an_export_that_is_killed_leaves_nothing_that_is_believed_and_the_next_is_whole(here, tmp_path):
-    order = ["export", "parquet", "--data", str(here.folder), "--out"]
-    assert cli.main([*order, str(tmp_path / "whole")]) == 0
-    whole, out, rng = content(tmp_path / "whole"), tmp_path / "out", stream(0, "kills")
-    for _ in range(3):
+@pytest.mark.parametrize("what", ["parquet", "r2r", "lerobot"])
+def test_an_export_that_is_killed_leaves_nothing_that_is_believed_and_the_next_is_whole(what, here, tmp_path):
+    options = ["--split", "val_seen", "--size", "16"] if what == "lerobot" else []
+    order = ["export", what, "--data", str(here.folder), *options, "--out"]
+    assert cli.main([*order, str(tmp_path / "whole" / "out")]) == 0
+    (tmp_path / "cut").mkdir()
+    whole, out, rng = content(tmp_path / "whole" / "out"), tmp_path / "cut" / "out", stream(0, "kills")
+    for _ in range(2):
         process = subprocess.Popen([sys.executable, "-m", "embodied", *order, str(out)], stderr=subprocess.DEVNULL)
-        while not out.exists() and process.poll() is None:
+        while not any(out.parent.iterdir()) and process.poll() is None:
             time.sleep(0.01)
         time.sleep(float(rng.uniform(0.0, 0.06)))
         process.send_signal(signal.SIGKILL)
@@ -200,8 +210,11 @@ def test_an_export_that_is_killed_leaves_nothing_that_is_believed_and_the_next_i
         there = {k: v for k, v in content(out).items() if not k.startswith(".")} if out.exists() else {}
         for name, data in there.items():
             assert DRAFTS in name or data == whole[name], "what has its name is whole"
-    assert cli.main([*order, str(out)]) == 0
-    assert content(out) == whole
+        if what == "lerobot" and there:
+            break  # it was done before it was killed, and goes into empty folders only
+    else:
+        assert cli.main([*order, str(out)]) == 0
+    assert content(out) == whole and list(out.parent.iterdir()) == [out]
 
 
 # Light --------------------------------------------------------------------------------------------
@@ -236,6 +249,20 @@ def test_two_that_light_one_house_light_it_once(tmp_path, monkeypatch):
     for t in threads:
         t.join()
     assert len(made) == 1
+
+
+def test_whoever_opens_an_unlit_house_is_told_how_long_its_light_takes(monkeypatch, tmp_path, caplog):
+    def bake(house, catalogue, cache, quality, *, progress):
+        assert "lighting grid takes about a minute, once" in caplog.text, "before it begins"
+
+    def begin(house, catalogue, cache, quality, *, progress):
+        progress("unwrapping", 0.0)
+        return bake(house, catalogue, cache, quality, progress=progress)
+
+    monkeypatch.setattr(light, "bake", begin)
+    world = grid_world(4)
+    open_world(world.house, HandCatalogue(), tmp_path, "fast", graph=world.graph).baked()
+    assert caplog.messages
 
 
 # What is read -------------------------------------------------------------------------------------
@@ -273,6 +300,46 @@ def test_a_seed_that_is_none_is_refused_before_any_work(wrong):
 
 def test_numpys_integers_are_seeds():
     assert stream(np.int64(3), "x").random() == stream(3, "x").random()
+
+
+def test_a_radius_that_no_house_has_is_refused(played):
+    body = json.loads(played.read_text().splitlines()[0])
+    body["task"]["radius"] = 5e11
+    with pytest.raises(RecordError, match="radius should be at most 100 m, which no house is wide, got 5e\\+11"):
+        from_json(Episode, json.dumps(body))
+
+
+def test_equal_weights_are_equal_files(tmp_path):
+    about = {f"key {k}": str(k) for k in range(8)}
+    for k in range(8):
+        save_tensors(tmp_path / str(k), {"a": torch.ones(3), "b": torch.zeros(2)}, about)
+    assert len({(tmp_path / str(k)).read_bytes() for k in range(8)}) == 1
+
+
+@pytest.mark.parametrize("wrong", ["weights", "optimizer"])
+def test_a_checkpoint_that_no_training_can_go_on_from_is_refused(wrong, tmp_path):
+    net = torch.nn.Linear(2, 2)
+    parts = {"network": net, "adam": torch.optim.Adam(net.parameters())}
+    with Session(tmp_path, {"settings": {}}, parts, 5, note=str) as session:
+        session.save()
+    body = read_checkpoint(tmp_path / "checkpoint.pt")
+    if wrong == "weights":
+        body["parts"]["network"]["bias"][0] = float("nan")
+    else:
+        del body["parts"]["adam"]
+    write_checkpoint(tmp_path / "checkpoint.pt", body)
+    with pytest.raises(
+        CheckpointError, match="not finite" if wrong == "weights" else "holds .*'network'.*, this run has"
+    ):
+        restore(tmp_path / "checkpoint.pt", {"settings": {}}, parts)
+
+
+def test_a_benchmark_of_several_parts_runs_them_all(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr("embodied.bench.world.houses", lambda *_: [Measure("a house", 1.0, "s", 1.0, 1.0, 1)])
+    monkeypatch.setattr("embodied.bench.light.compare", lambda *_, **__: Report({"seen": True}, "ways of rendering"))
+    assert cli.main(["bench", "houses", "light", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "a house" in said and "ways of rendering" in said
 
 
 @pytest.mark.parametrize("angle", [90.0, -360.0, float("nan"), float("inf")])

@@ -156,6 +156,22 @@ def test_request_instruction_and_ways_on_are_in_every_info_also_after_a_reply(tm
     assert all(("left" in c["text"]) == (0.1 < c["heading"] < 2.9) for c in info["candidates"])
 
 
+class Pointer(Guide):
+    """The same, who lets the agent stay where it is."""
+
+    def answer(self, situation, question, *, rng):
+        goal = situation.task.goal_nodes[0]
+        return Reply("over there", subtask=Subtask("own", goal, start=None, goal=goal))
+
+
+def test_an_assistant_need_not_name_where_a_subtask_starts(tmp):
+    env = make("hanna", tmp, assistant=Pointer())
+    env.reset(seed=0)
+    before = env.unwrapped._env.pose
+    env.step(number(Ask(), SpaceLayout()))
+    assert env.unwrapped._env.pose == before
+
+
 def test_an_assistant_is_named_by_module_and_class_and_refused_where_nobody_is_asked(tmp):
     envs = gym.make_vec(
         "embodied/HANNA-v0", 2, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", assistant="test_gym:Guide"

@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from embodied import cli
+from embodied.cli.light import hour
 from embodied.cli.options import any_folder, any_path, file_to_write, folder_to_write, positive, video_side, whole
 
 
@@ -93,6 +94,7 @@ def test_odd_arguments_are_refused_before_any_work(words, message, capsys, tmp_p
         (whole(0), ("0",), ("-1",)),
         (video_side, ("16", "480"), ("17", "0", "4098")),
         (positive, ("0.5", "3"), ("0", "-1", "nan", "inf", "1e999", "x")),
+        (hour, ("16:00", "16.5", "night", "0"), ("24", "16:60", "noonish", "-1", "nan", "")),
         (any_path, (".", "ü"), ("", "a\udcff")),
         (any_folder, (".", "new/one"), (__file__,)),
         (folder_to_write, ("new/one",), (f"{__file__}/x",)),

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import re
+import signal
+import subprocess
 import sys
 import types
 from collections.abc import Mapping
@@ -184,6 +187,38 @@ def test_some_rows_are_had_alone_and_missing_ones_are_named(tmp_path):
 def test_two_studies_never_write_into_one_folder(tmp_path):
     with locked(tmp_path), pytest.raises(LockedError):
         run_study(Archer(tmp_path / "log"), ["1"], tmp_path, note=quiet)
+
+
+KILLED = """
+import dataclasses, os, signal, sys
+from pathlib import Path
+import agents.studies.engine as engine
+from test_studies import Archer, table
+
+class Mortal(Archer):
+    def _did(self, what):
+        super()._did(what)
+        if self.log.read_text().split().count(what) == int(sys.argv[2]) and what == sys.argv[3]:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+table(Mortal(Path(sys.argv[1]) / "log"), Path(sys.argv[1]) / "out")
+"""
+
+
+@pytest.mark.slow
+def test_a_study_that_is_killed_goes_on_and_does_nothing_twice(tmp_path):
+    whole = table(Archer(tmp_path / "other log"), tmp_path / "whole")
+    for number, what in ((2, "train"), (5, "judge")):
+        order = [sys.executable, "-c", KILLED, str(tmp_path), str(number), what]
+        paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+        assert subprocess.run(order, env={**os.environ, "PYTHONPATH": paths}).returncode == -signal.SIGKILL
+    assert not list((tmp_path / "out").glob("*.json")), "no table is shown of half a study"
+    archer = Archer(tmp_path / "log")
+    before = did(archer)
+    assert table(archer, tmp_path / "out") == whole
+    after = did(archer)
+    done = {what: before[what] + after[what] for what in before}
+    assert done == {"train": 6 + 1, "judge": 14 + 1}, "each once, and what was cut short"
 
 
 def test_a_table_without_columns_shows_all_that_is_counted(tmp_path):

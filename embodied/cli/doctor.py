@@ -23,7 +23,9 @@ from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.cli.origins import REMEDY, strangers
 from embodied.distribution import DISTRIBUTION
 
-LIBRARIES = (DISTRIBUTION, "mujoco", "trimesh", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely")
+LIBRARIES = (
+    DISTRIBUTION, "mujoco-core", "trimesh", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",
+)  # fmt: skip
 """What houses, light and pictures need."""
 EXTRAS = {"agents": ("torch", "safetensors"), "viz": ("rerun-sdk", "av", "matplotlib"), "data": ("pyarrow",)}
 """What else there is, by the extra of the distribution that brings it."""
@@ -181,7 +183,8 @@ def vulkan(_: Options) -> Finding:
         "Vulkan",
         found is not None,
         found or "no Vulkan loader",
-        "only --pictures fast-filament and normal-filament need it: apt-get install libvulkan1 mesa-vulkan-drivers",
+        "only --pictures fast-filament and normal-filament need it, with the extra [filament]: apt-get install "
+        "libvulkan1 mesa-vulkan-drivers",
         False,
     )
 

@@ -3,6 +3,7 @@
 from embodied.light.backend import LightError as LightError
 from embodied.light.baking import bake as bake
 from embodied.light.baking import bake_all as bake_all
+from embodied.light.baking import duration as duration
 from embodied.light.baking import lightings_of as lightings_of
 from embodied.light.baking import progress_bar as progress_bar
 from embodied.light.files import Bake as Bake

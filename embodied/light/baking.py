@@ -10,6 +10,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import math
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +26,7 @@ from assets.records import DETAILS, Finish
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light import tone
 from embodied.light.atlas import Atlas, Page, atlas_of, coarsened, things_of
-from embodied.light.backend import rest, warn
+from embodied.light.backend import device, rest, warn
 from embodied.light.colours import ColourMaps
 from embodied.light.compose import Composer, Solved, page_of
 from embodied.light.emitters import in_the_open, lamps_of
@@ -60,6 +62,12 @@ from embodied.seeds import stream
 Progress = Callable[[str, float], None]
 
 
+SECONDS = {"fast": 1.0, "normal": 2.5, "high": 8.0}
+"""Of one core per square metre of a house, by quality, with LLVM and furniture that is new to the cache."""
+SCALAR_FACTOR = 10.0
+"""How much longer it takes without LLVM."""
+MOST_CORES = 8
+"""More shorten it little."""
 STAGES = {
     "unwrapping": (0.0, 0.2),
     "direct light": (0.2, 0.4),
@@ -69,6 +77,14 @@ STAGES = {
     "done": (1.0, 1.0),
 }
 """Where each stage lies on the progress bar: its rough share of a bake's time."""
+
+
+def duration(house: House, quality: str) -> str:
+    """About how long `bake` takes on this machine, in words."""
+    cores = min(os.cpu_count() or 1, MOST_CORES)
+    slower = SCALAR_FACTOR if device() == "scalar" else 1.0
+    seconds = slower * house.area * SECONDS[quality] / cores
+    return f"about {math.ceil(seconds / 60)} minutes" if seconds > 60 else "about a minute"
 
 
 @contextlib.contextmanager

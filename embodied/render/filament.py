@@ -67,7 +67,10 @@ class FilamentPainter:
         Raises:
           VulkanError: no Vulkan, or a forked process.
         """
-        from mujoco import mjrf
+        try:
+            from mujoco import mjrf
+        except ImportError as e:
+            raise VulkanError("Filament comes with MuJoCo's viewer; pip install 'embodied-houses[filament]'") from e
 
         self._mjrf, self._context = mjrf, _context(os.getpid())
         model = emissive_model(house, catalogue, lit)
