@@ -299,6 +299,9 @@ def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks,
     labels = np.full(len(shown), CHOICES.index(Intention.ROUTE))
     net = train(np.stack(shown), labels, seed=0)
     episodes = play(make_env, LearnedAsker(net), tasks[:4], seed=0)
+    for batch in (5, 32):
+        together = play(make_env, LearnedAsker(net), tasks, seed=0, batch=batch)
+        assert [to_json(e) for e in together[:4]] == [to_json(e) for e in episodes]
     assert all(isinstance(e.steps[0].action, Ask) and e.steps[0].action.intention is Intention.ROUTE for e in episodes)
     quiet = play(make_env, LearnedAsker(net, reserve=100.0), tasks[:4], seed=0)
     assert not any(e.requests for e in quiet)

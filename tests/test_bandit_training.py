@@ -268,10 +268,14 @@ def test_log_probabilities_sum_to_one_over_the_next_word():
 
 def test_what_is_sampled_does_not_depend_on_the_batch():
     translator, _ = networks()
-    uniforms = stream(0, "u").random((3, 20))
-    together = decode(translator, padded(SOURCE), drawn_with(uniforms), 20)
-    alone = [decode(translator, padded([s]), drawn_with(uniforms[[i]]), 20)[0] for i, s in enumerate(SOURCE)]
-    assert together == alone
+    source, uniforms = SOURCE * 11, stream(0, "u").random((33, 20))
+
+    def drawn(batch: int) -> list[list[int]]:
+        parts = [slice(k, k + batch) for k in range(0, 33, batch)]
+        return [s for p in parts for s in decode(translator, padded(source[p]), drawn_with(uniforms[p]), 20)]
+
+    together = drawn(32)
+    assert together == drawn(5) == drawn(1)
     assert all(PAD_NUMBER not in s and len(s) <= 20 for s in together)
 
 

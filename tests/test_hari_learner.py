@@ -478,12 +478,12 @@ def test_shaped_costs_of_played_episodes_telescope(fork_executor):
 @pytest.mark.slow
 def test_an_episode_does_not_depend_on_the_batch_around_it(fork_executor):
     agent = HariAgent(fork_executor, new_heads(QUICK, SMALL.hidden_size)[0], QUICK)
-    tasks = [dataclasses.replace(fork_task(1 + k % 2), id=f"fork/{k}") for k in range(6)]
-    together = play(fork_env, policy_of(agent), tasks, seed=1, batch=6)
-    alone = [play(fork_env, policy_of(agent), [t], seed=1)[0] for t in reversed(tasks)]
-    assert together == list(reversed(alone))
+    tasks = [dataclasses.replace(fork_task(1 + k % 2), id=f"fork/{k}") for k in range(33)]
     ruled = RuleAgent(fork_executor, RandomWithBudgets({"cur": 1.5, "goal": 1.0, "sub": 0.5, "do": 2.5}))
-    assert play(fork_env, ruled, tasks, seed=1, batch=6) == [play(fork_env, ruled, [t], seed=1)[0] for t in tasks]
+    for player in (policy_of(agent), ruled):
+        alone = [play(fork_env, player, [t], seed=1)[0] for t in reversed(tasks)]
+        for batch in (5, 32):
+            assert play(fork_env, player, tasks, seed=1, batch=batch) == list(reversed(alone))
 
 
 @pytest.mark.slow

@@ -92,6 +92,14 @@ def test_scores_are_those_of_the_steps_that_were_sampled():
     assert total == pytest.approx(1, abs=1e-5), "stopping and every neighbour"
 
 
+def test_a_student_walks_the_same_way_whoever_walks_beside():
+    walker = student(eyes(GRID, "grid", ["go", "to", "the", "end"]))
+    trips = [Trip("grid", Pose(k % 16), (k % 16,), ("go",)) for k in range(33)]
+    asked = [("go", "go to the end")[k % 2] for k in range(33)]
+    walked_by = lambda n: [w for k in range(0, 33, n) for w in walker.greedy(trips[k : k + n], asked[k : k + n])]
+    assert walked_by(1) == walked_by(5) == walked_by(32)
+
+
 class Scripted(LearnedNavTeacher):
     """Its executor goes where a description says, nodes apart by blanks."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import itertools
 import math
 
 import numpy as np
@@ -202,10 +203,12 @@ def test_every_asker_keeps_to_its_budget_and_to_itself(asker):
     agent, _, split = lesson()
     agent.network.eval()
     player = agent.player(split.bank, asker)
-    tasks = [dataclasses.replace(t, budget=2.0) for t in split.tasks[:6]]
-    together = play(split.make_env, player, tasks, seed=1, batch=6)
-    alone = play(split.make_env, player, tasks[::-1], seed=1, batch=1)[::-1]
-    assert [[s.action for s in e.steps] for e in together] == [[s.action for s in e.steps] for e in alone]
+    some = itertools.islice(itertools.cycle(split.tasks), 33)
+    tasks = [dataclasses.replace(t, id=f"{t.id}/{k}", budget=2.0, horizon=8) for k, t in enumerate(some)]
+    together = play(split.make_env, player, tasks, seed=1, batch=32)
+    for batch in (1, 5):
+        others = play(split.make_env, player, tasks[::-1], seed=1, batch=batch)[::-1]
+        assert [[s.action for s in e.steps] for e in together] == [[s.action for s in e.steps] for e in others]
     requests = [e.requests for e in together]
     assert max(requests) <= 2 and (asker != "none" or not any(requests)) and (asker != "first" or sum(requests) > 6)
 
