@@ -7,6 +7,7 @@ import fcntl
 import functools
 import hashlib
 import json
+import logging
 import os
 import shutil
 import tempfile
@@ -16,6 +17,7 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
+log = logging.getLogger(__name__)
 DRAFTS = ".embodied-unfinished-"
 """How folders of unfinished files begin; what makes them ours is the mark in them."""
 MARK = ".mark"
@@ -40,7 +42,10 @@ def default_cache() -> Path:
     except RuntimeError:  # neither HOME nor an entry in the list of users
         cache = Path(tempfile.gettempdir()) / f"embodied-{os.getuid()}"
     for other in filter(None, others):
-        link(Path(other).expanduser(), cache)
+        try:
+            link(Path(other).expanduser(), cache, frozenset({os.path.realpath(cache)}))
+        except (OSError, RuntimeError) as e:
+            log.warning("EMBODIED_CACHE names %s, which is left out: %s", other, e)
     return cache
 
 
@@ -49,19 +54,25 @@ def _users_cache() -> str:
     return f"{base}/embodied" if base else "~/.cache/embodied"
 
 
-def link(shared: Path, cache: Path) -> None:
+def link(shared: Path, cache: Path, above: frozenset[str] = frozenset()) -> None:
     """Let `cache` hold symbolic links to those files of `shared` that it lacks; hidden files are left out.
+
+    Args:
+      above: real paths of folders that are not entered again, so that links that lead back are none.
 
     Raises:
       OSError: `shared` cannot be read, or `cache` not be written.
     """
+    real = os.path.realpath(shared)
+    if real in above:
+        return
     with os.scandir(shared) as entries:
         inside = [e for e in entries if not e.name.startswith(".")]
     if inside:
         cache.mkdir(parents=True, exist_ok=True)
     for entry in inside:
         if entry.is_dir():
-            link(Path(entry.path), cache / entry.name)
+            link(Path(entry.path), cache / entry.name, above | {real})
         elif not os.path.lexists(cache / entry.name):
             with contextlib.suppress(FileExistsError):  # another process links, too
                 os.symlink(os.path.abspath(entry.path), cache / entry.name)

@@ -50,8 +50,9 @@ def run(args: Options) -> int:
 
 
 def files(cache: Path) -> list[Path]:
-    """The program's files in a cache, those it only links to included."""
-    return [p for kind in KINDS for p in sorted((cache / kind).rglob("*")) if p.is_symlink() or p.is_file()]
+    """The program's files in a cache, those it only links to included; folders that are links are somebody else's."""
+    own = [cache / kind for kind in KINDS if not (cache / kind).is_symlink()]
+    return [p for folder in own for p in sorted(folder.rglob("*")) if p.is_symlink() or p.is_file()]
 
 
 def measured(folder: Path) -> tuple[int, int]:
