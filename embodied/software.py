@@ -1,19 +1,25 @@
-"""Libraries of software OpenGL (OSMesa) and of LLVM that came by pip, for machines where nobody may install packages.
+"""Libraries that `embodied doctor --fix` brings to machines where nobody may install packages of the system.
 
-The wheel lavavu-osmesa (Linux, x86-64) carries both. `embodied doctor --fix` brings it; nothing of LavaVu itself is
-used.
+The wheel lavavu-osmesa (Linux, x86-64) carries software OpenGL (OSMesa) and LLVM; nothing of LavaVu itself is used.
+libatomic, which Dr.Jit's wheel expects of the system, is unpacked from Debian's package into the environment.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import ctypes.util
 import functools
 import importlib
 import importlib.util
+import shutil
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
+ATOMIC = "libatomic.so.1"
 FOLDER = "lavavu_osmesa.libs"
 WHEEL = "lavavu"
 
@@ -62,3 +68,22 @@ def bind_osmesa() -> None:
         importlib.import_module("OpenGL.platform")
     finally:
         loader._dlltype = load
+
+
+def load_atomic(folder: Path = Path(sys.prefix, "lib")) -> bool:
+    """Load libatomic, the system's or the one in `folder`, for libraries that are loaded later; whether it is there."""
+    return sys.platform != "linux" or _try(Path(ATOMIC)) or _try(folder / ATOMIC)
+
+
+def bring_atomic(folder: Path = Path(sys.prefix, "lib")) -> bool:
+    """Unpack libatomic of the Debian or Ubuntu package into `folder`, without root; whether it is there then."""
+    with tempfile.TemporaryDirectory() as place, contextlib.suppress(OSError, subprocess.SubprocessError):
+        Path(place, "lists", "partial").mkdir(parents=True)
+        lists = ["-o", f"Dir::State::lists={place}/lists", "-o", f"Dir::Cache={place}"]
+        for order in (["apt-get", *lists, "update"], ["apt-get", *lists, "download", "libatomic1"]):
+            subprocess.run(order, cwd=place, check=True, capture_output=True)
+        (package,) = Path(place).glob("libatomic1_*.deb")
+        subprocess.run(["dpkg-deb", "-x", package.name, "whole"], cwd=place, check=True, capture_output=True)
+        (library,) = Path(place, "whole").rglob(ATOMIC)
+        shutil.copyfile(library, folder / ATOMIC)  # of the file that this name links to
+    return load_atomic(folder)

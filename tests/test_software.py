@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import importlib.util
+import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -50,3 +52,26 @@ def test_the_systems_osmesa_goes_before_the_wheels(monkeypatch):
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: "libOSMesa.so.8")
     software.bind_osmesa()
     assert ctypes.cdll._dlltype is before
+
+
+def test_libatomic_comes_out_of_debians_package_without_root(tmp_path, monkeypatch):
+    def run(order, *, cwd, **_):
+        if order[0] == "apt-get" and order[-1] == "libatomic1":
+            Path(cwd, "libatomic1_12_amd64.deb").write_bytes(b"")
+        elif order[0] == "dpkg-deb":
+            place = Path(cwd, order[3], "usr/lib/x86_64-linux-gnu")
+            place.mkdir(parents=True)
+            (place / "libatomic.so.1.2.0").write_bytes(b"the library")
+            (place / software.ATOMIC).symlink_to("libatomic.so.1.2.0")
+
+    loaded = []
+    monkeypatch.setattr(subprocess, "run", run)
+    monkeypatch.setattr(software, "_try", lambda path: loaded.append(path) or path.exists())
+    assert not software.load_atomic(tmp_path) and software.bring_atomic(tmp_path)
+    assert loaded[-1].read_bytes() == b"the library" and not loaded[-1].is_symlink()
+
+
+def test_where_apt_is_not_nothing_is_brought(tmp_path, monkeypatch):
+    monkeypatch.setattr(software, "_try", lambda path: False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert not software.bring_atomic(tmp_path)

@@ -6,7 +6,6 @@ versions and free disk. Exits 1, with the remedy, when houses cannot be generate
 
 from __future__ import annotations
 
-import importlib
 import importlib.metadata
 import platform
 import shutil
@@ -22,6 +21,7 @@ from embodied.cli import message_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.cli.origins import REMEDY, strangers
 from embodied.distribution import DISTRIBUTION
+from embodied.software import bring_atomic, load_atomic
 
 LIBRARIES = (
     DISTRIBUTION, "mujoco-core", "trimesh", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",
@@ -48,14 +48,19 @@ class Finding:
 @dataclass(frozen=True, kw_only=True)
 class Options(Furnished, Printed):
     fix: bool = False
-    """Install by pip, without root, what is missing: furniture models, software OpenGL and LLVM."""
+    """Install without root what is missing: furniture models, software OpenGL and LLVM by pip, libatomic by apt-get."""
 
 
 def run(args: Options) -> int:
     findings = []
     if args.fix:
-        for line_of in fix(catalogue_packs=args.pack):
-            note(line_of)
+        done = [note(said) for said in fix(catalogue_packs=args.pack)]
+        if not done:
+            note("nothing is missing that can be brought without root")
+        else:  # libraries are found by processes that start when they are there
+            again = ["doctor", "--cache", str(args.cache), *(w for p in args.pack for w in ("--pack", str(p)))]
+            again += ["--json"] if args.json else []
+            return subprocess.run([sys.executable, "-m", "embodied", *again], check=False).returncode
     for look in (versions, extras, packages, renderer, packs, path_tracer, vulkan, body, disk):
         findings.append(look(args))
         if not args.json:
@@ -76,7 +81,7 @@ def line(f: Finding) -> str:
 
 
 def fix(catalogue_packs: tuple[Path, ...]) -> Iterator[str]:
-    """Install what pip can bring and this machine lacks; yields what is done."""
+    """Install what can be had without root and this machine lacks; yields what is done."""
     from assets.importing.packs import find_packs
     from embodied import gl
     from embodied.light.backend import find_llvm
@@ -90,9 +95,10 @@ def fix(catalogue_packs: tuple[Path, ...]) -> Iterator[str]:
         yield f"pip install {name}"
         # without what that package needs itself: only libraries in it are used
         subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", name], check=False)
-    importlib.invalidate_caches()
-    if not wanted:
-        yield "nothing is missing that pip could bring"
+    if not load_atomic():
+        yield "apt-get download libatomic1, of which the library goes into this environment"
+        if not bring_atomic():
+            yield "that failed; have an administrator install libatomic1"
 
 
 def versions(_: Options) -> Finding:

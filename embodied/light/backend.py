@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from embodied.errors import UnableError
 from embodied.light import scalar
 from embodied.light.arrays import Array, RayScene
-from embodied.software import bundled
+from embodied.software import bundled, load_atomic
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -59,12 +59,15 @@ def _module() -> types.ModuleType:
     """Mitsuba itself, with its best variant switched on."""
     if "DRJIT_LIBLLVM_PATH" not in os.environ and (llvm := find_llvm()):
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm  # Dr.Jit reads it once, when it is imported
+    load_atomic()
     try:
         import drjit as dr
         import mitsuba as mi
     except (ImportError, NameError) as e:  # NameError: Dr.Jit's own, where a library of the system is missing
         why = str(e.__context__ or e)
-        remedy = "apt-get install libatomic1" if "libatomic" in why else "pip install mitsuba"
+        remedy = "pip install mitsuba"
+        if "libatomic" in why:
+            remedy = "apt-get install libatomic1 or, without root on Debian and Ubuntu, embodied doctor --fix"
         raise LightError(f"light needs mitsuba ({why}); {remedy}, or look at houses without light (unlit)") from e
 
     mi.set_variant(variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name)))))
