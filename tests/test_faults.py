@@ -353,7 +353,7 @@ def test_degrees_and_what_is_no_angle_are_no_radians(angle):
 
 
 def test_one_folder_of_own_models_may_be_named_as_a_text(tmp_path):
-    with pytest.raises(CatalogueError, match="catalogue.json does not exist"):
+    with pytest.raises(CatalogueError, match="mymodels/catalogue.json does not exist"):
         load_catalogue(tmp_path, own=str(tmp_path / "mymodels"))
 
 
