@@ -16,6 +16,7 @@ from embodied.datasets.store import Dataset
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
 from embodied.scene.house_meshes import owners
+from embodied.seeds import stream
 
 
 def hand_house(seed, name, config, catalogue):
@@ -76,3 +77,18 @@ def paint(data, pictures, names=None):
         nodes = [painted_panorama(k, many, pictures.size) for k in range(len(place.graph.ids))]
         meta = {"house": place.house.digest, **pictures.stored()}
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)
+
+
+def noise_features(data):
+    """Features of nothing for all houses of a data set, as made by an untrained encoder, which is returned."""
+    from agents.vision.drawn import pictures_of
+    from agents.vision.encoder import random_encoder
+    from agents.vision.features import feature_path, save_features
+
+    encoder = random_encoder(seed=0)
+    for name in dict.fromkeys(n for split in data.splits for n in data.names(split)):
+        place, pictures = data.place(name), pictures_of(data, name)
+        noise = stream(0, "noise", name).normal(size=(len(place.graph.ids), 36, encoder.size)).astype(np.float16)
+        path = feature_path(data.folder / "features", encoder.digest, name, pictures)
+        save_features(path, noise, encoder, place.house.digest, pictures)
+    return encoder

@@ -5,10 +5,9 @@ from __future__ import annotations
 import dataclasses
 import json
 
-import numpy as np
 import pytest
 import torch
-from hand_data import build, small_house
+from hand_data import build, noise_features, small_house
 
 from agents.common.checkpoint import CheckpointError
 from agents.iliad.config import LearnerConfig
@@ -21,13 +20,10 @@ from agents.iliad.nav.student import NavStudent
 from agents.iliad.nav.world import NavWorld, walk_along
 from agents.iliad.study import IliadStudy, NavStudyWorld
 from agents.studies.engine import run_study
-from agents.vision.encoder import random_encoder
-from agents.vision.features import feature_path, save_features
 from embodied.cli import main
 from embodied.datasets.store import Dataset
 from embodied.interface import Stop
 from embodied.language.plain import PlainLanguage
-from embodied.seeds import stream
 
 pytestmark = pytest.mark.slow
 
@@ -41,12 +37,7 @@ def source(tmp_path_factory) -> NavSource:
     """Grids of 16 nodes whose features are noise."""
     folder = tmp_path_factory.mktemp("vln")
     cache = tmp_path_factory.mktemp("cache")
-    data, encoder = build(folder, cache, "vln", make_house=small_house), random_encoder(seed=0)
-    for name in dict.fromkeys(n for split in data.splits for n in data.names(split)):
-        place = data.place(name)
-        noise = stream(0, "noise", name).normal(size=(len(place.graph.ids), 36, encoder.size)).astype(np.float16)
-        path = feature_path(folder / "features", encoder.digest, name)
-        save_features(path, noise, encoder, place.house.digest)
+    encoder = noise_features(build(folder, cache, "vln", make_house=small_house))
     return NavSource(folder, encoder.digest, None, cache)
 
 

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import json
+import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hand_data import noise_features
 from hand_serve import HEAD, TOGETHER, make_data, write_study
 
 from agents.bandit.ratings import Rater, fitted
+from agents.common.weights import load_weights
+from agents.iliad.nav.stages import NavAbout
+from agents.vnla.agent import load_agent as load_vnla
 from agents.vnla.run import vocabulary_of
+from embodied.cli import main as start
 from embodied.envs.base import ActionError
-from embodied.interface import Ask, Episode
+from embodied.errors import UnableError
+from embodied.geometry import wrap
+from embodied.interface import Ask, Episode, Thought
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import PeoplesWords
+from embodied.policies.baselines import RandomWalk
 from embodied.records import load_lines, parse, to_json
+from embodied.serve.app import app_of
+from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game, set_table
 from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
 from embodied.serve.results import JUDGEMENTS, Judgement, Writer, agreement, part_summary, summary
+from embodied.serve.run import open_study
 from embodied.serve.screens import screen_of
 from embodied.serve.sessions import Sessions
 from embodied.serve.store import Event
@@ -174,8 +188,9 @@ def test_judges_see_what_others_played_and_never_their_own(data, tmp_path):
     assert play.screen("eve")["screen"] == "judge" and play.sessions.people["ann"].viewing is None
     frames = play.screen("eve")["frames"]
     assert "Question: Where?\nAnswer: over there" in [f["text"] for f in frames] and frames[-1]["text"] == "The end."
-    with pytest.raises(ActionError, match="stars"):
-        play.do("judged", "eve", stars=6, text="")
+    for nonsense in (6, 0, True, 3.0, "4", None):
+        with pytest.raises(ActionError, match="stars"):
+            play.do("judged", "eve", stars=nonsense, text="")
     play.do("judged", "eve", stars=4, text="well <b>done</b>", seconds=3.21)
     Writer(tmp_path, play.sessions)
     (told,) = load_lines(tmp_path / JUDGEMENTS, Judgement)
@@ -314,21 +329,104 @@ def test_an_assistant_by_name_is_given_the_simulated_one_to_reword(data):
     assert game.said[-1]["text"].endswith("(WHERE?)") and game.situation.subtask.start == game.situation.pose
 
 
-def test_a_machine_goes_on_after_a_restart_where_it_was(data):
-    parts = '[[parts]]\nname = "help"\nagent = "random"\nbudget = 0\n'
+class Thinker(RandomWalk):
+    """A machine that says what it thought."""
+
+    def act(self, observations, memory, *, rngs):
+        actions, memory = super().act(observations, memory, rngs=rngs)
+        thoughts = [o and Thought(np.full(len(o.candidates) + 1, 0.25), words="onward") for o in observations]
+        return [a and dataclasses.replace(a, thought=t) for a, t in zip(actions, thoughts)], memory
+
+
+def test_a_machine_goes_on_after_a_restart_where_it_was_and_its_thoughts_are_in_the_episode(data, tmp_path):
+    parts = '[[parts]]\nname = "help"\nagent = "test_serve:Thinker"\nbudget = 0\n'
     plays = [Script(data, parts), Script(data, parts)]
     plays[0].join("bob")
     plays[0].ready("bob")
-    game = plays[0].game("bob")
-    for _ in range(4):
+    game, thought = plays[0].game("bob"), []
+    while not game.over:
         kind, body = game.think()
+        if len(thought) == 3:
+            plays[1].time = plays[0].time
+            for event in plays[0].log:
+                plays[1].take(Event(**json.loads(json.dumps(dataclasses.asdict(event)))))
+            assert plays[1].sessions.games[game.id].think() == (kind, body)
+        thought.append(body["thought"])
         plays[0].do(kind, None, game=game.id, **body)
-        if game.over:
+    Writer(tmp_path, plays[0].sessions)
+    (episode,) = load_lines(tmp_path / "episodes_val_seen_help.jsonl", Episode)
+    assert len(thought) > 3 and [parse(to_json(s.action.thought)) for s in episode.steps] == thought
+
+
+def test_whoever_drives_moves_to_a_viewpoint_when_it_is_the_nearest(data):
+    play = Script(data, TOGETHER + 'moves = "drive"\n')
+    play.join("ann", "bob")
+    play.ready("ann", "bob")
+    game = play.game("ann")
+    first, graph = game.env.pose.node, game.situation.world.graph
+    room = graph.room_of_node
+    near = next(n for n in game.situation.candidate_nodes if room[n] == room[first])
+    goal = graph.positions[near]
+    before = play.screen("ann")
+    assert before["words"] == list(ACTIONS) and before["moves"] == [{"candidate": k} for k in range(3)]
+    for _ in range(60):
+        dx, dy = goal[:2] - game.drive.position
+        off = wrap(math.atan2(dy, dx) - game.drive.yaw)
+        play.play("ann", "moved", candidate=0 if abs(off) < 0.2 else 1 if off > 0 else 2)
+        assert play.screen("ann")["live"] != before["live"], "there is a picture of every moment"
+        if game.env.pose.node != first:
             break
-    else:
-        for event in plays[0].log:
-            plays[1].sessions.apply(event)
-        assert plays[1].sessions.games[game.id].think() == game.think()
+    play.play("ann", "stopped")
+    *moves, stop = game.episode.steps
+    assert [s.next_pose.node for s in moves] == [near] and math.dist(game.drive.position, goal[:2]) < 0.75 * math.dist(
+        graph.positions[first], goal
+    )
+    with pytest.raises(ActionError, match="over"):
+        play.play("ann", "moved", candidate=0)
+    with pytest.raises(ValueError, match="viewpoints"):
+        set_table(Part("p", assistant="simulated", moves="drive"), data)
+
+
+def test_live_pictures_are_of_this_moment_and_for_whoever_drives(data, tmp_path, monkeypatch):
+    drawn = []
+    picture = lambda camera, size: drawn.append(camera) or np.full((*size, 3), 100, np.uint8)
+    world = SimpleNamespace(renderer=SimpleNamespace(rgb=picture))
+    study = write_study(data.folder.parent, TOGETHER + 'moves = "drive"\n', name="live")
+    panoramas = lambda data, name: data.folder / "houses" / name / "panoramas.pano"
+    opened = open_study(study, tmp_path / "out", panoramas, open_world=lambda data, name: world)
+    play, server = Script(data, TOGETHER), opened.server
+    play.sessions, app = server.sessions, app_of(server)
+    play.join("ann", "bob")
+    play.ready("ann", "bob")
+
+    def live():
+        return screen_of(play.sessions, play.sessions.people["ann"], server.pictures, "")["live"]
+
+    async def get(name):
+        said = []
+        scope = {"type": "http", "method": "GET", "path": f"/live/{name}.jpg", "headers": [], "query_string": b""}
+
+        async def send(message):
+            said.append(message)
+
+        await app(scope, asyncio.sleep, send)
+        return said[0]["status"], b"".join(m.get("body", b"") for m in said[1:])
+
+    async def look():
+        first, before = live(), len(drawn)
+        for _ in range(2):
+            status, body = await get(first)
+            assert status == 200 and body[:2] == b"\xff\xd8"
+        assert len(drawn) == before + 1, "asked for twice, drawn once"
+        play.play("ann", "moved", candidate=1)
+        assert (await get(live()))[0] == 200 and drawn[-1] != drawn[-2]
+        for gone in (first, f"{play.game('ann').id}/{'0' * 24}", "nobody/nothing"):
+            assert (await get(gone))[0] == 404
+
+    asyncio.run(look())
+    monkeypatch.setattr("embodied.serve.driving.SLOWEST", 0.0)
+    with pytest.raises(UnableError, match="too slow to drive"):
+        open_study(study, tmp_path / "slow", panoramas, open_world=lambda data, name: world)
 
 
 def test_typed_questions_have_prices_that_are_written_down(data):
@@ -403,6 +501,35 @@ def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path, share
     voice = PeoplesWords([said], PlainLanguage())
     assert voice.subgoal(said.words) == "over there" and voice.subgoal(("left", *said.words)) != "over there"
     assert "there" in vocabulary_of(made).words
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hanna", "vnla"])
+def test_iliad_and_vnla_train_on_what_people_said(tmp_path, shared_cache, kind):
+    data = make_data(tmp_path, shared_cache, kind)
+    played(data, tmp_path / "people", "hop over yonder", far=kind == "hanna")
+    noise_features(data)
+    people = ["--people", str(tmp_path / "people"), "--data", str(data.folder), "--out", str(tmp_path / "made")]
+    assert start(["dataset", "from-people", *people]) == 0
+    learn = ["--data", str(tmp_path / "made"), "--out", str(tmp_path / "out"), "--network", "random", "--iterations=2"]
+    if kind == "vnla":
+        small = ["--hidden-size=16", "--batch=4", "--validate-every=2", "--validation-tasks=4"]
+        assert start(["train", "vnla", *learn, *small]) == 0
+        words = load_vnla(tmp_path / "out" / "best.safetensors").vocabulary.words
+    else:
+        small = ["--hidden-size=16", "--heads=2", "--candidates=2", "--executor-iterations=2"]
+        small += [
+            "--describer-iterations=2",
+            "--batch=4",
+            "--teacher-batch=4",
+            "--cache",
+            str(shared_cache),
+            "--held-out=0.1",
+        ]
+        assert start(["train", "iliad", "nav", *learn, *small]) == 0
+        (best,) = (tmp_path / "out").rglob("best.safetensors")
+        words = load_weights(best, "nav", NavAbout, "")[1].words
+    assert "yonder" in words
 
 
 def test_descriptions_become_routes_and_stars_a_rater(data, tmp_path):

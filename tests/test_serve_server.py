@@ -111,6 +111,11 @@ def test_nobody_acts_for_another_or_out_of_turn(server):
     assert "error" not in helper.say("house") and helper.plan["rooms"]
     for nonsense in ("happen", "_joined", "broken", "began", None, 7):
         assert "error" in agent.say(nonsense, **theirs)
+    assert "error" not in agent.play("asked", text="Where?")
+    helper.until("assistant", lambda s: s["yours"])
+    for picture in (2.0, True, -1, 10**30, "1", [1]):
+        assert "error" in helper.play("answered", text="there", picture=picture), picture
+    assert "error" not in helper.play("answered", text="there", picture=2)
 
 
 def test_strangers_pages_and_words_are_refused(server):

@@ -24,6 +24,7 @@ from embodied.cli.model import WithModel, client_of
 from embodied.cli.options import Count, Option, OutputFolder, any_path, whole
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
+from embodied.render.pictures import PictureSettings
 
 if TYPE_CHECKING:
     from agents.language_models.client import Client
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from embodied.interface import Agent, Assistant, Place
     from embodied.serve.game import AgentMaker
     from embodied.serve.study import Study
+    from embodied.world import World
 
 LOOPBACK = "127.0.0.1"
 LOOPBACKS = (LOOPBACK, "localhost", "::1")
@@ -80,6 +82,7 @@ def run(args: Options) -> int:
         agents_of(args.study.parent / study.data, client),
         {"llm": lambda base: model_assistant(base, client(), args.prompts)},
         origins_of(args),
+        lambda data, name: live_world(data, name, study, args),
     )
     if args.summary:
         from embodied.serve.results import as_text, summary
@@ -102,14 +105,23 @@ def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
     """The panoramas of a house: the data set's, else drawn into the cache."""
     if data.drawn_pictures(name) is not None:
         return data.folder / "houses" / name / "panoramas.pano"
-    from embodied.world import open_world
-
-    place, catalogue = data.place(name), catalogue_of(args)
-    with open_world(
-        place.house, catalogue, args.cache, graph=place.graph, pictures=study.pictures, size=study.size
-    ) as world:
+    with world_of(data, name, PictureSettings(study.size, study.pictures), args) as world:
         note(f"panoramas of {name}: {study.pictures}, faces of {study.size} pixels")
         return world.render_all(progress=True)
+
+
+def live_world(data: Dataset, name: str, study: Study, args: Options) -> World:
+    """A house to be drawn for people who drive: as its panoramas are, as far as that is quick."""
+    pictures = data.drawn_pictures(name) or PictureSettings(study.size, study.pictures)
+    return world_of(data, name, PictureSettings(kind="fast-matte") if pictures.traced else pictures.matte, args)
+
+
+def world_of(data: Dataset, name: str, pictures: PictureSettings, args: Options) -> World:
+    """A house of the data set, to be drawn so."""
+    from embodied.world import open_world
+
+    place = data.place(name)
+    return open_world(place.house, catalogue_of(args), args.cache, pictures, graph=place.graph)
 
 
 def origins_of(args: Options) -> tuple[str, ...] | None:

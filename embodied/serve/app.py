@@ -24,10 +24,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from embodied.envs.base import ActionError
 from embodied.records import parse, to_json
+from embodied.serve.driving import Live
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.results import summary
-from embodied.serve.screens import houses_of, plan_of, screen_of
+from embodied.serve.screens import houses_of, live_name, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions
 from embodied.serve.store import Event, Store
 from embodied.serve.study import LONGEST_TEXT
@@ -78,15 +79,22 @@ class Server:
     """Owns the connections; everything else is in the sessions and in the store."""
 
     def __init__(
-        self, sessions: Sessions, store: Store, pictures: Pictures, secret: str, origins: Iterable[str] | None = None
+        self,
+        sessions: Sessions,
+        store: Store,
+        pictures: Pictures,
+        secret: str,
+        origins: Iterable[str] | None = None,
+        live: Live | None = None,
     ) -> None:
         """
         Args:
           secret: makes links and completion codes.
+          live: draws what people see who drive.
           origins: addresses of the page that may connect, 'https://study.example.org'; None for the one that the
             browser asked for, whatever its name is.
         """
-        self.sessions, self.store, self.pictures = sessions, store, pictures
+        self.sessions, self.store, self.pictures, self.live = sessions, store, pictures, live
         self.origins = None if origins is None else frozenset(origins)
         self._secret = secret.encode()
         self._sockets: dict[str, WebSocket] = {}
@@ -292,7 +300,8 @@ class Server:
             await self.happen(Event("ended", now, person.id, name, {"person": person.id, "why": "left"}))
             await self.late()
         elif do == "judge":
-            body = {"stars": message.get("stars"), "text": message.get("text", ""), "seconds": message.get("seconds")}
+            text = words(message["text"]) if message.get("text") else ""
+            body = {"stars": message.get("stars"), "text": text, "seconds": message.get("seconds")}
             if message["unit"] != "/".join(person.viewing or ()):
                 raise ActionError("this was judged already")
             await self.happen(Event("judged", now, person.id, name, body))
@@ -317,7 +326,7 @@ class Server:
             if picture is not None:
                 if not part.send_pictures:
                     raise ActionError("no pictures are sent here")
-                if picture not in range(len(game.situation.world.graph.positions)):
+                if type(picture) is not int or picture not in range(len(game.situation.world.graph.positions)):
                     raise ActionError("there is no such viewpoint")
             reply = spoken_reply(game.situation, words(message["text"]), picture, len(game.said), part.way)
             event.body["reply"] = parse(to_json(reply))
@@ -394,6 +403,14 @@ def app_of(server: Server) -> ASGIApp:
         data = await asyncio.to_thread(server.pictures.encoded, name, size)
         return Response(data, media_type="image/jpeg", headers={"cache-control": "private, max-age=604800, immutable"})
 
+    async def live(request: Request) -> Response:
+        game = server.sessions.games.get(request.path_params["game"])
+        name = f"{request.path_params['game']}/{request.path_params['name']}"
+        if server.live is None or game is None or game.drive is None or name != live_name(game, server.pictures):
+            return PlainTextResponse("There is no such picture now.", 404)
+        data = await server.live.picture(name, game.drive.eye)
+        return Response(data, media_type="image/jpeg", headers={"cache-control": "private, max-age=60, immutable"})
+
     async def health(request: Request) -> Response:
         return PlainTextResponse("failed" if server.failed else "ok", 503 if server.failed else 200)
 
@@ -410,6 +427,7 @@ def app_of(server: Server) -> ASGIApp:
         Route("/health", health),
         Route("/static/{name}", page),
         Route("/pano/{name}/{size}.jpg", panorama),
+        Route("/live/{game}/{name}.jpg", live),
         WebSocketRoute("/ws", server.connect),
     ]
     return with_headers(Starlette(routes=routes, lifespan=lifespan))

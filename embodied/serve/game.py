@@ -11,6 +11,7 @@ from typing import Any
 from embodied.action_spaces import PanoramicMoves
 from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError, HelpEnv
+from embodied.envs.continuous import Grounds
 from embodied.envs.hanna import HannaEnv
 from embodied.envs.vnla import VnlaEnv
 from embodied.interface import (
@@ -28,11 +29,13 @@ from embodied.interface import (
     Step,
     Stop,
     Task,
+    Thought,
     act,
 )
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 from embodied.records import from_plain, parse, to_json
 from embodied.seeds import stream
+from embodied.serve.driving import ACTIONS, Drive
 from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, PERSON, Part
 from embodied.serve.talk import Follower, Overheard, PathSpeaker, Relay, TalkEnv, loaded
@@ -62,6 +65,8 @@ class Table:
     make_env: Callable[[], tuple[HelpEnv, Relay]]
     agent: Agent | None
     assistant: Any
+    grounds: Grounds = field(default_factory=Grounds)
+    """The floors to drive on."""
 
 
 def set_table(
@@ -98,6 +103,10 @@ def set_table(
         assistant = loaded(part.assistant)
     simulated_help = part.assistant in ("simulated", *assistants)
     by_own_rule = own is not None and (simulated_help or part.agent not in (PERSON, *POLICIES))
+    if by_own_rule and part.moves == "drive":
+        raise ValueError(
+            f"part {part.name!r}: nobody drives by the rules of {data.kind!r}; let a person assist, or use viewpoints"
+        )
 
     def make_env() -> tuple[HelpEnv, Relay]:
         relay = Relay() if assistant is None else Overheard(assistant)
@@ -142,9 +151,12 @@ class Game:
             self.env, self.relay = self.table.make_env()
             self.agent, self.assistant = self.table.agent, self.table.assistant
         self.observation: Observation | None = self.env.reset(self.task, seed=self.seed)
+        drives = self.table.part.moves == "drive" and "agent" in self.people
+        self.drive = Drive(self.env.world, self.task.start, self.table.grounds) if drives else None
         self.last_change = self.begun
         self._steps: list[Step] = []
         self._asked_at = 0.0
+        self._asking: Thought | None = None
         self._seen: list[tuple[Observation, Situation]] = [(self.observation, self.env.situation)]
         self._memory: Any = None
         self._thought = 0
@@ -188,21 +200,27 @@ class Game:
             self.broken = str(event.body["why"])
         elif event.kind == "asked":
             self._ask(str(event.body["question"]), event.time)
+            self._asking = _thought_of(event)
         elif event.kind == "answered":
             if self.question is None:
                 raise ActionError("nothing was asked")
             reply = from_plain(Reply, event.body["reply"])
             self.relay.reply = reply
             question, self.question = self.question, None
-            self._step(Ask(question=question), self._asked_at)
+            self._step(Ask(question=question, thought=self._asking), self._asked_at)
             picture = None if reply.image is None else reply.image.node
             seconds = event.time - self._asked_at
             self.said.append({"who": "assistant", "text": reply.text or "", "picture": picture, "seconds": seconds})
         else:
             if self.question is not None:
                 raise ActionError("the assistant has not answered yet")
-            action: Action = Move(int(event.body["candidate"])) if event.kind == "moved" else Stop()
-            self._step(action, event.time)
+            thought = _thought_of(event)
+            if event.kind != "moved":
+                self._step(Stop(thought), event.time)
+            elif self.drive is None:
+                self._step(Move(int(event.body["candidate"]), thought), event.time)
+            else:
+                self._drive(self.drive, int(event.body["candidate"]), event.time)
         self.turn += 1
         self.last_change = event.time
 
@@ -215,11 +233,13 @@ class Game:
         for seen, situation in self._seen[self._thought :]:
             (action,), self._memory = act(self.agent, [seen], [situation], self._memory, rngs=[self._rng])
         self._thought = len(self._seen)
+        assert action is not None, "something new was seen"
+        body = {} if action.thought is None else {"thought": parse(to_json(action.thought))}
         if isinstance(action, Move):
-            return "moved", {"candidate": action.candidate}
+            return "moved", {"candidate": action.candidate, **body}
         if isinstance(action, Ask):
-            return "asked", {"question": action.question or "Can you help me?"}
-        return "stopped", {}
+            return "asked", {"question": action.question or "Can you help me?", **body}
+        return "stopped", body
 
     def _answer(self, question: str) -> Any:
         rng = stream(self.seed, "assistant", self.task.id, self.env.time)
@@ -236,8 +256,24 @@ class Game:
         self.question, self._asked_at = question, time
         self.said.append({"who": "agent", "text": question, "picture": None})
 
+    def _drive(self, drive: Drive, action: int, time: float) -> None:
+        """One action of whoever drives; moves along the graph when another viewpoint is the nearest."""
+        if action not in range(len(ACTIONS)):
+            raise ActionError(f"there are {len(ACTIONS)} actions, counted from 0")
+        here = drive.act(action)
+        for node in self.situation.world.graph.path(self.env.pose.node, here)[1:]:
+            if self.over:
+                break
+            self._step(Move(self.situation.candidate_nodes.index(node)), time)
+
     def _step(self, action: Action, time: float) -> None:
         self.observation = self.env.step(action)
         self._steps.append(dataclasses.replace(self.env.last_step, seconds=round(time - self.begun, 3)))
         if self.observation is not None:
             self._seen.append((self.observation, self.env.situation))
+
+
+def _thought_of(event: Event) -> Thought | None:
+    """What a machine thought when it acted; nothing where it did not say, and of people."""
+    thought = event.body.get("thought")
+    return None if thought is None else from_plain(Thought, thought)

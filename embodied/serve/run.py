@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import secrets
 from collections.abc import Callable, Iterable, Mapping
@@ -14,12 +15,14 @@ from embodied.interface import Episode
 from embodied.records import load_lines, to_json
 from embodied.render.panorama_file import PanoramaFile
 from embodied.serve.app import Server, key_of
+from embodied.serve.driving import Drive, Live
 from embodied.serve.game import POLICIES, AgentMaker, AssistantMaker, set_table
 from embodied.serve.pictures import Pictures
 from embodied.serve.results import Writer
 from embodied.serve.sessions import Sessions
 from embodied.serve.store import Store
 from embodied.serve.study import Study, StudyError, load_study
+from embodied.world import World
 
 PanoramaDrawer = Callable[[Dataset, str], Path]
 """Gives the file with a house's panoramas; draws it where it is not there."""
@@ -60,6 +63,7 @@ def open_study(
     agents: Mapping[str, AgentMaker] = POLICIES,
     assistants: Mapping[str, AssistantMaker] = MappingProxyType({}),
     origins: Iterable[str] | None = None,
+    open_world: Callable[[Dataset, str], World] | None = None,
 ) -> Opened:
     """Open a study and read what people did before.
 
@@ -68,9 +72,11 @@ def open_study(
       draw: see PanoramaDrawer.
       agents, assistants: by name, see `set_table`.
       origins: see Server.
+      open_world: gives a house that can be drawn, for people who drive.
 
     Raises:
       StudyError: not a study, or its log is another's.
+      UnableError: people should drive, and this machine cannot draw fast enough.
     """
     path = Path(path)
     study, data_path = load_study(path), path.parent
@@ -90,12 +96,20 @@ def open_study(
             f"{folder} holds what people did in another study, or in this one before {path.name} or its data set were "
             "changed; give another --out"
         )
+    live = None
+    if driven := [t for t in tables.values() if t.part.moves == "drive"]:
+        if open_world is None:
+            raise StudyError(f"{path.name}: nobody can drive here, for nothing draws live pictures")
+        live = Live(functools.partial(open_world, data))
+        for table in driven:
+            for task in {t.world: t for t in (table.practice, *table.tasks.values())}.values():
+                live.prepare(Drive(table.places[task.world], task.start, table.grounds).eye)
     sessions = Sessions(study, tables, viewed)
     for event in store.events():
         sessions.apply(event)
     writer = Writer(folder, sessions)
     sessions.finished, sessions.judged = writer.game, writer.judged
-    return Opened(study, folder, Server(sessions, store, Pictures(files, secret), secret, origins))
+    return Opened(study, folder, Server(sessions, store, Pictures(files, secret), secret, origins, live))
 
 
 def serve(opened: Opened, host: str, port: int) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Sight, Situation, Step, viewpoint
+from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.sessions import STARS, Person, Sessions
@@ -91,9 +92,11 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
     part, seen = game.table.part, game.observation
     assert seen is not None
     target = None if seen.target is None else _picture_of(seen.target, pictures)
+    drives = {"live": live_name(game, pictures), "moves": [{"candidate": k} for k in range(len(ACTIONS))]}
+    moves = {"live": None, "moves": moves_of(seen, game.situation, pictures)}
     return {
-        "moves": moves_of(seen, game.situation, pictures),
-        "words": list(seen.candidates.words),
+        **(moves if game.drive is None else drives),
+        "words": list(seen.candidates.words if game.drive is None else ACTIONS),
         "instruction": seen.instruction,
         "subtask": seen.mode is Mode.SUB,
         "target": target,
@@ -104,6 +107,11 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
         "time": seen.time,
         "horizon": game.task.horizon,
     }
+
+
+def live_name(game: Game, pictures: Pictures) -> str:
+    """Under which the browser of whoever drives gets what is seen now; others cannot guess it."""
+    return f"{game.id}/{pictures.name(game.id, game.turn)}"
 
 
 def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> list[Screen]:

@@ -143,11 +143,11 @@ class Sessions:
             raise ActionError("there is nothing to judge now")
         part = self.part(person.viewing[0])
         stars, text = event.body.get("stars"), event.body.get("text", "")
-        if part.kind == "rate" and stars not in range(1, STARS + 1):
+        if part.kind == "rate" and (type(stars) is not int or not 1 <= stars <= STARS):  # True and 3.0 are no stars
             raise ActionError(f"stars are 1 to {STARS}")
         if not isinstance(text, str) or len(text) > LONGEST_TEXT or (part.kind == "describe" and not text.strip()):
             raise ActionError(f"a description has 1 to {LONGEST_TEXT} characters")
-        event.body.update(part=part.name, unit=person.viewing[1])
+        event.body.update(part=part.name, unit=person.viewing[1], stars=stars if part.kind == "rate" else None)
         self.judgements.append(event)
         self.judged(event)
         person.done[part.name] += 1

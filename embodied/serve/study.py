@@ -9,6 +9,7 @@ from pathlib import Path
 from embodied.records import RecordError, from_plain
 
 KINDS = ("play", "rate", "describe")
+MOVES = ("viewpoints", "drive")
 PERSON = "person"
 LONGEST_TEXT = 2000
 """Characters that a person may send at once."""
@@ -46,6 +47,8 @@ class Part:
     """Who acts: 'person', a policy that the server knows ('shortest', 'shipped', 'llm', ...) or 'module:Class'."""
     assistant: str = PERSON
     """Who answers: 'person', 'simulated', 'llm', 'none' or 'module:Class'."""
+    moves: str = "viewpoints"
+    """How a person who acts moves: from one of the 'viewpoints' to the next, or 'drive', with live pictures."""
     questions: tuple[Question, ...] = ()
     """Questions that a person may choose; with `free_question`, own words besides."""
     free_question: bool = True
@@ -76,6 +79,8 @@ class Part:
             raise ValueError(f"kind should be one of {list(KINDS)}, got {self.kind!r}")
         if self.kind == "play" and not self.roles:
             raise ValueError("agent or assistant should be 'person'; nobody would take part")
+        if self.moves not in MOVES or (self.moves == "drive" and (self.kind != "play" or self.agent != PERSON)):
+            raise ValueError(f"moves should be one of {list(MOVES)}, and only people drive; got {self.moves!r}")
         if self.kind != "play" and bool(self.of) == bool(self.episodes):
             raise ValueError("a part that judges needs either `of`, a part of this study, or `episodes`, a file")
         if PERSON in (self.agent,) and self.assistant != "none" and not (self.questions or self.free_question):

@@ -8,6 +8,8 @@ import type { AgentScreen, AssistantScreen, House, Said, Way } from "./types";
 
 const LONGEST = 2000;
 const LEVEL = -0.12; // a little below the horizon, where the ways are
+const SLOW = 1000; // milliseconds for a live picture, from which on the page says so
+const DRIVING: Record<string, number> = { ArrowUp: 0, ArrowLeft: 1, ArrowRight: 2, w: 0, a: 1, d: 2 };
 
 /** What stays on the page while an episode goes on. */
 export interface View<S> {
@@ -95,6 +97,7 @@ export class AgentView implements View<AgentScreen> {
   private going = false;
   private elsewhere: string | null = null;
   private readonly view = new Panorama(() => this.turned());
+  private readonly live = h("img", { class: "live", alt: "What you see", hidden: true });
   private readonly corner = h("div", { class: "corner top" });
   private readonly banner = h("div", { class: "banner", role: "status" });
   private readonly talk = h("ol", { class: "talk", "aria-live": "polite", "aria-label": "Conversation" });
@@ -108,7 +111,7 @@ export class AgentView implements View<AgentScreen> {
     this.root = h(
       "div",
       { class: "play" },
-      h("div", { class: "stage" }, this.view.root, this.banner, this.corner),
+      h("div", { class: "stage" }, this.view.root, this.live, this.banner, this.corner),
       h(
         "div",
         { class: "side" },
@@ -117,6 +120,7 @@ export class AgentView implements View<AgentScreen> {
         this.ending,
       ),
     );
+    document.addEventListener("keydown", (e) => this.key(e));
   }
 
   update(screen: AgentScreen): void {
@@ -127,7 +131,7 @@ export class AgentView implements View<AgentScreen> {
     } else if (screen.words.length) this.view.look(screen.yaw, screen.pitch);
     this.node = screen.pano;
     this.state = screen;
-    this.going = false;
+    this.going = screen.live !== null && this.going; // whoever drives goes on when they see where they are
     this.request.textContent = screen.request;
     const sub = screen.subtask || (screen.instruction !== screen.request && screen.said.length > 0);
     this.told.replaceChildren(
@@ -150,8 +154,35 @@ export class AgentView implements View<AgentScreen> {
     const stop = button(screen.subtask ? "I have followed this advice" : "I am there: stop here", () => this.stop(), "primary stop");
     stop.disabled = waiting;
     this.ending.replaceChildren(stop, h("p", { class: "hint" }, `${left} ${left === 1 ? "step" : "steps"} left.`));
-    void this.view.show(this.elsewhere ?? screen.pano);
-    prefetch(screen.moves.map((m) => m.pano));
+    this.live.hidden = !screen.live || this.elsewhere !== null;
+    if (screen.live) void this.drive(screen.live);
+    if (this.live.hidden) void this.view.show(this.elsewhere ?? screen.pano);
+    if (!screen.live) prefetch(screen.moves.map((m) => m.pano));
+  }
+
+  /** Shows a live picture; says so where that takes long. */
+  private async drive(live: string): Promise<void> {
+    if (this.live.dataset.of === live) return;
+    const [next, begun] = [new Image(), performance.now()];
+    next.src = `/live/${live}.jpg`;
+    this.live.dataset.of = live;
+    try {
+      await next.decode();
+      if (this.state.live === live) this.live.src = next.src;
+      const took = performance.now() - begun;
+      if (took > SLOW) say(`Each picture takes ${(took / 1000).toFixed(1)} s: the server is slow. Press a key, then wait.`);
+    } catch {
+      if (this.state.live === live) delete this.live.dataset.of; // so that the next update tries again
+    } finally {
+      if (this.state.live === live) this.going = false;
+    }
+  }
+
+  private key(e: KeyboardEvent): void {
+    const way = this.state?.live && this.root.isConnected ? this.state.moves[DRIVING[e.key] ?? -1] : undefined;
+    if (!way || e.ctrlKey || e.metaKey || e.altKey || e.target instanceof HTMLTextAreaElement) return;
+    e.preventDefault();
+    if (this.state.question === null) this.go(way);
   }
 
   private questions(screen: AgentScreen): void {
@@ -172,6 +203,7 @@ export class AgentView implements View<AgentScreen> {
     const ways = waiting || this.elsewhere ? [] : screen.moves;
     if (screen.words.length) {
       const buttons = ways.map((m) => button(screen.words[m.candidate]!, () => this.go(m)));
+      if (this.elsewhere) buttons.push(this.back());
       this.corner.replaceChildren(h("div", { class: "keys", role: "group", "aria-label": "Moves" }, ...buttons));
       return;
     }
@@ -180,8 +212,12 @@ export class AgentView implements View<AgentScreen> {
 
   private turned(): void {
     if (!this.state || this.state.words.length) return;
-    const back = this.elsewhere && button("Back to where you are", () => this.visit(null), "primary");
-    this.corner.replaceChildren(back || compass(this.state.question === null ? this.state.moves : [], this.view));
+    const ways = this.state.question === null ? this.state.moves : [];
+    this.corner.replaceChildren(this.elsewhere ? this.back() : compass(ways, this.view));
+  }
+
+  private back(): HTMLButtonElement {
+    return button("Back to where you are", () => this.visit(null), "primary");
   }
 
   private visit(pano: string | null): void {
@@ -197,9 +233,11 @@ export class AgentView implements View<AgentScreen> {
   private go(way: Way): void {
     if (this.going) return;
     this.going = true;
-    setTimeout(() => (this.going = false), 1500);
-    if (!this.state.words.length) this.view.look(way.yaw, LEVEL);
-    void this.view.show(way.pano);
+    setTimeout(() => (this.going = false), this.state.live ? 10_000 : 1500);
+    if (!this.state.words.length) {
+      this.view.look(way.yaw, LEVEL);
+      void this.view.show(way.pano);
+    }
     this.act("moved", { candidate: way.candidate });
   }
 

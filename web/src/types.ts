@@ -35,7 +35,7 @@ export interface Game extends Base {
 }
 
 export interface Way {
-  candidate: number;
+  candidate: number; // of somebody who drives, all there is
   yaw: number;
   pitch: number;
   distance: number;
@@ -44,6 +44,7 @@ export interface Way {
 
 export interface AgentScreen extends Game {
   screen: "agent";
+  live: string | null; // address of what somebody sees who drives
   moves: Way[];
   words: string[];
   instruction: string;

@@ -1,0 +1,114 @@
+"""Driving in the browser: a body that goes a step ahead or turns, and live pictures of what it sees.
+
+The episode stays one of viewpoints: somebody who drives has moved to a viewpoint once it is the nearest that they could
+go straight to. Assistants, measures and learners need not know how people moved.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+import numpy as np
+
+from embodied.envs.continuous import Body, Grounds
+from embodied.errors import UnableError
+from embodied.interface import Place, Pose
+from embodied.render.camera import camera_at
+from embodied.world import World
+
+ACTIONS = ("Go ahead", "Turn left", "Turn right")
+"""What somebody who drives can do, by number."""
+BODY = Body()
+"""VLN-CE's: steps of 0.25 m, turns of 15 degrees."""
+SIZE = (240, 320)
+"""Height and width of a live picture, pixels."""
+VFOV = math.radians(62.0)
+QUALITY = 70
+SLOWEST = 2.0
+"""Seconds for a picture from which on a machine is too slow to drive on."""
+KEPT = 64
+"""Live pictures in memory."""
+Eye = tuple[str, float, float, float, float]
+"""World, x, y, z of the camera in metres, yaw in radians."""
+
+
+class Drive:
+    """Where a body is in one episode. What it does follows from the order of its actions."""
+
+    def __init__(self, place: Place, pose: Pose, grounds: Grounds) -> None:
+        """
+        Raises:
+          ValueError: a house of several storeys, whose stairs cannot be driven.
+        """
+        if len(place.house.storeys) > 1:
+            raise ValueError(f"house {place.house.name!r} has several storeys, which cannot be driven; use viewpoints")
+        self._graph, self._ground = place.graph, grounds.of(place.house)
+        self._height = float(place.house.storeys[0].elevation) + BODY.eye
+        self._world, self.yaw, self._here = place.name, pose.yaw, pose.node
+        self.position = self._ground.nearest_free(np.asarray(place.graph.positions)[pose.node, :2])
+        """(2,) metres."""
+
+    def act(self, action: int) -> int:
+        """Do one of ACTIONS; the viewpoint where the body is now: the nearest that it could go straight to."""
+        if action == 0:
+            ahead = BODY.forward * np.array([math.cos(self.yaw), math.sin(self.yaw)])
+            self.position = self._ground.moved(self.position, self.position + ahead, sliding=True)
+        else:
+            self.yaw += math.radians(BODY.turn) * (1 if action == 1 else -1)
+        nodes = np.asarray(self._graph.positions)[:, :2]
+        away = np.linalg.norm(nodes - self.position, axis=1)
+        straight = self._ground.is_free(self.position, nodes)
+        straight[self._here] = True
+        self._here = int(np.argmin(np.where(straight, away, np.inf)))
+        return self._here
+
+    @property
+    def eye(self) -> Eye:
+        return self._world, float(self.position[0]), float(self.position[1]), self._height, self.yaw
+
+
+class Live:
+    """Draws what people see who drive, one picture at a time in a thread of its own; owns the renderers."""
+
+    def __init__(self, open_world: Callable[[str], World]) -> None:
+        """`open_world`: gives a house that can be drawn, by name."""
+        self._open, self._worlds = open_world, dict[str, World]()
+        self._thread = ThreadPoolExecutor(1, "live")
+        self._drawn: OrderedDict[str, asyncio.Future[bytes]] = OrderedDict()
+
+    def prepare(self, eye: Eye) -> None:
+        """Draw a first picture of a house.
+
+        Raises:
+          UnableError: this machine cannot draw, or is too slow.
+        """
+        self._thread.submit(self._draw, eye).result()  # opens and uploads
+        begun = time.monotonic()
+        self._thread.submit(self._draw, eye).result()
+        if (took := time.monotonic() - begun) > SLOWEST:
+            raise UnableError(
+                f"a live picture takes {took:.1f} s on this machine, which is too slow to drive by; leave out "
+                'moves = "drive", so that people go from viewpoint to viewpoint'
+            )
+
+    async def picture(self, name: str, eye: Eye) -> bytes:
+        """A JPEG of what is seen; one that is asked for again under the same name is not drawn again."""
+        if name not in self._drawn:
+            self._drawn[name] = asyncio.get_running_loop().run_in_executor(self._thread, self._draw, eye)
+            if len(self._drawn) > KEPT:
+                self._drawn.popitem(last=False)
+        return await asyncio.shield(self._drawn[name])
+
+    def _draw(self, eye: Eye) -> bytes:
+        name, x, y, z, yaw = eye
+        if name not in self._worlds:
+            self._worlds[name] = self._open(name)
+        rgb = self._worlds[name].renderer.rgb(camera_at((x, y, z), yaw, 0.0, VFOV), SIZE)
+        bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
+        return cv2.imencode(".jpg", bgr, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))[1].tobytes()
