@@ -14,8 +14,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
+from agents.ask.config import AskerConfig, AskEvaluation
 from agents.ask.foresight import CHOICES, Foresight
-from agents.ask.learned import LearnedAsker, facts, train
+from agents.ask.learned import LearnedAsker, facts, fit
+from agents.ask.study import AskStudy
+from agents.studies.engine import run_study
 from embodied.assistants.ask import in_view, understood
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
@@ -27,10 +30,11 @@ from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv, layout_of
 from embodied.gym.eyes import Closed
 from embodied.interface import Ask, Intention, Move, Pose, Stop
-from embodied.policies.ask import RULES, Asker, Mind, baselines
+from embodied.policies.ask import RULES, Asker, Mind, baselines, reached
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AskConfig, ask_pool, ask_tasks
 
+LITTLE = AskerConfig(hidden_size=16, passes=300)
 CHAIRS = ("red", "red", "blue", "blue")
 
 
@@ -294,10 +298,11 @@ def test_thinking_ahead_changes_nothing_in_the_episode(tasks, make_env):
 
 
 def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks, make_env):
-    """It is taught to ask for the way at once, and does so."""
-    shown = [(o := make_env().reset(t), facts(o, Mind()))[1] for t in tasks]
-    labels = np.full(len(shown), CHOICES.index(Intention.ROUTE))
-    net = train(np.stack(shown), labels, seed=0)
+    """It is taught that asking for the way at once is worth most, and does so."""
+    known = np.stack([facts(make_env().reset(t), Mind()) for t in tasks])
+    worth = np.zeros((len(tasks), len(CHOICES)))
+    worth[:, CHOICES.index(Intention.ROUTE)], worth[:, CHOICES.index(Intention.CONFIRM)] = 1.0, np.nan
+    net = fit((known, worth), LITTLE)
     episodes = play(make_env, LearnedAsker(net), tasks[:4], seed=0)
     for batch in (5, 32):
         together = play(make_env, LearnedAsker(net), tasks, seed=0, batch=batch)
@@ -305,6 +310,41 @@ def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks,
     assert all(isinstance(e.steps[0].action, Ask) and e.steps[0].action.intention is Intention.ROUTE for e in episodes)
     quiet = play(make_env, LearnedAsker(net, reserve=100.0), tasks[:4], seed=0)
     assert not any(e.requests for e in quiet)
+
+
+def test_what_it_knows_tells_a_yes_from_a_no(world, tasks, make_env):
+    known = {}
+    for placement in (t := next(t for t in tasks if len(t.goal.fitting) > 1)).goal.fitting:
+        seen = ((n, in_view(world, n, t.goal)[:1]) for n in range(36))
+        node = next(n for n, near in seen if near and near[0][0] == placement and near[0][2] <= 2.0)
+        env, trail = make_env(), Mind()
+        o = env.reset(dataclasses.replace(t, start=dataclasses.replace(t.start, node=node)))
+        o = env.step(trail.ask(Intention.CONFIRM, reached(o)))
+        known[env.last_step.reply.text[:2]] = facts(o, trail)
+        assert len(known) == 1 or not np.allclose(known["Ye"], known["No"])
+    assert set(known) == {"Ye", "No"}
+
+
+def test_a_study_trains_by_dagger_judges_and_draws(world, tasks, make_env, tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.ask.study.houses", lambda *_: ({"grid": world}, make_env, look))
+    config = dataclasses.replace(LITTLE, houses=1, tasks=2, rounds=1, round_tasks=2)
+    sizes = AskEvaluation(test_houses=1, test_tasks=3, oracle_tasks=2, model_tasks=2)
+    model = lambda places: Asker(RULES["always route"])
+    study = AskStudy(tmp_path, config, sizes, (0, 1), model=model, model_about={"model": "scripted"})
+    rows = ["never ask", "always route", "learned asker", "language model", "oracle of asking"]
+    quiet = lambda line: None
+    run_study(study, ["houses"], tmp_path, rows=rows, note=quiet)
+    found = {r["label"]: r["values"] for r in json.loads((tmp_path / "ask-houses.json").read_text())["rows"]}
+    assert [found[r]["success_unseen_houses"]["n"] for r in rows] == [3, 3, 6, 2, 2]
+    assert (
+        found["language model"]["success_unseen_houses"]["mean"] == 100
+        and found["never ask"]["price_unseen_houses"]["mean"] == 0
+    )
+    made = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.safetensors")}
+    curve = ["learned asker, reserve 0", "learned asker, reserve 2", "never ask"]
+    run_study(study, ["curves"], tmp_path, rows=curve, note=quiet)
+    assert (tmp_path / "ask-curves.png").exists()
+    assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.safetensors")} == made and len(made) == 2
 
 
 @pytest.mark.slow

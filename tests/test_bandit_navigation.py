@@ -190,12 +190,13 @@ def test_a_study_learns_judges_and_writes_once(split, tmp_path, monkeypatch):
     for module in ("bandit.stars_study", "studies.episodes"):
         monkeypatch.setattr(f"agents.{module}.Dataset", lambda _: data)
     study = StarsStudy(tmp_path, (0, 1), 8, (0,), agent=tmp_path / "agent.safetensors", encoder="tests", config=STARS)
+    study = dataclasses.replace(study, rater=Rater(granularity=4, skew=2.0))
     monkeypatch.setattr(StarsStudy, "about", lambda self: "Stars.")
-    wanted = ["clean", "granularity 4"]
+    wanted = ["people", "granularity 4"]
     text = run_study(study, ["stars"], tmp_path / "out", rows=wanted, note=silent)["stars"].read_text()
-    assert "| clean |" in text and "| granularity 4 |" in text and "granularity 1" in text.partition("Not run: ")[2]
+    assert "| people |" in text and "| granularity 4 |" in text and "granularity 1" in text.partition("Not run: ")[2]
     assert (tmp_path / "out/stars-stars.png").exists()
     made = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*.safetensors")}
     assert len(made) == 4
-    run_study(study, ["stars"], tmp_path / "out", rows=["clean"], note=silent)
+    run_study(study, ["stars"], tmp_path / "out", rows=["people"], note=silent)
     assert {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*.safetensors")} == made

@@ -386,6 +386,11 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
         and rows["reference"]["perplexity"]["mean"] > 1
     )
     assert rows["Δ NED-A2C"]["entropy"]["half_width"] >= 0
+    people = dataclasses.replace(study, repeats=(0,), rater=Rater(granularity=4, skew=2.0))
+    assert "| as people rate |" in run_study(people, ["people"], tmp_path, note=silent)["people"].read_text()
+    (home,) = tmp_path.glob("runs/*rater*")
+    (rated,) = read_checkpoint(home / "checkpoint.pt")["history"]
+    assert rated["rating"] < rated["per-sentence BLEU"], "a harsh rater"
     text = run_study(study, ["rates"], tmp_path, rows=["0.0001, Δ NED-A2C"], note=silent)["rates"].read_text()
     assert "| 0.0001, Δ NED-A2C |" in text
     (of_text, _) = tmp_path.glob("runs/*bandit_rate_0.0001*/trained.json")

@@ -17,15 +17,15 @@ import numpy as np
 from embodied.assistants.ask import NEAR, in_view
 from embodied.envs.ask import AskEnv
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.metrics import weighted_success
+from embodied.evaluation.metrics import price, success
 from embodied.interface import (
     Action,
     Actions,
-    Ask,
     FindDescribed,
     Intention,
     Observation,
     Observations,
+    Situation,
     Situations,
     Stop,
 )
@@ -33,9 +33,11 @@ from embodied.policies.ask import Asker, Mind, confirm_on_sight, onward, reached
 
 EVERY = 4
 """Steps between two moments at which it thinks about asking; it also does whenever a thing was reached."""
+LABELLED = 1 / 3
+"""Of a learner's decisions, how many the oracle thinks about."""
 IMAGINED = 3
 """Things that one who doubts weighs at a time."""
-SLOW = 0.003
+SLOW = 0.0003
 """What a step is worth: of two ways that succeed alike, the shorter one."""
 Choice = Intention | str
 """A question, 'go' or 'stop'."""
@@ -50,6 +52,19 @@ CHOICES: tuple[Choice, ...] = (
 )
 
 
+ONCE = (Intention.APPEARANCE, Intention.REGION)
+"""Questions whose answers stay the same."""
+HERE = (Intention.CONFIRM, Intention.DISAMBIGUATE)
+"""Questions whose answers stay the same where one stands."""
+
+
+def possible(o: Observation, trail: Mind) -> list[Choice]:
+    """The choices that can be made; no question twice whose answer is known."""
+    known = [q for q in ONCE if trail.asked.get(q)] + [q for q in HERE if trail.asked_at.get(q) == trail.moment]
+    questions = [c for c in CHOICES if isinstance(c, Intention) and c in o.can_ask and c not in known]
+    return ["go", *(["stop"] if reached(o) else []), *questions]
+
+
 def thinks(o: Observation, trail: Mind) -> bool:
     """Whether this is a moment to decide; between them, and on a route, one goes on."""
     return o.advised is None and (reached(o) is not None or o.time % EVERY == 0)
@@ -61,16 +76,18 @@ class Foresight:
     def __init__(
         self,
         make_env: Callable[[], HelpEnv],
-        note: Callable[[Observation, Mind, int], None] | None = None,
+        note: Callable[[Observation, Mind, np.ndarray], None] | None = None,
         doubts: bool = False,
+        learner: Callable[[Observation, Mind], Choice] | None = None,
     ) -> None:
         """
         Args:
           make_env: of the same houses and rules, to play in the head.
+          note: is told at a decision what each of CHOICES is worth, (7,) float64, NaN for those that cannot be.
           doubts: whether which thing is meant is not known.
-          note: is told every decision, as an index into CHOICES.
+          learner: who decides instead, while the oracle says of some decisions what they are worth (DAgger).
         """
-        self._make_env, self._note, self._doubts = make_env, note, doubts
+        self._make_env, self._note, self._doubts, self._learner = make_env, note, doubts, learner
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
@@ -91,25 +108,29 @@ class Foresight:
         return actions, memory
 
     def _one(self, env: HelpEnv, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
-        choice = 0
-        if thinks(o, trail):
-            can = [k for k, c in enumerate(CHOICES) if isinstance(c, str) or c in o.can_ask]
+        choice = CHOICES[0]
+        if thinks(o, trail) and self._learner and copy.deepcopy(rng).random() > LABELLED:
+            choice = self._learner(o, trail)
+        elif thinks(o, trail):
             minds = imagined(env, rng) if self._doubts else [env]
-            value = {k: sum(self._value(e, o, trail, CHOICES[k], rng) for e in minds) for k in can}
-            choice = max(can, key=lambda k: (value[k], -k))
+            values = np.full(len(CHOICES), np.nan)
+            for c in possible(o, trail):
+                values[CHOICES.index(c)] = np.mean([self._value(e, o, trail, c, rng) for e in minds])
             if self._note:
-                self._note(o, trail, choice)
-        return carried_out(CHOICES[choice], env, o, trail, rng)
+                self._note(o, trail, values)
+            choice = self._learner(o, trail) if self._learner else CHOICES[int(np.nanargmax(values))]
+        return carried_out(choice, env.situation, o, trail, rng)
 
     def _value(self, env: HelpEnv, o: Observation, trail: Mind, choice: Choice, rng: np.random.Generator) -> float:
-        """Weighted success in the end, after this choice, with the draws that will come."""
+        """Success less price in the end, after this choice, with the draws that will come."""
         ahead, mind, rng = _copy(env), copy.deepcopy(trail), copy.deepcopy(rng)
-        seen = ahead.step(carried_out(choice, ahead, o, mind, rng))
+        seen = ahead.step(carried_out(choice, ahead.situation, o, mind, rng))
         asker = Asker(confirm_on_sight)
         while seen is not None:
             seen = ahead.step(asker.one(seen, ahead.situation, mind, rng))
         episode = ahead.episode()
-        return weighted_success(episode, env.world.graph) - SLOW * len(episode.steps)
+        graph = env.world.graph
+        return success(episode, graph) - price(episode, graph) - SLOW * len(episode.steps)
 
 
 def imagined(env: HelpEnv, rng: np.random.Generator) -> list[HelpEnv]:
@@ -133,15 +154,14 @@ def imagined(env: HelpEnv, rng: np.random.Generator) -> list[HelpEnv]:
     return minds or [env]
 
 
-def carried_out(choice: Choice, env: HelpEnv, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
+def carried_out(choice: Choice, s: Situation, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
     """The action of a choice; notes it in the trail."""
     if choice == "stop":
         return Stop()
     if isinstance(choice, Intention):
-        trail.asked[choice] = trail.asked.get(choice, 0) + 1
-        return Ask(choice)
-    trail.visits[env.pose.node] = trail.visits.get(env.pose.node, 0) + 1
-    return onward(o, env.situation, trail, rng)
+        return trail.ask(choice, reached(o))
+    trail.visits[s.pose.node] = trail.visits.get(s.pose.node, 0) + 1
+    return onward(o, s, trail, rng)
 
 
 def _copy(env: HelpEnv) -> HelpEnv:

@@ -1,52 +1,89 @@
-"""A learned asker: a small network that imitates the oracle's decisions from what the agent itself knows."""
+"""A learned asker: a small network that imitates the oracle by what each answer would have saved.
+
+Imitation is by DAgger with costs (Ross & Bagnell 2014): the learner plays, the oracle says of some decisions what each
+choice would be worth, and the network's choices should be worth as much as the best ones. What the oracle knows and the
+agent does not, such as where things are, averages out over houses.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from torch import nn
 
-from agents.ask.foresight import CHOICES, thinks
-from embodied.interface import Action, Actions, Ask, Intention, Observation, Observations, Situations, Stop
-from embodied.policies.ask import Mind, onward, reached
+from agents.ask.config import AskerConfig
+from agents.ask.foresight import CHOICES, Choice, Foresight, carried_out, possible, thinks
+from agents.common.weights import load_weights, save_weights
+from embodied.envs.base import HelpEnv
+from embodied.evaluation.rollout import play
+from embodied.identity import Identity
+from embodied.interface import Actions, Detection, Intention, Observation, Observations, Situations, Task
+from embodied.policies.ask import LIKELY, REACH, Mind, reached
 
-HIDDEN, EPOCHS, RATE, DECAY = 32, 300, 1e-2, 1e-3
 QUESTIONS = tuple(c for c in CHOICES if isinstance(c, Intention))
+SEEN = 3
+"""Detections that are told one by one, the best first."""
+BATCH = 512
+ENTROPY = 0.003
+"""Weight of the entropy, which keeps choices of equal worth alike."""
+LEAST = 1e-9
+"""Probabilities below it count as it in the entropy."""
+Decisions = tuple[np.ndarray, np.ndarray]
+"""(n, d) float32 what was known; (n, 7) float64 what each of CHOICES was worth, NaN where it could not be."""
+REMEDY = "train it again: embodied study ask"
 
 
 def facts(o: Observation, trail: Mind) -> np.ndarray:
-    """(22,) float32: time, what is seen, what was reached, what was asked. Nothing of it names a place."""
-    scores = [d.score for d in o.detections][:3]
-    scores += [0.0] * (3 - len(scores))
-    thing = reached(o)
+    """(37,) float32: time, the way so far, what is seen and reached, and what was asked. Nothing names a place."""
+    seen, thing = o.detections, reached(o)
+    far = [d for d in seen if d.distance > REACH]
+    visits, score = list(trail.visits.values()), thing.score if thing else 0.0
+    confirmed = thing is not None and trail.asked_at.get(Intention.CONFIRM) == trail.moment
+    plain = [o.time / 60, (o.time / 60) ** 2, len(visits) / 40, sum(visits) / max(len(visits), 1) - 1]
+    words = [0.0 if trail.asked else len(o.instruction.split()) / 10, float(" in the " in o.instruction)]
+    likely = [sum(d.score > LIKELY for d in some) / 4 for some in (seen, far)]
+    view = [len(seen) / 8, *likely, max((d.score for d in far), default=0.0)]
+    best: list[Detection | None] = [*seen[:SEEN], *[None] * (SEEN - len(seen))]
+    each = [x for d in best for x in ((d.score, d.distance / 6) if d else (0.0, 0.0))]
+    here = [float(thing is not None), score, thing.distance / REACH if thing else 0.0, float(score > LIKELY)]
+    # after a yes the score stays, after a no it falls
+    answer = [float(confirmed), trail.before - score if confirmed else 0.0, float(confirmed and score >= trail.before)]
+    margin = [max(0.0, score - LIKELY), max(0.0, score - LIKELY - 0.2), float(score > LIKELY + 0.2)]
     asked = [min(trail.asked.get(q, 0), 3) / 3 for q in QUESTIONS]
     can = [float(q in o.can_ask) for q in QUESTIONS]
-    seen = [len(o.detections) / 8, sum(d.score > 0.5 for d in o.detections) / 4]
-    here = [float(thing is not None), thing.score if thing else 0.0, thing.distance / 2 if thing else 0.0]
-    plain = [o.time / 60, len(trail.visits) / 40, len(o.instruction.split()) / 10, float(" in the " in o.instruction)]
-    return np.array([*plain, *seen, *scores, *here, *asked, *can], dtype=np.float32)
+    return np.array([*plain, *words, *view, *each, *here, *answer, *margin, *asked, *can], dtype=np.float32)
 
 
-def train(inputs: np.ndarray, labels: np.ndarray, *, seed: int) -> nn.Module:
-    """A network that predicts the oracle's choice; rare choices count as much as common ones do by the root.
+def network(width: int) -> nn.Sequential:
+    """Numbers for CHOICES from `facts`."""
+    return nn.Sequential(
+        nn.LazyLinear(width), nn.Tanh(), nn.Linear(width, width), nn.Tanh(), nn.Linear(width, len(CHOICES))
+    )
 
-    Args:
-      inputs: (n, d) float32; `labels` (n,) indices into CHOICES.
-    """
+
+def fit(decisions: Decisions, config: AskerConfig) -> nn.Sequential:
+    """A network whose choices lose least of what the best ones were worth."""
+    x, worth = torch.from_numpy(decisions[0]), torch.from_numpy(decisions[1].astype(np.float32))
+    can = ~torch.isnan(worth)
+    worth = torch.where(can, worth, -torch.inf)
+    lost = torch.where(can, worth.max(1, keepdim=True).values - worth, 0.0)
     with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        net = nn.Sequential(nn.Linear(inputs.shape[1], HIDDEN), nn.Tanh(), nn.Linear(HIDDEN, len(CHOICES)))
-        optimizer = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=DECAY)
-        counts = np.bincount(labels, minlength=len(CHOICES))
-        weight = torch.tensor(1.0 / np.sqrt(np.maximum(counts, 1)), dtype=torch.float32)
-        x, y = torch.from_numpy(inputs), torch.from_numpy(labels)
-        for _ in range(EPOCHS):
-            optimizer.zero_grad()
-            nn.functional.cross_entropy(net(x), y, weight=weight).backward()
-            optimizer.step()
+        torch.manual_seed(config.seed)
+        net = network(config.hidden_size)
+        net(x[:1])
+        optimizer = torch.optim.AdamW(net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
+        for _ in range(config.passes):
+            for chosen in torch.randperm(len(x)).split(BATCH):
+                p = torch.softmax(torch.where(can[chosen], net(x[chosen]), -1e9), 1)
+                entropy = -(p * p.clamp_min(LEAST).log()).sum(1).mean()
+                loss = (p * lost[chosen]).sum(1).mean() - ENTROPY * entropy
+                optimizer.zero_grad()
+                loss.backward()
+                optimizer.step()
     return net.eval()
 
 
@@ -57,33 +94,69 @@ class LearnedAsker:
         """`reserve`: taken off the logits of questions; more of it asks less."""
         self._net, self._reserve = net, reserve
 
+    @torch.inference_mode()
+    def choose(self, o: Observation, trail: Mind) -> Choice:
+        """One of CHOICES that is possible."""
+        logits = self._net(torch.from_numpy(facts(o, trail))[None])[0].numpy()
+        worth = {c: float(logits[CHOICES.index(c)]) for c in possible(o, trail)}
+        worth = {c: v - self._reserve * (c in QUESTIONS) for c, v in worth.items()}
+        return max(worth, key=lambda c: worth[c])
+
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Any]:
         trails = memory or [Mind() for _ in observations]
         actions: Actions = [None] * len(observations)
         for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
-            if o is None or s is None:
-                continue
-            action = self._decided(o, trails[i])
-            if action is None:
-                trails[i].visits[s.pose.node] = trails[i].visits.get(s.pose.node, 0) + 1
-                action = onward(o, s, trails[i], rngs[i])
-            actions[i] = action
+            if o is not None and s is not None:
+                choice = self.choose(o, trails[i]) if thinks(o, trails[i]) else "go"
+                actions[i] = carried_out(choice, s, o, trails[i], rngs[i])
         return actions, trails
 
-    def _decided(self, o: Observation, trail: Mind) -> Action | None:
-        if not thinks(o, trail):
-            return None
-        with torch.no_grad():
-            logits = self._net(torch.from_numpy(facts(o, trail))[None])[0].numpy().copy()
-        for k, choice in enumerate(CHOICES):
-            if isinstance(choice, Intention):
-                logits[k] = logits[k] - self._reserve if choice in o.can_ask else -np.inf
-        if reached(o) is None:
-            logits[CHOICES.index("stop")] = -np.inf
-        choice = CHOICES[int(np.argmax(logits))]
-        if isinstance(choice, Intention):
-            trail.asked[choice] = trail.asked.get(choice, 0) + 1
-            return Ask(choice)
-        return Stop() if choice == "stop" else None
+
+def shown(
+    make_env: Callable[[], HelpEnv], tasks: Sequence[Task], learner: LearnedAsker | None = None, *, seed: int
+) -> Decisions:
+    """The decisions of some episodes, played by the oracle that does not know which thing is meant, or by a learner."""
+    known: list[np.ndarray] = []
+    worth: list[np.ndarray] = []
+
+    def note(o: Observation, trail: Mind, values: np.ndarray) -> None:
+        known.append(facts(o, trail))
+        worth.append(values)
+
+    player = Foresight(make_env, note, doubts=True, learner=learner.choose if learner else None)
+    play(make_env, player, tasks, seed=seed)
+    return np.stack(known), np.stack(worth)
+
+
+def train(
+    make_env: Callable[[], HelpEnv],
+    first: Decisions,
+    rounds: Sequence[Sequence[Task]],
+    config: AskerConfig,
+    note: Callable[[str], None] = print,
+) -> nn.Sequential:
+    """Imitate the oracle in decisions of its own, then in those of the learner while it plays the rounds."""
+    found = [first]
+    net = fit(first, config)
+    for number, tasks in enumerate(rounds):
+        found.append(shown(make_env, tasks, LearnedAsker(net), seed=config.seed))
+        net = fit((np.concatenate([x for x, _ in found]), np.concatenate([v for _, v in found])), config)
+        note(f"round {number + 1} of {len(rounds)}: {sum(len(x) for x, _ in found)} decisions")
+    return net
+
+
+def save_asker(path: Path, net: nn.Sequential, config: AskerConfig, identity: Identity | None = None) -> None:
+    save_weights(path, "asker", net.state_dict(), config, identity)
+
+
+def load_asker(path: Path) -> nn.Sequential:
+    """
+    Raises:
+      FileNotFoundError, ValueError: missing, damaged, or something else.
+    """
+    tensors, config = load_weights(path, "asker", AskerConfig, REMEDY)
+    net = network(config.hidden_size)
+    net.load_state_dict(tensors)
+    return net.eval()

@@ -1,56 +1,49 @@
-"""All baselines of Ask-v0 in houses never seen: one table with intervals, and curves of success against price.
-
-embodied study ask --out docs            # writes ask.json, ask_table.md and figure_ask.png
-embodied study ask --out docs --draw     # only draws the figure from ask.json again
-"""
+"""Ask-v0's tables as data for the engine: all agents in houses never seen, and curves of success against price."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
-
-from agents.ask.foresight import CHOICES, Foresight
-from agents.ask.learned import LearnedAsker, facts, train
-from assets.cache import atomic_path, write_bytes
-from assets.catalogue import Catalogue, load_catalogue
+from agents.ask.config import AskerConfig, AskEvaluation
+from agents.ask.foresight import Foresight
+from agents.ask.learned import Decisions, LearnedAsker, load_asker, save_asker, shown, train
+from agents.common.session import Note
+from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
+from assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
+from embodied.envs.base import HelpEnv
 from embodied.envs.make import ask_environment_maker, look_of
-from embodied.evaluation.ask import COLUMNS, ask_row, ask_split
+from embodied.evaluation import metrics
+from embodied.evaluation.ask import COLUMNS, ask_split
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
-from embodied.evaluation.tables import Row, as_json, markdown
+from embodied.evaluation.tables import measured
 from embodied.generate import HouseConfig
-from embodied.interface import Action, Agent, Ask, Detection, Episode, Intention, Observation, Task
+from embodied.identity import Identity, identity_of
+from embodied.interface import Action, Agent, Ask, Detection, Intention, Observation, Task
 from embodied.policies.ask import Asker, AskRule, Mind, baselines, between, first
-from embodied.tasks.ask import Look
+from embodied.records import save_lines
 
 AREA = (90.0, 140.0)
 """Square metres of the houses."""
-SEEDS = (0, 1, 2)
-"""Of the learned asker."""
+FIRST = 100
+"""Seed of the first training house; test houses have seeds from 0 on."""
+SPLITS = ("unseen houses", "unseen houses and classes")
+MODEL, FORESIGHT = "language model", "oracle of asking"
+KINDS = tuple(metrics.PER_KIND["ask"])
+Places = Mapping[str, StoredPlace]
+ModelMaker = Callable[[Places], Agent]
 
 
-@dataclass(frozen=True)
-class StudySize:
-    """How large the study is."""
-
-    train_houses: int = 8
-    train_tasks: int = 8
-    """Per house."""
-    test_houses: int = 8
-    test_tasks: int = 15
-    foresight: int = 40
-    """Tasks of the test that the oracle of asking plays: every house's first five, of which three are ambiguous."""
-
-
-def after(steps: int, rule: AskRule) -> AskRule:
-    """Asks for the way once so many steps have passed, and again when it has been walked; before, another rule."""
+def after(steps: int) -> AskRule:
+    """Asks for the way once so many steps have passed, and again when it has been walked; before, by thresholds."""
+    rule = between(0.55, 0.75)
 
     def late(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
         return Ask(Intention.ROUTE) if o.advised is None and o.time >= steps else rule(o, thing, trail)
@@ -58,95 +51,132 @@ def after(steps: int, rule: AskRule) -> AskRule:
     return late
 
 
-def families() -> dict[str, list[Agent]]:
-    """Curves: rules with one number that says how readily they ask."""
-    levels = ((0.75, 0.75), (0.7, 0.85), (0.6, 0.85), (0.5, 0.95), (0.4, 2.0))
-    sure = between(0.55, 0.75)
-    return {
-        "thresholds on the score": [Asker(between(low, high)) for low, high in levels],
-        "region, then thresholds": [Asker(first(Intention.REGION, between(low, high))) for low, high in levels],
-        "route after some steps": [Asker(after(n, sure)) for n in (50, 30, 20, 10, 0)],
-    }
+LEVELS = ((0.75, 0.75), (0.7, 0.85), (0.6, 0.85), (0.5, 0.95), (0.4, 2.0))
+FAMILIES: Mapping[str, tuple[Callable[..., AskRule], Sequence[tuple[float, ...]]]] = {
+    "thresholds on the score": (between, LEVELS),
+    "region, then thresholds": (lambda low, high: first(Intention.REGION, between(low, high)), LEVELS),
+    "route after some steps": (after, ((50,), (30,), (20,), (10,), (0,))),
+}
+"""Rules with numbers that say how readily they ask."""
+RESERVES = (2.0, 1.0, 0.0, -1.0)
 
 
-def houses(seeds: Sequence[int], name: str, catalogue: Catalogue) -> dict[str, StoredPlace]:
-    """Houses never seen anywhere else: their names are drawn from, too."""
-    made = (make_dataset_house(s, f"{name}_{k}", HouseConfig(area=AREA), catalogue) for k, s in enumerate(seeds))
-    return {house.name: StoredPlace(house, graph) for house, graph in made}
+def _rule(name: str) -> StudyRow:
+    return StudyRow(name, None, {"rule": name})
 
 
-def lessons(places: dict[str, StoredPlace], look: Look, tasks: Sequence[Task]) -> tuple[np.ndarray, np.ndarray]:
-    """The oracle's decisions: (n, d) what was known, (n,) what it chose."""
-    known: list[np.ndarray] = []
-    chosen: list[int] = []
-
-    def note(o: Observation, trail: Mind, choice: int) -> None:
-        known.append(facts(o, trail))
-        chosen.append(choice)
-
-    make_env = ask_environment_maker(places, look)
-    play(make_env, Foresight(make_env, note, doubts=True), tasks, seed=0)
-    return np.stack(known), np.array(chosen, dtype=np.int64)
+def _curves() -> tuple[StudyRow, ...]:
+    rows = [
+        StudyRow(f"{name} {' '.join(f'{x:g}' for x in level)}", None, {"rule": name, "level": level}, series=name)
+        for name, (_, levels) in FAMILIES.items()
+        for level in levels
+    ]
+    learned = [StudyRow(f"learned asker, reserve {r:g}", {}, {"reserve": r}, series="learned asker") for r in RESERVES]
+    return (*rows, *learned, *map(_rule, ("never ask", "always route", FORESIGHT, "oracle")))
 
 
-def run(out: Path, plan: StudySize, cache: Path) -> None:
-    """Everything: lessons, training, judging, table and figure."""
+@dataclass(frozen=True)
+class AskStudy:
+    """Who asks when, and what it is worth; a StudyLearner of agents.studies.engine."""
+
+    cache: Path
+    config: AskerConfig
+    evaluation: AskEvaluation
+    repeats: tuple[int, ...]
+    """Training seeds of the learned asker."""
+    threads: int = 1
+    model: ModelMaker | None = None
+    """Makes the agent of a language model; None where none takes part."""
+    model_about: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """All that its answers depend on."""
+
+    name = "ask"
+    judges = ("agents.ask.foresight", "agents.ask.study", "embodied.evaluation.ask")
+
+    def tables(self) -> Mapping[str, StudyTable]:
+        rows = (*map(_rule, baselines()), StudyRow("learned asker", {}), _rule(FORESIGHT))
+        model, columns = (_rule(MODEL),) if self.model else (), (*COLUMNS, *KINDS, *metrics.USAGE)
+        figure = Figure(
+            ("success_",), "mean price of an episode's questions", "success (%)", against="price_unseen_houses"
+        )
+        return {
+            "houses": StudyTable("Ask-v0 in unseen houses", (*rows, *model), columns, SPLITS[:1]),
+            "classes": StudyTable("Ask-v0 in unseen houses with unseen classes", rows, columns, SPLITS[1:]),
+            "curves": StudyTable(
+                "Ask-v0: success against price", _curves(), ("success", "price"), SPLITS[:1], figure=figure
+            ),
+        }
+
+    def seeds(self, row: StudyRow) -> Sequence[int]:
+        return self.repeats if row.train is not None else self.repeats[:1]
+
+    def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None: ...
+
+    def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None: ...
+
+    def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
+        return identity_of("agents.ask.learned", settings=dataclasses.replace(self.config, seed=seed))
+
+    def train(self, train_: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
+        config = dataclasses.replace(self.config, seed=seed)
+        first, rounds, make_env = lessons(config.houses, config.tasks, config.rounds, config.round_tasks, self.cache)
+        net = train(make_env, first, rounds, config, note)
+        save_asker(home / "best.safetensors", net, config, self.trained(train_, seed, folder))
+        return home / "best.safetensors"
+
+    def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
+        model = self.model_about if row.judge.get("rule") == MODEL else {}
+        return {"evaluation": self.evaluation, "model": model}
+
+    def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
+        e, rule = self.evaluation, row.judge.get("rule")
+        places, make_env, look = houses("ask_test", 0, e.test_houses, self.cache)
+        tasks: Sequence[Task] = ask_split(places, look, e.test_tasks, seed=0, unseen=split == SPLITS[1])
+        tasks = spread(tasks, {MODEL: e.model_tasks, FORESIGHT: e.oracle_tasks}.get(str(rule)))
+        player = self._player(weights, row.judge, places, make_env)
+        episodes = play(make_env, player, tasks, seed=0, batch=8, agent=row.label)
+        save_lines(keep.with_name(f"{keep.name}.jsonl"), episodes)
+        return measured(episodes, {name: place.graph for name, place in places.items()})
+
+    def _player(
+        self, weights: Path | None, judge: Mapping[str, Any], places: Places, make_env: Callable[[], HelpEnv]
+    ) -> Agent:
+        if weights is not None:
+            return LearnedAsker(load_asker(weights), judge.get("reserve", 0.0))
+        rule = judge["rule"]
+        if rule in FAMILIES:
+            return Asker(FAMILIES[rule][0](*judge["level"]))
+        if rule == MODEL:
+            assert self.model is not None, "the row is there where a model is"
+            return self.model(places)
+        return Foresight(make_env) if rule == FORESIGHT else baselines()[rule]
+
+    def about(self) -> str:
+        c, e = self.config, self.evaluation
+        return (
+            f"{e.test_houses} houses of 90 to 140 m² that nobody learned in, {e.test_tasks} tasks in each; the oracle "
+            f"of asking plays {e.oracle_tasks} of them. The learned asker imitates it in {c.houses} houses: "
+            f"{c.houses * c.tasks} tasks that the oracle plays, then {c.rounds} rounds of {c.houses * c.round_tasks} "
+            f"that the learner plays (DAgger); training seeds {', '.join(map(str, self.repeats))}."
+        ) + (f" {MODEL.capitalize()}: {self.model_about['model']}, {e.model_tasks} tasks." if self.model else "")
+
+
+@functools.cache
+def houses(name: str, seed: int, count: int, cache: Path) -> tuple[dict[str, StoredPlace], Callable[[], HelpEnv], Any]:
+    """So many houses with seeds from `seed` on, what makes environments in them, and the looks of things."""
     catalogue = load_catalogue(cache)
+    made = (make_dataset_house(seed + k, f"{name}_{k}", HouseConfig(area=AREA), catalogue) for k in range(count))
+    places = {house.name: StoredPlace(house, graph) for house, graph in made}
     look = look_of(catalogue)
-    school = houses(range(100, 100 + plan.train_houses), "ask_train", catalogue)
-    inputs, labels = lessons(school, look, ask_split(school, look, plan.train_tasks, seed=100, unseen=False))
-    print(f"{len(labels)} decisions: {dict(zip(map(str, CHOICES), np.bincount(labels, minlength=len(CHOICES))))}")
-    nets = [train(inputs, labels, seed=s) for s in SEEDS]
-    test = houses(range(plan.test_houses), "ask_test", catalogue)
-    make_env, rows, curves = ask_environment_maker(test, look), [], {}
-    for split, unseen in (("unseen houses", False), ("unseen houses and classes", True)):
-        tasks = ask_split(test, look, plan.test_tasks, seed=0, unseen=unseen)
-
-        def judged(name: str, agents: Sequence[Agent], tasks: Sequence[Task] = tasks, split: str = split) -> Row:
-            episodes: list[Episode] = []
-            for agent in agents:
-                episodes += play(make_env, agent, tasks, seed=0, batch=8, agent=name)
-            return ask_row(name, split, episodes, test, seed=0)
-
-        for name, agent in baselines().items():
-            rows.append(judged(name, [agent]))
-        rows.append(judged("learned asker (3 seeds)", [LearnedAsker(n) for n in nets]))
-        rows.append(judged("oracle of asking", [Foresight(make_env)], spread(tasks, plan.foresight)))
-        if not unseen:
-            for name, agents in families().items():
-                curves[name] = [_point(judged(name, [a])) for a in agents]
-            reserves = (4.0, 2.0, 1.0, 0.0, -1.0)
-            learned = [judged("learned", [LearnedAsker(n, r) for n in nets]) for r in reserves]
-            curves["learned asker"] = [_point(r) for r in learned]
-    body = {"plan": vars(plan), "rows": json.loads(as_json(rows)), "curves": curves}
-    write_bytes(out / "ask.json", (json.dumps(body, indent=1) + "\n").encode())
-    write_bytes(out / "ask_table.md", markdown(rows, COLUMNS).encode())
-    print(markdown(rows, COLUMNS))
-    draw(out)
+    return places, ask_environment_maker(places, look), look
 
 
-def _point(row: Row) -> list[float]:
-    """(mean price, success, half width of its interval)."""
-    found = row.values["success"]
-    return [round(x, 4) for x in (row.values["price"].mean, found.mean, found.half)]
-
-
-def draw(out: Path) -> None:
-    """The figure, from ask.json."""
-    body = json.loads((out / "ask.json").read_text())
-    figure = Figure(figsize=(7.2, 4.6), dpi=120, layout="constrained")
-    axes = figure.subplots()
-    for name, points in body["curves"].items():
-        x, y, half = np.array(points).T
-        axes.errorbar(x, 100 * y, 100 * half, marker="o", markersize=4, capsize=2, linewidth=1.2, label=name)
-    marks = {"never ask": "v", "always route": "s", "oracle": "*", "oracle of asking": "P"}
-    for row in body["rows"]:
-        if row["agent"] in marks and row["split"] == "unseen houses":
-            v = row["values"]
-            mark = marks[row["agent"]]
-            axes.plot(v["price"]["mean"], 100 * v["success"]["mean"], mark, color="black", label=row["agent"])
-    axes.set(xlabel="mean price of the questions of an episode", ylabel="success (%)", ylim=(0, 104))
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="lower right")
-    with atomic_path(out / "figure_ask.png") as path:
-        figure.savefig(path, metadata={"Software": None})
+@functools.cache
+def lessons(
+    count: int, tasks: int, rounds: int, round_tasks: int, cache: Path
+) -> tuple[Decisions, list[list[Task]], Callable[[], HelpEnv]]:
+    """What all training seeds share: the oracle's own decisions, and the tasks of the further rounds."""
+    places, make_env, look = houses("ask_train", FIRST, count, cache)
+    first = shown(make_env, ask_split(places, look, tasks, seed=FIRST, unseen=False), seed=0)
+    further = [ask_split(places, look, round_tasks, seed=FIRST + 1 + k, unseen=False) for k in range(rounds)]
+    return first, further, make_env

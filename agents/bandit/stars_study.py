@@ -68,6 +68,8 @@ class StarsStudy(EpisodeStudy):
     decisions: str = "drawn"
     """Judged with moves and questions 'drawn' from the networks, as they are while they are rated, or with the
     'usual' ones of `embodied evaluate`, which asks where that is likelier than not."""
+    rater: Rater | None = None
+    """Who rates in the row 'people': the rater that people were found to resemble."""
 
     name = "stars"
     makers = ("agents.bandit.navigation",)
@@ -80,9 +82,9 @@ class StarsStudy(EpisodeStudy):
     def tables(self) -> Mapping[str, StudyTable]:
         figure = Figure(("success",), "strength of the perturbation", "Δ success (points)", log=True)
         title = "Navigation from ratings: gain in houses that were not rated"
-        return {
-            "stars": StudyTable(title, _rows(), ("success", "SDTW", "requests", RISE), (self.split,), figure=figure)
-        }
+        people = StudyRow("people", {"rater": dataclasses.asdict(self.rater)}, minus=BEFORE) if self.rater else None
+        rows = (*_rows(), people) if people else _rows()
+        return {"stars": StudyTable(title, rows, ("success", "SDTW", "requests", RISE), (self.split,), figure=figure)}
 
     def settings(self, train: Mapping[str, Any], seed: int) -> RatingConfig:
         return dataclasses.replace(self.config, seed=seed)
@@ -105,7 +107,8 @@ class StarsStudy(EpisodeStudy):
         if train["rater"] == "none":
             return self.agent
         rated, begun = split_of(dataset_of(self.data, "hanna"), self.rated, self.encoder), weights_digest(self.agent)
-        rater, config = raters()[train["rater"]], self.settings(train, seed)
+        who, config = train["rater"], self.settings(train, seed)
+        rater = Rater(**who) if isinstance(who, dict) else raters()[who]
         learn_from_stars(load_agent(self.agent), rated, rater, config, home, begun_with=begun, note=note)
         return home / "best.safetensors"
 

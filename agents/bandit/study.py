@@ -116,12 +116,18 @@ class BanditStudy:
     repeats: tuple[int, ...]
     """Training seeds, each with its own pre-training."""
     threads: int = 1
+    rater: Rater | None = None
+    """Who rates in the table 'people': the rater that people were found to resemble."""
 
     name = "bandit"
     judges = ("agents.bandit.behaviour",)
 
     def tables(self) -> Mapping[str, StudyTable]:
-        return TABLES
+        if self.rater is None:
+            return TABLES
+        people = _gain("as people rate", "a2c", rater=dataclasses.asdict(self.rater))
+        title = f"Gain by NED-A2C from ratings like people's: {self.rater}"
+        return {**TABLES, "people": StudyTable(title, (_gain("clean", "a2c"), people), (SENTENCE, HELD_OUT))}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         return self.repeats
@@ -145,7 +151,7 @@ class BanditStudy:
         reference = begun / "pretrain" / f"{train['reference']}.safetensors"
         critic = begun / train["reference"] / "critic.safetensors"
         (off,) = [k for k in train if k in SWEEPS] or [""]
-        rater: Rater = rater_of(off, train[off]) if off else CLEAN
+        rater = rater_of(off, train[off]) if off else Rater(**train["rater"]) if "rater" in train else CLEAN
         passes = train.get("passes", 1)
         bandit(m, reference, critic, home, train["learner"], rater=rater, passes=passes, note=note)
         return home / "best.safetensors"

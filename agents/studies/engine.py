@@ -71,6 +71,8 @@ class Figure:
     columns: tuple[str, ...]
     xlabel: str
     ylabel: str
+    against: str = ""
+    """Key of the column over whose mean rows are drawn, instead of their `x`."""
     log: bool = False
     """Whether x grows by factors."""
 

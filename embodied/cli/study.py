@@ -4,6 +4,7 @@
     embodied study vision encoders pictures --data DATA --out STUDY
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
+    embodied study ask houses classes curves --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
     embodied study stars --data DATA --out STUDY
     embodied study iliad regex 3.4 3.5 C.1 --out STUDY
@@ -12,19 +13,22 @@
 
 HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1 and D.2. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b' and 'figure 4.6'.
 VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and `algorithm-6`.
-`bandit` has Table 3.2, Figures 3.4 and 3.5, `rates` and `held-out`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7'
-and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share are trained
-once, each table is written as JSON, Markdown and, where it has one, as a figure. Interrupt it whenever you like: the
-same command goes on.
+Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table 3.2, Figures 3.4 and 3.5, `rates`, `held-out` and,
+with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`. `check` says which stored
+tables no longer belong to this code. Rows that tables share are trained once, each table is written as JSON, Markdown
+and, where it has one, as a figure. Interrupt it whenever you like: the same command goes on.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
+from agents.ask.config import AskerConfig, AskEvaluation
 from agents.bandit.config import SCALES as BANDIT_SCALES
 from agents.bandit.config import BanditConfig
 from agents.bandit.rating_config import DECISIONS, RatingConfig
@@ -52,6 +56,7 @@ from embodied.cli.learning import (
     WithDevice,
     by_name,
 )
+from embodied.cli.model import WithModel, client_of
 from embodied.cli.options import (
     REPEATS,
     AnyFolder,
@@ -64,9 +69,12 @@ from embodied.cli.options import (
     whole,
 )
 from embodied.cli.train import EVALUATION, TRAINING, RegexFiles, Strips
+from embodied.records import load_json
 
 if TYPE_CHECKING:
+    from agents.bandit.ratings import Rater
     from agents.studies.engine import StudyLearner
+    from embodied.interface import Agent
 
 Tables = Annotated[tuple[str, ...], Option(metavar="TABLE", name="TABLE")]
 Seeds = Annotated[int, Option(whole(1, REPEATS), "N")]
@@ -102,6 +110,22 @@ class Judged:
 class JudgeSeed:
     judge_seed: int = 0
     """Random seed of the evaluation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LikePeople:
+    rater: InputPath | None = None
+    """Learn from ratings like people's, too: rater.json of `embodied dataset from-people`."""
+
+    def read_rater(self) -> Rater | None:
+        """The rater of --rater.
+
+        Raises:
+          RecordError: the file holds none.
+        """
+        from agents.bandit.ratings import Rater
+
+        return None if self.rater is None else load_json(self.rater, Rater)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,11 +192,11 @@ class VnlaOptions(Study, Trained, Judged, WithData, Encoded):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BanditOptions(Study, Trained):
+class BanditOptions(Study, Trained, LikePeople):
     """A translator that learns from ratings."""
 
     tables: Tables
-    """Make these tables: 3.2, 3.4, 3.5, rates or held-out."""
+    """Make these tables: 3.2, 3.4, 3.5, rates, held-out or, with --rater, people."""
     data: InputFolder
     """The corpus, a folder that `embodied corpus` made."""
     scale: Annotated[str, SMALL_SCALE] = "mini"
@@ -181,7 +205,7 @@ class BanditOptions(Study, Trained):
 
 
 @dataclass(frozen=True, kw_only=True)
-class StarsOptions(Study, Trained, Judged, WithData, Encoded):
+class StarsOptions(Study, Trained, Judged, WithData, Encoded, LikePeople):
     """HANNA agents that learn from ratings of their episodes."""
 
     agent: InputPath = SHIPPED_AGENT
@@ -228,15 +252,13 @@ class NavOptions(IliadOptions, Nav):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AskOptions(Cached):
-    """Ask-v0's table and figure: success of scripted agents against the price of their questions."""
+class AskOptions(Study, Trained, WithModel, Cached):
+    """Ask-v0: agents that decide when to ask, against the price of their questions."""
 
-    out: OutputFolder
-    """Folder of ask.json, ask_table.md and figure_ask.png."""
-    draw: bool = False
-    """Only draw the figure of a stored ask.json."""
-    small: bool = False
-    """Use two houses of each kind, to see that it runs."""
+    tables: Tables
+    """Make these tables: houses, classes or curves."""
+    config: Annotated[AskerConfig, Settings("the learned asker", AskerConfig())]
+    evaluation: Annotated[AskEvaluation, Settings(EVALUATION, AskEvaluation())]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -349,7 +371,8 @@ def vnla(args: VnlaOptions) -> int:
 def bandit(args: BanditOptions) -> int:
     from agents.bandit.study import BanditStudy
 
-    return run_table(args, BanditStudy(args.data, args.config, seeds_of(args, args.config.seed), args.threads))
+    seeds = seeds_of(args, args.config.seed)
+    return run_table(args, BanditStudy(args.data, args.config, seeds, args.threads, args.read_rater()))
 
 
 def stars(args: StarsOptions) -> int:
@@ -367,6 +390,7 @@ def stars(args: StarsOptions) -> int:
         split=args.split,
         rated=args.rated,
         decisions=args.decisions,
+        rater=args.read_rater(),
     )
     return run_table(args, learner)
 
@@ -391,11 +415,21 @@ def check(args: CheckOptions) -> int:
 
 
 def ask(args: AskOptions) -> int:
-    from agents.ask.study import StudySize, draw, run
+    from agents.ask.study import AskStudy
 
-    size = StudySize(2, 4, 2, 5, 4) if args.small else StudySize()
-    draw(args.out) if args.draw else run(args.out, size, args.cache)
-    return 0
+    learner = AskStudy(args.cache, args.config, args.evaluation, seeds_of(args, args.config.seed), args.threads)
+    if args.server.model:
+        about = {k: getattr(args.server, k) for k in ("model", "form", "temperature", "most_tokens")}
+        learner = dataclasses.replace(learner, model=functools.partial(model_agent, args), model_about=about)
+    return run_table(args, learner)
+
+
+def model_agent(args: AskOptions, places: object) -> Agent:
+    """The language model that the options name."""
+    from agents.language_models.agent import LanguageModelAgent
+    from agents.language_models.telling import Teller, agent_prompt
+
+    return LanguageModelAgent(client_of(args), Teller(prompt=agent_prompt(args.prompts)))
 
 
 COMMANDS: Mapping[str, Any] = {

@@ -42,10 +42,22 @@ class Mind:
     visits: dict[int, int] = field(default_factory=dict)
     asked: dict[Intention, int] = field(default_factory=dict)
     """How often each question was asked."""
-    confirmed: int | None = None
-    """Where it asked last whether this is it."""
+    asked_at: dict[Intention, int] = field(default_factory=dict)
+    """At which `moment` each question was asked last."""
     before: float = 0.0
-    """The score of the thing then."""
+    """The score of the thing when it was asked last whether this is it."""
+
+    @property
+    def moment(self) -> int:
+        """A number that every move changes."""
+        return len(self.visits) + sum(self.visits.values())
+
+    def ask(self, question: Intention, thing: Detection | None) -> Ask:
+        """Remember a question that is asked now, and of which thing that was reached."""
+        self.asked[question], self.asked_at[question] = self.asked.get(question, 0) + 1, self.moment
+        if question is Intention.CONFIRM and thing is not None:
+            self.before = thing.score
+        return Ask(question)
 
 
 AskRule = Callable[[Observation, Detection | None, Mind], Action | None]
@@ -72,8 +84,7 @@ class Asker:
         """The action of one episode; notes it in its trail."""
         action = self.rule(o, reached(o), trail)
         if isinstance(action, Ask) and action.intention in o.can_ask:
-            trail.asked[action.intention] = trail.asked.get(action.intention, 0) + 1
-            return action
+            return trail.ask(action.intention, reached(o))
         if isinstance(action, Stop):
             return action
         trail.visits[s.pose.node] = trail.visits.get(s.pose.node, 0) + 1
@@ -123,16 +134,15 @@ def between(low: float, high: float) -> AskRule:
     """Stops at a thing whose score is at least `high`, passes by below `low`, and asks between."""
 
     def rule(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
-        here = trail.confirmed == len(trail.visits) + sum(trail.visits.values())
         if thing is None:
             return None
-        if here:  # it was asked at this very place: a no has lowered the score
+        if (
+            trail.asked_at.get(Intention.CONFIRM) == trail.moment
+        ):  # it was asked at this very place: a no has lowered the score
             return Stop() if thing.score >= trail.before else None
         if thing.score >= high:
             return Stop()
         if thing.score >= low and Intention.CONFIRM in o.can_ask:
-            trail.confirmed = len(trail.visits) + sum(trail.visits.values())
-            trail.before = thing.score
             return Ask(Intention.CONFIRM)
         return None
 
