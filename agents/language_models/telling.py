@@ -64,9 +64,9 @@ def agent_prompt(folder: Path | None = None) -> Prompt:
 
 def schema_of(o: Observation) -> dict[str, Any]:
     """What the model may answer."""
-    text = {"type": "string", "maxLength": 300}
-    free = {"question": text} if Intention.FREE in o.can_ask else {}
-    return object_schema(reason=text, action={"type": "string", "enum": list(actions_of(o))}, **free)
+    text = lambda most: {"type": "string", "maxLength": most}
+    free = {"question": text(300)} if Intention.FREE in o.can_ask else {}
+    return object_schema(reason=text(100), action={"type": "string", "enum": list(actions_of(o))}, **free)
 
 
 def action_in(o: Observation, value: Mapping[str, Any]) -> Action:
