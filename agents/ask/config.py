@@ -13,15 +13,15 @@ class AskerConfig:
 
     houses: int = 20
     """Training houses of 90 to 140 square metres."""
-    tasks: int = 8
+    tasks: int = 10
     """Tasks of each house in the first round, which the oracle plays."""
     rounds: int = 2
     """Further rounds, which the learner plays (DAgger)."""
-    round_tasks: int = 4
+    round_tasks: int = 6
     """Tasks of each house in a further round."""
     hidden_size: int = 64
     """Width of the network's two hidden layers."""
-    passes: int = 150
+    passes: int = 120
     """Passes over all decisions in each round."""
     learning_rate: float = 3e-3
     """Learning rate of AdamW."""

@@ -33,7 +33,7 @@ from embodied.policies.ask import Asker, Mind, confirm_on_sight, onward, reached
 
 EVERY = 4
 """Steps between two moments at which it thinks about asking; it also does whenever a thing was reached."""
-LABELLED = 1 / 3
+LABELLED = 0.5
 """Of a learner's decisions, how many the oracle thinks about."""
 IMAGINED = 3
 """Things that one who doubts weighs at a time."""

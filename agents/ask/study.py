@@ -58,7 +58,7 @@ FAMILIES: Mapping[str, tuple[Callable[..., AskRule], Sequence[tuple[float, ...]]
     "route after some steps": (after, ((50,), (30,), (20,), (10,), (0,))),
 }
 """Rules with numbers that say how readily they ask."""
-RESERVES = (2.0, 1.0, 0.0, -1.0)
+RESERVES = (2.0, 1.0)
 
 
 def _rule(name: str) -> StudyRow:
@@ -72,6 +72,7 @@ def _curves() -> tuple[StudyRow, ...]:
         for level in levels
     ]
     learned = [StudyRow(f"learned asker, reserve {r:g}", {}, {"reserve": r}, series="learned asker") for r in RESERVES]
+    learned.append(StudyRow("learned asker", {}, series="learned asker"))
     return (*rows, *learned, *map(_rule, ("never ask", "always route", FORESIGHT, "oracle")))
 
 
