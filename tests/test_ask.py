@@ -341,7 +341,7 @@ def test_a_study_trains_by_dagger_judges_and_draws(world, tasks, make_env, tmp_p
         and found["never ask"]["price_unseen_houses"]["mean"] == 0
     )
     made = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.safetensors")}
-    curve = ["learned asker, reserve 0", "learned asker, reserve 2", "never ask"]
+    curve = ["learned asker, reserve 1", "learned asker, reserve 2", "never ask"]
     run_study(study, ["curves"], tmp_path, rows=curve, note=quiet)
     assert (tmp_path / "ask-curves.png").exists()
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("*.safetensors")} == made and len(made) == 2
