@@ -139,7 +139,8 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
             "learning rate": optimizer.param_groups[0]["lr"],
         }
 
-    return _passes(folder, identity, parts, m, data, "pretrain", config.pretraining_passes, step, finish, note)
+    plan = Passes("pretrain", config.pretraining_passes, step, finish)
+    return _run(plan, folder, identity, parts, config, data, note)
 
 
 def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
@@ -169,7 +170,8 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
         save_network(critic, m, folder / "critic.safetensors", identity)
         return {"mean square error": sums["error"] / sums["words"]}
 
-    return _passes(folder, identity, parts, m, data, "critic", config.critic_passes, step, finish, note)
+    plan = Passes("critic", config.critic_passes, step, finish)
+    return _run(plan, folder, identity, parts, config, data, note)
 
 
 def bandit(
@@ -198,16 +200,14 @@ def bandit(
     translator, critic = m.translator(), m.critic()
     load_network(translator, reference)
     optimizers = {"translator": adam(translator, config.bandit_rate)}
+    parts: dict[str, Stateful] = {"translator": translator, "translator optimizer": optimizers["translator"]}
+    about = {"begin": weights_digest(reference), "learner": learner, "rater": dataclasses.asdict(rater)}
     if learner == "a2c":
         load_network(critic, critic_file)
         optimizers["critic"] = adam(critic, config.bandit_rate)
-    about = {"begin": weights_digest(reference), "learner": learner, "rater": dataclasses.asdict(rater)}
-    if learner == "a2c":
+        parts |= {"critic": critic, "critic optimizer": optimizers["critic"]}
         about["critic"] = weights_digest(critic_file)
     identity = m.identity("bandit", "critic_passes", "bandit_rate", "bandit_set", ratings=m.bandit_digest, **about)
-    parts: dict[str, Stateful] = {"translator": translator, "translator optimizer": optimizers["translator"]}
-    if learner == "a2c":
-        parts |= {"critic": critic, "critic optimizer": optimizers["critic"]}
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         said = sampled(translator, m, data, chosen, "bandit", turn)
@@ -233,7 +233,7 @@ def bandit(
         }
         return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
-    found = _passes(folder, identity, parts, m, data, "bandit", passes, step, finish, note)
+    found = _run(Passes("bandit", passes, step, finish), folder, identity, parts, config, data, note)
     save_network(translator, m, folder / "best.safetensors", identity)
     return found
 
@@ -289,29 +289,35 @@ def adam(module: torch.nn.Module, rate: float) -> torch.optim.Adam:
     return torch.optim.Adam(module.parameters(), rate, fused=True)
 
 
-def _passes(
+@dataclass(frozen=True)
+class Passes:
+    """What a stage does in its passes over the sentences."""
+
+    purpose: str
+    """Names the random order of the sentences, anew in every pass."""
+    count: int
+    step: Step
+    """Is given sentences, the pass and the number of the update, does it, and returns numbers to add up."""
+    finish: Finish
+    """Is given a pass, the sums of its numbers and what the passes before gave; returns what is kept of it."""
+
+
+def _run(
+    plan: Passes,
     folder: Path,
     identity: Identity,
     parts: Mapping[str, Stateful],
-    m: NumberedCorpus,
+    config: BanditConfig,
     data: Numbered,
-    purpose: str,
-    passes: int,
-    step: Step,
-    finish: Finish,
     note: Note,
 ) -> list[dict[str, float]]:
-    """Go on with a run until it has had so many passes over `data`; returns what `finish` said of each.
-
-    Args:
-      purpose: names the random order of the sentences, anew in every pass.
-      step: is given sentences, the pass and the number of the update, does it, and returns numbers to add up.
-      finish: is given a pass, the sums of its numbers and what the passes before gave; returns what is kept of it.
+    """Go on with a run until it has had its passes over `data`; returns what `finish` said of each.
 
     Raises:
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
-    config, lengths = m.config, [len(s) for s in data.source]
+    purpose, passes, step, finish = plan.purpose, plan.count, plan.step, plan.finish
+    lengths = [len(s) for s in data.source]
     each, order = -(-len(lengths) // config.batch), None
     minutes = config.checkpoint_minutes
     with Session(folder, identity, parts, passes * each, checkpoint_minutes=minutes, every=each, note=note) as session:
