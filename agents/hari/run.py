@@ -44,8 +44,7 @@ def lessons_of(data: Dataset, kept: float) -> PretrainingData:
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
     costs = Costs.alike(config.cost)
-    some = {"stack": config.stack, "longest": config.longest, "cooperative": config.cooperative}
-    return HariRules(costs, horizon=config.horizon, kept=config.kept, **some)
+    return HariRules(costs, config.stack, config.longest, config.cooperative, horizon=config.horizon, kept=config.kept)
 
 
 def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> TaskSplit:
