@@ -12,31 +12,31 @@ class BanditConfig(RunSettings):
     """The defaults are the dissertation's; SCALES holds the smaller settings."""
 
     hidden_size: int = 500
-    """Width of word embeddings and LSTMs of the translator and of the critic."""
+    """Width of word embeddings and LSTMs of translator and critic."""
     source_words: int = 50_000
-    """Most frequent words of the source language that are known."""
+    """Vocabulary size of the source language."""
     target_words: int = 50_000
-    """Most frequent words of the target language that are known."""
+    """Vocabulary size of the target language."""
     longest: int = 50
-    """Words of the longest translation; corpora leave out sentences of more words."""
+    """Longest translation, words; corpora leave out longer sentences."""
     batch: int = 64
     """Sentences per update."""
     pretraining_passes: int = 10
-    """Passes over the supervised set; the weakly trained reference has had one."""
+    """Epochs of supervised pre-training; the weakly trained reference has one."""
     decay_from: int = 5
-    """From this pass on the learning rate halves when dev perplexity rises."""
+    """Epoch from which the learning rate halves when the perplexity of the dev set rises."""
     critic_passes: int = 5
-    """Passes over the supervised set, with sampled translations, that teach the critic."""
+    """Epochs of pre-training the critic on sampled translations."""
     pretraining_rate: float = 1e-3
-    """Adam's learning rate in pre-training, of translator and critic."""
+    """Learning rate of pre-training, of translator and critic."""
     bandit_rate: float = 1e-4
-    """Adam's learning rate while learning from ratings, of translator and critic, and of the supervised control."""
+    """Learning rate of learning from ratings, of translator and critic, and of the supervised control."""
     bandit_set: str = "bandit_overlap"
     """The split that is rated: 'bandit_overlap' (the dissertation's case) or 'bandit_disjoint'."""
     clip: float = 5.0
-    """Longest gradient; the authors' program's (docs/sources.md, S73)."""
+    """Largest gradient norm, that of the authors' program (docs/sources.md, S73)."""
     checkpoint_minutes: float = 2.0
-    """How often a run is saved, so that it can go on after an interruption."""
+    """Minutes between checkpoints."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -21,18 +21,18 @@ class RatingConfig:
     batch: int = 32
     """Episodes per update, each rated once."""
     steps: int = 50
-    """Actions of the longest episode that is rated, at most those of its task; imitation cuts episodes off after 20."""
+    """Longest rated episode, steps; at most its task's."""
     learning_rate: float = 1e-4
-    """Adam's, of the agent; the dissertation's for translators."""
+    """Learning rate of the agent."""
     critic_rate: float = 1e-3
-    """Adam's, of the critic, which begins untaught."""
+    """Learning rate of the critic, which starts untrained."""
     critic_updates: int = 10
-    """First updates, in which the critic learns alone."""
+    """Updates at the start in which only the critic learns."""
     score: str = "SDTW"
-    """What a rating is made from: 'success', 'nDTW' of the walk against the shortest one, which teaches to stand
-    still rather than to err (docs/results/bandit.md), or 'SDTW': nDTW where the goal was reached, else nothing."""
+    """What ratings are simulated from: 'success', 'nDTW' of the path, which teaches agents to stand still
+    (docs/results/bandit.md), or 'SDTW': nDTW where the goal was reached, else 0."""
     clip: float = 5.0
-    """Gradients are clipped to this norm."""
+    """Largest gradient norm."""
     seed: int = 0
     """Random seed."""
 

@@ -12,13 +12,13 @@ class Sizes:
     supervised: int = 14_000
     """Pairs for supervised pre-training."""
     bandit: int = 12_800
-    """Pairs of each set to be rated."""
+    """Pairs of each set that is rated."""
     dev: int = 1_000
-    """Pairs to choose on, at least."""
+    """Least number of pairs for model selection."""
     test: int = 2_000
-    """Pairs to judge on, at least."""
+    """Least number of pairs for evaluation."""
     overlap: float = 0.95
-    """Share of the set bandit_overlap that was seen in supervised training (the dissertation: over 95 %)."""
+    """Share of the set bandit_overlap that is in the supervised set (the dissertation: over 95 %)."""
 
     def __post_init__(self) -> None:
         if min(self.supervised, self.bandit, self.dev, self.test) < 1:

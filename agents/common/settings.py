@@ -89,18 +89,18 @@ class ImitationSettings(ValidatedRunSettings):
     """Of agents that look at features, imitate a teacher, and learn when to ask."""
 
     cooldown: float = 0.0
-    """The last share of the updates, over which the learning rate falls to zero (docs/sources.md, S32, S113)."""
+    """Share of the updates at the end over which the learning rate falls to zero (docs/sources.md, S32, S113)."""
     weight_decay: float = 5e-4
     """Weight decay, as in the authors' programs; the text does not mention it (docs/sources.md, S28)."""
     training_houses: int = 0
-    """Learn from so many of the data set's training houses; 0: from all."""
+    """Train in this many of the data set's training houses; 0: in all."""
     lights: int = 1
-    """Lightings of every training house, of which each update shows one: its own, and those that hour, weather and
-    lamps drawn from its seed make (`embodied features --lights`)."""
+    """Train on this many lightings of every house, one per update: its own, and random hours, weathers and lamps
+    (`embodied features --lights`)."""
     environment_dropout: float = 0.0
     """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35, S113)."""
     instruction_length: int = 50
-    """Words of an instruction that are read."""
+    """Longest instruction, words."""
     validation_tasks: int = 200
     """Tasks of each validation."""
 
@@ -122,9 +122,9 @@ class EvaluationSettings:
 
     evaluation_temperature: float = 0.0
     """Sampling temperature of navigation actions in evaluation: 0 is greedy decoding, 1 samples from the distribution.
-    An agent that is often wrong and decodes greedily walks in circles (docs/sources.md, S36)."""
+    A weak agent that decodes greedily walks in circles (docs/sources.md, S36)."""
     ask_threshold: float = 0.5
-    """In evaluation, the learned rule asks where asking is more probable than this."""
+    """In evaluation, the learned rule asks where its probability of asking exceeds this."""
     evaluation_batch: int = 32
     """Episodes evaluated in parallel; changes speed, not results."""
 

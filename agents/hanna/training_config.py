@@ -49,26 +49,29 @@ class TrainingConfig(ImitationSettings):
     training_steps: int = 20
     """Horizon of training episodes."""
     alpha: float = 1.0
-    """Weight of the curiosity-encouraging loss; 0: ablation. The authors: 0.5 with ask rules other than 'learned'."""
+    """Weight of the curiosity-encouraging loss; 0: ablation. The authors use 0.5 with ask rules other than
+    'learned'."""
     curiosity_floor: float = 0.0
-    """Mistakes less likely than this are not pushed down further; 0: Eq 4.13, without bound (docs/sources.md, S34)."""
+    """Mistakes with a lower probability than this add nothing to the curiosity loss; 0: Eq 4.13 (docs/sources.md,
+    S34)."""
     ask_rule: str = "learned"
-    """Who decides when to ask: 'learned', 'never', 'random' or 'every5' (hanna.asking.RULES)."""
+    """Who decides when to ask: 'learned', 'never', 'random' or 'every5'."""
     guided_asking: float = 0.0
-    """Share of training episodes of the learned rule in which 'every5' asks in its place (docs/sources.md, S33).
-    A learner that asks at the wrong time gives itself the wrong routes to learn to walk by."""
+    """Share of training episodes in which 'every5' asks instead of the learned rule, so that early mistakes in asking
+    do not spoil the routes to learn from (docs/sources.md, S33)."""
     ask_price: float = 1.0
-    """What a needless request costs in training, against one that is missing; 1: Eq 4.14."""
+    """Weight of a needless request in the loss, relative to a missing one; 1: Eq 4.14."""
     read_assistance: bool = True
-    """False: on routes there is only the target image (Table 4.4)."""
+    """Read the words of routes; False: show only the goal image (Table 4.4)."""
     reset_inter_task: bool = True
-    """False: ablation of Table D.2."""
+    """Reset the inter-task module between sub-tasks; False: ablation of Table D.2."""
     predict_reasons: bool = True
-    """False: ablation of Table D.2."""
+    """Predict the reasons for asking, too; False: ablation of Table D.2."""
     similarity_attention: bool = True
-    """False: ablation of Table D.2 (beta = 0)."""
+    """Attend by cosine similarity; False: ablation of Table D.2 (beta = 0)."""
     turn_to_agent: bool = True
-    """Views in the agent's frame; False: in absolute order, as in the authors' program (docs/sources.md, S29)."""
+    """Order the views from the agent's heading on; False: in absolute order, as in the authors' program
+    (docs/sources.md, S29)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -105,20 +108,20 @@ class HannaEvaluation(EvaluationSettings):
     evaluation_steps: int = 50
     """Longest episode in evaluation, steps."""
     revisit_weight: float = 1.0
-    """In evaluation, the probability of a move is multiplied by this for each earlier visit, under the same words, to
-    the place that it leads to; 1: no effect. Greedy decoding alone walks to and fro (docs/sources.md, S36)."""
+    """In evaluation, multiply the probability of a move by this for each earlier visit to its target under the same
+    instruction; 1: no effect (docs/sources.md, S36)."""
     use_goal_image: bool = False
-    """In evaluation, an agent that is shown a goal image stops only at that place, and takes the shortest way through
-    its topological map where it has been there (hanna.trail; docs/sources.md, S161)."""
+    """In evaluation with a goal image, stop only at the place that it shows, and take the shortest path there if it is
+    on the topological map (docs/sources.md, S161)."""
     frontier_discount: float = 0.0
-    """In evaluation with goal images, the value of an untried way is multiplied by this for each move back to it, so
-    that the agent explores without going in circles; 0: no exploration (hanna.trail)."""
+    """In evaluation with a goal image, multiply the value of an untried move by this for each step back to it; 0: no
+    exploration."""
     first_ask_threshold: float = 0.5
-    """In evaluation, `ask_threshold` while no image of where to go has been shown (docs/sources.md, S162)."""
+    """In evaluation, `ask_threshold` before the first goal image (docs/sources.md, S162)."""
     route_ask_threshold: float = 0.5
     """In evaluation, `ask_threshold` on a route (docs/sources.md, S162)."""
     min_moves_between_requests: int = 0
-    """In evaluation, moves after departing from a route before the learned rule asks again."""
+    """In evaluation, moves after leaving a route before the learned rule asks again."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

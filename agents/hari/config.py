@@ -14,32 +14,32 @@ class ExecutionConfig(ValidatedRunSettings):
     hidden_size: int = 256
     """Width of encoder, decoder and belief."""
     layers: int = 2
-    """Of the encoder and of the decoder each."""
+    """Layers of the encoder, and of the decoder."""
     heads: int = 8
-    """Of the attention."""
+    """Attention heads."""
     dropout: float = 0.1
-    """Share of units that are silent in training, in attention as elsewhere."""
+    """Dropout rate in training."""
     iterations: int = 100_000
     """Updates of the weights."""
     horizon: int = 15
-    """Most steps of a pre-training episode."""
+    """Longest pre-training episode, steps."""
     guided: float = 0.0
-    """Share of the updates, the first ones, over which the shortest path takes ever fewer of the steps: DAgger's beta
-    falls linearly from 1 to 0 over them (docs/sources.md, S81)."""
+    """Share of the updates at the start over which the expert's share of the steps falls linearly from 1 to 0: DAgger's
+    beta (docs/sources.md, S81)."""
     subgoals: float = 0.0
-    """Share of the training episodes that have a sub-goal of one to three nodes from the beginning, worded as SUB's
-    answer is (docs/sources.md, S144)."""
+    """Share of training episodes with a sub-goal of one to three nodes from the start, worded as SUB's answer
+    (docs/sources.md, S144)."""
     standing: float = 0.0
-    """Share of the training steps at which it stands still and is told what it is told unasked, as an agent that asks
-    does (docs/sources.md, S172)."""
+    """Share of training steps at which the agent stands still and gets the same description again, as an agent that
+    asks does (docs/sources.md, S172)."""
     kept: float = 0.1
-    """Share of the object classes that descriptions keep while it stands still (docs/sources.md, S170)."""
+    """Share of object classes that descriptions keep while the agent stands still (docs/sources.md, S170)."""
     afresh: bool = False
-    """Whether its belief begins anew when the goal on top of the stack is another one (docs/sources.md, S145)."""
+    """Reset the belief when the goal on top of the stack changes (docs/sources.md, S145)."""
     clip: float = 1.0
-    """Norm to which gradients are cut (docs/sources.md, S76)."""
+    """Largest gradient norm (docs/sources.md, S76)."""
     cooldown: float = 0.0
-    """Share of the updates, the last ones, over which the learning rate falls linearly (docs/sources.md, S79)."""
+    """Share of the updates at the end over which the learning rate falls linearly to zero (docs/sources.md, S79)."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -60,34 +60,33 @@ class IntentionConfig(ValidatedRunSettings):
     learning_rate: float = 1e-5
     """Learning rate of Adam."""
     critic_iterations: int = 5_000
-    """Updates of the critic alone, before the first of both."""
+    """Updates of the critic alone, before both are trained."""
     iterations: int = 50_000
-    """Updates of both."""
+    """Updates of policy and critic together."""
     entropy: float = 1e-3
-    """Weight of the policy's entropy."""
+    """Weight of the entropy bonus."""
     clip: float = 1.0
-    """Norm to which gradients are cut (docs/sources.md, S76)."""
+    """Largest gradient norm (docs/sources.md, S76)."""
     knows_stack: bool = True
-    """Whether it is told how many goals are on the stack, which it put there itself; the dissertation's is not, and
-    blames that for its critic's mistakes (4.3.6; docs/sources.md, S77)."""
+    """Observe how many goals are on the stack; the dissertation's agent does not (4.3.6; docs/sources.md, S77)."""
     stack: int = 2
-    """L, the most goals on the stack."""
+    """Largest number of goals on the stack (L)."""
     longest: int = 3
-    """l_max, the most nodes to a sub-goal."""
+    """Longest path to a sub-goal, nodes (l_max)."""
     cost: float = 0.01
-    """Of each CUR, GOAL, SUB and DO."""
+    """Cost of each CUR, GOAL, SUB and DO."""
     horizon: int = 30
-    """H, the most steps of an episode."""
+    """Longest episode, steps (H)."""
     cooperative: bool = True
-    """False: the assistant answers another question than was asked (Table 4.7)."""
+    """The assistant answers the question that was asked; False: a different one (Table 4.7)."""
     kept: float = 0.1
-    """Share of the object classes that sparse descriptions keep (docs/sources.md, S170)."""
+    """Share of object classes that sparse descriptions keep (docs/sources.md, S170)."""
     perfect: bool = False
-    """True: sub-goals are reached perfectly, whatever the execution policy would do (the skyline of Table 4.7)."""
+    """Reach sub-goals perfectly, whatever the execution policy does (the skyline of Table 4.7)."""
     validate_every: int = 250
     """Updates between validations."""
     validation_tasks: int = 300
-    """Tasks of each validation, from its three conditions alike."""
+    """Tasks of each validation, a third from each of its conditions."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

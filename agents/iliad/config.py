@@ -17,35 +17,36 @@ class LearnerConfig:
     """The defaults are those of the dissertation for REGEX."""
 
     learner: str = "adel"
-    """Who learns: adel, mixture, dagger, binary or continuous (REINFORCE with either reward)."""
+    """Learning algorithm: adel (Algorithm 9), mixture (Algorithm 5), dagger, or REINFORCE with a binary or a continuous
+    reward."""
     iterations: int = 30_000
     """Updates of the weights."""
     batch: int = 32
     """Episodes per update."""
     learning_rate: float = 1e-3
-    """Of Adam; REINFORCE takes a tenth of it, as in the dissertation."""
+    """Learning rate of Adam; REINFORCE uses a tenth of it, as in the dissertation."""
     mixing: float = 0.5
-    """Lambda, the weight of executions from the marginal (Algorithm 9), or their share (Eq 3.14)."""
+    """Lambda: the weight of executions from the marginal (Algorithm 9), or their share (Eq 3.14)."""
     anneal_every: int = 0
-    """L, updates after which lambda is multiplied by `anneal_rate`; 0 for never (Table C.1)."""
+    """Multiply lambda by `anneal_rate` after every so many updates; 0: never (L of Table C.1)."""
     anneal_rate: float = 0.5
-    """Beta of Algorithm 5."""
+    """Factor of annealing (beta of Algorithm 5)."""
     least_mixing: float = 0.1
-    """Lambda never falls below it when it is annealed."""
+    """Smallest lambda of annealing."""
     entropy: float = 0.1
-    """Weight of the policy's entropy in REINFORCE."""
+    """Weight of the entropy bonus in REINFORCE."""
     clip: float = 5.0
-    """Norm to which gradients are cut; the dissertation does not cut (docs/sources.md, S92)."""
+    """Largest gradient norm; the dissertation does not clip (docs/sources.md, S92)."""
     cooldown: float = 0.0
-    """Share of the updates, the last ones, over which the learning rate falls linearly."""
+    """Share of the updates at the end over which the learning rate falls linearly to zero."""
     threshold: float = 0.85
-    """c, the validation success whose episodes are counted (Table 3.4)."""
+    """Validation success at which training episodes are counted (c of Table 3.4)."""
     validate_every: int = 500
     """Updates between validations."""
     checkpoint_minutes: float = 2.0
-    """How often the run is saved."""
+    """Minutes between checkpoints."""
     seed: int = 0
-    """Of everything that is drawn while learning."""
+    """Random seed of training."""
 
     def __post_init__(self) -> None:
         require_word(self, "learner", LEARNERS)

@@ -68,30 +68,31 @@ class VisionConfig:
     """How the encoder is trained."""
 
     network: str = "compact"
-    """One of NETWORKS: 'compact' and 'compact_maxpool' are small residual networks, 'lite0' is EfficientNet-Lite0.
-    Half of the features of 'compact_maxpool' and 'lite0' are max-pooled over a view, all others mean-pooled."""
+    """'compact' and 'compact_maxpool' are small residual networks, 'lite0' and 'lite0_means' are EfficientNet-Lite0,
+    'resnet18' to 'resnet152' are torchvision's. Half of the features of 'compact_maxpool' and 'lite0' are max-pooled
+    over a view, all others mean-pooled."""
     begin: str = "random"
-    """'imagenet' takes the weights of a package, which there are for 'lite0' and 'lite0_means'."""
+    """Initial weights: 'random', or 'imagenet' for 'lite0' and 'lite0_means'."""
     frozen: bool = False
     """Freeze the body; the neck and the heads are trained."""
     training_houses: int = 0
     """Train on this many of the data set's training houses; 0: on all."""
     epochs: int = 6
-    """Passes over the strips."""
+    """Epochs over the strips."""
     batch: int = 8
     """Strips per update."""
     shade: float = 0.0
-    """Deviation of the logarithm of an uneven light laid over strips; 0.3 suits pictures without light."""
+    """Standard deviation of the logarithm of a random uneven light laid over strips; 0.3 suits unlit pictures."""
     learning_rate: float = 2e-3
-    """Highest rate of a one-cycle schedule."""
+    """Highest learning rate of a one-cycle schedule."""
     weight_decay: float = 1e-2
     """Weight decay of AdamW."""
     least_views: int = 50
-    """Classes that are visible in fewer training views are left out."""
+    """Leave out classes that are visible in fewer training views."""
     seed: int = 0
     """Random seed."""
     cameras: tuple[str, ...] = ("ideal",)
-    """Kinds of camera, 'ideal', 'phone' or 'robot', one of which takes each strip, drawn evenly."""
+    """Cameras that take the strips, 'ideal', 'phone' or 'robot', one of them at random for each strip."""
     like: str = ""
     """Digest of an encoder to begin with, whose sight of the same places without light is learned; '' for none."""
 

@@ -31,7 +31,7 @@ class VnlaSettings(ImitationSettings):
     """The defaults are the program's; SCALES holds smaller ones."""
 
     hidden_size: int = 512
-    """Width of the encoder's and the decoder's LSTM."""
+    """Width of the LSTMs of encoder and decoder."""
     word_embedding: int = 256
     """Width of an embedded word."""
     navigation_embedding: int = 32
@@ -39,9 +39,9 @@ class VnlaSettings(ImitationSettings):
     ask_embedding: int = 32
     """Width of an embedded decision to ask."""
     budget_embedding: int = 16
-    """Width of an embedded number of requests that are left."""
+    """Width of the embedded number of remaining requests."""
     coverage: int = 10
-    """Width of what is remembered of every word: how much attention it had."""
+    """Width of the coverage vectors, which record the attention to each word."""
     dropout: float = 0.5
     """Dropout rate in training."""
     iterations: int = 100_000
@@ -49,11 +49,11 @@ class VnlaSettings(ImitationSettings):
     batch: int = 100
     """Episodes per update."""
     asker: str = "learned"
-    """Who decides when to ask, in training and when judged: 'none', 'first', 'random', 'teacher' or 'learned'."""
+    """Who decides when to ask, in training and evaluation: 'none', 'first', 'random', 'teacher' or 'learned'."""
     ask_rules: str = "all"
     """Rules of the asking teacher: 'all', 'a and e' or 'b to d'."""
     rules: str = "indirect"
-    """Rule of play that it is judged under: indirect, direct, direct-mute, goal-aware or algorithm-6."""
+    """Rule of play in evaluation: indirect, direct, direct-mute, goal-aware or algorithm-6."""
     validate_every: int = 1000
     """Updates between validations."""
 

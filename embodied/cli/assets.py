@@ -1,7 +1,7 @@
 """Build, list or show the catalogue of furniture.
 
-build imports every model of the furniture packs into the cache (otherwise each is imported when
-first needed), list prints the catalogue, sheet draws contact sheets of all models.
+`build` imports every model of the furniture packs into the cache (otherwise each is imported when first needed), `list`
+prints the catalogue, `sheet` draws contact sheets of all models.
 """
 
 from __future__ import annotations

@@ -1,12 +1,16 @@
-"""Measure speed and memory here, as medians, and compare them with what the project promises.
+"""Measure speed and memory on this machine, as medians.
 
-houses, pictures, steps and memory measure the main line; views measures views of a panorama; plays counts environment
-steps with help, seen those with pixels; drive counts live pictures and the steps of a body on wheels that sees them;
-gpu measures pictures, features and learning on a CUDA device, and checks a little on the CPU where there is none;
-bakes lights a flat again and again; light compares the ways of drawing with a path tracer; growth lights houses of 40
-to 400 m² (fast, or --pictures normal) and fits how the cost grows; serve lets --people take part in a study at once for
---seconds and tells how long a step takes from the browser to the disk and back. Close other programs first: they make
-every number worse.
+  houses, pictures, steps   generation, rendering, environment steps
+  views, plays, seen        views of a panorama, steps with help, steps with pixels
+  drive                     live pictures, and the steps of a body on wheels that sees them
+  gpu                       pictures, features and learning on a CUDA device; without one, a short check on the CPU
+  memory                    memory while houses are loaded and released
+  bakes                     light a flat repeatedly
+  light                     compare the ways of rendering with a path tracer
+  growth                    light houses of 40 to 400 m² and fit how the cost grows
+  serve                     people in a study at once: time of a step from the browser to the disk and back
+
+Close other programs first.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ PARTS = (
 @dataclass(frozen=True, kw_only=True)
 class Options(Furnished, Printed):
     part: Annotated[tuple[str, ...], Option(metavar="PART", name="part")] = ()
-    """Benchmarks to run: houses, pictures, steps, views, plays, seen, drive, gpu, memory, bakes, light, growth, serve
+    """Benchmarks to run
     (default: houses, pictures, steps)."""
     seed: int = 7
     """Seed of the houses."""

@@ -1,8 +1,8 @@
-"""Show how large the cache is, by what it holds, and make room in it.
+"""Show the size of the cache by kind of product, and make room in it.
 
-Everything in the cache can be made again. `--prune DAYS` removes what nobody has read for so many days, `--clear KIND`
-one kind of products (assets, light, panoramas ...) as a whole. EMBODIED_CACHE may name several folders, separated as in
-PATH: files are read from all of them and written to the first, so that a group can share one that is read-only.
+Everything in the cache can be made again. --prune DAYS removes what nobody has read for so many days, --clear KIND all
+products of a kind (assets, light, panoramas ...). EMBODIED_CACHE may name several folders, separated as in PATH: files
+are read from all of them and written to the first, so that a group can share a read-only one.
 """
 
 from __future__ import annotations

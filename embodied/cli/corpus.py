@@ -1,12 +1,12 @@
-"""Make a corpus of German and English sentences to learn to translate with.
+"""Make a corpus of German and English sentences for learning to translate.
 
     embodied corpus --out CORPUS
     embodied corpus --out CORPUS --from FOLDER
     embodied corpus --out CORPUS --moses TEXT.de TEXT.en
 
-The first fetches LibreOffice's help and menus through the distribution's own client (three Debian
-or Ubuntu packages of 6 MB, MPL-2.0), the second finds them in a folder, the third takes any two
-plain-text files of equal length. Splits share no document (lines of own files count in blocks).
+The first fetches LibreOffice's help and menus with apt (three Debian or Ubuntu packages of 6 MB, MPL-2.0), the second
+finds them in a folder, the third takes two plain-text files of equal length. No document is in two splits; with --moses,
+blocks of lines count as documents.
 """
 
 from __future__ import annotations

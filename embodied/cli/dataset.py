@@ -1,12 +1,13 @@
 """Build a data set: houses, graphs, routes, tasks and the lit panoramas of all viewpoints.
 
-Interrupt it whenever you like: the same command goes on from there, and the files do not depend
-on the number of workers. One house is one unit of work. Whoever needs words only leaves the pictures
-out by --pictures none; they can be drawn later, by the same command without it.
+Rerun an interrupted command to resume; the files do not depend on the number of workers. --pictures none leaves out the
+panoramas, and the same command without it renders them later.
 
-`embodied dataset from-people --people STUDY.people --data DATA --out DIR` writes DATA again with the words of the
-people of `embodied serve`: their routes for HANNA, VLN and ILIAD, their sub-goals for VNLA, and, where they gave
-stars, rater.json, which says what rater of BANDIT they resemble.
+    embodied dataset hanna --out DATA --scale mini
+    embodied dataset from-people --people STUDY.people --data DATA --out DIR
+
+The second writes DATA again with the words of people who took part in `embodied serve`: their routes for HANNA, VLN and
+ILIAD, their sub-goals for VNLA, and, where they gave stars, rater.json: the simulated rater that resembles them most.
 """
 
 from __future__ import annotations

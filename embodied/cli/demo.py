@@ -1,9 +1,8 @@
-"""From a seed to a recorded walk, in one command.
+"""From a seed to recorded episodes, in one command.
 
-Generates a furnished house with people in it, lights it, draws the panorama of every viewpoint,
-lets an agent walk to an object it is asked for, then lets a trained agent, which has never seen
-this house, find another one by asking the people; both episodes are recorded for Rerun, the
-second one with --video as a film.
+Generates a furnished house with people in it, lights it and renders the panorama of every viewpoint. Then one agent
+looks for an object along the shortest path, and a trained agent that has never seen this house finds another one by
+asking the people. Both episodes are recorded for Rerun; --video also films the second.
 """
 
 from __future__ import annotations

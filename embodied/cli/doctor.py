@@ -1,7 +1,7 @@
-"""Check that this machine can do the main job, and say what it will use.
+"""Check that this machine can generate, light and render houses, and say what it will use.
 
-Prints the renderer (vendor, device, software or hardware), the asset packs found, library
-versions and free disk. Exits 1, with the remedy, when houses cannot be generated or rendered.
+Prints the renderer (vendor, device, software or hardware), the furniture found, library versions and free disk. Exits
+with 1, and says what to do, when houses cannot be generated or rendered.
 """
 
 from __future__ import annotations

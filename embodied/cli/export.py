@@ -1,6 +1,6 @@
-"""Write a data set or a house as others read it: folders of published programs, Parquet, LeRobot, glTF, MJCF, USD.
+"""Export a data set or a house to the formats of other programs.
 
-  hanna, vnla, r2r, iliad-nav   folders to lay over copies of the programs of these names
+  hanna, vnla, r2r, iliad-nav   folders to copy into the published programs of these names
   duet                          the same for VLN-DUET and HAMT; EnvDrop and Recurrent-VLN-BERT read r2r
   matterport                    graphs and skyboxes for the Matterport3D simulator
   vlnce, streamvln, uninavid, internnav, lerobot-vlnce
@@ -9,7 +9,7 @@
   lerobot                       episodes with video, poses, actions and instructions, for `LeRobotDataset`
   glb, mjcf, usd                a house for web viewers and Blender, for MuJoCo's viewer, for USD programs
 
-Folders of programs come with a README-embodied.md: which version, what goes where, which lines a current PyTorch
+Folders for programs contain a README-embodied.md: which version, what goes where, and which lines a current PyTorch
 needs changed. `python -m embodied.mattersim` then runs the programs without a compiled simulator.
 """
 

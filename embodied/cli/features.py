@@ -1,7 +1,7 @@
-"""Turn the panoramas of a data set into the 36 x D features per node that learners read.
+"""Compute features of a data set's panoramas: 36 x D per viewpoint, which learners read.
 
-Houses that have features of this encoder are skipped. The encoder is the one that ships with the
-repository, one of `embodied train vision`, or a torchvision network whose weights are on your disk.
+Houses that have features of this encoder are skipped. The encoder is the shipped one, one of `embodied train vision`,
+or a torchvision network whose weights are on your disk.
 """
 
 from __future__ import annotations

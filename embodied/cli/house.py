@@ -1,7 +1,7 @@
 """Generate a furnished house into a folder.
 
-Writes house.json (the house as data), house.xml with its meshes and textures (opens in MuJoCo's
-own viewer), connectivity.json (the navigation graph in Matterport's format) and plan.png.
+Writes house.json (the house as data), house.xml with its meshes and textures (opens in MuJoCo's viewer),
+connectivity.json (the navigation graph in Matterport's format) and plan.png.
 """
 
 from __future__ import annotations

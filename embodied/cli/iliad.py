@@ -1,14 +1,13 @@
-"""Show episodes of a student that learns from descriptions: what was asked, done, said and learned.
+"""Show episodes of an ILIAD student: the request, what the student did, and the description that it learned from.
 
     embodied iliad --request "drop every vowel" --word banana
     embodied iliad --shared SHARED
     embodied iliad STUDY/students/learned/seed_0/adel_0.5/best.safetensors --shared STUDY/shared
     embodied iliad --world nav --data DATA --rrd walk.rrd
 
-The student is the shipped one of its world, or one of `embodied train iliad` or `embodied study iliad`, whose
-data and teacher are in the folder `shared` beside it. The shipped one's are made there if they are missing.
-NAV's student walks through the houses of a data set (`embodied dataset vln` or `hanna`, `embodied features`); --teacher
-grammar lets whoever words routes here describe its walks instead of a trained describer.
+FILE is a student of `embodied train iliad` or `embodied study iliad`, whose data and teacher are in the folder `shared`
+beside it. The shipped student's are made in --shared if they are missing. In NAV the student walks through the houses
+of a data set with features, and --teacher grammar describes its walks without a trained describer.
 """
 
 from __future__ import annotations

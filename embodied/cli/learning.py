@@ -90,8 +90,6 @@ class Lit:
 
 @dataclass(frozen=True, kw_only=True)
 class Nav(Cached, Encoded):
-    """Where NAV's houses and what is seen of them come from."""
-
     data: InputFolder | None = None
     """NAV: the data set, a folder that `embodied dataset vln` or `hanna` built."""
 

@@ -1,8 +1,8 @@
-"""Light a generated house once, so that looking at it is fast and photo-realistic.
+"""Light a generated house once, so that rendering it is fast and photo-realistic.
 
-Bakes global illumination (sky, sun and lamps, several bounces) into textures, kept in the cache
-under the house's digest. An interrupted bake resumes. With --lights the house is lit at other hours, too, at
-a part of the price: lights.json in its folder lists them.
+Bakes global illumination (sky, sun and lamps, several bounces) into textures, which the cache keeps. Rerun an
+interrupted command to resume. --lights also lights the house at other hours, each in less than half of the time, and
+lists them in lights.json.
 """
 
 from __future__ import annotations

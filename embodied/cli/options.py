@@ -256,8 +256,7 @@ def add_options(parser: argparse._ActionsContainer, kind: type) -> None:
     fields = {f.name: f for f in dataclasses.fields(kind)}
     owners: dict[str, type] = {}
     for base in kind.__mro__:
-        for name in vars(base).get("__annotations__", ()):
-            owners.setdefault(name, base)
+        owners |= dict.fromkeys(vars(base).get("__annotations__", ()), base)  # where it was declared first
     groups: dict[str, argparse._ActionsContainer] = {"": parser}
     for name in sorted(owners, key=lambda n: not _required(fields[n]) or _settings(hints[n]) is not None):
         owner, settings = owners[name], _settings(hints[name])

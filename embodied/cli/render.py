@@ -1,7 +1,7 @@
 """Render the panoramas of a generated house.
 
-Without --node, all viewpoints of the house go to DIR/panoramas.pano, one file with random access.
-With --node, one panorama is drawn, as an equirectangular picture or a view out of it, perhaps photographed (--camera).
+Without --node, all viewpoints go to DIR/panoramas.pano, one file with random access. With --node, one panorama is
+written as an equirectangular picture (--equirect), or a view of it (--view), optionally through an imperfect --camera.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Roll out an agent on tasks of one house, off-screen, into videos and recordings.
+"""Run an agent on tasks of one house, and write videos and recordings.
 
-The camera of --video moves smoothly between viewpoints: this is a 3D scene, not a set of
-photographs. With several episodes, %d in a file name stands for the number of the episode.
+The camera of --video moves smoothly between viewpoints. With several episodes, %d in a file name stands for the number
+of the episode.
 """
 
 from __future__ import annotations

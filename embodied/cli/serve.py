@@ -1,9 +1,9 @@
 """Let people take part in a browser: as assistant, agent, rater or describer.
 
-STUDY.toml says who does what, with whom and how often; examples/study.toml is one, and the tutorial "Collect help from
-people" explains it. Prints the links to give away and serves until Ctrl-C; started again, it goes on where it was.
-What people did is in OUT: episodes*.jsonl for `embodied view`, judgements.jsonl, and the log people.db, from which both
-are made. `embodied dataset from-people` makes a data set of it.
+STUDY.toml says who does what, with whom and how often; examples/study.toml is an example. Prints the links for
+participants and serves until Ctrl-C; rerun the command to continue. The answers are in OUT: episodes*.jsonl for
+`embodied view`, judgements.jsonl, and the log people.db, from which both are made. `embodied dataset from-people` makes
+a data set of them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Train agents for each row of a table of the dissertation, evaluate them, and write the table.
+"""Train agents for each row of a table of a paper, evaluate them, and write the table beside the printed numbers.
 
     embodied study hanna 4.5 --data DATA --judged-in OTHER --out STUDY --seeds 3
     embodied study vision encoders pictures --data DATA --out STUDY
@@ -15,8 +15,8 @@ HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1 and D.2. HARI's are 4.7, 4.8, 'figure
 VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and `algorithm-6`.
 Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table 3.2, Figures 3.4 and 3.5, `rates`, `held-out` and,
 with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`. `check` says which stored
-tables no longer belong to this code. Rows that tables share are trained once, each table is written as JSON, Markdown
-and, where it has one, as a figure. Interrupt it whenever you like: the same command goes on.
+tables no longer belong to this code. Rows that tables share are trained once. Each table is written as JSON, Markdown
+and, for some, as a figure. Rerun an interrupted command to resume.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Train the encoder, an agent (hanna, vnla, hari), or the ILIAD student.
 
-Rerun the command to resume an interrupted run; the result is the same. `tensorboard --logdir DIR` shows the curves, and
---rrd records validation episodes. On several GPUs run `torchrun --nproc-per-node N --no-python embodied train hanna
---device cuda ...`, and on several cores the same without --device.
+Rerun an interrupted command to resume; the result is the same. `tensorboard --logdir DIR` shows the curves. On several
+GPUs run `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`, and on several cores the same
+without --device.
 """
 
 from __future__ import annotations

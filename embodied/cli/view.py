@@ -1,10 +1,8 @@
-"""Look at what happened: open a recording, or the episodes of a run.
+"""Look at a recording, or at the episodes of a run.
 
-RUN is a .rrd file, which opens in the Rerun viewer (with --serve in the browser, with --connect in
-a viewer that runs already), or a folder that `embodied evaluate` wrote: its episodes are
-listed, --page writes one HTML page about them, and --episode N makes the recording of one (with
---data, the data set its houses come from), and with --video a film. What the agent sees in the
-recording is drawn as it was for the agent.
+RUN is a .rrd file, which opens in the Rerun viewer, or a folder that `embodied evaluate` wrote. Of a folder, the
+command lists the episodes; --page writes an HTML page about them, and --episode N with --data records one, and with
+--video films it. The recording shows what the agent saw.
 """
 
 from __future__ import annotations

@@ -22,33 +22,32 @@ class HouseConfig:
     """The knobs of the generator. None means: draw it from the seed."""
 
     area: tuple[float, float] | None = None
-    """Lowest and highest total area, square metres, drawn uniformly between them."""
+    """Lowest and highest floor area in square metres, drawn uniformly between them."""
     rooms: int | None = None
-    """Number of main rooms as flats are advertised: kitchen, wet rooms, storage, garage and circulation
-    do not count. 2 to 20."""
+    """Number of main rooms, 2 to 20; kitchen, bathrooms, storage, garage and corridors do not count."""
     bedrooms: int | None = None
-    """Bedrooms of every sort (main, children's, guest), 1 to 12."""
+    """Number of bedrooms (main, children's, guest), 1 to 12."""
     shape: str | None = None
-    """Footprint, seen from above."""
+    """Shape of the floor plan."""
     storeys: int = 1
-    """Only 1 is built so far."""
+    """Number of storeys; only 1 is implemented."""
     open_plan: bool | None = None
-    """Whether kitchen, dining and living flow into each other through wide openings."""
+    """Connect kitchen, dining and living room by wide openings."""
     style: str | None = None
-    """Palette and taste of materials and furniture."""
+    """Style of materials and furniture."""
     disorder: float | None = None
-    """0 is tidy, 1 is thoroughly lived in; read by the furnishing stages."""
+    """Disorder, from 0 (tidy) to 1 (thoroughly lived in)."""
     hour: float | None = None
     """Local solar time, hours in [0, 24)."""
     weather: str | None = None
-    """Of the sky: it decides how light falls in."""
+    """Weather, which decides the light from the sky."""
     landscape: str | None = None
-    """What is seen through the windows."""
+    """What the windows show."""
     season: str | None = None
-    """Of the landscape: leaves, bare trees, snow."""
+    """Season of the landscape (leaves, bare trees, snow)."""
     novelty: str | None = None
-    """'familiar' or 'novel': of what houses to learn from may hold when others are out of distribution, or of what
-    they never hold (embodied.generate.novelty); None is all there is."""
+    """For tests out of distribution: 'familiar' restricts a house to what training houses hold, 'novel' to what they
+    never hold (embodied.generate.novelty); None: no restriction."""
 
     def __post_init__(self) -> None:
         if self.area is not None:

@@ -17,29 +17,29 @@ class NavConfig:
     hidden_size: int = 256
     """Width of all networks."""
     heads: int = 8
-    """Of attention."""
+    """Attention heads."""
     teacher: str = "learned"
-    """'learned': a describer and an executor of the data (3.2.4.1); 'grammar': who words routes here."""
+    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
+    that word the routes of data sets."""
     pragmatics: str = "program"
-    """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the first that leads to the walk's end ('program',
-    docs/sources.md, S93, S141)."""
+    """Which candidate description is taken: by Eq 3.15 and 3.16 ('text'), or the first that leads the executor to the
+    end of the walk ('program'; docs/sources.md, S93, S141)."""
     candidates: int = 5
-    """|D_cand|: the likeliest description and sampled ones (Table C.2)."""
+    """Number of candidate descriptions: the likeliest and sampled ones (Table C.2)."""
     executor_iterations: int = 20_000
     """Updates of the teacher's executor."""
     describer_iterations: int = 20_000
     """Updates of the teacher's describer."""
     teacher_batch: int = 32
-    """Trips per update of the two."""
+    """Routes per update of the teacher's networks."""
     teacher_rate: float = 1e-4
-    """Adam's learning rate for the two."""
+    """Learning rate of the teacher's networks."""
     held_out: float = 0.2
-    """Share of the paths of houses to learn from that nobody learns, for validation."""
+    """Share of the paths of training houses held out for validation."""
     more_paths: int = 0
-    """Paths of each house to learn from besides those of the data set, each worded three times by the
-    same people: houses have ten times as many as a data set of Room-to-Room's density."""
+    """Additional paths per training house, each worded three times."""
     data_seed: int = 0
-    """Of which paths are held out, and of the teacher, which all students share."""
+    """Random seed of the held-out paths and of the teacher, which all students share."""
 
     def __post_init__(self) -> None:
         if self.teacher not in TEACHERS:

@@ -16,42 +16,44 @@ class RegexConfig:
     """The defaults are the dissertation's."""
 
     items: int = 114_503
-    """Data points of the simulation split, each with three requests."""
+    """Training examples, each with three requests."""
     held_out_items: int = 6_429
-    """Data points of validation and of test each, with one request."""
+    """Examples for validation, and for testing, each with one request."""
     vocabulary: int = 8_000
-    """Words that rules are carried out on, where they are made up."""
+    """Number of words that rules are applied to, where words are made up."""
     examples: int = 5
-    """J, words that a teacher sees changed; all of them must fit (tau = J)."""
+    """Word pairs per example; a description must fit all of them (J, tau)."""
     hidden_size: int = 512
     """Width of all recurrent networks."""
     word_size: int = 128
     """Width of the embeddings of words of a request."""
     character_size: int = 32
-    """Width of the embeddings of letters and of a rule's characters."""
+    """Width of the embeddings of letters and of characters of a rule."""
     teacher: str = "learned"
-    """'learned': a describer and an executor of the data (3.2.4.1); 'grammar': whoever made the requests."""
+    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
+    that word the requests."""
     pragmatics: str = "program"
-    """Which descriptions survive: Eq 3.15 and 3.16 ('text') or the best one ('program', docs/sources.md, S93)."""
+    """Which candidate description is taken: by Eq 3.15 and 3.16 ('text'), or the best one ('program'; docs/sources.md,
+    S93)."""
     candidates: int = 10
-    """|D_cand|: the likeliest description and sampled ones (Table C.2)."""
+    """Number of candidate descriptions: the likeliest and sampled ones (Table C.2)."""
     marginal: str = "asked"
-    """Which rules the student knows without requests: drawn as requests are ('asked'), or of half of their shapes only
-    ('narrow'; docs/sources.md, S140)."""
+    """Distribution of the unlabelled rules: that of requests ('asked'), or half of their shapes only ('narrow';
+    docs/sources.md, S140)."""
     unlabeled: int = 20_000
-    """Rules of the marginal's list."""
+    """Number of unlabelled rules."""
     executor_iterations: int = 30_000
     """Updates of the teacher's executor."""
     describer_iterations: int = 40_000
     """Updates of the teacher's describer."""
     pretraining_iterations: int = 10_000
-    """Updates of the student on rules without requests, before it learns; 0 for none, as the text has it."""
+    """Updates of the student on unlabelled rules before it learns from descriptions; 0: none, as in the text."""
     teacher_batch: int = 256
-    """Data points per update of the three."""
+    """Examples per update in training the teacher and in pre-training."""
     teacher_rate: float = 1e-3
-    """Adam's learning rate for the three."""
+    """Learning rate of the teacher and of pre-training."""
     data_seed: int = 0
-    """Of data and teacher, which all students share."""
+    """Random seed of data and teacher, which all students share."""
 
     def __post_init__(self) -> None:
         if self.teacher not in TEACHERS:
