@@ -30,10 +30,10 @@ class ExecutionConfig(ValidatedRunSettings):
     """Share of training episodes with a sub-goal of one to three nodes from the start, worded as SUB's answer
     (docs/sources.md, S144)."""
     standing: float = 0.0
-    """Share of training steps at which the agent stands still and gets the same description again, as an agent that
+    """Share of training steps at which the agent stands still and gets the description of its place, as an agent that
     asks does (docs/sources.md, S172)."""
     kept: float = 0.1
-    """Share of object classes that descriptions keep while the agent stands still (docs/sources.md, S170)."""
+    """Share of object classes that these descriptions keep (docs/sources.md, S170)."""
     afresh: bool = False
     """Reset the belief when the goal on top of the stack changes (docs/sources.md, S145)."""
     clip: float = 1.0

@@ -5,8 +5,8 @@
     embodied corpus --out CORPUS --moses TEXT.de TEXT.en
 
 The first fetches LibreOffice's help and menus with apt (three Debian or Ubuntu packages of 6 MB, MPL-2.0), the second
-finds them in a folder, the third takes two plain-text files of equal length. No document is in two splits; with --moses,
-blocks of lines count as documents.
+finds them in a folder, the third takes two plain-text files of equal length. No document is in two splits; with
+--moses, blocks of lines count as documents.
 """
 
 from __future__ import annotations
