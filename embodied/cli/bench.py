@@ -49,8 +49,7 @@ PARTS = (
 @dataclass(frozen=True, kw_only=True)
 class Options(Furnished, Printed):
     part: Annotated[tuple[str, ...], Option(metavar="PART", name="part")] = ()
-    """Benchmarks to run
-    (default: houses, pictures, steps)."""
+    """Benchmarks to run (default: houses, pictures, steps)."""
     seed: int = 7
     """Seed of the houses."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
