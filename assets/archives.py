@@ -26,7 +26,8 @@ def open_arrays(file: Path | BinaryIO, most: int = MOST) -> Iterator[NpzFile]:
     if not isinstance(archive, NpzFile):
         raise ValueError(f"{file} is no .npz archive")
     with archive:
-        whole = sum(entry.file_size for entry in archive.zip.infolist())  # zipfile unpacks no more than that
+        directory = archive.zip.infolist() if archive.zip else []
+        whole = sum(int(entry.file_size) for entry in directory)  # zipfile unpacks no more than that
         if whole > most:
             raise ValueError(f"{file} unpacks to {whole} bytes, such a file should hold at most {most}")
         yield archive

@@ -179,7 +179,8 @@ class World:
         if self._bake is None:
             from embodied import light  # late: loads the path tracer
 
-            name, told = self.pictures.lit_by or "normal", []
+            name = self.pictures.lit_by or "normal"
+            told: list[str] = []
             with light.progress_bar(shown=progress) as show:
 
                 def tell(stage: str, done: float) -> None:

@@ -54,7 +54,10 @@ class Options(Furnished, Printed):
 def run(args: Options) -> int:
     findings = []
     if args.fix:
-        done = [note(said) for said in fix(catalogue_packs=args.pack)]
+        done = 0
+        for said in fix(catalogue_packs=args.pack):
+            note(said)
+            done += 1
         if not done:
             note("nothing is missing that can be brought without root")
         else:  # libraries are found by processes that start when they are there
