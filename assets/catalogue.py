@@ -31,6 +31,8 @@ from assets.rows import DATA, CatalogueError, check_classes, read_json, read_mod
 __all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
 
 log = logging.getLogger(__name__)
+GROUPS = "groups.toml"
+"""The name of a file of furniture groups in a user's folder."""
 Params = tuple[tuple[str, str | float], ...]
 """What a maker of built things is told, by name."""
 
@@ -45,18 +47,21 @@ class Catalogue:
         cache: Path,
         packs: Sequence[Path] = (),
         own: Mapping[str, OwnModel] = MappingProxyType({}),
+        groups: Sequence[Path] = (),
     ) -> None:
         self.assets: Mapping[str, Asset] = MappingProxyType(dict(sorted(assets.items())))
         self.cache = Path(cache)
         self.packs = tuple(packs)
         self._recipes = dict(recipes)
         self._own = dict(own)
+        self.groups = tuple(groups)
+        """Files of a user's own furniture groups (embodied.generate.furnish.tables)."""
         self._imported = functools.lru_cache(maxsize=512)(self._import)
         self._scaled = functools.lru_cache(maxsize=1024)(self._scale)
 
     def __reduce__(self) -> tuple[type[Catalogue], tuple[object, ...]]:
         """What another process needs to make it again; meshes are read from the cache there."""
-        return Catalogue, (dict(self.assets), self._recipes, self.cache, self.packs, self._own)
+        return Catalogue, (dict(self.assets), self._recipes, self.cache, self.packs, self._own, self.groups)
 
     @functools.cached_property
     def classes(self) -> tuple[str, ...]:
@@ -87,7 +92,7 @@ class Catalogue:
           CatalogueError: unknown key.
         """
         kept = {key: self._asset(key) for key in keys}
-        return Catalogue(kept, self._recipes, self.cache, self.packs, self._own)
+        return Catalogue(kept, self._recipes, self.cache, self.packs, self._own, self.groups)
 
     @functools.cached_property
     def furnishing(self) -> Catalogue:
@@ -187,7 +192,8 @@ def load_catalogue(
     Args:
       cache: folder for imported meshes and textures; the user's cache folder if None.
       packs: .sh3f files or folders of them that replace the system's furniture folder.
-      own: folders of a user's own models, each with a catalogue.json (docs/assets.md).
+      own: folders of a user's own models, each with a catalogue.json, or of furniture groups, a groups.toml, or both
+        (docs/assets.md).
     """
     packs_given, own_given = ((Path(p),) if isinstance(p, (str, Path)) else p for p in (packs, own))
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
@@ -195,12 +201,17 @@ def load_catalogue(
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
     assets |= {key: maker.asset for key, maker in MAKERS.items()}
     models: dict[str, OwnModel] = {}
-    for folder in own_given:
-        more, more_recipes, more_models = read_own(Path(folder), classes)
+    groups: list[Path] = []
+    for folder in map(Path, own_given):
+        if (folder / GROUPS).is_file():
+            groups.append(folder / GROUPS)
+            if not (folder / "catalogue.json").exists():
+                continue
+        more, more_recipes, more_models = read_own(folder, classes)
         if twice := sorted(set(more) & set(assets)):
             raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
-    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs_given, models)
+    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs_given, models, groups)
     for name in catalogue.own_classes:
         if why := _placed_nowhere(catalogue.of_class(name)):
             log.warning("class %r is placed in no house: %s", name, why)

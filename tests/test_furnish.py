@@ -16,11 +16,12 @@ from conftest import FINISHES, two_rooms
 from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
+from embodied.generate.config import RETRIES
 from embodied.generate.furnish import furnish
 from embodied.generate.furnish.lights import LUMENS
-from embodied.generate.furnish.rooms import BEDS
 from embodied.generate.furnish.space import box, overlap, room_space
 from embodied.generate.furnish.style import PREFERENCES
+from embodied.generate.furnish.tables import tables
 from embodied.generate.lacking import lacking
 from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house.house import DOORS, House, HouseError, Opening, Room, Storey, check
@@ -68,6 +69,7 @@ def furnished(seed: int, area: tuple[float, float]) -> House:
     return furnish(draft, catalogue(), seed=seed)
 
 
+BEDS = tables().classes("something to sleep in")
 AREAS = ((45, 55), (70, 90), (110, 130), (160, 200), (240, 280), (350, 400))
 FEW = 3
 """Of the houses that are looked at in the whole suite, those that `-m "not slow"` looks at, too."""
@@ -316,21 +318,14 @@ def test_a_house_is_drawn_anew_where_a_bedroom_opens_off_the_living_room_only():
 def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monkeypatch):
     short = iter([("a", "b"), ("a",), ("a", "b", "c"), ("a",), ("a",)])
     monkeypatch.setattr(stages, "lacking", lambda house: next(short))
-    monkeypatch.setattr(stages, "REDRAWN", 5)
-    first = []
-    room = {**STAGES, "rooms": lambda draft: (first.append(draft.first), STAGES["rooms"](draft))[1]}
+    monkeypatch.setattr(stages, "RETRIES", dataclasses.replace(RETRIES, house=5))
+    drawn = []
+    room = {**STAGES, "rooms": lambda draft: (drawn.append(draft.attempt), STAGES["rooms"](draft))[1]}
     house = generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=room)
-    assert first == [0, 1, 2, 3, 4]
+    assert drawn == [0, 1, 2, 3, 4]
     monkeypatch.setattr(stages, "lacking", lambda house: ())
-    assert (
-        house.digest
-        == generate_house(
-            7,
-            HouseConfig(area=(38.0, 46.0)),
-            catalogue(),
-            stages={**STAGES, "rooms": lambda draft: STAGES["rooms"](dataclasses.replace(draft, first=1))},
-        ).digest
-    )
+    second = {**STAGES, "rooms": lambda draft: STAGES["rooms"](dataclasses.replace(draft, attempt=1))}
+    assert house.digest == generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=second).digest
 
 
 def test_worktops_of_all_kitchens_are_in_use(some):

@@ -17,10 +17,8 @@ from assets.materials import MATERIALS
 from assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.clearing import cleared
+from embodied.generate.config import RETRIES
 from embodied.generate.footprint import draw_footprint
-from embodied.generate.furnish import groups_work as work
-from embodied.generate.furnish.programme import Programme, Wish
-from embodied.generate.furnish.rooms import PROGRAMMES, piece
 from embodied.generate.kinds import BEDROOMS, KINDS, Extra
 from embodied.generate.stages import Draft
 from embodied.generate.tastes import TASTES
@@ -324,17 +322,17 @@ def test_a_stage_can_be_replaced():
 
 @pytest.mark.slow
 def test_a_replaced_stage_is_asked_on_every_retry(monkeypatch):
-    """No doors please until the fifth attempt: the plan is drawn again after four, by the stage that was given."""
-    asked, refused = [], iter(["hall_1"] * 4)
+    """No doors please at the first plan: it is drawn again by the stage that was given."""
+    asked, refused = [], iter(["hall_1"] * RETRIES.doors)
     monkeypatch.setattr(stages, "unreachable_rooms", lambda house: next(refused, ()))
 
     def mine(draft: Draft) -> Draft:
-        asked.append(draft.first)
+        asked.append(draft.attempt)
         return STAGES["rooms"](draft)
 
     house = generate_house(2, stages={**BARE, "rooms": mine})
     assert asked == [0, 1]
-    second = generate_house(2, stages={**BARE, "rooms": lambda d: STAGES["rooms"](replace(d, first=1))})
+    second = generate_house(2, stages={**BARE, "rooms": lambda d: STAGES["rooms"](replace(d, attempt=1))})
     assert [r.polygon for r in house.rooms] == [r.polygon for r in second.rooms]
 
 
@@ -344,14 +342,15 @@ def test_a_stage_that_was_left_out_is_named():
 
 
 @pytest.mark.slow
-def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(monkeypatch):
+def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(tmp_path, monkeypatch):
     """As docs/houses.md promises: its name, how architects think of it, and its furniture."""
     monkeypatch.setattr("embodied.house.house.ROOM_KINDS", (*ROOM_KINDS, "music_room"))
     often = Extra(house=0.0, size=14.0, likely=1e6)
     monkeypatch.setitem(KINDS, "music_room", replace(KINDS["library"], extra=often))
-    piano = Wish(piece("upright piano", clear=0.8))
-    monkeypatch.setitem(PROGRAMMES, "music_room", Programme((piano, Wish(work.corner_plant))))
-    house = generate_house(4, HouseConfig(rooms=6, bedrooms=2), load_catalogue())
+    (tmp_path / "groups.toml").write_text(
+        '[rooms.music_room]\nwishes = [{ group = "piece", role = "upright piano" }, { group = "greenery" }]'
+    )
+    house = generate_house(4, HouseConfig(rooms=6, bedrooms=2), load_catalogue(own=tmp_path))
     rooms = {r.id for r in house.rooms if r.kind == "music_room"}
     assert rooms and {p.room for p in house.placements if p.object_class == "upright piano"} >= rooms
 

@@ -12,13 +12,12 @@ import shapely
 
 from assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig, generate_house
-from embodied.generate.furnish.arrange import Thing
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.smalls import Board, Tops
-from embodied.generate.furnish.space import overlap, room_space
+from embodied.generate.furnish.space import Thing, overlap, room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
-from embodied.generate.furnish.traces import TRACES
+from embodied.generate.furnish.tables import tables
 from embodied.generate.household import HABITS, Household, draw_household, household_of
 from embodied.geometry import rectangle
 from embodied.house.house import House
@@ -67,13 +66,15 @@ def test_who_uses_a_room():
     assert family.residents("guest_room") == 0
 
 
-def test_every_trace_asks_for_what_the_catalogue_has():
-    stock = Stock(catalogue(), house_style("warm", 0.4, rng=np.random.default_rng(0)))
-    for kind, traces in TRACES.items():
-        for trace in traces:
-            assert stock.of_role(trace.role), (kind, trace.role)
-            assert trace.habit is None or trace.habit in HABITS
-            assert trace.per in ("room", "person", "adult", "child", "young")
+def test_every_small_thing_and_every_part_of_a_group_is_something_that_the_catalogue_has():
+    stock = Stock(catalogue(), house_style("warm", 0.4, rng=np.random.default_rng(0)), tables())
+    known = tables()
+    smalls = [*known.hung, *(s for some in known.smalls.values() for s in some)]
+    assert all(stock.of_role(s.put) and s.habit in ("", *HABITS) for s in smalls)
+    assert all(stock.of_role(r) for some in known.shelves.values() for r in some)
+    assert all(stock.of_role(p.role) for g in known.groups.values() for p in g.parts if p.role)
+    wishes = [w for p in known.rooms.values() for w in (*p.wishes, *p.extras, *p.fillers)]
+    assert all(stock.of_role(r) for w in wishes for r in (w.role, *w.roles) if r)
 
 
 def test_a_board_is_filled_without_overlaps_until_nothing_fits():
@@ -84,20 +85,12 @@ def test_a_board_is_filled_without_overlaps_until_nothing_fits():
     space = room_space(house, room)
     x, y = space.polygon.centroid.coords[0]
     carrier = Thing(table, x, y, space.bottom, 0.0, table.size)
-    ctx = Context(
-        space,
-        Stock(catalogue(), house_style("warm", 0.4, rng=np.random.default_rng(0))),
-        np.random.default_rng(3),
-        ("living_room",),
-        household_of(house),
-        things=[carrier],
-    )
-    space.add([carrier.box])
-    tops = Tops(ctx)
-    tops.start()
+    stock = Stock(catalogue(), house_style("warm", 0.4, rng=np.random.default_rng(0)), tables())
+    full = space.holding([carrier], [carrier.box])
+    tops = Tops(Context(full, stock, np.random.default_rng(3), ("living_room",), household_of(house)))
     board = Board(carrier, max(table.surfaces, key=lambda s: (s.x1 - s.x0) * (s.y1 - s.y0)))
     laid = []
-    while (thing := tops.put_in_gap(mug, board, "any", 3.2)) is not None:
+    while (thing := tops.put(mug, board, "any", 3.2)) is not None:
         laid.append(thing)
         assert len(laid) < 500
     assert len(laid) > 20

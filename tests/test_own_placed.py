@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from conftest import two_rooms
 from handmade_models import CUBE, write_own, write_pack
 
 from assets.catalogue import load_catalogue
+from assets.json_file import RecordError
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.generate.furnish import furnish
 from embodied.house.house import House
@@ -109,3 +111,41 @@ def test_the_example_of_the_docs_places_its_gnomes(tmp_path):
     for house in houses:
         check_known(house, catalogue)
         assert unreachable_rooms(house) == ()
+
+
+def test_the_groups_of_the_docs_stand_in_living_rooms_as_they_are_arranged(tmp_path):
+    (tmp_path / "groups.toml").write_text(re.search(r"```toml\n(.*?)```", DOCS.read_text(), re.DOTALL)[1])
+    catalogue = load_catalogue(own=tmp_path)
+    houses = [furnish(two_rooms(), catalogue, seed=seed) for seed in range(6)]
+    pianos = [(h, p) for h in houses for p in h.placements if p.object_class == "upright piano"]
+    mine = [(h, p) for h, p in pianos if "music_corner" in p.group]
+    assert len(mine) >= 2
+    for house, piano in mine:
+        others = [p for p in house.placements if p.group == piano.group and p.parent is None]
+        stool = next(p for p in others if p.object_class == "stool")
+        front = np.subtract(stool.position[:2], piano.position[:2])
+        assert front @ (math.sin(piano.yaw), -math.cos(piano.yaw)) > 0.2  # before it
+        assert math.cos(stool.yaw - piano.yaw) < -0.9  # and looking at it
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("[groups.a]\nparts = [{ role = 'sofa', at = 'nowhere' }]", "at should be one of"),
+        ("[groups.a]\nparts = [{ role = 'sofa' }, { role = 'rug', of = 'chair' }]", "'chair'"),
+        ("[groups.a]\nparts = [{ role = 'sofer' }]", "sofa"),
+        ("[groups.a]\nparts = [{ role = 'sofa' }]\nlikes = { sun = 1 }", "likes should be one of"),
+        ("[groups.a]\nlike = 'a'", "like 'a'"),
+        ("[rooms.hall]\nwishes = [{ group = 'none' }]", "rooms.hall"),
+        ("[rooms.hall]\nwishes = [{ group = 'plant', sized = 3 }]", "sized"),
+        ("[choices.a]\nfirst = [{ group = 'a' }]", "back to itself"),
+        ("[choices.sofa_group]\nfirst = [{ group = 'plant' }]", "both groups and choices"),
+        ("groups = 3", "object"),
+        ("[groups.a\nx", "groups.toml"),
+    ],
+)
+def test_a_mistake_in_a_file_of_groups_is_named(tmp_path, text, why):
+    (tmp_path / "groups.toml").write_text(text)
+    with pytest.raises(RecordError, match=why) as e:
+        furnish(two_rooms(), load_catalogue(own=tmp_path), seed=0)
+    assert "groups.toml" in str(e.value)

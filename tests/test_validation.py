@@ -12,7 +12,7 @@ from assets.catalogue import Catalogue, CatalogueError, load_catalogue
 from assets.records import ROOM_KINDS
 from embodied.datasets.matterport import REGIONS
 from embodied.generate import HouseConfig, generate_house
-from embodied.generate.furnish.rooms import PROGRAMMES
+from embodied.generate.furnish.tables import tables
 from embodied.house.floor_plan import ROOM_COLOURS
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.validation import check_known, load_house
@@ -106,7 +106,7 @@ def test_parameters_are_those_of_the_maker():
 @pytest.mark.parametrize(
     "table",
     [
-        pytest.param(PROGRAMMES, id="generate/furnish/rooms.py"),
+        pytest.param(tables().rooms, id="generate/furnish/rooms.toml"),
         pytest.param(ROOM_NOUNS, id="language/lexicon.py"),
         pytest.param(ROOM_COLOURS, id="house/floor_plan.py"),
         pytest.param(REGIONS, id="datasets/matterport.py"),

@@ -37,7 +37,7 @@ class Furnished(Cached):
     pack: Annotated[tuple[Path, ...], Option(any_path, "FILE", repeated=True)] = ()
     """A .sh3f furniture library; may be repeated (default: those of the system package)."""
     own: Annotated[tuple[Path, ...], Option(any_path, "DIR", repeated=True)] = ()
-    """Folder with your own .sh3f, .glb or .obj files and a catalogue.json (docs/assets.md); may be repeated."""
+    """Folder with your own models and a catalogue.json, or your groups.toml (docs/assets.md); may be repeated."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,6 +9,7 @@ import shapely
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from embodied.generate.config import RETRIES
 from embodied.house.house import House, HouseError
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import HEAD, LOW
@@ -16,7 +17,6 @@ from embodied.navigation.graph import CELL, RADIUS, closed_rooms, reachable
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")
 """Words of object classes that are moved out of the way last."""
-ROUNDS = 8
 
 
 def cleared(house: House) -> House:
@@ -26,7 +26,7 @@ def cleared(house: House) -> House:
       HouseError: a room stays closed although nothing stands in the way.
     """
     for storey in range(len(house.storeys)):
-        for _ in range(ROUNDS):
+        for _ in range(RETRIES.clearing):
             grid, room_of_cell, reach = reachable(house, storey)
             rooms = [r for r in house.rooms if r.storey == storey]
             closed = closed_rooms(room_of_cell, reach, len(rooms))
@@ -40,7 +40,8 @@ def cleared(house: House) -> House:
                 )
             house = without(house, blocking)
         else:
-            raise HouseError(f"rooms {[rooms[k].id for k in closed]} stay closed after {ROUNDS} rounds of clearing")
+            names = [rooms[k].id for k in closed]
+            raise HouseError(f"rooms {names} stay closed after {RETRIES.clearing} rounds of clearing")
     return house
 
 

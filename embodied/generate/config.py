@@ -18,6 +18,25 @@ OTHERS = 14
 
 
 @dataclass(frozen=True)
+class Retries:
+    """How often each step of generation is drawn anew at most; nothing else in it is tried again."""
+
+    house: int = 24
+    """Plans: while none is walkable, no doors leave every room open, or a room lacks what it must have."""
+    doors: int = 12
+    """Doors and windows of one plan: while a leaf shuts a room off."""
+    room: int = 6
+    """Furniture of one room: while it lacks something (Programme.needs)."""
+    fillers: int = 8
+    """Groups that are added to one room while it looks bare."""
+    clearing: int = 8
+    """Rounds in which what blocks the ways is taken out."""
+
+
+RETRIES = Retries()
+
+
+@dataclass(frozen=True)
 class HouseConfig:
     """The knobs of the generator. None means: draw it from the seed."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from embodied.generate.furnish.rooms import PROGRAMMES
+from embodied.generate.furnish.tables import tables
 from embodied.generate.kinds import BEDROOMS
 from embodied.house.house import DOORS, House
 
@@ -19,11 +19,12 @@ def lacking(house: House) -> tuple[str, ...]:
     there: dict[str, set[str]] = {}
     for p in house.placements:
         there.setdefault(p.room, set()).add(p.object_class)
+    known = tables()
     short = [
-        f"{r.id}: {need.classes[0]}"
+        f"{r.id}: {need.roles[0]}"
         for r in house.rooms
-        for need in PROGRAMMES[r.kind].needs
-        if need.classes and there.get(r.id, set()).isdisjoint(need.classes)
+        for need in known.rooms[r.kind].needs
+        if need.classes and not any({*known.classes(c)} & there.get(r.id, set()) for c in need.classes)
     ]
     return (*short, *_through_rooms(house))
 

@@ -83,7 +83,7 @@ def house_of_plan(
         "rooms": with_plan(plan),
         **{name: s for name, s in STAGES.items() if name not in ("footprint", "program", "rooms")},
     }
-    draft = Draft(seed, config, catalogue, area=area, spaces=spaces, stages=stages)
+    draft = Draft(seed, config, catalogue, area=area, spaces=spaces)
     for stage in stages.values():
         draft = stage(draft)
     assert draft.house is not None, "the openings stage makes it"

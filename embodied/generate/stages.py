@@ -6,14 +6,14 @@ import dataclasses
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import SupportsIndex, TypeVar
 
 import numpy as np
 
 from assets.catalogue import Catalogue, load_catalogue
 from embodied.generate.clearing import cleared
-from embodied.generate.config import HouseConfig
+from embodied.generate.config import RETRIES, HouseConfig
 from embodied.generate.finishes import Palette, draw_palette, dressed
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
@@ -31,9 +31,6 @@ from embodied.seeds import checked_seed, stream
 
 TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
-ATTEMPTS = 12
-REDRAWN = 16
-"""Houses drawn at most for a seed, until one has all that its rooms must not lack."""
 DEFAULT = HouseConfig()
 
 
@@ -52,10 +49,12 @@ class Draft:
     plan: Plan | None = None
     palette: Palette | None = None
     house: House | None = None
-    first: int = 0
-    """Attempts at the rooms that are skipped: no doors or no furniture fitted what came of them."""
-    stages: Mapping[str, Stage] = field(default_factory=lambda: STAGES)
-    """All stages of the run: one that finds no way goes back to an earlier one by its name, replaced or not."""
+    attempt: int = 0
+    """How many houses of this seed were drawn before: no doors or no furniture fitted their rooms."""
+
+
+class DeadEndError(HouseError):
+    """A stage found no way on; another house of the same seed may have one."""
 
 
 Stage = Callable[[Draft], Draft]
@@ -94,19 +93,18 @@ def program(draft: Draft) -> Draft:
 
 def rooms(draft: Draft) -> Draft:
     """The best of many plans."""
-    for attempt in range(draft.first, draft.first + ATTEMPTS):
-        rng = stream(draft.seed, "house", "rooms", attempt)
-        footprints, spaces = draft.footprints, draft.spaces
-        if attempt:
-            footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
-            spaces = draw_program(draft.area, draft.config, rng=rng)
-        plan = draw_plan(footprints, spaces, min(1500, max(550, TRIES // len(spaces))), rng=rng)
-        if plan is not None:
-            return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
-    raise HouseError(
-        f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} "
-        f"footprint after {ATTEMPTS} attempts; widen HouseConfig.area or ask for fewer rooms"
-    )
+    rng = stream(draft.seed, "house", "rooms", draft.attempt)
+    footprints, spaces = draft.footprints, draft.spaces
+    if draft.attempt:
+        footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
+        spaces = draw_program(draft.area, draft.config, rng=rng)
+    plan = draw_plan(footprints, spaces, min(1500, max(550, TRIES // len(spaces))), rng=rng)
+    if plan is None:
+        raise DeadEndError(
+            f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} footprint; "
+            "widen HouseConfig.area or ask for fewer rooms"
+        )
+    return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
 
 
 def with_plan(plan: Plan) -> Stage:
@@ -116,16 +114,13 @@ def with_plan(plan: Plan) -> Stage:
 
 def openings(draft: Draft) -> Draft:
     """The bare house: rooms with ids, doors and windows; drawn again while a leaf shuts a room off."""
-    config, begun = draft.config, draft.first
+    config = draft.config
     palette = draw_palette(config.style, config.novelty, rng=stream(draft.seed, "house", "palette"))
-    for attempt in range(2 * ATTEMPTS):
-        rng = stream(draft.seed, "house", "openings", attempt)
-        house = _bare_house(draft, palette, rng)
+    for attempt in range(RETRIES.doors):
+        house = _bare_house(draft, palette, stream(draft.seed, "house", "openings", attempt))
         if not unreachable_rooms(house):
             return dataclasses.replace(draft, palette=palette, house=house)
-        if attempt % 4 == 3:
-            draft = draft.stages["rooms"](dataclasses.replace(draft, first=begun + 1 + attempt // 4))
-    raise HouseError(f"no doors of seed {draft.seed} leave every room open; widen HouseConfig.area")
+    raise DeadEndError(f"no doors of seed {draft.seed} leave every room open; widen HouseConfig.area")
 
 
 def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> House:
@@ -237,8 +232,8 @@ def generate_house(
 ) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 
-    Rooms are drawn anew where furniture that makes a room what it is found no place (lacking.py); of
-    `REDRAWN` houses, the one that lacks least.
+    Of up to `RETRIES.house` houses, the first that lacks nothing that makes its rooms what they are (lacking.py), or
+    the one that lacks least.
 
     Args:
       seed: any integer.
@@ -253,22 +248,22 @@ def generate_house(
     """
     seed, catalogue = checked_seed(seed), (catalogue or load_catalogue()).furnishing
     best: tuple[int, House] | None = None
-    for first in range(REDRAWN):
-        draft = Draft(seed, config, catalogue, first=first, stages=stages)
+    for attempt in range(RETRIES.house):
+        draft = Draft(seed, config, catalogue, attempt=attempt)
         try:
             for stage in stages.values():
                 draft = stage(draft)
-        except HouseError:
-            if best is None:
-                raise
-            break
+        except DeadEndError as e:
+            dead_end = e
+            continue
         house = _made(draft.house, "openings")
         short = len(lacking(house))
         if best is None or short < best[0]:
             best = short, house
         if not short or not house.placements:
             break
-    assert best is not None  # REDRAWN is positive
+    if best is None:
+        raise dead_end
     return best[1]
 
 

@@ -1,10 +1,8 @@
 """Furnishing: a House with rooms and openings becomes one with objects and lights.
 
-Room by room: groups of furniture claim their place in order of importance (rooms.py, the table of
-what each kind of room gets), then what a user's own classes add (own.py), then what hangs on ceilings and walls
-(ceilings.py, hanging.py, pictures.py), then small things on surfaces (smalls.py), then what the household leaves about
-(traces.py), then lights.
-docs/houses.md tells more.
+Room by room: groups of furniture claim their place in order of importance (rooms.toml and groups.toml), then what a
+user's own classes add (own.py), then what hangs on ceilings and walls (ceilings.py, hanging.py, pictures.py), then
+small things on all of it (smalls.toml), then lights. docs/houses.md tells more.
 """
 
 from __future__ import annotations
@@ -13,23 +11,21 @@ import dataclasses
 from collections import Counter
 
 from assets.catalogue import Catalogue
-from embodied.generate.furnish.arrange import Thing
+from embodied.generate.config import RETRIES
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.hanging import hang_all
 from embodied.generate.furnish.lights import lights
 from embodied.generate.furnish.own import place_own
-from embodied.generate.furnish.rooms import furnish_room, missing
+from embodied.generate.furnish.programme import furnish_room, shortage
 from embodied.generate.furnish.smalls import clutter
-from embodied.generate.furnish.space import room_space
+from embodied.generate.furnish.space import RoomSpace, Thing, room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
-from embodied.generate.furnish.traces import leave_traces
-from embodied.generate.household import Household, household_of
+from embodied.generate.furnish.tables import tables_of
+from embodied.generate.household import household_of
 from embodied.geometry import wrap
 from embodied.house.house import House, Placement, Room, rounded
 from embodied.seeds import stream
-
-ATTEMPTS = 6
 
 
 def furnish(draft: House, catalogue: Catalogue, *, seed: int) -> House:
@@ -40,74 +36,72 @@ def furnish(draft: House, catalogue: Catalogue, *, seed: int) -> House:
         already has are replaced.
       catalogue: only its records are used, never a mesh.
       seed: the same seed gives the same furniture.
+
+    Raises:
+      RecordError: a table of groups beside a user's own models is none.
     """
     style = house_style(draft.style, draft.disorder, rng=stream(seed, "furnish", "style"))
-    stock = Stock(catalogue, style)
-    kinds, household = tuple(r.kind for r in draft.rooms), household_of(draft)
-    rooms: list[Context] = []
+    stock = Stock(catalogue, style, tables_of(catalogue))
+    used: Counter[str] = Counter()
+    furnished: list[RoomSpace] = []
     for room in draft.rooms:
-        ctx = _arranged(draft, room, stock, kinds, household, seed)
-        drawn, ctx.rng = ctx.rng, stream(seed, "furnish", room.id, "own")  # others draw what they drew without
-        place_own(ctx)
-        ctx.rng = drawn
+        ctx = _arranged(draft, room, stock, used, seed)
+        own = dataclasses.replace(ctx, rng=stream(seed, "furnish", room.id, "own"))
+        place_own(own)
+        ctx = dataclasses.replace(own, rng=ctx.rng)  # the rest is drawn as without own classes
         hang_all(ctx)
         clutter(ctx)
-        rooms.append(ctx)
-    for ctx in rooms:
-        ctx.rng = stream(seed, "furnish", ctx.space.room.id, "traces")
-        leave_traces(ctx)
-    placements = _placements([(ctx.space.room.id, ctx.things) for ctx in rooms])
+        furnished.append(ctx.space)
+        used = ctx.used
+    placements = _placements(furnished)
     shining = lights(placements, style, rng=stream(seed, "furnish", "lights"))
     return dataclasses.replace(draft, placements=placements, lights=shining)
 
 
-def _arranged(
-    draft: House, room: Room, stock: Stock, kinds: tuple[str, ...], household: Household, seed: int
-) -> Context:
+def _arranged(draft: House, room: Room, stock: Stock, used: Counter[str], seed: int) -> Context:
     """The room with its furniture: the first of a few attempts that lacks nothing, or the best of them."""
-    best: tuple[int, Context, Counter[str]] | None = None
-    before = stock.used.copy()
-    for attempt in range(ATTEMPTS):
-        stock.used = before.copy()
+    empty, best = room_space(draft, room), None
+    for attempt in range(RETRIES.room):
         ctx = Context(
-            space=room_space(draft, room),
+            space=empty,
             stock=stock,
             rng=stream(seed, "furnish", room.id, attempt),
-            kinds=kinds,
-            household=household,
+            kinds=tuple(r.kind for r in draft.rooms),
+            household=household_of(draft),
             attempt=attempt,
+            used=used.copy(),
         )
         furnish_room(ctx)
-        short = missing(ctx)
+        short = shortage(ctx)
         if best is None or short < best[0]:
-            best = short, ctx, stock.used
+            best = short, ctx
         if not short:
             break
-    assert best is not None  # ATTEMPTS is positive
-    stock.used = best[2]
+    assert best is not None  # RETRIES.room is positive
     return best[1]
 
 
-def _placements(rooms: list[tuple[str, list[Thing]]]) -> tuple[Placement, ...]:
+def _placements(rooms: list[RoomSpace]) -> tuple[Placement, ...]:
     """Things with ids, in the order in which they were placed."""
     numbers: Counter[str] = Counter()
-    ids: dict[int, str] = {}
+    ids: dict[Thing, str] = {}
     placements = []
-    for room, things in rooms:
-        for t in things:
+    for space in rooms:
+        room = space.room.id
+        for t in space.things:
             name = t.asset.object_class.replace(" ", "_")
             numbers[name] += 1
-            ids[id(t)] = f"{name}_{numbers[name]}"
+            ids[t] = f"{name}_{numbers[name]}"
             placements.append(
                 Placement(
-                    id=ids[id(t)],
+                    id=ids[t],
                     asset=t.asset.key,
                     object_class=t.asset.object_class,
                     room=room,
                     position=rounded((t.x, t.y, t.z)),
                     yaw=rounded(float(wrap(t.yaw))),
                     size=rounded(t.size),
-                    parent=ids[id(t.parent)] if t.parent is not None else None,
+                    parent=ids[t.parent] if t.parent is not None else None,
                     surface=t.surface,
                     params=tuple(sorted(t.params)),
                     group=f"{room}/{t.group}" if t.group else None,

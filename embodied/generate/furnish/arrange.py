@@ -14,10 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from assets.records import Asset
-from embodied.generate.furnish.space import Box, RoomSpace, Wall, box, overlap
+from embodied.generate.furnish.space import Box, Params, RoomSpace, Thing, Wall, box, overlap, same_box
 
-Params = tuple[tuple[str, str | float], ...]
-"""Arguments for a built asset, (name, value)."""
 WALL_GAP = 0.02
 """Free strip between a wall and furniture, for the skirting, metres."""
 RUG_HEIGHT = 0.012
@@ -73,88 +71,36 @@ class ScoredPose:
     wall: Wall | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Thing:
-    """An object that has found its place; becomes a Placement once it has an id."""
-
-    asset: Asset
-    x: float
-    y: float
-    z: float
-    yaw: float
-    size: tuple[float, float, float]
-    params: Params = ()
-    parent: Thing | None = None
-    surface: str | None = None
-    group: str | None = None
-    role: str = ""
-    wall: Wall | None = None
-
-    @property
-    def box(self) -> Box:
-        """The upright box that it fills."""
-        w, d, h = self.size
-        return box(self.x, self.y, w, d, self.yaw, self.z, self.z + h)
-
-    @property
-    def front(self) -> tuple[float, float]:
-        """Unit vector toward which its front looks."""
-        return math.sin(self.yaw), -math.cos(self.yaw)
-
-    def local(self, u: float, v: float) -> tuple[float, float]:
-        """World point of (u, v) in its own frame."""
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        return self.x + c * u - s * v, self.y + s * u + c * v
-
-
-def same_box(p: Box, q: Box) -> bool:
-    """Whether two boxes are the box of one thing."""
-    return abs(p.x - q.x) < 1e-9 and abs(p.y - q.y) < 1e-9 and p.bottom == q.bottom and p.top == q.top
-
-
 def is_flat(size: tuple[float, float, float], z: float = 0.0) -> bool:
     """Whether a thing on the floor is a rug or mat that furniture may stand on."""
     return size[2] <= 0.03 and z < 0.01
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """An arrangement at a pose, with what it would add to the room."""
-
-    things: tuple[Thing, ...]
-    solids: tuple[Box, ...]
-    clearances: tuple[Box, ...]
-    walk: np.ndarray
-
-
 def pack(
     space: RoomSpace, items: Sequence[Item], poses: Iterable[ScoredPose], group: str, tries: int = 40
-) -> list[Thing] | None:
-    """Put the arrangement at the first pose that takes all of it, or at one that takes most of it.
+) -> RoomSpace | None:
+    """The room with the arrangement at the first pose that takes all of it, or at one that takes most of it.
 
-    A worse pose must make up for its rank by more things (PATIENCE poses for one thing).
+    A worse pose must make up for its rank by more things (PATIENCE poses for one thing). None where no pose takes
+    what is not optional, or where it would cut the room apart.
     """
-    best: tuple[float, Fit] | None = None
+    best: tuple[float, RoomSpace] | None = None
     for rank, pose in enumerate(sorted(poses, key=lambda p: -p.score)[:tries]):
         if best is not None and len(items) - rank / PATIENCE <= best[0]:
             break
         fit = _fit(space, items, pose, group)
         if fit is None:
             continue
-        value = len(fit.things) - rank / PATIENCE
-        if best is None or value > best[0]:
-            best = value, fit
-        if len(fit.things) == len(items):
+        found = len(fit.things) - len(space.things)
+        if best is None or found - rank / PATIENCE > best[0]:
+            best = found - rank / PATIENCE, fit
+        if found == len(items):
             break
-    if best is None:
-        return None
-    fit = best[1]
-    space.add(fit.solids, fit.clearances, fit.walk)
-    return list(fit.things)
+    return best[1] if best else None
 
 
-def _fit(space: RoomSpace, items: Sequence[Item], pose: ScoredPose, group: str) -> Fit | None:
-    """The arrangement at a pose; None where something that is not optional finds no room, or it cuts the room apart."""
+def _fit(space: RoomSpace, items: Sequence[Item], pose: ScoredPose, group: str) -> RoomSpace | None:
+    """The room with the arrangement at a pose."""
     trial = _Trial(space, pose, group)
     for item in items:
         if not trial.place(item):
@@ -168,7 +114,7 @@ def _fit(space: RoomSpace, items: Sequence[Item], pose: ScoredPose, group: str) 
         if plan is None:
             return None
     resting, kept = _resting(space, items, things)
-    return Fit(tuple(kept), (*solids, *resting), tuple(trial.zones), plan)
+    return space.holding(kept, (*solids, *resting), trial.zones.values(), plan)
 
 
 @dataclass
@@ -182,8 +128,8 @@ class _Trial:
     """One for each item so far; None where an optional one was left out."""
     boxes: list[Box | None] = field(default_factory=list)
     """Of what stands; None for rugs, for what rests on something and for what was left out."""
-    zones: list[Box] = field(default_factory=list)
-    """What must stay clear before the fronts."""
+    zones: dict[int, Box] = field(default_factory=dict)
+    """What must stay clear before the fronts of items; what goes under an item may be in its zone."""
     reach: list[tuple[float, float]] = field(default_factory=list)
     """Where somebody must be able to stand."""
 
@@ -204,7 +150,7 @@ class _Trial:
             self._keep(None, None)
             return item.optional
         if zone is not None:
-            self.zones.append(zone)
+            self.zones[len(self.things)] = zone
             if item.clear >= 0.5:
                 away = item.extent[1] / 2 + self.space.radius + 0.06
                 fx, fy = thing.front
@@ -241,7 +187,7 @@ class _Trial:
         return (
             self.space.fits(b, ignore=allowed, passage=item.passage, aside=item.aside)
             and not any(overlap(b, q) and not any(q is a for a in allowed) for q in self.solids())
-            and not any(overlap(b, z) for z in self.zones)
+            and not any(overlap(b, z) for i, z in self.zones.items() if i not in item.under)
         )
 
 

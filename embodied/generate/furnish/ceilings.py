@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Thing
 from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.looks import looks
-from embodied.generate.furnish.space import box, overlap
+from embodied.generate.furnish.lights import ALWAYS, LUMENS
+from embodied.generate.furnish.space import Thing, box, overlap
 
 BRIGHT = ("garage", "workshop")
 """Room kinds under fluorescent tubes."""
@@ -36,7 +35,7 @@ def ceiling_lamps(ctx: Context) -> None:
     spots = []
     for table in tables:
         pendant = ctx.pick("fine pendant", most=(1.4, 1.4, 1.8)) or lamp
-        if _ceiling(ctx, pendant, table.x, table.y, table.z + table.size[2] + 0.7):
+        if hang_from_ceiling(ctx, pendant, table.x, table.y, table.z + table.size[2] + 0.7):
             spots.append((table.x, table.y))
     centre = (
         space.polygon.representative_point()
@@ -50,11 +49,11 @@ def ceiling_lamps(ctx: Context) -> None:
                 x, y = centre.x, centre.y
             if any(math.hypot(x - a, y - b) < 1.5 for a, b in spots):
                 continue
-            if _ceiling(ctx, lamp, x, y, None):
+            if hang_from_ceiling(ctx, lamp, x, y):
                 spots.append((x, y))
     if not spots:
         for lamp in sorted(ctx.stock.of_role("ceiling lamp"), key=lambda a: a.size[2]):
-            if _ceiling(ctx, lamp, centre.x, centre.y, None):
+            if hang_from_ceiling(ctx, lamp, centre.x, centre.y):
                 return
 
 
@@ -63,14 +62,14 @@ def detectors(ctx: Context) -> None:
     if ctx.kind in FANS and ctx.chance(0.12):
         fan = ctx.pick("ceiling fan")
         if fan is not None:
-            _ceiling(ctx, fan, ctx.space.polygon.centroid.x, ctx.space.polygon.centroid.y, None)
+            hang_from_ceiling(ctx, fan, ctx.space.polygon.centroid.x, ctx.space.polygon.centroid.y)
     if ctx.kind not in DETECTORS or not ctx.chance(0.6):
         return
     asset = ctx.pick("smoke detector")
     c = ctx.space.polygon.representative_point()
     if asset is not None:
         for dx, dy in ((0.6, 0.0), (0.0, 0.6), (-0.6, 0.0)):
-            if _ceiling(ctx, asset, c.x + dx, c.y + dy, None):
+            if hang_from_ceiling(ctx, asset, c.x + dx, c.y + dy):
                 return
 
 
@@ -90,48 +89,29 @@ def _ceiling_lamp(ctx: Context) -> Asset | None:
     return ctx.pick("ceiling light", most=(0.9, 0.9, height - 2.0), avoid=()) or ctx.pick("ceiling lamp", avoid=())
 
 
-def hang_from_ceiling(ctx: Context, asset: Asset, x: float, y: float) -> bool:
-    """Hang a thing that is no lamp from the ceiling over (x, y), if it fits there; `elevation` is its drop."""
+def hang_from_ceiling(ctx: Context, asset: Asset, x: float, y: float, underside: float | None = None) -> bool:
+    """Hang a thing from the ceiling over (x, y), `elevation` below it, if it fits there.
+
+    Args:
+      underside: z that the lowest point of a hanging lamp should have.
+    """
     w, d, h = asset.size
-    top = ctx.space.bottom + ctx.space.height - asset.elevation
-    filled = box(x, y, w, d, 0.0, top - h, top)
-    if any(overlap(filled, k) for k in ctx.space.keepouts) or not ctx.space.fits(filled, passage=True):
-        return False
-    ctx.space.add([filled])
-    ctx.things.append(
-        Thing(asset, x, y, top - h, 0.0, asset.size, looks(ctx, asset), group="ceiling", role=asset.object_class)
+    flat = asset.object_class == "ceiling lamp"
+    top = (
+        ctx.space.bottom
+        + ctx.space.height
+        - asset.elevation * (asset.support == "ceiling" and asset.object_class not in LUMENS)
     )
-    return True
-
-
-def _ceiling(ctx: Context, lamp: Asset, x: float, y: float, underside: float | None) -> bool:
-    """Hang `lamp` from the ceiling over (x, y); `underside` is the z its lowest point should have."""
-    w, d, h = lamp.size
-    top = ctx.space.bottom + ctx.space.height
-    scale = 1.0
-    if underside is not None and lamp.object_class != "ceiling lamp":
+    if underside is not None and not flat:
         scale = min(max((top - underside) / h, 0.6), 1.35)
-        if scale < 1 or lamp.object_class != "chandelier":
+        if scale < 1 or asset.object_class != "chandelier":
             h = h * scale
-            if scale < 1:
-                w, d = w * scale, d * scale
-    b = box(x, y, w, d, 0.0, top - h, top)
-    hangs = underside is not None or lamp.object_class != "ceiling lamp"
-    low = hangs and any(overlap(b, k) for k in ctx.space.keepouts)  # before a window or in a doorway
-    if low or not ctx.space.fits(b, passage=True):
+            w, d = w * min(scale, 1.0), d * min(scale, 1.0)
+    filled = box(x, y, w, d, 0.0, top - h, top)
+    low = not flat and any(overlap(filled, k) for k in ctx.space.keepouts)  # before a window or in a doorway
+    if low or not ctx.space.fits(filled, passage=True):
         return False
-    ctx.space.add([b])
-    ctx.things.append(
-        Thing(
-            asset=lamp,
-            x=x,
-            y=y,
-            z=top - h,
-            yaw=0.0,
-            size=(w, d, h),
-            params=looks(ctx, lamp),
-            group="ceiling",
-            role="ceiling lamp",
-        )
-    )
+    role = "ceiling lamp" if asset.object_class in ALWAYS else asset.object_class
+    thing = Thing(asset, x, y, top - h, 0.0, (w, d, h), ctx.looks(asset), group="ceiling", role=role)
+    ctx.add(thing, filled)
     return True

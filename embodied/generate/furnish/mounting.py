@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Thing
 from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.looks import looks
-from embodied.generate.furnish.space import RoomSpace, Wall, box, overlap
-from embodied.generate.furnish.stock import Size
+from embodied.generate.furnish.space import RoomSpace, Thing, Wall, box, overlap
+from embodied.generate.furnish.tables import Size
 
 DEEP, THIN = 0.12, 0.07
 """What comes farther out of the wall must leave room to walk past: as furniture must, and a narrow way, metres."""
@@ -72,15 +70,12 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
         z=base,
         yaw=wall.yaw,
         size=(w, d, h),
-        params=looks(ctx, asset),
+        params=ctx.looks(asset),
         group=hanging.group,
         role=role,
         wall=wall,
     )
-    ctx.space.add([exact], (), plan)
-    ctx.things.append(thing)
-    ctx.stock.note([asset])
-    return thing
+    return ctx.add(thing, exact, plan)
 
 
 def hang_first(ctx: Context, hanging: Hanging, spots: Iterable[Spot]) -> Thing | None:
@@ -132,7 +127,7 @@ def spot_behind(ctx: Context, thing: Thing) -> Spot | None:
             continue
         dx, dy = thing.x - wall.start[0], thing.y - wall.start[1]
         away = dx * wall.inward[0] + dy * wall.inward[1] - thing.size[1] / 2
-        s = dx * wall.along[0] + dy * wall.along[1]
+        s = wall.along_of(thing.x, thing.y)
         if -0.05 < away < 0.3 and 0 < s < wall.length:
             return wall, s
     return None

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Thing
-from embodied.generate.furnish.context import Context, free_stretch
+from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.likes import free_stretch
 from embodied.generate.furnish.mounting import (
     Hanging,
     along_stretches,
@@ -17,8 +17,8 @@ from embodied.generate.furnish.mounting import (
     spot_behind,
     stretches,
 )
-from embodied.generate.furnish.space import Wall
-from embodied.generate.furnish.stock import Size
+from embodied.generate.furnish.space import Thing, Wall
+from embodied.generate.furnish.tables import Size
 
 MIDDLE = 1.5
 """Height of the middle of a picture, metres."""
@@ -48,7 +48,7 @@ MIRRORED = ("hall", "closet", "main_bedroom", "gym", "bedroom")
 
 def above_furniture(ctx: Context) -> None:
     """Pictures and mirrors over sofas, beds, sideboards, desks and consoles; a television over its bench."""
-    for thing in list(ctx.things):
+    for thing in ctx.things:
         if thing.role not in BELOW_PICTURES:
             continue
         spot = spot_behind(ctx, thing)
@@ -129,7 +129,7 @@ def _picture_group(ctx: Context, wall: Wall, s: float, width: float, lowest: flo
 def _art(ctx: Context) -> Asset | None:
     """Something to hang whose image is not in the room yet and the rarest in the house."""
     hung: Counter[str] = Counter()
-    for key, n in ctx.stock.used.items():
+    for key, n in ctx.used.items():
         hung[_image(key)] += n
     here = {_image(t.asset.key) for t in ctx.things if t.role == "picture"}
     options = [a.key for a in ctx.stock.of_role("art") if _image(a.key) not in here]

@@ -1,21 +1,25 @@
-"""Small things on tables, shelves and worktops, where people put them."""
+"""Small things on tables, shelves, walls and floors: what stands there, and what the household leaves there.
+
+smalls.toml says what there is: kettles on worktops, shoes at the door, dishes by the sink, clothes on a chair.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from assets.records import Asset, SupportSurface
-from embodied.generate.furnish.arrange import Thing, same_box
+from embodied.generate.furnish.arrange import Item, ScoredPose, floor_poses, wall_poses
 from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.looks import looks
-from embodied.generate.furnish.recipes import CLUTTER, MOST_ALIKE, RECIPES
-from embodied.generate.furnish.space import Box, box, overlap
-from embodied.generate.furnish.stock import Size
+from embodied.generate.furnish.likes import door_distance, nearest
+from embodied.generate.furnish.mounting import Hanging, Spot, along_stretches, hang_first, longest_first
+from embodied.generate.furnish.space import CELL, Box, Thing, Wall, box, overlap, same_box
+from embodied.generate.furnish.tables import Size, Small
 
 EDGE, APART = 0.012, 0.008
 """Free strip at the edge of a surface, and between two things on it, metres."""
@@ -49,18 +53,11 @@ SHELVES = (
 )
 STORING = ("pantry", "closet", "garage", "workshop", "laundry_room", "bathroom", "kitchen", "gym")
 """Room kinds whose shelves hold what is kept there instead of books."""
-CENTREPIECES = (
-    "fruit bowl",
-    "vase",
-    "bouquet",
-    "tulips",
-    "candlestick",
-    "bowl of apples",
-    "lilies",
-    "salad bowl",
-    "orchid",
-)
-"""Roles of what stands in the middle of dining tables."""
+CHILDRENS = ("kids_room", "playroom")
+LARGEST = 0.25
+"""Most of the floor that one can walk on which a thing left on it takes from it, square metres."""
+CUT_TO_FIT = ("storage box", "folded clothes", "towel", "row of folders", "cushion", "heap of clothes")
+"""Object classes that come in many sizes."""
 
 
 @dataclass(frozen=True)
@@ -111,70 +108,28 @@ class Tops:
     """For each Board.key, x0, y0, x1, y1 of what lies there, in the carrier's frame."""
     alike: Counter[str] = field(default_factory=Counter)
 
-    def start(self) -> None:
-        """Take note of what the groups have put on surfaces."""
+    def __post_init__(self) -> None:
         for thing in self.ctx.things:
             self.alike[thing.asset.object_class] += 1
             if thing.parent is not None:
                 self._occupy(thing, thing.parent)
 
     def _occupy(self, thing: Thing, parent: Thing) -> None:
-        dx, dy = thing.x - parent.x, thing.y - parent.y
-        c, s = math.cos(parent.yaw), math.sin(parent.yaw)
-        u, v = c * dx + s * dy, -s * dx + c * dy
+        u, v = _in_frame(parent, thing)
         a, b = _reach(thing.size, thing.yaw - parent.yaw)
         key = (id(parent), thing.surface or "")
         self.taken.setdefault(key, []).append((u - a, v - b, u + a, v + b))
 
     def put(
-        self,
-        asset: Asset | None,
-        board: Board,
-        spot: str = "any",
-        turn: float = 0.2,
-        size: Size | None = None,
-        tries: int = 7,
+        self, asset: Asset | None, board: Board, spot: str = "any", turn: float = 0.2, size: Size | None = None
     ) -> Thing | None:
-        """Rest `asset` on a board, near `spot`; None where there is no free place.
+        """Rest `asset` on a board wherever there is a gap for it, near `spot` if it can be; None where there is none.
 
         Args:
           turn: how far it may be turned either way, radians; 3 or more for any way.
         """
         if asset is None:
             return None
-        ctx, rng = self.ctx, self.ctx.rng
-        w, d, h = size or asset.size
-        x0, x1, y0, y1 = board.area
-        z = board.top
-        if h > board.headroom - 0.01 or z + h > ctx.space.bottom + ctx.space.height:
-            return None
-        for _ in range(tries):
-            yaw = float(rng.uniform(-turn, turn)) if turn < 3 else float(rng.uniform(-math.pi, math.pi))
-            a, b = _reach((w, d, h), yaw)
-            if 2 * a > x1 - x0 - 2 * EDGE or 2 * b > y1 - y0 - 2 * EDGE:
-                yaw = 0.0
-                a, b = w / 2, d / 2
-                if 2 * a > x1 - x0 or 2 * b > y1 - y0:
-                    return None
-            u, v = _spot(spot, x0 + a + EDGE, x1 - a - EDGE, y0 + b + EDGE, y1 - b - EDGE, rng)
-            taken = (u - a, v - b, u + a, v + b)
-            if self._is_taken(board, taken, APART):
-                continue
-            x, y = board.carrier.local(u, v)
-            own = box(x, y, w, d, board.carrier.yaw + yaw, z, z + h)
-            if not ctx.space.inside(own) or self._meets_others(own, board.carrier):
-                continue
-            self.alike[asset.object_class] += 1
-            ctx.stock.note([asset])
-            return self._lay(asset, board, taken, yaw, own, (w, d, h))
-        return None
-
-    def put_in_gap(self, asset: Asset, board: Board, spot: str, turn: float, size: Size | None = None) -> Thing | None:
-        """Rest `asset` on a board wherever there is a gap for it, near `spot` if it can be; None where there is none.
-
-        Args:
-          turn: how far it may be turned either way, radians; 3 or more for any way.
-        """
         ctx, rng = self.ctx, self.ctx.rng
         w, d, h = size or asset.size
         if h > board.headroom - 0.01 or board.top + h > ctx.space.bottom + ctx.space.height:
@@ -186,19 +141,15 @@ class Tops:
             gaps = self._gaps(board, (x0 + a, x1 - a, y0 + b, y1 - b), a, b)
             if not len(gaps):
                 continue
-            rank = rng.random(len(gaps))
-            if spot in ("back", "front"):
-                rank += 3.0 * (gaps[:, 1] if spot == "front" else -gaps[:, 1]) / max(y1 - y0, 1e-6)
-            elif spot in ("side", "centre"):
-                off = np.abs(gaps[:, 0] - (x0 + x1) / 2) / max(x1 - x0, 1e-6)
-                rank += -3.0 * off if spot == "side" else 3.0 * off
+            off = np.abs(gaps - ((x0 + x1) / 2, (y0 + y1) / 2)) / np.maximum((x1 - x0, y1 - y0), 1e-6)
+            back = (gaps[:, 1] - y0) / max(y1 - y0, 1e-6)
+            far = {"back": 1 - back, "front": back, "side": 0.5 - off[:, 0], "centre": 2 * off.sum(axis=1)}
+            rank = rng.random(len(gaps)) + 3.0 * far.get(spot, 0.0)
             for k in np.argsort(rank)[:3]:
                 u, v = (float(c) for c in gaps[k])
                 x, y = board.carrier.local(u, v)
                 own = box(x, y, w, d, board.carrier.yaw + yaw, board.top, board.top + h)
                 if ctx.space.inside(own) and not self._meets_others(own, board.carrier):
-                    self.alike[asset.object_class] += 1
-                    ctx.stock.note([asset])
                     return self._lay(asset, board, (u - a, v - b, u + a, v + b), yaw, own, (w, d, h))
         return None
 
@@ -223,21 +174,13 @@ class Tops:
             return
         u, v = u0 + a, v0 + b
         taken = (u - a, v - b, u + a, v + b)
-        if self._is_taken(board, taken, 0.0):
+        if any(u0 < t[2] and u + a > t[0] and v0 < t[3] and v + b > t[1] for t in self.taken.get(board.key, [])):
             return
         (x, y), (w, d, h), z = board.carrier.local(u, v), asset.size, board.top
         own = box(x, y, w, d, board.carrier.yaw + turn, z, z + h)
         if self._meets_others(own, board.carrier):
             return
         self._lay(asset, board, taken, turn, own, asset.size)
-
-    def _is_taken(self, board: Board, place: tuple[float, float, float, float], apart: float) -> bool:
-        """Whether something lies closer than `apart` to a rectangle of a board."""
-        x0, y0, x1, y1 = place
-        return any(
-            x0 < t[2] + apart and x1 > t[0] - apart and y0 < t[3] + apart and y1 > t[1] - apart
-            for t in self.taken.setdefault(board.key, [])
-        )
 
     def _meets_others(self, own: Box, carrier: Thing) -> bool:
         support = carrier.box
@@ -254,20 +197,19 @@ class Tops:
             z=own.bottom,
             yaw=carrier.yaw + turn,
             size=size,
-            params=looks(self.ctx, asset),
+            params=self.ctx.looks(asset),
             parent=carrier,
             surface=board.surface.name,
             group=carrier.group,
             role="small",
         )
-        self.taken[board.key].append(taken)
-        self.ctx.space.add([own])
-        self.ctx.things.append(thing)
-        return thing
+        self.taken.setdefault(board.key, []).append(taken)
+        self.alike[asset.object_class] += 1
+        return self.ctx.add(thing, own)
 
     def allows(self, asset: Asset, most: int = 2) -> bool:
         """Whether the room may hold one more of its class, of which `most` are few."""
-        return self.alike[asset.object_class] < max(MOST_ALIKE.get(asset.object_class, 2), most)
+        return self.alike[asset.object_class] < max(self.ctx.tables.at_most.get(asset.object_class, 2), most)
 
 
 def _steps(low: float, high: float) -> np.ndarray:
@@ -281,48 +223,26 @@ def _reach(size: tuple[float, float, float], yaw: float) -> tuple[float, float]:
     return (c * size[0] + s * size[1]) / 2, (s * size[0] + c * size[1]) / 2
 
 
-def _spot(spot: str, x0: float, x1: float, y0: float, y1: float, rng: np.random.Generator) -> tuple[float, float]:
-    """A point of the rectangle near the named spot; the back is +y."""
-    fx, fy = rng.random(), rng.random()
-    if spot == "centre":
-        fx, fy = 0.5 + 0.16 * (fx - 0.5), 0.5 + 0.16 * (fy - 0.5)
-    elif spot == "back":
-        fy = 1.0 - 0.25 * fy
-    elif spot == "front":
-        fy = 0.3 * fy
-    elif spot == "side":
-        fx = 0.12 * fx if fx < 0.5 else 1.0 - 0.12 * (1 - fx)
-        fy = 0.4 + 0.6 * fy
-    return x0 + fx * max(x1 - x0, 0.0), y0 + fy * max(y1 - y0, 0.0)
+def _in_frame(carrier: Thing, thing: Thing) -> tuple[float, float]:
+    """Where a thing is in the frame of another, metres."""
+    dx, dy = thing.x - carrier.x, thing.y - carrier.y
+    c, s = math.cos(carrier.yaw), math.sin(carrier.yaw)
+    return c * dx + s * dy, -s * dx + c * dy
 
 
 def clutter(ctx: Context) -> None:
     """Put the small things of daily life onto everything in the room that can carry them."""
     tops = Tops(ctx)
-    tops.start()
-    density = 1.3 - 0.75 * ctx.stock.style.tidiness
     carriers = [t for t in ctx.things if t.asset.surfaces and not _hollow(t.asset)]
     for thing in carriers:
         if thing.role == "dining table":
             _set_table(tops, thing)
-    for name, recipe in RECIPES.items():
-        group = [t for t in carriers if t.role == name or t.asset.object_class == name]
-        if not group:
-            continue
-        for role, chance, spot, turn in recipe:
-            repeats = 1 if name in ("counter",) else len(group)
-            for k in range(repeats):
-                if not ctx.chance(min(chance * (max(density, 0.9) if name == "counter" else density), 0.97)):
-                    continue
-                asset = ctx.pick(role, most=(1.2, 0.9, 0.9))
-                if asset is None or not tops.allows(asset):
-                    continue
-                places = [group[k]] if repeats > 1 else [group[int(i)] for i in ctx.rng.permutation(len(group))[:3]]
-                any(tops.put(asset, main_board(thing), spot, turn) for thing in places)
     for thing in carriers:
-        _shelves(tops, thing, density)
+        _shelves(tops, thing)
+    small = ctx.tables.smalls
+    leave(ctx, [s for name in ("everywhere", *ctx.tables.lies_in.get(ctx.kind, ())) for s in small[name]], tops)
     for thing in carriers:
-        _more(tops, thing, density)
+        _more(tops, thing)
 
 
 def _hollow(asset: Asset) -> bool:
@@ -343,17 +263,15 @@ def _set_table(tops: Tops, table: Thing) -> None:
     """Something in the middle, and now and then places laid before the chairs."""
     ctx = tops.ctx
     top = main_board(table)
-    for role in ctx.rng.permutation(len(CENTREPIECES))[: 1 + int(ctx.chance(0.3))]:
-        asset = ctx.pick(CENTREPIECES[int(role)], most=(0.5, 0.5, 0.6))
+    for role in ctx.rng.permutation(ctx.tables.centrepieces)[: 1 + int(ctx.chance(0.3))]:
+        asset = ctx.pick(str(role), most=(0.5, 0.5, 0.6))
         if asset is not None and ctx.chance(0.85):
             tops.put(asset, top, "centre", 3.2)
     laid = ctx.chance(0.3)
     cup = ctx.pick("mug") if ctx.chance(0.5) else ctx.pick("glass")
     plate = ctx.pick("place setting") if laid else None
     for chair in [t for t in ctx.things if t.group == table.group and t.role == "dining chair"]:
-        dx, dy = chair.x - table.x, chair.y - table.y
-        c, s = math.cos(table.yaw), math.sin(table.yaw)
-        u, v = c * dx + s * dy, -s * dx + c * dy
+        u, v = _in_frame(table, chair)
         asset = plate if laid else (cup if ctx.chance(0.15) else None)
         if asset is None:
             continue
@@ -365,7 +283,7 @@ def _set_table(tops: Tops, table: Thing) -> None:
         tops.put_exactly(asset, top, place, turn)
 
 
-def _shelves(tops: Tops, thing: Thing, density: float) -> None:
+def _shelves(tops: Tops, thing: Thing) -> None:
     """Fill the boards of a shelf: rows of books, or what one keeps in that room."""
     ctx = tops.ctx
     surfaces = [s for s in thing.asset.surfaces if 0.1 < s.headroom < 1.2] or (
@@ -379,7 +297,7 @@ def _shelves(tops: Tops, thing: Thing, density: float) -> None:
         if books is not None and bookish and board.surface.headroom < 0.45 and ctx.chance(0.8):
             _book_row(tops, board, ctx.pick("row of books", avoid=()) or books)
         if bookish:
-            count, share = int(ctx.rng.integers(1, 4)), 0.75 * density
+            count, share = int(ctx.rng.integers(1, 4)), 0.75 * _density(ctx)
         else:  # storage is there to be filled
             count, share = 3 + int(ctx.rng.integers(3) + 3 * (board.surface.x1 - board.surface.x0)), 0.95
         for _ in range(count):
@@ -390,7 +308,7 @@ def _shelves(tops: Tops, thing: Thing, density: float) -> None:
                 asset, size = _box_for(ctx, board)
             if asset is None:
                 asset = _resident(tops, board, 2 if bookish else 5)
-            tops.put(asset, board, "any", 0.2, size=size, tries=5)
+            tops.put(asset, board, "any", 0.2, size)
 
 
 def _book_row(tops: Tops, board: Board, books: Asset) -> None:
@@ -405,14 +323,9 @@ def _book_row(tops: Tops, board: Board, books: Asset) -> None:
     side = 1 if ctx.chance(0.5) else -1
     middle = (s.x0 + s.x1) / 2 * kx + side * (width / 2 - w / 2 - EDGE)
     back = s.y1 * ky - d - 0.02
-    at = dataclasses.replace(
-        s,
-        x0=(middle - w / 2) / kx - 2 * EDGE,
-        y0=back / ky - 2 * EDGE,
-        x1=(middle + w / 2) / kx + 2 * EDGE,
-        y1=(back + d) / ky + 2 * EDGE,
-    )
-    tops.put(books, Board(board.carrier, at), "centre", 0.0, size=(w, d, h), tries=2)
+    (x0, x1), (y0, y1) = (middle - w / 2, middle + w / 2), (back, back + d)
+    at = dataclasses.replace(s, x0=x0 / kx, y0=y0 / ky, x1=x1 / kx + 1e-6, y1=y1 / ky + 1e-6)
+    tops.put(books, Board(board.carrier, at), "centre", 0.0, (w, d, h))
 
 
 def _box_for(ctx: Context, board: Board) -> tuple[Asset | None, Size | None]:
@@ -433,50 +346,175 @@ def _resident(tops: Tops, board: Board, most_alike: int) -> Asset | None:
     most = ((s.x1 - s.x0) * 0.8, s.y1 - s.y0, s.headroom - 0.01)
     fitting = [
         (a, w)
-        for a, w in resting_on(ctx, board.carrier.asset.object_class)
+        for a, w in ctx.stock.resting_on(board.carrier.asset.object_class, ctx.kind)
         if a.object_class != "row of books" and all(side <= m for side, m in zip(a.size, most))
     ]
     if fitting and ctx.chance(0.45):
         asset: Asset | None = _weighted(ctx, fitting)
     else:
-        roles = CLUTTER.get(ctx.kind) or CLUTTER["any"]
+        roles = ctx.tables.shelves.get(ctx.kind) or ctx.tables.shelves["any"]
         asset = ctx.pick(roles[int(ctx.rng.integers(len(roles)))], most=most)
     return asset if asset is not None and tops.allows(asset, most_alike) else None
 
 
 def _weighted(ctx: Context, options: list[tuple[Asset, float]]) -> Asset:
     """One of the (asset, weight), what the house has already the less likely."""
-    weights = np.array([w / (1 + 2 * ctx.stock.used[a.key]) for a, w in options])
+    weights = np.array([w / (1 + 2 * ctx.used[a.key]) for a, w in options])
     return options[int(ctx.rng.choice(len(options), p=weights / weights.sum()))][0]
 
 
-def _more(tops: Tops, thing: Thing, density: float) -> None:
+def _more(tops: Tops, thing: Thing) -> None:
     """A few more things that the catalogue says lie on this class of object in this kind of room."""
     ctx = tops.ctx
     if thing.asset.object_class in SHELVES or thing.role in ("bed", "dining chair", "bedside table", "bench"):
         return
     top = main_board(thing)
     area = (top.surface.x1 - top.surface.x0) * (top.surface.y1 - top.surface.y0)
-    count = int(ctx.rng.poisson(min(area * 1.6, 2.0) * density))
+    count = int(ctx.rng.poisson(min(area * 1.6, 2.0) * _density(ctx)))
     if not count:
         return
-    fitting = resting_on(ctx, thing.asset.object_class)
+    fitting = ctx.stock.resting_on(thing.asset.object_class, ctx.kind)
     for _ in range(min(count, 4)):
         options = [(a, w) for a, w in fitting if tops.allows(a)]
         if not options:
             return
         asset = _weighted(ctx, options)
-        tops.put(asset, top, "any", 0.4 if asset.size[0] > 0.12 else 3.2, tries=5)
+        tops.put(asset, top, "any", 0.4 if asset.size[0] > 0.12 else 3.2)
 
 
-def resting_on(ctx: Context, object_class: str) -> list[tuple[Asset, float]]:
-    """Assets that rest on this class, with their weight in this kind of room."""
-    memo = ctx.stock.resting
-    key = (object_class, ctx.kind)
-    if key not in memo:
-        memo[key] = [
-            (a, a.rooms[ctx.kind])
-            for a in ctx.stock.catalogue.assets.values()
-            if object_class in a.on and a.rooms.get(ctx.kind, 0.0) > 0 and max(a.size[:2]) < 0.6 and a.size[2] < 0.6
-        ]
-    return memo[key]
+def _density(ctx: Context) -> float:
+    """How much lies about, as a share of what lies about in houses of middling tidiness."""
+    return 1.5 - 0.87 * ctx.stock.style.tidiness
+
+
+def leave(ctx: Context, smalls: Iterable[Small], tops: Tops | None = None) -> None:
+    """Put small things of the table where they go, as many as its people have or leave there."""
+    tops = tops or Tops(ctx)
+    for small in smalls:
+        if (small.kinds and ctx.kind not in small.kinds) or (
+            ctx.kind in CHILDRENS and small.put in ctx.tables.grown_up
+        ):
+            continue
+        carriers = [t for t in ctx.called(*small.on) if t.asset.surfaces]
+        if small.on and not carriers:
+            continue
+        for some in [[t] for t in carriers] if small.per == "carrier" else [carriers]:
+            for _ in range(_number(ctx, small)):
+                _leave(tops, small, some)
+
+
+def _number(ctx: Context, small: Small) -> int:
+    """How many of it there are: the whole part of the mean, and one more with the rest as its chance."""
+    household = ctx.household
+    if small.habit and small.habit not in household.habits:
+        return 0
+    users = household.residents(ctx.kind, ctx.kinds.count(ctx.kind))
+    of = {
+        "person": users,
+        "adult": float(min(users, household.adults)),
+        "child": float(len(household.children)),
+        "young": float(sum(age < 7 for age in household.children)),
+    }
+    untidy = 1.0 - ctx.stock.style.tidiness
+    mean = small.count * of.get(small.per, 1.0)
+    if small.wall is None:
+        mean *= 0.25 + 1.9 * untidy if small.mess else _density(ctx)
+    return int(mean) + int(ctx.chance(mean - int(mean)))
+
+
+def _leave(tops: Tops, small: Small, carriers: list[Thing]) -> None:
+    """One of it, if there is a place for it."""
+    ctx = tops.ctx
+    asset = ctx.pick(small.put, most=(1.6, 1.6, 1.6), avoid=())
+    if asset is None or not tops.allows(asset, small.most):
+        return
+    if small.on:
+        _lay_on(tops, small, asset, carriers)
+        return
+    if small.wall is not None:
+        z = min(small.wall, ctx.space.height - 0.1) - asset.size[2]
+        hanging = Hanging(asset, z, "left", asset.object_class, margin=0.012)
+        found = hang_first(ctx, hanging, _wall_spots(ctx, small, asset)) is not None
+    else:
+        found = _put_down(ctx, small, asset)
+    tops.alike[asset.object_class] += found
+
+
+def _lay_on(tops: Tops, small: Small, asset: Asset, carriers: list[Thing]) -> None:
+    """On one of the carriers: the nearest ones where it keeps close to something, else any."""
+    rng, anchors = tops.ctx.rng, tops.ctx.called(*small.near)
+    if anchors:
+        carriers = sorted(carriers, key=lambda t: nearest(t.x, t.y, anchors) + 0.5 * rng.random())
+    elif len(carriers) > 1:
+        carriers = [carriers[int(k)] for k in rng.permutation(len(carriers))]
+    for carrier in carriers[:3]:
+        boards = [main_board(carrier)]
+        if carrier.asset.object_class in (*SHELVES, "shoe rack"):
+            found = [Board(carrier, s) for s in carrier.asset.surfaces]
+            boards = [found[int(k)] for k in rng.permutation(len(found))[:4]]
+        for board in boards:
+            if tops.put(asset, board, small.spot, small.turn, _fitting(asset, board)) is not None:
+                return
+
+
+def _fitting(asset: Asset, board: Board) -> tuple[float, float, float] | None:
+    """The size of cloth and boxes that come in the size of what they lie on; None for what keeps its own."""
+    x0, x1, y0, y1 = board.area
+    w, d, h = asset.size
+    if asset.object_class == "duvet":
+        return min(w, 0.96 * (x1 - x0)), min(d, 0.7 * (y1 - y0)), h
+    if asset.object_class not in CUT_TO_FIT:
+        return None
+    shrink = min(1.0, 0.92 * (x1 - x0) / w, 0.96 * (y1 - y0) / d, 0.92 * board.headroom / h)
+    return (shrink * w, shrink * d, shrink * h) if shrink > 0.55 else None
+
+
+def _wall_spots(ctx: Context, small: Small, asset: Asset) -> Iterator[Spot]:
+    """Spots on the walls: beside what it keeps close to, the nearest first, else about the middles of free walls."""
+    anchors = ctx.called(*small.near)
+    if not anchors:
+        yield from along_stretches(longest_first(ctx.space), lambda: ctx.rng.uniform(0.12, 0.88, 5).tolist())
+        return
+    spots: list[tuple[float, int, float]] = []
+    for k, wall in enumerate(ctx.space.walls):
+        for s in np.arange(0.06, wall.length, 0.12).tolist():
+            away = nearest(*wall.point(s, asset.size[1] / 2), anchors)
+            if away < 1.6:
+                spots.append((away + 0.25 * ctx.rng.random(), k, s))
+    yield from ((ctx.space.walls[k], s) for _, k, s in sorted(spots))
+
+
+def _put_down(ctx: Context, small: Small, asset: Asset) -> bool:
+    """On the floor: at a wall close to something, or anywhere out of the way."""
+    w, d = asset.size[:2]
+    anchors = ctx.called(*small.near)
+    if small.near and not anchors:
+        return False
+    turn = float(ctx.rng.uniform(-small.turn, small.turn))
+    if anchors:
+
+        def close(wall: Wall, s: float) -> float:
+            return -nearest(*wall.point(s, d / 2), anchors) + 0.3 * ctx.rng.random()
+
+        wide, deep = (2 * half for half in _reach(asset.size, turn))
+        poses = wall_poses(ctx.space, wide, score=close, step=0.12)
+        item = Item(asset, 0.0, -deep / 2, turn, role=asset.object_class, aside=True)
+    else:
+        standing = [t for t in ctx.things if t.parent is None]
+
+        def aside(x: float, y: float, yaw: float) -> float:
+            return min(door_distance(ctx.space, x, y), 1.5) - nearest(x, y, standing) + 0.8 * ctx.rng.random()
+
+        poses = floor_poses(ctx.space, score=aside, yaws=(turn,), step=0.35)
+        item = Item(asset, role=asset.object_class, aside=True)
+    free = ctx.space.walk.sum() * CELL**2
+    likely = sorted(poses, key=lambda p: -p.score)[:24]
+    chosen = [p for p in likely if ctx.space.taken(_where(item, p, ctx.space.bottom)) < min(LARGEST, 0.1 * free)]
+    return bool(ctx.put([item], chosen, "left"))
+
+
+def _where(item: Item, pose: ScoredPose, z: float) -> Box:
+    """The box of an arrangement's only item at a pose."""
+    w, d, h = item.extent
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    return box(pose.x - s * item.y, pose.y + c * item.y, w, d, pose.yaw + item.yaw, z, z + h)

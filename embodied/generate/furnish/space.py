@@ -10,15 +10,18 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 import shapely
 
+from assets.records import Asset
 from embodied.house.house import DOORS, House, Opening, Room, Stair
 from embodied.navigation.free_space import LOW
 
+Params = tuple[tuple[str, str | float], ...]
+"""Arguments for a built asset, (name, value)."""
 CELL = 0.05
 """Side of a cell of the walking plan, metres."""
 NARROW = 0.4
@@ -84,6 +87,11 @@ def overlap(p: Box, q: Box, gap: float = -TOUCH) -> bool:
     return True
 
 
+def same_box(p: Box, q: Box) -> bool:
+    """Whether two boxes are the box of one thing."""
+    return abs(p.x - q.x) < 1e-9 and abs(p.y - q.y) < 1e-9 and p.bottom == q.bottom and p.top == q.top
+
+
 @dataclass(frozen=True)
 class Wall:
     """One straight inner face of a room, seen from inside with the wall at the back.
@@ -115,10 +123,48 @@ class Wall:
             self.start[1] + s * self.along[1] + away * self.inward[1],
         )
 
+    def along_of(self, x: float, y: float) -> float:
+        """How far along the wall a world point is, metres."""
+        return (x - self.start[0]) * self.along[0] + (y - self.start[1]) * self.along[1]
 
-@dataclass
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """An object that has found its place; becomes a Placement once it has an id."""
+
+    asset: Asset
+    x: float
+    y: float
+    z: float
+    yaw: float
+    size: tuple[float, float, float]
+    params: Params = ()
+    parent: Thing | None = None
+    surface: str | None = None
+    group: str | None = None
+    role: str = ""
+    wall: Wall | None = None
+
+    @property
+    def box(self) -> Box:
+        """The upright box that it fills."""
+        w, d, h = self.size
+        return box(self.x, self.y, w, d, self.yaw, self.z, self.z + h)
+
+    @property
+    def front(self) -> tuple[float, float]:
+        """Unit vector toward which its front looks."""
+        return math.sin(self.yaw), -math.cos(self.yaw)
+
+    def local(self, u: float, v: float) -> tuple[float, float]:
+        """World point of (u, v) in its own frame."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return self.x + c * u - s * v, self.y + s * u + c * v
+
+
+@dataclass(frozen=True, eq=False)
 class RoomSpace:
-    """What a room has in it while it is being furnished; `add` is the only thing that changes it."""
+    """A room and what is in it so far. It never changes: `holding` gives the room with more in it."""
 
     room: Room
     bottom: float
@@ -129,15 +175,21 @@ class RoomSpace:
     openings: tuple[Opening, ...]
     entries: tuple[tuple[float, float], ...]
     """Where one stands after each door, metres."""
-    keepouts: list[Box]
+    keepouts: tuple[Box, ...]
     """Where nothing may stand: door swings, approaches, the light of windows, stairs."""
     radius: float
     """Of the walker, metres."""
     walk: np.ndarray
     """(rows, columns) uint8, 1 where the walker's centre may be."""
     origin: tuple[float, float]
-    solids: list[Box] = field(default_factory=list)
-    clearances: list[Box] = field(default_factory=list)
+    grown: shapely.Polygon
+    """`polygon`, a millimetre larger, prepared."""
+    convex: bool
+    rectangle: tuple[float, float, float, float] | None
+    """x0, y0, x1, y1 of `grown` where it is a rectangle along the axes."""
+    things: tuple[Thing, ...] = ()
+    solids: tuple[Box, ...] = ()
+    clearances: tuple[Box, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -151,19 +203,11 @@ class RoomSpace:
 
     def inside(self, b: Box) -> bool:
         """Whether the box stays between the walls, a millimetre forgiven."""
-        return bool(shapely.contains_xy(self._grown, b.corners()).all()) and (
-            self._convex or self._grown.covers(shapely.Polygon(b.corners()))
-        )
-
-    def __post_init__(self) -> None:
-        self._grown = self.polygon.buffer(TOUCH, join_style="mitre")
-        shapely.prepare(self._grown)
-        self._convex = self.polygon.convex_hull.area - self.polygon.area < 1e-4
-        x0, y0, x1, y1 = self.polygon.bounds
-        self._rectangle = (
-            (x0 - TOUCH, y0 - TOUCH, x1 + TOUCH, y1 + TOUCH)
-            if (x1 - x0) * (y1 - y0) - self.polygon.area < 1e-4
-            else None
+        if self.rectangle is not None:
+            x0, y0, x1, y1 = self.rectangle
+            return x0 <= b.x - b.reach_x and b.x + b.reach_x <= x1 and y0 <= b.y - b.reach_y and b.y + b.reach_y <= y1
+        return bool(shapely.contains_xy(self.grown, b.corners()).all()) and (
+            self.convex or self.grown.covers(shapely.Polygon(b.corners()))
         )
 
     def fits(self, b: Box, *, ignore: Sequence[Box] = (), passage: bool = False, aside: bool = False) -> bool:
@@ -174,13 +218,7 @@ class RoomSpace:
           passage: whether it may reach into keep-outs and clearances (a curtain, a rug).
           aside: whether it may reach into clearances (slippers).
         """
-        if self._rectangle is not None:
-            x0, y0, x1, y1 = self._rectangle
-            if not (
-                x0 <= b.x - b.reach_x and b.x + b.reach_x <= x1 and y0 <= b.y - b.reach_y and b.y + b.reach_y <= y1
-            ):
-                return False
-        elif not self.inside(b):
+        if not self.inside(b):
             return False
         if b.top > self.bottom + self.height + TOUCH:
             return False
@@ -242,12 +280,27 @@ class RoomSpace:
         cv2.fillConvexPoly(plan, self._cells(b.corners(self.radius)), 0)
         return float(int(self.walk.sum()) - int(plan.sum())) * CELL**2
 
-    def add(self, solids: Iterable[Box], clearances: Iterable[Box] = (), plan: np.ndarray | None = None) -> None:
-        """Put boxes into the room for good."""
-        self.solids.extend(solids)
-        self.clearances.extend(clearances)
-        if plan is not None:
-            self.walk = plan
+    def holding(
+        self,
+        things: Iterable[Thing],
+        solids: Iterable[Box],
+        clearances: Iterable[Box] = (),
+        walk: np.ndarray | None = None,
+    ) -> RoomSpace:
+        """The room with these things in it, too, and the boxes that they fill and that must stay clear for them."""
+        return replace(
+            self,
+            things=(*self.things, *things),
+            solids=(*self.solids, *solids),
+            clearances=(*self.clearances, *clearances),
+            walk=self.walk if walk is None else walk,
+        )
+
+    def without_floor(self, b: Box, grow: float) -> RoomSpace:
+        """The room where nobody walks within `grow` metres of a box."""
+        walk = self.walk.copy()
+        cv2.fillConvexPoly(walk, self._cells(b.corners(grow)), 0)
+        return replace(self, walk=walk)
 
     def _in_the_way(self, b: Box) -> bool:
         return b.bottom - self.bottom < 1.9 and b.top - self.bottom > LOW
@@ -293,10 +346,10 @@ def room_space(house: House, room: Room) -> RoomSpace:
         if room.id in stair.rooms
         for b in _stair_keepouts(stair, storey.elevation, storey.height)
     ]
-    keepouts.extend(flights)
     origin = (x0 - CELL, y0 - CELL)
     shape = (int((y1 - y0) / CELL) + 3, int((x1 - x0) / CELL) + 3)
-    walk = _free_cells(floor, radius, shape, origin)
+    grown = floor.buffer(TOUCH, join_style="mitre")
+    shapely.prepare(grown)
     space = RoomSpace(
         room=room,
         bottom=storey.elevation,
@@ -305,24 +358,27 @@ def room_space(house: House, room: Room) -> RoomSpace:
         walls=walls,
         openings=openings,
         entries=tuple(entries),
-        keepouts=keepouts,
+        keepouts=(*keepouts, *flights),
         radius=radius,
-        walk=walk,
+        walk=_free_cells(floor, radius, shape, origin),
         origin=origin,
+        grown=grown,
+        convex=floor.convex_hull.area - floor.area < 1e-4,
+        rectangle=grown.bounds if (x1 - x0) * (y1 - y0) - floor.area < 1e-4 else None,
     )
-    for wall in walls:
-        for s0, s1, o in wall.openings:
-            if o.rooms[0] == room.id and o.angle > 0.5 and o.kind in ("door", "front_door", "back_door"):
-                shut = walk.copy()
-                cv2.fillConvexPoly(shut, space._cells(_leaf(wall, s0, s1, o).corners(radius - 0.05)), 0)
-                if space.walkable((), ()) is not None:
-                    space.walk, before = shut, space.walk
-                    if space.walkable((), ()) is None:
-                        space.walk = before
-    walk = space.walk
+    leaves = (
+        _leaf(wall, s0, s1, o)
+        for wall in walls
+        for s0, s1, o in wall.openings
+        if o.rooms[0] == room.id and o.angle > 0.5 and o.kind in ("door", "front_door", "back_door")
+    )
+    for leaf in leaves:
+        shut = space.without_floor(leaf, radius - 0.05)
+        if space.walkable((), ()) is not None and shut.walkable((), ()) is not None:
+            space = shut
     for b in flights:
         if b.top - storey.elevation > 2.3:
-            cv2.fillConvexPoly(walk, space._cells(b.corners(radius - 0.02)), 0)
+            space = space.without_floor(b, radius - 0.02)
     return space
 
 

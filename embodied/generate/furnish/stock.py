@@ -11,8 +11,8 @@ import numpy as np
 
 from assets.catalogue import Catalogue
 from assets.records import Asset
-from embodied.generate.furnish.roles import ROLES
 from embodied.generate.furnish.style import Style, liking
+from embodied.generate.furnish.tables import Size, Tables
 
 SMALLEST, LARGEST = (0.0, 0.0, 0.0), (99.0, 99.0, 99.0)
 """Bounds where no others are asked for, metres."""
@@ -20,10 +20,6 @@ CHILDREN = ("kids_room", "playroom", None)
 """Room kinds where anything made for children may stand."""
 CHILDISH = ("high chair", "stroller", "kick scooter", "tricycle", "bicycle")
 """Things for children that are kept elsewhere too."""
-
-
-Size = tuple[float, float, float]
-"""Width, depth and height, metres."""
 
 
 class AssetLimits(TypedDict, total=False):
@@ -37,33 +33,37 @@ class AssetLimits(TypedDict, total=False):
     """Keys not to take unless nothing else is left."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Stock:
-    """The catalogue through the eyes of one house: remembers what has been used how often."""
+    """The catalogue through the eyes of one house."""
 
     catalogue: Catalogue
     style: Style
-    used: Counter[str] = field(default_factory=Counter)
+    tables: Tables
     _by_role: dict[str, tuple[Asset, ...]] = field(default_factory=dict)
     _liking: dict[str, float] = field(default_factory=dict)
-    resting: dict[tuple[str, str], list[tuple[Asset, float]]] = field(default_factory=dict)
-    """(object class, room kind) to the small things that lie there, filled on first use."""
+    _resting: dict[tuple[str, str], list[tuple[Asset, float]]] = field(default_factory=dict)
 
     def of_role(self, role: str) -> tuple[Asset, ...]:
-        """All assets that can play `role` (a key of ROLES, or an object class)."""
+        """All assets that can play `role`."""
         if role not in self._by_role:
-            found: dict[str, Asset] = {}
-            for name in ROLES.get(role, (role,)):
-                found.update({a.key: a for a in self.catalogue.of_class(name)})
+            found = {a.key: a for name in self.tables.classes(role) for a in self.catalogue.of_class(name)}
             self._by_role[role] = tuple(found.values())
         return self._by_role[role]
 
     def pick(
-        self, role: str, *, rng: np.random.Generator, kind: str | None = None, **limits: Unpack[AssetLimits]
+        self,
+        role: str,
+        *,
+        used: Counter[str],
+        rng: np.random.Generator,
+        kind: str | None = None,
+        **limits: Unpack[AssetLimits],
     ) -> Asset | None:
         """An asset for `role` within the size limits, or None.
 
         Args:
+          used: how often the house has each asset: what it has often is taken rarely.
           kind: room kind; assets that are rare there are rarely taken.
         """
         most, least = limits.get("most", LARGEST), limits.get("least", SMALLEST)
@@ -78,7 +78,7 @@ class Stock:
         fit = [a for a in fit if a.key not in avoid] or fit
         if not fit:
             return None
-        weights = np.array([self._weight(a, kind) for a in fit])
+        weights = np.array([self._weight(a, kind) / (1.0 + 1.5 * used[a.key]) for a in fit])
         return fit[int(rng.choice(len(fit), p=weights / weights.sum()))]
 
     def _weight(self, asset: Asset, kind: str | None) -> float:
@@ -87,8 +87,15 @@ class Stock:
         room = 1.0
         if kind is not None and asset.rooms:
             room = 0.15 + asset.rooms.get(kind, 0.0)
-        return self._liking[asset.key] * room / (1.0 + 1.5 * self.used[asset.key])
+        return self._liking[asset.key] * room
 
-    def note(self, assets: Sequence[Asset]) -> None:
-        """Remember that these were used, so that the house varies."""
-        self.used.update(a.key for a in assets)
+    def resting_on(self, object_class: str, kind: str) -> list[tuple[Asset, float]]:
+        """Small assets that rest on this class, with their weight in this kind of room."""
+        key = (object_class, kind)
+        if key not in self._resting:
+            self._resting[key] = [
+                (a, a.rooms[kind])
+                for a in self.catalogue.assets.values()
+                if object_class in a.on and a.rooms.get(kind, 0.0) > 0 and max(a.size[:2]) < 0.6 and a.size[2] < 0.6
+            ]
+        return self._resting[key]

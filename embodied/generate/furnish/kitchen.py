@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from assets.records import Asset
-from embodied.generate.furnish.arrange import Item, Params, ScoredPose, Thing, floor_poses, wall_poses
-from embodied.generate.furnish.context import Context, Liking, at_corner
-from embodied.generate.furnish.looks import SEEDS
-from embodied.generate.furnish.space import RoomSpace, Wall, box
+from embodied.generate.furnish.arrange import Item, ScoredPose, wall_poses
+from embodied.generate.furnish.context import Context
+from embodied.generate.furnish.groups import put_group
+from embodied.generate.furnish.likes import at_corner
+from embodied.generate.furnish.space import RoomSpace, Thing, Wall, box
 
 UPPER = 1.45
 """Height of the underside of wall cabinets, metres: 0.5 above the worktop."""
@@ -127,17 +129,18 @@ def _edge(space: RoomSpace, wall: Wall, s: float, sign: int, depth: float, heigh
     return min(max(s, 0.0), wall.length)
 
 
-def kitchen_units(ctx: Context) -> None:
+def kitchen_line(ctx: Context) -> bool:
     """The line of units and the fridge; in some later attempts the fridge chooses its place first."""
     first = ctx.attempt in (3, 5)
     if first:
-        lone_fridge(ctx)
-    kitchen_line(ctx, fridge=not first)
+        _lone_fridge(ctx)
+    found = _line(ctx, fridge=not first)
     if not ctx.roles("fridge"):
-        lone_fridge(ctx)
+        _lone_fridge(ctx)
+    return found
 
 
-def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
+def _line(ctx: Context, fridge: bool) -> bool:
     """One run of units with sink, cooker and fridge, wall cabinets above; a second run in large kitchens.
 
     Args:
@@ -151,22 +154,22 @@ def kitchen_line(ctx: Context, fridge: bool = True) -> list[Thing] | None:
                 continue
             kit, things = found
             if fridge and not with_fridge and not _tall_block(ctx, kit, things):
-                lone_fridge(ctx)
-            _more_runs(ctx, kit, things)
-            return things
-    return None
+                _lone_fridge(ctx)
+            _more_runs(ctx, kit, list(things))
+            return True
+    return False
 
 
 def _line_at_a_wall(
     ctx: Context, kits: list[KitchenSet], with_fridge: bool, clear: float, spare: int, aside: float
-) -> tuple[KitchenSet, list[Thing]] | None:
+) -> tuple[KitchenSet, tuple[Thing, ...]] | None:
     """The first kit that finds a wall; `aside` metres of it stay free at one end or both, for a door beside it."""
     ends = ((aside, 0.0), (0.0, aside), (aside, aside)) if aside else ((0.0, 0.0),)
     for kit in kits:
         for wall, a, b in _best_runs(ctx, kit):
             for left, right in ends:
                 things = _run(ctx, kit, wall, a + left, b - right, with_fridge, clear, spare)
-                if things is not None:
+                if things:
                     return kit, things
     return None
 
@@ -188,19 +191,11 @@ def _fridge(ctx: Context, widest: float) -> Asset | None:
     )
 
 
-def noted(ctx: Context, fridge: Asset) -> Params:
-    """What a household keeps under magnets on the door of a fridge that code builds: more with children."""
-    if not fridge.key.startswith("built/"):
-        return ()
-    notes = int(ctx.rng.poisson(0.7 + 1.3 * len(ctx.household.children)))
-    return (("notes", float(min(notes, 6))), ("seed", float(ctx.rng.integers(SEEDS)))) if notes else ()
-
-
-def _tall_block(ctx: Context, kit: KitchenSet, done: list[Thing]) -> list[Thing] | None:
+def _tall_block(ctx: Context, kit: KitchenSet, done: Sequence[Thing]) -> tuple[Thing, ...]:
     """The fridge between tall cabinets or beside base units, on another stretch of wall than the line."""
     fridge = _fridge(ctx, 0.65)
     if fridge is None:
-        return None
+        return ()
     line = next((t for t in kit.sink.tags if t.startswith("line_")), "")
     tall = [a for a in ctx.stock.of_role("tall cabinet") if line in a.tags] or list(ctx.stock.of_role("tall cabinet"))
     low = [a for a in kit.base if kit.units(a) == 1]
@@ -218,7 +213,7 @@ def _tall_block(ctx: Context, kit: KitchenSet, done: list[Thing]) -> list[Thing]
                     asset,
                     x + asset.size[0] / 2,
                     -asset.size[1] / 2,
-                    params=noted(ctx, asset) if asset is fridge else (),
+                    params=ctx.looks(asset) if asset is fridge else (),
                     clear=0.5,
                     role=role,
                 )
@@ -232,10 +227,10 @@ def _tall_block(ctx: Context, kit: KitchenSet, done: list[Thing]) -> list[Thing]
         found = ctx.put(items, [p for p in poses if not _darkens(p, width)], "kitchen", tries=40)
         if found:
             return found
-    return None
+    return ()
 
 
-def _has_worktop(done: list[Thing]) -> bool:
+def _has_worktop(done: Sequence[Thing]) -> bool:
     return any(t.role == "counter" for t in done)
 
 
@@ -244,27 +239,18 @@ def _darkens(pose: ScoredPose, width: float) -> bool:
     wall = pose.wall
     if wall is None:
         return False
-    dx, dy = pose.x - wall.start[0], pose.y - wall.start[1]
-    s = dx * wall.along[0] + dy * wall.along[1]
+    s = wall.along_of(pose.x, pose.y)
     return any(s - width / 2 < s1 and s0 < s + width / 2 for s0, s1, o in wall.openings if o.kind == "window")
 
 
-def lone_fridge(ctx: Context) -> list[Thing] | None:
+def _lone_fridge(ctx: Context) -> None:
     """A fridge that found no place in the line: at its end if it can be, else anywhere at a wall."""
     slim = _fridge(ctx, 0.65)
-    for clear in (0.5, 0.35, 0.2):
-        if slim is None:
-            break
-        item = Item(slim, 0.0, -slim.size[1] / 2, params=noted(ctx, slim), clear=clear, role="fridge")
-        if found := ctx.put([item], _line_ends(ctx, slim.size[0]), "kitchen"):
-            return found
-    for width, clear in ((0.95 if ctx.space.area > 8 else 0.65, 0.6), (0.65, 0.4), (0.65, 0.2)):
-        fridge = _fridge(ctx, width)
-        liking = Liking(corner=0.8, window=-3.0)
-        found = ctx.against_wall(fridge, "kitchen", liking=liking, clear=clear, role="fridge")
-        if found:
-            return found
-    return None
+    for clear in (0.5, 0.35, 0.2) if slim is not None else ():
+        item = Item(slim, 0.0, -slim.size[1] / 2, params=ctx.looks(slim), clear=clear, role="fridge")
+        if ctx.put([item], _line_ends(ctx, slim.size[0]), "kitchen"):
+            return
+    put_group(ctx, ctx.tables.groups["fridge"], "kitchen")
 
 
 def _line_ends(ctx: Context, width: float) -> list[ScoredPose]:
@@ -274,7 +260,7 @@ def _line_ends(ctx: Context, width: float) -> list[ScoredPose]:
         wall = unit.wall
         if wall is None or not _on_floor(ctx, unit):
             continue
-        s = (unit.x - wall.start[0]) * wall.along[0] + (unit.y - wall.start[1]) * wall.along[1]
+        s = wall.along_of(unit.x, unit.y)
         for side in (-1, 1):
             at = s + side * (unit.size[0] + width + 0.008) / 2
             x, y = wall.point(at, 0.005)
@@ -286,7 +272,7 @@ def _line_ends(ctx: Context, width: float) -> list[ScoredPose]:
 
 def _run(
     ctx: Context, kit: KitchenSet, wall: Wall, a: float, b: float, with_fridge: bool, free: float, spare: int
-) -> list[Thing] | None:
+) -> tuple[Thing, ...]:
     """Sink, cooker and at least `spare` cabinets between `a` and `b` of a wall, the fridge at an end without window.
 
     Args:
@@ -298,7 +284,7 @@ def _run(
     room = b - a - (fridge.size[0] + 0.02 if fridge else 0.0)
     count = min(int(room / kit.unit + 0.15), int(4.0 / kit.unit))
     if count < need:
-        return None
+        return ()
     line = UnitLine(kit, wall, min(max(room / count, 0.88 * kit.unit), 1.12 * kit.unit), free)
     for at_end in _fridge_ends(ctx, line.windows, a, b, fridge):
         start = a if at_end or fridge is None else a + fridge.size[0] + 0.02
@@ -310,12 +296,12 @@ def _run(
             s = (b - fridge.size[0] / 2 - 0.005) if at_end else (a + fridge.size[0] / 2 + 0.005)
             clear = free - 0.05
             items.append(
-                (s, Item(fridge, 0.0, -fridge.size[1] / 2, params=noted(ctx, fridge), clear=clear, role="fridge"))
+                (s, Item(fridge, 0.0, -fridge.size[1] / 2, params=ctx.looks(fridge), clear=clear, role="fridge"))
             )
         found = _put_line(ctx, wall, items)
         if found:
             return found
-    return None
+    return ()
 
 
 def _fridge_ends(
@@ -333,7 +319,7 @@ def _fridge_ends(
     return ends[::-1] if ctx.chance(0.5) else ends
 
 
-def _put_line(ctx: Context, wall: Wall, items: list[tuple[float, Item]]) -> list[Thing] | None:
+def _put_line(ctx: Context, wall: Wall, items: list[tuple[float, Item]]) -> tuple[Thing, ...]:
     """Put (s, item) at their places along a wall."""
     x, y = wall.point(0.0, 0.005)
     return ctx.put([_moved(item, -s) for s, item in items], [ScoredPose(0.0, x, y, wall.yaw, wall)], "kitchen")
@@ -492,41 +478,3 @@ def _add_run(
             done.extend(found)
             return n * width
     return 0.0
-
-
-def island(ctx: Context) -> list[Thing] | None:
-    """A kitchen island with stools, parallel to the line."""
-    line = ctx.roles("kitchen sink", "counter")
-    asset = ctx.pick("kitchen island")
-    if asset is None or not line:
-        return None
-    face = line[0].yaw
-    long_y = asset.size[1] > asset.size[0]
-    stool = ctx.pick("bar stool", most=(0.6, 0.6, 1.2))
-    w, d = (asset.size[1], asset.size[0]) if long_y else asset.size[:2]
-    items = [Item(asset, 0.0, 0.0, math.pi / 2 if long_y else 0.0, role="kitchen island")]
-    if stool is not None:
-        count = max(1, int(w / 0.55))
-        for k in range(count):
-            x = (k + 0.5) * w / count - w / 2
-            items.append(
-                Item(
-                    stool,
-                    x,
-                    -d / 2 - stool.size[1] / 2 + 0.05,
-                    math.pi + float(ctx.rng.normal(0, 0.15)),
-                    optional=True,
-                    under=(0,),
-                    role="bar stool",
-                )
-            )
-    cx = sum(t.x for t in line) / len(line)
-    cy = sum(t.y for t in line) / len(line)
-    fx, fy = line[0].front
-
-    def score(x: float, y: float, yaw: float) -> float:
-        ahead = (x - cx) * fx + (y - cy) * fy
-        aside = abs(-(x - cx) * fy + (y - cy) * fx)
-        return -abs(ahead - (0.31 + 1.05 + d / 2)) - 0.5 * aside
-
-    return ctx.put(items, floor_poses(ctx.space, score=score, yaws=(face,), step=0.2), "island", tries=20)
