@@ -40,9 +40,6 @@ from assets.built.primitives import (
 from assets.built.soft import layers
 from assets.records import Finish, MeshPart
 
-BATH = {"bathroom": 1.0, "toilet": 0.4}
-BASINS = ("bathroom vanity", "washbasin", "wall washbasin", "double vanity")
-
 
 def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A drawer cabinet hung off the floor, a ceramic top with an oval basin, a mixer tap."""

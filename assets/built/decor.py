@@ -26,19 +26,6 @@ from assets.built.maker import (
 from assets.built.primitives import Shape, ball, box, cylinder, flat, lathe, moved, quads, scaled, sheet, tube, turned
 from assets.records import MeshPart
 
-LIVING = {
-    "living_room": 1.0,
-    "family_room": 1.0,
-    "bedroom": 0.8,
-    "main_bedroom": 0.9,
-    "guest_room": 0.7,
-    "study": 0.6,
-    "library": 0.7,
-    "dining_room": 0.6,
-    "hall": 0.4,
-}
-
-
 FRAMES = {"black": BLACK, "white": WHITE, "brass": BRASS}
 
 

@@ -27,17 +27,6 @@ from assets.records import MeshPart
 
 PLEAT = 0.095
 """Width of a fold of a drawn curtain, metres."""
-LIVING = {
-    "living_room": 1.0,
-    "family_room": 1.0,
-    "bedroom": 0.8,
-    "main_bedroom": 0.9,
-    "guest_room": 0.7,
-    "study": 0.6,
-    "library": 0.7,
-    "dining_room": 0.6,
-    "hall": 0.4,
-}
 
 
 def rug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:

@@ -9,9 +9,6 @@ from assets.built.maker import BLACK, BRASS, GLASS, STEEL, FinishOf, Look, Size,
 from assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, moved, scaled, tube, turned
 from assets.records import MeshPart
 
-KITCHEN_TOPS = ("base cabinet", "drawer cabinet", "kitchen island", "corner base cabinet", "dining table")
-TABLES = ("dining table", "coffee table", "kitchen island", "sideboard", "bistro table")
-
 
 def cup(r: float, h: float, taper: float = 0.92, wall: float = 0.004) -> Shape:
     return lathe(
