@@ -317,13 +317,13 @@ def test_a_house_is_drawn_anew_where_a_bedroom_opens_off_the_living_room_only():
 @pytest.mark.slow
 def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monkeypatch):
     short = iter([("a", "b"), ("a",), ("a", "b", "c"), ("a",), ("a",)])
-    monkeypatch.setattr(stages, "lacking", lambda house: next(short))
+    monkeypatch.setattr(stages, "lacking", lambda *_: next(short))
     monkeypatch.setattr(stages, "RETRIES", dataclasses.replace(RETRIES, house=5))
     drawn = []
     room = {**STAGES, "rooms": lambda draft: (drawn.append(draft.attempt), STAGES["rooms"](draft))[1]}
     house = generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=room)
     assert drawn == [0, 1, 2, 3, 4]
-    monkeypatch.setattr(stages, "lacking", lambda house: ())
+    monkeypatch.setattr(stages, "lacking", lambda *_: ())
     second = {**STAGES, "rooms": lambda draft: STAGES["rooms"](dataclasses.replace(draft, attempt=1))}
     assert house.digest == generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=second).digest
 

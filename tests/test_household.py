@@ -12,12 +12,13 @@ import shapely
 
 from assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig, generate_house
+from embodied.generate.furnish import groups, likes
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.smalls import Board, Tops
 from embodied.generate.furnish.space import Thing, overlap, room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
-from embodied.generate.furnish.tables import tables
+from embodied.generate.furnish.tables import AT, LIKES, tables
 from embodied.generate.household import HABITS, Household, draw_household, household_of
 from embodied.geometry import rectangle
 from embodied.house.house import House
@@ -73,6 +74,7 @@ def test_every_small_thing_and_every_part_of_a_group_is_something_that_the_catal
     assert all(stock.of_role(s.put) and s.habit in ("", *HABITS) for s in smalls)
     assert all(stock.of_role(r) for some in known.shelves.values() for r in some)
     assert all(stock.of_role(p.role) for g in known.groups.values() for p in g.parts if p.role)
+    assert set(likes.LIKES) == set(LIKES) and {"wall", *groups.AROUND} == set(AT)
     wishes = [w for p in known.rooms.values() for w in (*p.wishes, *p.extras, *p.fillers)]
     assert all(stock.of_role(r) for w in wishes for r in (w.role, *w.roles) if r)
 

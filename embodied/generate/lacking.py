@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from embodied.generate.furnish.tables import tables
+from assets.catalogue import Catalogue
+from embodied.generate.furnish.tables import tables, tables_of
 from embodied.generate.kinds import BEDROOMS
 from embodied.house.house import DOORS, House
 
@@ -10,20 +11,23 @@ FLAT = 75.0
 """Up to here bedrooms may open off the living room, square metres."""
 
 
-def lacking(house: House) -> tuple[str, ...]:
+def lacking(house: House, catalogue: Catalogue | None = None) -> tuple[str, ...]:
     """'kitchen_1: fridge' for everything that a room of `house` lacks, 'bedroom_1: way from a hall or corridor'.
 
     Counted are the needs of the table of rooms that name object classes. The furnisher tries for
     more; and it is asked of the finished house, because clearing the ways may take a bed out again.
+
+    Args:
+      catalogue: one whose own groups have needs, too.
     """
     there: dict[str, set[str]] = {}
     for p in house.placements:
         there.setdefault(p.room, set()).add(p.object_class)
-    known = tables()
+    known = tables_of(catalogue) if catalogue is not None else tables()
     short = [
         f"{r.id}: {need.roles[0]}"
         for r in house.rooms
-        for need in known.rooms[r.kind].needs
+        for need in (known.rooms[r.kind].needs if r.kind in known.rooms else ())
         if need.classes and not any({*known.classes(c)} & there.get(r.id, set()) for c in need.classes)
     ]
     return (*short, *_through_rooms(house))

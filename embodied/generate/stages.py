@@ -257,7 +257,7 @@ def generate_house(
             dead_end = e
             continue
         house = _made(draft.house, "openings")
-        short = len(lacking(house))
+        short = len(lacking(house, catalogue))
         if best is None or short < best[0]:
             best = short, house
         if not short or not house.placements:
