@@ -74,7 +74,7 @@ def test_every_small_thing_and_every_part_of_a_group_is_something_that_the_catal
     assert all(stock.of_role(s.put) and s.habit in ("", *HABITS) for s in smalls)
     assert all(stock.of_role(r) for some in known.shelves.values() for r in some)
     assert all(stock.of_role(p.role) for g in known.groups.values() for p in g.parts if p.role)
-    assert set(likes.LIKES) == set(LIKES) and {"wall", *groups.AROUND} == set(AT)
+    assert set(likes.LIKES) == {*LIKES, "ahead"} and {"wall", *groups.AROUND} == set(AT)
     wishes = [w for p in known.rooms.values() for w in (*p.wishes, *p.extras, *p.fillers)]
     assert all(stock.of_role(r) for w in wishes for r in (w.role, *w.roles) if r)
 

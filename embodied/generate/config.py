@@ -21,9 +21,9 @@ OTHERS = 14
 class Retries:
     """How often each step of generation is drawn anew at most; nothing else in it is tried again."""
 
-    house: int = 24
+    house: int = 16
     """Plans: while none is walkable, no doors leave every room open, or a room lacks what it must have."""
-    doors: int = 12
+    doors: int = 8
     """Doors and windows of one plan: while a leaf shuts a room off."""
     room: int = 6
     """Furniture of one room: while it lacks something (Programme.needs)."""

@@ -23,7 +23,7 @@ from embodied.generate.furnish.arrange import (
 )
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import LIKES, Spot, depth_before
-from embodied.generate.furnish.space import Thing
+from embodied.generate.furnish.space import Thing, Wall
 from embodied.generate.furnish.stock import LARGEST, SMALLEST
 from embodied.generate.furnish.tables import Group, Part, Size
 
@@ -377,24 +377,26 @@ def _distances(ctx: Context, group: Group, chosen: list[tuple[Part, Asset]]) -> 
 def _poses(ctx: Context, group: Group, plan: _Plan, k: int) -> list[ScoredPose]:
     low, high = plan.span()
     first, width = plan.items[0], high - low + 2 * at_round(group.margin, k, 0.0)
-    place = group.place
-    if place == "open":
-        place = "floor" if first.extent[0] * first.extent[1] > LARGE else "wall"
-    terms = {"noise": 0.35, **group.likes} if place == group.place else {"middle": 1.0, "noise": 0.3}
-    near = ctx.called(*group.near)
+    place, terms = group.place, {"noise": 0.35, **group.likes}
+    near, distance = ctx.called(*group.near), plan.distance
+    yaws = tuple(n * math.pi / 2 for n in range(group.turns))
+    if place == "open" and first.extent[0] * first.extent[1] > LARGE:
+        place, terms = "floor", {"middle": 1.0, "noise": 0.3}
+    elif place == "ahead":
+        if not near:
+            return []
+        deep = plan.spots[group.parts[0].called][0].size[1]
+        yaws, terms, distance = (near[0].yaw,), {"ahead": 1.0}, (near[0].size[1] + deep) / 2 + group.gap
 
-    def score(x: float, y: float, yaw: float, wall: object = None, s: float = 0.0) -> float:
-        spot = Spot(ctx, x, y, yaw, wall, s, width, first, near, plan.distance)
+    def score(x: float, y: float, yaw: float, wall: Wall | None = None, s: float = 0.0) -> float:
+        spot = Spot(ctx, x, y, yaw, wall, s, width, first, near, distance)
         return sum(weight * LIKES[term](spot) for term, weight in terms.items() if weight)
 
-    if place == "wall":
-        return wall_poses(
-            ctx.space,
-            width,
-            score=lambda wall, s: score(*wall.point(s, 0.4), wall.yaw, wall, s),
-            gap=group.gap,
-            step=group.step,
-        )
+    def at_wall(wall: Wall, s: float) -> float:
+        return score(*wall.point(s, 0.4), wall.yaw, wall, s)
+
+    if place in ("wall", "open"):
+        return wall_poses(ctx.space, width, score=at_wall, gap=group.gap, step=group.step)
     if place == "middle":
         c, (x0, y0, x1, y1) = ctx.space.polygon.centroid, ctx.space.polygon.bounds
         return [_moved(ScoredPose(0.0, c.x, c.y, 0.0 if x1 - x0 >= y1 - y0 else math.pi / 2), first)]
@@ -405,19 +407,6 @@ def _poses(ctx: Context, group: Group, plan: _Plan, k: int) -> list[ScoredPose]:
             for s0, s1, o in wall.openings
             if o.kind in ("front_door", "back_door")
         ]
-    yaws = tuple(n * math.pi / 2 for n in range(group.turns))
-    if place == "ahead":
-        if not near:
-            return []
-        yaws = (near[0].yaw,)
-        (fx, fy), n = near[0].front, len(near)
-        cx, cy = sum(t.x for t in near) / n, sum(t.y for t in near) / n
-        away = near[0].size[1] / 2 + group.gap + plan.spots[group.parts[0].called][0].size[1] / 2
-
-        def score(x: float, y: float, yaw: float, wall: object = None, s: float = 0.0) -> float:
-            ahead, aside = (x - cx) * fx + (y - cy) * fy, (y - cy) * fx - (x - cx) * fy
-            return -abs(ahead - away) - 0.5 * abs(aside)
-
     return [_moved(pose, first) for pose in floor_poses(ctx.space, score=score, yaws=yaws, step=group.step)]
 
 

@@ -246,10 +246,11 @@ def _darkens(pose: ScoredPose, width: float) -> bool:
 def _lone_fridge(ctx: Context) -> None:
     """A fridge that found no place in the line: at its end if it can be, else anywhere at a wall."""
     slim = _fridge(ctx, 0.65)
-    for clear in (0.5, 0.35, 0.2) if slim is not None else ():
-        item = Item(slim, 0.0, -slim.size[1] / 2, params=ctx.looks(slim), clear=clear, role="fridge")
-        if ctx.put([item], _line_ends(ctx, slim.size[0]), "kitchen"):
-            return
+    if slim is not None:
+        for clear in (0.5, 0.35, 0.2):
+            item = Item(slim, 0.0, -slim.size[1] / 2, params=ctx.looks(slim), clear=clear, role="fridge")
+            if ctx.put([item], _line_ends(ctx, slim.size[0]), "kitchen"):
+                return
     put_group(ctx, ctx.tables.groups["fridge"], "kitchen")
 
 

@@ -32,7 +32,7 @@ class Spot:
     first: Item
     near: Sequence[Thing]
     distance: float
-    """From the wall to the back of what faces the first part, metres."""
+    """From the wall to the back of what faces the first part, or to what is near if it is ahead of that, metres."""
 
 
 def at_corner(wall: Wall, s: float, width: float) -> float:
@@ -145,6 +145,13 @@ def _middle(p: Spot) -> float:
     return -math.hypot(p.x - (x0 + x1) / 2, p.y - (y0 + y1) / 2)
 
 
+def _ahead(p: Spot) -> float:
+    """0 where the group is `distance` before the middle of what is near, less elsewhere."""
+    n, (fx, fy) = len(p.near), p.near[0].front
+    dx, dy = p.x - sum(t.x for t in p.near) / n, p.y - sum(t.y for t in p.near) / n
+    return -abs(dx * fx + dy * fy - p.distance) - 0.5 * abs(dy * fx - dx * fy)
+
+
 LIKES: Mapping[str, Callable[[Spot], float]] = {
     "corner": lambda p: at_corner(p.wall, p.s, p.width) if p.wall else 0.0,
     "centre": lambda p: centred(p.wall, p.s) if p.wall else 0.0,
@@ -162,6 +169,7 @@ LIKES: Mapping[str, Callable[[Spot], float]] = {
         min(depth_before(p.ctx.space, p.wall, p.s) - p.first.extent[1], 1.2) if p.wall is not None else 0.0
     ),
     "facing_door": _facing_door,
+    "ahead": _ahead,
     "middle": _middle,
     "long": _long,
     "noise": lambda p: float(p.ctx.rng.random()),

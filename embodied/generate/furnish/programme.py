@@ -70,9 +70,14 @@ def _once(wish: Wish, ctx: Context) -> bool:
 
 def _as_wished(group: Group, wish: Wish) -> Group:
     """The group with what the wish says of its first part."""
-    asked = {"role": wish.role, "clear": None if wish.clear is None else (wish.clear,), "most": wish.most}
-    changes = {k: v for k, v in asked.items() if v not in (None, "")}
-    first = dataclasses.replace(group.parts[0], **changes, again=wish.again or group.parts[0].again)
+    own = group.parts[0]
+    first = dataclasses.replace(
+        own,
+        role=wish.role or own.role,
+        clear=own.clear if wish.clear is None else (wish.clear,),
+        most=wish.most or own.most,
+        again=wish.again or own.again,
+    )
     return dataclasses.replace(group, parts=(first, *group.parts[1:]), near=wish.near or group.near)
 
 
