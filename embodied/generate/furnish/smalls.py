@@ -6,6 +6,7 @@ smalls.toml says what there is: kettles on worktops, shoes at the door, dishes b
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -508,8 +509,9 @@ def _put_down(ctx: Context, small: Small, asset: Asset) -> bool:
         poses = floor_poses(ctx.space, score=aside, yaws=(turn,), step=0.35)
         item = Item(asset, role=asset.object_class, aside=True)
     free = ctx.space.walk.sum() * CELL**2
-    likely = sorted(poses, key=lambda p: -p.score)[:24]
-    chosen = [p for p in likely if ctx.space.taken(_where(item, p, ctx.space.bottom)) < min(LARGEST, 0.1 * free)]
+    boxes = ((p, _where(item, p, ctx.space.bottom)) for p in sorted(poses, key=lambda p: -p.score))
+    likely = itertools.islice(((p, b) for p, b in boxes if ctx.space.fits(b, aside=True)), 12)
+    chosen = [p for p, b in likely if ctx.space.taken(b) < min(LARGEST, 0.1 * free)]
     return bool(ctx.put([item], chosen, "left"))
 
 
