@@ -27,7 +27,7 @@ if command -v dpkg-query >/dev/null; then
       if [ -z "$llvm" ]; then
         # the newest LLVM that the distribution offers and Mitsuba's LLVM back end accepts
         llvm=$(apt-cache pkgnames libllvm | grep -E '^libllvm(1[7-9]|20)(t64)?$' | sort -V | tail -n 1 || true)
-        [ -n "$llvm" ] && missing+=("$llvm") || echo "note: no libLLVM >= 17 on offer; light is baked with the slower scalar path tracer"
+        [ -n "$llvm" ] && missing+=("$llvm") || echo "note: no libLLVM >= 17 on offer; light needs one: embodied doctor --fix"
       fi
       as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
     else

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from tqdm import tqdm
 
-from assets.archives import open_arrays
 from assets.cache import default_cache, digest
 from assets.catalogue import Catalogue, load_catalogue
 from assets.closure import code_digest
@@ -33,8 +32,8 @@ from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
     from embodied.light import Bake
-    from embodied.light.reference import Tracer
-    from embodied.render.gloss import Gloss, Shine
+    from embodied.light.tracing.reference import Tracer
+    from embodied.render.gloss import Gloss
 
 KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
@@ -202,7 +201,7 @@ class World:
         if not self.pictures.traced:
             return self.renderer
         if self._tracer is None:
-            from embodied.light.reference import Tracer  # late: loads the path tracer
+            from embodied.light.tracing.reference import Tracer  # late: loads the path tracer
 
             p = self.pictures
             quality = "glossy" if p.kind == "traced" else p.kind
@@ -369,53 +368,23 @@ def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_diff
 def gloss_of(bake: Bake, *, detail: bool = True) -> Gloss:
     """What lays a baked house's reflections over its pictures, and, unless told otherwise, what matter shows from
     nearby."""
-    from embodied.light.rays import rays_among  # late: loads the path tracer
+    from embodied.light.pages.shine import shine_of  # late: loads the path tracer
+    from embodied.light.tracing.rays import rays_among
     from embodied.render.gloss import Gloss
 
     shine = shine_of(bake)
     return Gloss(bake.lit, shine if detail else dataclasses.replace(shine, detail=()), rays_among)
 
 
-def shine_of(bake: Bake) -> Shine:
-    """What a bake knows of its house's gloss; colours of metal faces from the middle of each face."""
-    from embodied.light.colours import linear  # late: loads the path tracer
-    from embodied.render.gloss import Shine
-
-    own, lit = bake.manifest["own_pages"], bake.lit
-    with open_arrays(bake.folder / "meshes.npz") as z:
-        faces = [z[f"g{i}"] if f"g{i}" in z.files and m.page < own else None for i, m in enumerate(lit.meshes)]
-    gloss, detail = ([None if f is None else f[:, k] for f in faces] for k in (slice(3), 3))
-    tint: list[np.ndarray | None] = []
-    glow: list[np.ndarray | None] = [None] * len(lit.pages)
-    for page in range(own):
-        with open_arrays(bake.folder / f"light_{page:03d}.npz") as z:
-            glow[page] = z["glow"] if z["glow"].size else None
-    colours: dict[int, np.ndarray] = {}
-    for mesh, shine in zip(lit.meshes, gloss, strict=True):
-        if shine is None or not shine[:, 2].any():
-            tint.append(None)
-            continue
-        if mesh.page not in colours:
-            colours[mesh.page] = bake.ingredients(mesh.page).albedo
-        picture = colours[mesh.page]
-        h, w = picture.shape[:2]
-        at = mesh.uv[mesh.faces].mean(1)
-        x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
-        tint.append(linear(picture[y, x] / 255.0))
-    exposure = bake.exposure
-    outdoors = exposure.outdoors.astype(np.float32)
-    return Shine(gloss, tint, glow, exposure.near, outdoors, float(np.median(exposure.gains)), detail)
-
-
 def makers(pictures: PictureSettings) -> tuple[str, ...]:
     """Modules that draw and keep such pictures; cached pictures made by other code than theirs are not used."""
     modules = ["assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
     if pictures.lit:
-        modules.append("embodied.light.baking")
+        modules.append("embodied.light.baking.house")
     if pictures.gloss:
-        modules += ["embodied.render.gloss", "embodied.light.rays"]
+        modules += ["embodied.render.gloss", "embodied.light.tracing.rays"]
     if pictures.filament:
         modules.append("embodied.render.filament")
     if pictures.traced:
-        modules.append("embodied.light.reference")
+        modules.append("embodied.light.tracing.reference")
     return tuple(modules)

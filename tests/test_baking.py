@@ -12,21 +12,12 @@ from handmade import HandCatalogue, furnished
 
 from embodied.house.house import Light, Sky
 from embodied.house.shapes import inward
-from embodied.light import (
-    LightError,
-    StaleBake,
-    bake,
-    bake_all,
-    baking,
-    check,
-    files,
-    lightings_of,
-    open_bake,
-    radiosity,
-    solve,
-)
+from embodied.light import LightError, StaleBake, bake, bake_all, lightings_of, open_bake
+from embodied.light.baking import check, solve
+from embodied.light.baking import house as baking
 from embodied.light.memory import Memory
-from embodied.light.sites import Spread, sites_of
+from embodied.light.pages import files
+from embodied.light.tracing import luxels, radiosity
 from embodied.scene.house_meshes import house_parts
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
@@ -52,10 +43,9 @@ def solved(lit):
 
 def test_what_stands_in_outer_walls_takes_light_from_the_open_sky_on_its_outer_side_only(solved):
     """Doors straight from the sky; windows, which stand behind the portal they are, through it."""
-    house, atlas, lux, sites = solved.house, solved.atlas, solved.lux, sites_of(solved.lux, TINY.every)
-    problem = solve.Problem(house, atlas, lux, sites, solved.space, solved.outdoors, solved.lamps, TINY)
-    everywhere = Spread(sites, lux.position, lux.normal, np.ones(len(sites.luxel), bool))
-    e, all_ = solve.outer_light(problem, everywhere).mean(1), solved.light.soft.mean(1)
+    house, atlas, lux = solved.house, solved.atlas, solved.lux
+    problem = solve.Problem(house, atlas, lux, solved.space, solved.outdoors, solved.lamps, TINY)
+    e, all_ = solve.outer_light(problem).mean(1), solved.light.soft.mean(1)
     kinds = set()
     for opening in (o for o in house.openings if None in o.rooms):
         window = opening.kind == "window"
@@ -87,7 +77,7 @@ def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solved, monkeypatc
 
 def test_a_third_of_the_luxels_dark_slips_through_one_time_in_eight_at_most(solved, monkeypatch):
     """Whichever third it is, and whichever luxels are looked at; a bake without fault is not told off."""
-    known = check.compare(solved, luxels=200, paths_each=check.AGAIN_PATHS)
+    known = check.compare(solved, luxels=200, paths_each=check.PATHS)
 
     def told(dark: float, trial: int) -> bool:
         rng = np.random.default_rng(trial)
@@ -171,7 +161,7 @@ def test_lit_at_several_hours_every_lighting_is_what_it_is_alone(lit, tmp_path, 
 
 def test_rays_remembered_bring_what_they_met(solved):
     space, lux = solved.space, solved.lux
-    p = solve.subset(lux, np.arange(0, len(lux.position), 50))
+    p = luxels.subset(lux, np.arange(0, len(lux.position), 50))
     memory, table = Memory(), lux.albedo.copy()
     for _ in range(2):
         for known, asked in zip(
@@ -202,7 +192,7 @@ def test_an_interrupted_bake_resumes_and_a_damaged_one_is_repaired(lit, tmp_path
         with pytest.raises(KeyboardInterrupt):
             bake(house, catalogue, tmp_path, TINY)
     with monkeypatch.context() as m:
-        m.setattr(solve, "direct_light", interrupt)  # must not be needed again
+        m.setattr(solve, "shone_on", interrupt)  # must not be needed again
         m.setattr(solve, "bounce", interrupt)
         m.setattr(baking, "outside_of", lambda *_: None)
         m.setattr(baking, "daylit", lambda *_: [np.zeros((4, 8, 3), np.uint8)])
@@ -230,7 +220,7 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
     """28 dB and 6 levels at most between the classic renderer's pages and a path-traced picture of the same walls."""
     import cv2
 
-    from embodied.light.reference import Tracer
+    from embodied.light.tracing.reference import Tracer
     from embodied.render.camera import camera_at
     from embodied.render.classic import Renderer
 
@@ -250,7 +240,7 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
 
 
 def test_faces_of_a_traced_panorama_are_pictures_of_their_directions(lit):
-    from embodied.light.reference import Tracer
+    from embodied.light.tracing.reference import Tracer
     from embodied.render.panorama import FACES
 
     house, _, _, baked = lit
@@ -265,7 +255,7 @@ def test_faces_of_a_traced_panorama_are_pictures_of_their_directions(lit):
 
 
 def test_lucky_rays_are_spread_over_their_surface_and_not_lost():
-    from embodied.light.reference import _denoised
+    from embodied.light.tracing.reference import _denoised
 
     shape = (48, 48)
     guide = np.zeros((*shape, 4), np.float32)
@@ -283,7 +273,7 @@ def test_a_mirror_shows_what_stands_before_it_however_few_rays_there_are(lit):
     """Noise in a mirror is smoothed over what is seen in it, not over its glass: as sharp as baked light, which has
     none."""
     from embodied.light.backend import floats
-    from embodied.light.reference import Tracer
+    from embodied.light.tracing.reference import Tracer
     from embodied.render.camera import camera_at
 
     house, _, _, baked = lit
@@ -307,10 +297,10 @@ def test_a_mirror_shows_what_stands_before_it_however_few_rays_there_are(lit):
 
 def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):
     """Ended paths may be left behind or carried along: what the others bring is the same."""
-    from embodied.light import paths
     from embodied.light.backend import array, flags, floats, mitsuba, vector
-    from embodied.light.radiosity import Points
-    from embodied.light.trace import world_of
+    from embodied.light.tracing import paths
+    from embodied.light.tracing.radiosity import Points
+    from embodied.light.tracing.scene import world_of
 
     house, _, _, baked = lit
     world, n = world_of(baked, house), 4096

@@ -19,7 +19,8 @@ from agents.vision.labels import HouseStrips
 from assets.archives import open_arrays
 from assets.json_file import RecordError
 from embodied.datasets import habitat
-from embodied.light.unwrap import Unwrapped, load_record
+from embodied.light.pages.records import load_record
+from embodied.light.pages.unwrap import Unwrapped
 from embodied.render import panorama_file
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas

@@ -12,7 +12,8 @@ import assets.closure
 from assets.closure import ROOT, closure, code_digest
 from assets.importing import importer
 from embodied.datasets.build import program
-from embodied.light import colours, settings, unwrap
+from embodied.light import settings
+from embodied.light.pages import colours, unwrap
 from embodied.render.pictures import PictureSettings
 from embodied.scene import collision
 from embodied.world import makers
@@ -75,23 +76,23 @@ def test_what_a_picture_shows_is_in_its_key(tree, file, old, new):
 
 
 PRODUCTS = {
-    "bakes": ("embodied.light.baking", settings.APART),
-    "unwrappings": ("embodied.light.unwrap", unwrap.APART),
-    "halved maps": ("embodied.light.colours", colours.APART),
+    "bakes": ("embodied.light.baking.house", settings.APART),
+    "unwrappings": ("embodied.light.pages.unwrap", unwrap.APART),
+    "halved maps": ("embodied.light.pages.colours", colours.APART),
     "boxes": ("embodied.scene.collision", collision.APART),
     "models": (importer.READER, importer.APART),
 }
 DECIDED_BY = {
-    "embodied/light/sky.py": {"bakes"},
+    "embodied/light/tracing/sky.py": {"bakes"},
     "embodied/house/shapes.py": {"bakes"},
-    "embodied/light/unwrap.py": {"bakes", "unwrappings"},
-    "embodied/light/colours.py": {"bakes", "halved maps"},
+    "embodied/light/pages/unwrap.py": {"bakes", "unwrappings"},
+    "embodied/light/pages/colours.py": {"bakes", "halved maps"},
     "embodied/geometry.py": {"bakes", "unwrappings", "boxes"},
     "embodied/scene/collision.py": {"boxes"},
     "assets/records.py": {"bakes", "unwrappings", "boxes", "models"},
     "assets/importing/glb.py": {"models"},
     "embodied/light/settings.py": set(),
-    "embodied/light/reference.py": set(),
+    "embodied/light/tracing/reference.py": set(),
     "embodied/light/__init__.py": set(),
     "embodied/scene/walls.py": set(),
     "embodied/gym/registration.py": set(),
@@ -115,11 +116,11 @@ def test_products_follow_the_code_that_makes_them_and_no_other(tree):
 
 
 def test_versions_of_libraries_that_decide_bakes_are_in_their_key(monkeypatch):
-    libraries = closure("embodied.light.baking", without=settings.APART).libraries
+    libraries = closure("embodied.light.baking.house", without=settings.APART).libraries
     assert {"drjit", "mitsuba", "numpy", "xatlas", "cv2"} <= set(libraries) and "tqdm" not in libraries
-    before = key(ROOT, "embodied.light.baking", without=settings.APART)
+    before = key(ROOT, "embodied.light.baking.house", without=settings.APART)
     monkeypatch.setattr(assets.closure, "_version", lambda name: "another" if name == "mitsuba" else "")
-    assert key(ROOT, "embodied.light.baking", without=settings.APART) != before
+    assert key(ROOT, "embodied.light.baking.house", without=settings.APART) != before
     code_digest.cache_clear()
 
 
@@ -132,9 +133,9 @@ def test_data_beside_the_code_is_in_the_key(tree):
 
 def test_pictures_depend_on_what_draws_them():
     unlit, lit = (set(closure(*makers(PictureSettings(kind=q))).modules) for q in ("unlit", "normal"))
-    assert "embodied.light.baking" in lit and not any(m.startswith("embodied.light") for m in unlit)
+    assert "embodied.light.baking.house" in lit and not any(m.startswith("embodied.light") for m in unlit)
     assert "embodied.house.house" in unlit and not any(m.startswith("embodied.generate") for m in lit)
-    assert "embodied.light.reference" in closure(*makers(PictureSettings(kind="traced"))).modules
+    assert "embodied.light.tracing.reference" in closure(*makers(PictureSettings(kind="traced"))).modules
 
 
 def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):

@@ -37,7 +37,7 @@ from embodied.evaluation.rollout import play
 from embodied.generate import generate_house
 from embodied.house.house import HouseError
 from embodied.interface import Episode
-from embodied.light import baking
+from embodied.light.baking import house as baking
 from embodied.mattersim.graphs import load_graphs
 from embodied.policies.baselines import Shortest
 from embodied.records import RecordError, from_json, save_lines
@@ -163,8 +163,8 @@ REVIEWED = {
     "embodied/locks.py": "its own lock",
     "embodied/bench/serve.py": "what people did in a study that it has just written",
     "embodied/datasets/lerobot.py": "an empty folder",
-    "embodied/light/baking.py": "a bake in the cache",
-    "embodied/light/files.py": "a bake in the cache",
+    "embodied/light/baking/house.py": "a bake in the cache",
+    "embodied/light/pages/files.py": "a bake in the cache",
     "embodied/scene/collision.py": "a file in the cache",
     "embodied/scene/export.py": "house.xml, which it writes anew",
     "agents/vision/run.py": "the checkpoint of a finished training",

@@ -11,7 +11,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from assets.records import Finish
-from embodied.light.rays import embree_among, mitsuba_among, rays_among
+from embodied.light.tracing.rays import embree_among, mitsuba_among, rays_among
 from embodied.render import gloss
 from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
@@ -26,7 +26,7 @@ GREY, RED = (120, 120, 120), (200, 30, 30)
 
 
 def test_the_film_curve_is_the_bakes_own_and_is_undone():
-    tone = pytest.importorskip("embodied.light.tone")
+    tone = pytest.importorskip("embodied.light.pages.tone")
     x = np.geomspace(1e-3, 5, 200)[:, None].repeat(3, 1)
     assert np.allclose(film(x), tone.develop(x, np.ones(3)), atol=2e-3)
     values = np.arange(256, dtype=np.uint8)[:, None].repeat(3, 1)

@@ -16,7 +16,7 @@ import shapely
 from assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig
 from embodied.house.house import LANDSCAPES, SEASONS, House, HouseError, Sky
-from embodied.light.sky import paint
+from embodied.light.tracing.sky import paint
 from embodied.scene import backdrop
 from embodied.scene.landscapes import TABLE, Scenery, near_buildings, scenery_of
 from embodied.scene.model import build_spec, compile_scene, owner_of_name

@@ -1,4 +1,4 @@
-"""Light: closed forms of energy, sites and what lies between them, the sky, exposure, and machines without LLVM."""
+"""Light: closed forms of energy, noise, the sky, and exposure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import itertools
 import os
 import subprocess
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,17 +18,18 @@ from handmade import box_mesh
 from assets.records import Finish
 from embodied.bench.light import psnr, ssim
 from embodied.house.house import House, Light, Room, Sky, Storey
-from embodied.light import LightError, check, compose, radiosity, scalar, settings_of, solve
-from embodied.light.atlas import atlas_of, things_of
-from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, threads_allowed, variant_of
-from embodied.light.baking import brightest
-from embodied.light.colours import ColourMaps
-from embodied.light.cover import rasterise
-from embodied.light.denoise import cap_sparks, neighbours, smooth_sites
-from embodied.light.emitters import lamps_of, portals_of
-from embodied.light.sites import Spread, around_good, sites_of
-from embodied.light.sky import Outdoors, paint, sun_direction, sun_height
-from embodied.light.tone import Exposure, develop
+from embodied.light import LightError, settings_of
+from embodied.light.backend import array, drjit, find_llvm, floats, threads_allowed, variant_of
+from embodied.light.baking import check, compose, solve
+from embodied.light.baking.denoise import smooth_pages
+from embodied.light.baking.house import brightest
+from embodied.light.pages.atlas import atlas_of, things_of
+from embodied.light.pages.colours import ColourMaps
+from embodied.light.pages.cover import rasterise
+from embodied.light.pages.tone import Exposure, develop
+from embodied.light.tracing import luxels, radiosity
+from embodied.light.tracing.emitters import lamps_of, portals_of
+from embodied.light.tracing.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.scene.landscapes import Scenery
 from embodied.scene.part import Part
 
@@ -54,17 +54,16 @@ def closed_box(size: float, finish: Finish, lights: tuple[Light, ...] = ()):
     part = Part("box_1/wall_0", "wall", "box_1", inward, "box")
     atlas = atlas_of(things_of([part], density=8.0, budget=100, cache=None))
     lamps = lamps_of(house, atlas)
-    lux = solve.with_glow(solve.luxels_of(atlas, ColourMaps()), house, atlas, lamps)
+    lux = luxels.with_glow(luxels.luxels_of(atlas, ColourMaps()), house, atlas, lamps)
     space = radiosity.space_of(atlas, lux.texels, DARK.picture)
-    settings = dataclasses.replace(TINY, bounces=(8, 8, 8, 8, 8, 8, 64), lamp_rays=24)
-    sites = sites_of(lux, settings.every)
-    return lux, solve.solve(solve.Problem(house, atlas, lux, sites, space, DARK, lamps, settings))
+    settings = dataclasses.replace(TINY, bounces=(8, 8, 8, 8, 8, 8, 32), lamp_rays=24)
+    return lux, solve.solve(solve.Problem(house, atlas, lux, space, DARK, lamps, settings))
 
 
 def test_in_a_furnace_light_is_emission_over_absorption():
     """Every wall glows with L and reflects a: e = L + a e everywhere, so e = L / (1 - a)."""
     _, light = closed_box(2.0, Finish((SRGB_HALF, SRGB_HALF, SRGB_HALF, 1.0), emission=(1.0, 2.0, 0.5)))
-    ambient = solve.AMBIENT / 0.5
+    ambient = luxels.AMBIENT / 0.5
     for channel, emitted in enumerate((1.0, 2.0, 0.5)):
         assert np.median(light.soft[:, channel]) == pytest.approx(emitted / 0.5 + ambient[channel], rel=0.02)
         assert np.percentile(light.soft[:, channel], 2) > emitted / 0.5 * 0.93
@@ -75,7 +74,7 @@ def test_a_closed_box_absorbs_exactly_what_its_lamp_gives():
     lumens = 1000.0
     lamp = Light("l", "box_1", None, (2.0, 2.0, 2.0), (1.0, 1.0, 1.0), lumens)
     lux, light = closed_box(4.0, Finish((SRGB_HALF, SRGB_HALF, SRGB_HALF, 1.0)), (lamp,))
-    e = light.soft[:, 1] - solve.AMBIENT[1]
+    e = light.soft[:, 1] - luxels.AMBIENT[1]
     absorbed = float((lux.area * (1 - lux.albedo[:, 1]) * e).sum() * np.pi * 100)
     assert absorbed == pytest.approx(lumens, rel=0.03)
     assert float(lux.area.sum()) == pytest.approx(6 * 16.0, rel=1e-3)
@@ -84,7 +83,7 @@ def test_a_closed_box_absorbs_exactly_what_its_lamp_gives():
 def test_sky_through_a_hole_matches_the_form_factor_of_a_rectangle():
     """Under the middle of a w x w uniform opening at height h, e / L is the textbook configuration factor."""
     w, h = 2.0, 1.5
-    from embodied.light.emitters import GLASS, Portal
+    from embodied.light.tracing.emitters import GLASS, Portal
 
     portal = Portal("p", "r", np.array([-w / 2, -w / 2, h]), np.array([0.0, w, 0.0]), np.array([w, 0.0, 0.0]))
     assert portal.normal == pytest.approx([0, 0, -1])
@@ -110,18 +109,6 @@ def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_f
     )  # never brighter than beside it
 
 
-def test_neighbours_are_looked_for_on_the_same_layer():
-    """A blanket 25 mm above its mattress, luxels 60 mm apart: the mattress is nearer, faces the same way, and is
-    dark."""
-    x, y = np.meshgrid(np.arange(9) * 0.06, np.arange(9) * 0.06)
-    layer = lambda z, step: np.stack([x.ravel() * step, y.ravel() * step, np.full(x.size, z)], 1).astype(np.float32)
-    position = np.concatenate([layer(0.025, 1.0), layer(0.0, 0.5) + np.float32([0.12, 0.12, 0])])
-    normal = np.tile(np.float32([0, 0, 1]), (len(position), 1))
-    blanket = np.arange(len(position)) < x.size
-    near = neighbours(position, normal, np.ones(len(position), bool), blanket)
-    assert near.shape == (x.size, 12) and blanket[near].mean(1).min() > 0.5
-
-
 def flat_luxels(z: float, owner: int, up: float = 1.0, n: int = 40, step: float = 0.025):
     """An n x n sheet of luxels: positions, normals and owners."""
     x, y = np.meshgrid(np.arange(n) * step, np.arange(n) * step)
@@ -129,26 +116,9 @@ def flat_luxels(z: float, owner: int, up: float = 1.0, n: int = 40, step: float 
     return position, np.tile(np.float32([0, 0, up]), (n * n, 1)), np.full(n * n, owner)
 
 
-def sheets(*made, shell: bool = True):
-    position, normal, owner = (np.concatenate(a) for a in zip(*made))
-    area, all_ = np.full(len(owner), 0.025**2, np.float32), np.full(len(owner), shell)
-    return SimpleNamespace(position=position, normal=normal, owner=owner, area=area, shell=all_)
-
-
-def test_sites_are_one_luxel_in_nine_and_carry_a_gradient_to_all_luxels():
-    lux = sheets(flat_luxels(0.0, 0))
-    sites = sites_of(lux, 3.0)
-    assert len(lux.owner) / 14 < len(sites.luxel) < len(lux.owner) / 7
-    spread = Spread(sites, lux.position, lux.normal, np.ones(len(sites.luxel), bool))
-    slope = lambda p: (1 + p[:, :1] * np.float32([0.5, 0.3, 0.1])).astype(np.float32)
-    inner = ((lux.position[:, :2] > 0.1) & (lux.position[:, :2] < 0.87)).all(1)
-    np.testing.assert_allclose(spread(slope(sites.position))[inner], slope(lux.position)[inner], rtol=0.02)
-
-
-def test_a_glint_that_reaches_no_site_adds_nothing():
+def test_a_glint_that_reaches_no_luxel_adds_nothing():
     """Dr.Jit refuses loops over no points: a flat of 56 (seed 0) could not be lit."""
-    lux, sites = SimpleNamespace(), SimpleNamespace(luxel=np.arange(9))
-    problem = SimpleNamespace(space=None, lux=lux, sites=sites)
+    problem = SimpleNamespace(space=None, lux=SimpleNamespace())
     assert solve._lit_by(problem, None, np.zeros(0, np.int64)).shape == (0, 3)
 
 
@@ -166,56 +136,17 @@ def test_a_sunlit_floor_has_as_many_small_lights_whatever_the_luxels_are():
     np.testing.assert_allclose(coarse.flux.sum(0), fine.flux.sum(0), rtol=1e-4)
 
 
-def test_what_is_no_shell_can_have_fewer_sites():
-    fine, coarse = (sites_of(sheets(flat_luxels(0.0, 0), shell=shell), 2.5, things=2.0) for shell in (True, False))
-    assert len(coarse.luxel) == pytest.approx(len(fine.luxel) / 4, rel=0.25)
-
-
-def test_few_luxels_at_a_rim_take_the_site_beside_them_unless_they_face_another_way_or_belong_to_another():
-    sheet = flat_luxels(0.0, 0)
-    beside = np.float32([[-0.02, 0.3, 0.0], [-0.02, 0.6, 0.0]])
-    up, down = np.float32([[0, 0, 1]] * 2), np.float32([[0, 0, -1]] * 2)
-    for normal, owner, own in ((up, 0, False), (down, 0, True), (up, 1, True)):
-        lux = sheets(sheet, (beside, normal, np.full(2, owner)))
-        sites = sites_of(lux, 3.0)
-        rim = sites.own[-2:]
-        assert (sites.luxel[rim] >= len(sheet[2])).all() == own
-        assert own or (np.abs(sites.position[rim] - beside).max() < 0.1)
-
-
-def test_a_rug_takes_no_light_from_its_own_underside_nor_from_the_floor_below():
-    """Rug 12 mm thick on a floor; its upper side is bright, all else is black."""
-    lux = sheets(flat_luxels(0.0, 0), flat_luxels(0.012, 1), flat_luxels(0.001, 1, up=-1.0))
-    sites = sites_of(lux, 3.0)
-    top = lambda i: (lux.owner[i] == 1) & (lux.normal[i, 2] > 0)
-    spread = Spread(sites, lux.position, lux.normal, np.ones(len(sites.luxel), bool))
-    e = spread(np.where(top(sites.luxel), 1.0, 0.0)[:, None].repeat(3, 1).astype(np.float32))
-    everyone = np.arange(len(lux.owner))
-    assert e[top(everyone)].min() > 0.99 and e[~top(everyone)].max() < 0.01
-
-
-def test_luxels_whose_sites_are_all_hidden_take_the_nearest_open_ones_light():
-    lux = sheets(flat_luxels(0.0, 0))
-    sites = sites_of(lux, 3.0)
-    good = sites.position[:, 0] < 0.3
-    spread = Spread(around_good(sites, good), lux.position, lux.normal, good)
-    assert spread(np.where(good, 1.0, 0.0)[:, None].repeat(3, 1)).min() > 0.95
-
-
-def test_noise_between_sites_goes_and_an_edge_stays():
-    lux = sheets(flat_luxels(0.0, 0))
-    sites = sites_of(lux, 2.0)
-    left = sites.position[:, 0] < 0.5
+def test_noise_goes_and_an_edge_stays():
+    mesh = box_mesh((0, 0, 0), (2.0, 2.0, 2.0), (0.5, 0.5, 0.5, 1.0))
+    atlas = atlas_of(things_of([Part("a/wall_0", "wall", "a", mesh, "a")], density=20.0, budget=100, cache=None))
+    lux = luxels.luxels_of(atlas, ColourMaps())
+    left, all_ = lux.position[:, 0] < 1.0, np.ones(len(lux.area), bool)
     clean = np.where(left, 1.0, 4.0)[:, None].repeat(3, 1).astype(np.float32)
     noise = np.random.default_rng(0).normal(0, 0.1, (len(clean), 1)).astype(np.float32)
-    all_ = np.ones(len(clean), bool)
-    options = {"variance": np.square(0.1 * clean[:, 0])}
-    out = smooth_sites(clean * (1 + noise), sites.position, sites.normal, sites.around, all_, **options)
+    options = {"steps": (1, 2, 4), "likeness": (0.12,) * 3, "variance": np.square(0.1 * clean[:, 0])}
+    out = smooth_pages(clean * (1 + noise), atlas, lux.texels, all_, all_, **options)
     assert np.abs(out / clean - 1).mean() < 0.4 * np.abs(noise).mean()
     assert out[left].max() < 1.6 and out[~left].min() > 3.0
-    spark = clean.copy()
-    spark[len(spark) // 2] *= 20
-    assert cap_sparks(spark, sites.around, all_).max() < 7
 
 
 def test_bright_spots_are_tamed_without_loss_of_light():
@@ -274,11 +205,11 @@ def test_the_newest_llvm_that_can_be_used_is_found(tmp_path, monkeypatch):
     assert find_llvm() == str(tmp_path / "libLLVM.so.19.1")
 
 
-def test_cuda_goes_before_llvm_and_without_both_the_scalar_variant_does_with_a_warning():
+def test_cuda_goes_before_llvm_and_without_both_the_error_says_what_to_do():
     assert variant_of(lambda name: True) == "cuda_ad_rgb"
     assert variant_of(lambda name: name == "LLVM") == "llvm_ad_rgb"
-    with pytest.warns(RuntimeWarning, match="scalar.*slower.*libllvm19.*pictures='unlit'"):
-        assert variant_of(lambda name: False) == "scalar_rgb"
+    with pytest.raises(LightError, match="CUDA or LLVM.*doctor --fix.*libllvm19.*unlit"):
+        variant_of(lambda name: False)
 
 
 def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
@@ -308,36 +239,6 @@ print(joblib.Parallel(n_jobs=many)(joblib.delayed(threads)(k) for k in range(2))
     assert told.stdout == "[1, 1]\n"
 
 
-def test_arrays_without_llvm_mean_the_same():
-    """What `embodied.light.scalar` does anew is what Dr.Jit and Mitsuba do."""
-    mi, dr = mitsuba(), drjit()
-    rng = np.random.default_rng(0)
-    n, square = rng.standard_normal((3, 999)).astype(np.float32), rng.random((2, 999), np.float32)
-    n /= np.linalg.norm(n, axis=0)
-    n[:, :2] = [[0, 0], [0, 0], [1, -1]]
-    square[:, :2] = 0.5, 0.25
-    table, index, active = (
-        rng.random(300, np.float32),
-        rng.integers(0, 100, 999).astype(np.uint32),
-        rng.random(999) < 0.5,
-    )
-
-    def made(mi, dr):
-        frame, u = mi.Frame3f(mi.Vector3f(*map(mi.Float, n))), mi.Point2f(*map(mi.Float, square))
-        yield from (frame.s, frame.t, mi.warp.square_to_cosine_hemisphere(u), mi.warp.square_to_uniform_sphere(u))
-        yield frame.to_world(mi.warp.square_to_cosine_hemisphere(u))
-        found = dr.gather(mi.Color3f, mi.Float(table), mi.UInt32(index), mi.Bool(active))
-        total = mi.Color3f(0.0)
-        total += found * u.x
-        yield from (found, total, dr.normalize(found + 0.1), dr.select(u.x < u.y, found, 0.5))
-        yield from (dr.max(found), dr.select(mi.Bool(active), 1.0, -1.0), mi.Color3f(0.5 * u.x), mi.UInt32(u.y * 7) % 3)
-        yield from (dr.clip(u.x, 0.2, u.y), dr.dot(frame.s, found), dr.sign(u.x - 0.5), dr.power(1 - u.x, 5))
-
-    for ours, theirs in zip(made(scalar, scalar), made(mi, dr), strict=True):
-        assert np.asarray(ours).dtype == np.asarray(theirs).dtype
-        np.testing.assert_allclose(np.asarray(ours), np.asarray(theirs), atol=1e-5)
-
-
 def test_where_numpy_puts_its_arrays_no_kernel_is_compiled_for():
     """Eight ways to lie in memory, one kernel: Dr.Jit compiles loads of aligned and of other addresses apart."""
     dr, spots = drjit(), range(0, 64, 8)
@@ -351,18 +252,6 @@ def test_where_numpy_puts_its_arrays_no_kernel_is_compiled_for():
             np.testing.assert_array_equal(np.asarray(out), np.arange(1024) * 3.0 + 1.0)
         made = [k["hash"] for k in dr.kernel_history() if "hash" in k]
     assert len(made) == len(spots) and len(set(made)) == 1
-
-
-def test_houses_are_lit_without_llvm():
-    """The closed forms hold in Mitsuba's scalar variant, too, and a whole bake agrees with its path tracer."""
-    names = ("in_a_furnace", "a_closed_box", "sky_through", "inside_out", "a_bake_agrees")
-    files = [str(Path(__file__).with_name(f"test_{name}.py")) for name in ("light", "unwrap", "baking")]
-    run = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *files, "-k", " or ".join(names)]
-    done = subprocess.run(
-        run, check=False, capture_output=True, text=True, env={**os.environ, "DRJIT_LIBLLVM_PATH": "/none"}
-    )
-    assert done.returncode == 0, done.stdout[-3000:]
-    assert "scalar variant computes the light" in done.stdout and f"{len(names)} passed" in done.stdout
 
 
 def test_grain_is_evened_without_loss_and_not_across_charts():

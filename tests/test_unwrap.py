@@ -11,10 +11,10 @@ import pytest
 from handmade import box_mesh
 
 from assets.records import Finish, MeshPart
-from embodied.light import cover, unwrap
-from embodied.light.atlas import Page, UnwrappedThing, coarsened
-from embodied.light.cover import rasterise
-from embodied.light.unwrap import ONCE, areas_of, density_of, pack, unwrap_model, unwrap_planes, with_budget
+from embodied.light.pages import cover, unwrap
+from embodied.light.pages.atlas import Page, UnwrappedThing, coarsened
+from embodied.light.pages.cover import rasterise
+from embodied.light.pages.unwrap import ONCE, areas_of, density_of, pack, unwrap_model, unwrap_planes, with_budget
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
@@ -50,7 +50,7 @@ def test_an_atlas_is_freed_only_after_its_threads_had_time_to_fall_asleep():
 def test_inside_out_things_are_turned_and_sheets_are_seen_from_both_sides():
     mesh = box_mesh((0, 0, 0), (1, 1, 1), (0.5, 0.5, 0.5, 1.0))
     inside_out = dataclasses.replace(mesh, faces=mesh.faces[:, ::-1])
-    from embodied.light.unwrap import face_normals
+    from embodied.light.pages.unwrap import face_normals
 
     flat = unwrap_model([inside_out], 1000.0)
     outward = flat.corners.mean(1) - 0.5
@@ -64,7 +64,7 @@ def test_sheets_listed_once_per_side_are_unwrapped_once():
     doubled = dataclasses.replace(mesh, faces=np.concatenate([mesh.faces, mesh.faces[:, ::-1]]))
     flat = unwrap_model([doubled], 1000.0)
     assert len(flat.corners) == 12 and not flat.thin.any()
-    from embodied.light.unwrap import face_normals
+    from embodied.light.pages.unwrap import face_normals
 
     assert (
         (face_normals(flat.corners) * (flat.corners.mean(1) - 0.2)).sum(1)[

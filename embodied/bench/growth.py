@@ -16,7 +16,7 @@ from assets.cache import write_bytes, write_json
 from assets.catalogue import Catalogue
 from embodied.bench.timing import Report
 from embodied.generate import HouseConfig, generate_house
-from embodied.light.baking import bake, forget
+from embodied.light.baking.house import bake, forget
 from embodied.light.settings import light_code
 from embodied.scene.house_meshes import house_parts
 

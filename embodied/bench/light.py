@@ -22,9 +22,9 @@ from embodied.bench.timing import Report
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.light.backend import device
-from embodied.light.baking import bake, forget
-from embodied.light.files import Bake
-from embodied.light.reference import Tracer
+from embodied.light.baking.house import bake, forget
+from embodied.light.pages.files import Bake
+from embodied.light.tracing.reference import Tracer
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer

@@ -12,7 +12,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -169,16 +168,13 @@ def packs(args: Options) -> Finding:
 
 
 def path_tracer(_: Options) -> Finding:
-    """Mitsuba's back end: CUDA or LLVM; slow without them; houses are drawn unlit without Mitsuba."""
-    from embodied.light.backend import SLOWER, VARIANTS, LightError, device
+    """Mitsuba's back end: CUDA or LLVM; houses are drawn unlit without."""
+    from embodied.light.backend import VARIANTS, LightError, device
 
     try:
-        with warnings.catch_warnings(action="ignore"):
-            found = device()
+        found = device()
     except LightError as e:
         return Finding("path tracer", False, str(e), "until then draw houses without light (unlit)", False)
-    if found == "scalar":
-        return Finding("path tracer", False, f"Mitsuba without CUDA and LLVM, {SLOWER}", "embodied doctor --fix", False)
     variant = next(v for v, _ in VARIANTS if v.startswith(found))
     return Finding("path tracer", True, f"Mitsuba on {found} (variant {variant})", needed=False)
 

@@ -1,8 +1,7 @@
 """Where Mitsuba is found and started, and the few array helpers all of `embodied.light` shares.
 
 Mitsuba's fast variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
-needs a shared libLLVM of version 15 or later (Debian: `apt install libllvm19`). Without either its
-scalar variant does, with arrays of NumPy's (`embodied.light.scalar`).
+needs a shared libLLVM of version 15 or later (`embodied doctor --fix`, or Debian: `apt install libllvm19`).
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from embodied.errors import UnableError
-from embodied.light import scalar
 from embodied.light.arrays import Array, RayScene
 from embodied.software import bundled, load_atomic
 
@@ -35,8 +33,10 @@ _LLVM_PLACES = (
 OLDEST_LLVM = 15
 VARIANTS = (("cuda_ad_rgb", "CUDA"), ("llvm_ad_rgb", "LLVM"))
 """Mitsuba's variants with arrays, best first, and what Dr.Jit needs for each."""
-SCALAR = "scalar_rgb"
-SLOWER = "one ray at a time and some ten times slower, about ten minutes for a small flat"
+REMEDY = (
+    f"`embodied doctor --fix` brings LLVM on Linux; else install version {OLDEST_LLVM} or later (Debian: apt install "
+    "libllvm19, macOS: brew install llvm) or name it in DRJIT_LIBLLVM_PATH, or look at houses without light (unlit)"
+)
 
 
 class LightError(UnableError):
@@ -88,42 +88,39 @@ def threads_allowed() -> int | None:
 
 
 def variant_of(has_backend: Callable[[str], bool]) -> str:
-    """The Mitsuba variant to use: CUDA's before LLVM's; with a warning the scalar one where both are missing.
+    """The Mitsuba variant to use: CUDA's before LLVM's.
 
     Args:
       has_backend: whether Dr.Jit can use 'CUDA' or 'LLVM' here.
+
+    Raises:
+      LightError: it can use neither.
     """
     for variant, name in VARIANTS:
         if has_backend(name):
             return variant
-    warn(
-        f"Dr.Jit finds neither CUDA nor LLVM: Mitsuba's scalar variant computes the light, {SLOWER}; install LLVM "
-        f"{OLDEST_LLVM} or later (Debian: apt install libllvm19) or name it in DRJIT_LIBLLVM_PATH, or look at houses "
-        "with pictures='unlit'"
-    )
-    return SCALAR
+    raise LightError(f"light needs CUDA or LLVM, and Dr.Jit finds neither; {REMEDY}")
 
 
 def mitsuba() -> types.ModuleType:
-    """Mitsuba's arrays, rays and warps, in its best variant; `embodied.light.scalar` in the scalar one.
+    """Mitsuba in its best variant.
 
     Raises:
-      LightError: Mitsuba is not installed.
+      LightError: Mitsuba is not installed, or finds neither CUDA nor LLVM.
     """
-    return scalar if device() == "scalar" else _module()
+    return _module()
 
 
 def drjit() -> types.ModuleType:
-    """Dr.Jit, for what can be done with Mitsuba's arrays; `embodied.light.scalar` in the scalar variant."""
-    if device() == "scalar":
-        return scalar
+    """Dr.Jit, for what can be done with Mitsuba's arrays."""
+    _module()
     import drjit as dr
 
     return dr
 
 
 def device() -> str:
-    """'cuda', 'llvm' or 'scalar': what the light is computed on, for fingerprints and tables."""
+    """'cuda' or 'llvm': what the light is computed on, for fingerprints and tables."""
     return _module().variant().split("_")[0]
 
 
@@ -140,8 +137,7 @@ def scene_of(corners: np.ndarray) -> RayScene:
     params["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
     params["faces"] = np.arange(3 * m, dtype=np.uint32)
     params.update()
-    scene = mi.load_dict({"type": "scene", "triangles": mesh})
-    return scalar.ScalarScene(scene, mi) if device() == "scalar" else scene
+    return mi.load_dict({"type": "scene", "triangles": mesh})
 
 
 ALIGNED = 64

@@ -22,40 +22,34 @@ settings themselves are in a bake's key; what packages offer by name; the progre
 
 def light_code() -> str:
     """Digest of the code and the libraries that bake; bakes made by others are made anew."""
-    return code_digest("embodied.light.baking", without=APART)
+    return code_digest("embodied.light.baking.house", without=APART)
 
 
 @dataclass(frozen=True)
 class Settings:
     """Everything a bake depends on besides the house."""
 
-    density: float = 40.0
+    density: float = 32.0
     """Luxels per metre on walls, floors and ceilings."""
-    budget: float = 6000.0
+    budget: float = 4000.0
     """Luxels per piece of furniture."""
-    every: float = 3.0
-    """Luxels from one site to the next (`embodied.light.sites`)."""
-    doubt: float = 0.04
-    """Share of a luxel's light by which the sites around may differ before it is traced itself."""
-    sky_rays: int = 24
-    """Rays per site and window, and per luxel where sites disagree."""
-    lamp_rays: int = 24
+    sky_rays: int = 12
+    """Rays per luxel and window."""
+    lamp_rays: int = 12
+    other_rays: int = 24
+    """Rays per luxel outdoors; of what metals mirror, as `compose` says."""
     sun_rays: int = 12
     """Rays over the sun's disc per texel near a shadow's edge."""
     patches: int = 64
     """Small lights that stand for the sun's patches in one room."""
-    bounces: tuple[int, ...] = (6, 6, 8, 12, 96)
-    """Rays per site in each round of gathering; the last is what is seen."""
+    bounces: tuple[int, ...] = (2, 2, 4, 32)
+    """Rays per luxel in each round of gathering; the last is what is seen."""
     sharpness: float = 1.0
     """Texels per metre, times those that patterns need to look sharp from nearby (`atlas.fineness`)."""
     tolerance: float = 0.10
-    """Relative difference from the path tracer that a luxel may have (`embodied.light.check`)."""
+    """Relative difference from the path tracer that a luxel may have (`embodied.light.baking.check`)."""
     jpeg: int = 92
     """Quality of the picture pages on disk."""
-    few: int = 2
-    """Luxels of a cell that has no site of its own but a neighbour's; 0 gives every cell one."""
-    things: float = 1.0
-    """Times `every` on furniture and joinery."""
     texels: float = 29e6
     """Of all pages together, before packing; patterns of large houses are drawn coarser to keep to it
     (`atlas.coarsened`)."""
@@ -64,15 +58,13 @@ class Settings:
 QUALITIES = {
     "fast": Settings(
         density=20.0,
-        budget=1200.0,
-        every=2.0,
-        few=0,
-        doubt=0.12,
+        budget=800.0,
         sky_rays=8,
         lamp_rays=8,
+        other_rays=8,
         sun_rays=4,
         patches=48,
-        bounces=(4, 4, 4, 4, 64),
+        bounces=(2, 2, 4, 24),
         sharpness=0.45,
         tolerance=0.2,
         jpeg=88,
@@ -81,12 +73,12 @@ QUALITIES = {
     "high": Settings(
         density=56.0,
         budget=14000.0,
-        doubt=0.02,
-        sky_rays=48,
-        lamp_rays=32,
+        sky_rays=16,
+        lamp_rays=16,
+        other_rays=48,
         sun_rays=16,
         patches=96,
-        bounces=(8, 8, 12, 16, 192),
+        bounces=(4, 4, 8, 64),
         jpeg=94,
         texels=120e6,
     ),

@@ -40,7 +40,7 @@ def _light_of_values() -> np.ndarray:
 
 
 def film(x: np.ndarray) -> np.ndarray:
-    """Exposed light of a grey as sRGB in [0, 1]: the curve of embodied.light.tone, which drawing may not import;
+    """Exposed light of a grey as sRGB in [0, 1]: the curve of embodied.light.pages.tone, which drawing may not import;
     a test compares them."""
     y = np.minimum(x * (1 + x / 25.0) / (1 + x), 1.0)
     lifted = np.where(y <= 0.0031308, 12.92 * y, 1.055 * y ** (1 / 2.4) - 0.055) * 1.12

@@ -44,7 +44,7 @@ class PictureSettings:
     light: str | None = None
     """Light settings by name (embodied.light); those that the kind stands for if None."""
     rays: int | None = None
-    """Per pixel, of kinds in TRACED; None: as many as embodied.light.reference.RAYS has for the kind."""
+    """Per pixel, of kinds in TRACED; None: as many as embodied.light.tracing.reference.RAYS has for the kind."""
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -17,7 +17,7 @@ from scipy.ndimage import map_coordinates
 from embodied.house.house import House
 from embodied.light.arrays import Array
 from embodied.light.backend import array, drjit, mitsuba, vector
-from embodied.light.colours import shown
+from embodied.light.pages.colours import shown
 
 TARGET = 1.05
 """Linear value (before the curve) that a white sheet in a room's fuller light (85th percentile) is brought to."""

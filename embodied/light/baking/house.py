@@ -2,7 +2,7 @@
 
 A bake lives in `<cache>/light/<key>`, where the key is made of the house's digest, all its parts with their meshes and
 materials, the settings and the code that bakes (`embodied.light.settings.light_code`). Its files are
-`embodied.light.files`'; an interrupted bake goes on where it stopped.
+`embodied.light.pages.files`'; an interrupted bake goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -20,39 +20,35 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from assets.cache import digest, write_json
+from assets.cache import digest, write_bytes, write_json
 from assets.catalogue import Catalogue
-from assets.records import DETAILS, Finish
 from embodied.house.house import WEATHERS, House, Sky
-from embodied.light import tone
-from embodied.light.atlas import Atlas, Page, atlas_of, coarsened, things_of
-from embodied.light.backend import device, rest, warn
-from embodied.light.colours import ColourMaps
-from embodied.light.compose import Composer, Solved, page_of
-from embodied.light.emitters import in_the_open, lamps_of
-from embodied.light.files import (
+from embodied.light.backend import rest, warn
+from embodied.light.baking.compose import Composer, Solved, page_of
+from embodied.light.baking.solve import Problem, Radiosity, solve
+from embodied.light.baking.stages import facts_of, kept_light, same_atlas
+from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
+from embodied.light.memory import Memory, once
+from embodied.light.pages import tone
+from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
+from embodied.light.pages.colours import ColourMaps
+from embodied.light.pages.files import (
     Bake,
     StaleBake,
-    facts_of,
-    kept_light,
     open_bake,
+    packed_meshes,
     page_files,
     reopened,
-    same_atlas,
     write_jpeg,
-    write_lamps,
-    write_meshes,
     write_page,
 )
-from embodied.light.memory import Memory
-from embodied.light.radiosity import space_of, with_env
+from embodied.light.pages.meshes import meshes_of
+from embodied.light.pages.tone import expose
 from embodied.light.settings import QUALITIES, Settings, light_code, settings_of
-from embodied.light.sites import sites_of
-from embodied.light.sky import outdoors as outdoors_of
-from embodied.light.solve import Luxels, Problem, Radiosity, luxels_of, solve, with_glow
-from embodied.light.surroundings import Outside, daylit, dome_mesh, outside_of
-from embodied.light.tone import expose
-from embodied.light.unwrap import areas_of
+from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
+from embodied.light.tracing.luxels import Luxels, luxels_of, with_glow
+from embodied.light.tracing.radiosity import space_of, spaces_without, with_env
+from embodied.light.tracing.sky import outdoors as outdoors_of
 from embodied.locks import locked
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh
@@ -63,9 +59,7 @@ Progress = Callable[[str, float], None]
 
 
 SECONDS = {"fast": 1.0, "normal": 2.5, "high": 8.0}
-"""Of one core per square metre of a house, by quality, with LLVM and furniture that is new to the cache."""
-SCALAR_FACTOR = 10.0
-"""How much longer it takes without LLVM."""
+"""Of one core per square metre of a house, by quality, with furniture that is new to the cache."""
 MOST_CORES = 8
 """More shorten it little."""
 STAGES = {
@@ -82,8 +76,7 @@ STAGES = {
 def duration(house: House, quality: str) -> str:
     """About how long `bake` takes on this machine, in words."""
     cores = min(os.cpu_count() or 1, MOST_CORES)
-    slower = SCALAR_FACTOR if device() == "scalar" else 1.0
-    seconds = slower * house.area * SECONDS[quality] / cores
+    seconds = house.area * SECONDS[quality] / cores
     return f"about {math.ceil(seconds / 60)} minutes" if seconds > 60 else "about a minute"
 
 
@@ -247,27 +240,30 @@ class Shared:
         self.atlas = atlas_of(coarsened(things, settings.texels))
         self.lux = luxels_of(self.atlas, self.maps)
         self.space = space_of(self.atlas, self.lux.texels)
-        clock("luxels")
-        self.sites = sites_of(self.lux, settings.every, few=settings.few, things=settings.things)
         self.memory = Memory() if several else None
-        clock("sites")
+        clock("luxels")
 
     @functools.cached_property
     def outside(self) -> Outside | None:
         """What the sun and the sky light outside."""
-        return outside_of(self._outer, self.atlas, self._cache, self.maps, self._sharpness)
+        return outside_of(self._outer, self.space.scene, self._cache, self.maps, self._sharpness)
 
     @functools.cached_property
     def meshes(self) -> tuple[list[LitMesh], list[np.ndarray]]:
         """What renderers draw, and the gloss of its faces."""
         first = len(self.atlas.pages)
-        meshes, gloss = _meshes(self.atlas, 0)
+        meshes, gloss = meshes_of(self.atlas, 0)
         if self.outside is not None:
-            more, more_gloss = _meshes(self.outside.atlas, first)
+            more, more_gloss = meshes_of(self.outside.atlas, first)
             meshes += [dataclasses.replace(m, kind="outdoor") for m in more]
             gloss += more_gloss
             first += len(self.outside.atlas.pages)
         return [*meshes, dome_mesh(self._house, first)], gloss
+
+    @functools.cached_property
+    def meshes_file(self) -> bytes:
+        """`meshes` as they are written."""
+        return packed_meshes(*self.meshes)
 
 
 def solve_house(
@@ -290,16 +286,18 @@ def solve_house(
     lamps = tuple(in_the_open(x, space.scene) for x in lamps_of(house, atlas))
     lux = with_glow(shared.lux, house, atlas, lamps)
     clock("luxels")
-    problem = Problem(house, atlas, lux, shared.sites, space, outdoors, lamps, settings, shared.memory)
+    bare = tuple(sorted({x.owner for x in lamps if x.owner in atlas.owners}))  # type: ignore[type-var]  # no None
+    without = once(shared.memory, ("without", bare), lambda: spaces_without(space, atlas, bare))
+    problem = Problem(house, atlas, lux, space, outdoors, lamps, settings, shared.memory, without)
     light = kept_light(folder, len(lux.position), lambda: solve(problem, progress, clock))
     clock("direct")
     outside = np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0)
     exposure = expose(house, _light_of_rooms(house, atlas, lux, light), outside)
-    return Solved(house, atlas, lux, light, outdoors, lamps, exposure, space)
+    return Solved(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
 
 
 def _make(house: House, shared: Shared, folder: Path, settings: Settings, progress: Progress) -> Bake:
-    from embodied.light.check import check
+    from embodied.light.baking.check import check
 
     took, shared.took = shared.took, {}
     start, used = time.perf_counter(), time.process_time()
@@ -315,20 +313,19 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
         progress("pages", i / len(s.atlas.pages))
         if not all((folder / n).exists() for n in page_files(i)):
             one = page_of(i, composer)
-            write_page(folder, i, one, settings.jpeg)
+            write_page(folder, i, one, settings.jpeg, shared.memory)
     clock("pages")
     first = len(s.atlas.pages)
-    pictures = daylit(shared.outside, s.outdoors, s.exposure, settings.sky_rays)
+    pictures = daylit(shared.outside, s.outdoors, s.exposure, settings.other_rays)
     for i, picture in enumerate(pictures, first):
         write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
     clock("surroundings")
-    meshes, gloss = shared.meshes
-    write_meshes(folder, meshes, gloss)
-    write_lamps(folder, s.lamps)
+    write_bytes(folder / "meshes.npz", shared.meshes_file)
+    write_lamps(folder / "lamps.npz", s.lamps)
     clock("meshes")
     (folder / "stage_light.npz").unlink(missing_ok=True)
     manifest = {
-        **facts_of(s, meshes, _probes(s), folder),
+        **facts_of(s, shared.meshes[0], _probes(s), folder),
         "settings": dataclasses.asdict(settings),
         "pages": first + len(pictures),
         "seconds": {k: round(v, 2) for k, v in took.items()},
@@ -387,75 +384,9 @@ def _levels(s: Solved) -> list[float]:
 
 
 def _probes(s: Solved) -> dict[str, list]:
-    from embodied.light.probe import ambient_cubes
+    from embodied.light.baking.probe import ambient_cubes
 
     return {r.id: cube.round(4).tolist() for r, cube in zip(s.house.rooms, ambient_cubes(s))}
-
-
-def _meshes(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
-    """One mesh per owner and page, corners welded, thin faces listed twice, and the gloss of its faces.
-
-    Args:
-      first: number of the atlas's first page.
-
-    Returns:
-      Meshes, and for each (m, 4) uint8: roughness, specular and metallic times 255, and detail (see gloss_of and
-      detail_of).
-    """
-    out, shine = [], []
-    for number, page in enumerate(atlas.pages, first):
-        uv = page.luxels / np.array([page.width, page.height], np.float32)
-        for o in np.unique(page.owner):
-            mine = np.nonzero(page.owner == o)[0]
-            both = np.concatenate([page.corners[mine], uv[mine]], axis=-1).reshape(-1, 5)
-            _, corner, index = np.unique(np.round(both, 5), axis=0, return_index=True, return_inverse=True)
-            faces = index.reshape(-1, 3).astype(np.int32)
-            thin = page.thin[mine]
-            faces = np.concatenate([faces, faces[thin][:, ::-1]])
-            real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-            alpha = (
-                min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
-            )
-            out.append(
-                LitMesh(
-                    atlas.owners[o],
-                    atlas.kinds[o],
-                    atlas.rooms[o],
-                    number,
-                    both[corner, :3].astype(np.float32),
-                    faces[real],
-                    both[corner, 3:].astype(np.float32),
-                    float(alpha),
-                )
-            )
-            kind = np.array([gloss_of(f) for f in page.finishes], np.uint8)[page.finish[mine]]
-            kind = np.column_stack([kind, detail_of(page, mine)])
-            area = areas_of(page.corners[mine])
-            mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
-            out[-1] = dataclasses.replace(out[-1], gloss=mean)
-            shine.append(np.concatenate([kind, kind[thin]])[real])
-    return out, shine
-
-
-def gloss_of(finish: Finish) -> tuple[int, int, int]:
-    """Roughness, specular and metallic times 255; a mirror is smooth metal."""
-    if finish.mirror:
-        return 4, 255, 255
-    rough, specular, metal = (min(max(x, 0.0), 1.0) for x in (finish.roughness, finish.specular, finish.metallic))
-    return round(255 * rough), round(255 * specular), round(255 * metal)
-
-
-def detail_of(page: Page, faces: np.ndarray) -> np.ndarray:
-    """(k,) uint8 of some faces: number of what they show from nearby, from 1 on, and 16 times that of the axis along
-    which their texture's u runs, 3 for none; 0 for smooth ones."""
-    number = np.array([1 + DETAILS.index(f.detail) if f.detail else 0 for f in page.finishes], np.uint8)
-    corners, uv = page.corners[faces], page.uv[faces].astype(np.float64)
-    sides, turns = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
-    area = turns[:, 0, 0] * turns[:, 1, 1] - turns[:, 0, 1] * turns[:, 1, 0]
-    along = sides[:, 0] * turns[:, 1, 1, None] - sides[:, 1] * turns[:, 0, 1, None]
-    axis = np.where(np.abs(area) > 1e-12, np.abs(along).argmax(1), 3)
-    detail = number[page.finish[faces]]
-    return np.where(detail > 0, detail + 16 * axis, 0).astype(np.uint8)
 
 
 def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:

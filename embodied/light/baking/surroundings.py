@@ -12,17 +12,17 @@ import numpy as np
 
 from embodied.geometry import r2
 from embodied.house.house import House
-from embodied.light import radiosity
 from embodied.light.arrays import Array, RayScene
-from embodied.light.atlas import Atlas, atlas_of, things_of
 from embodied.light.backend import added_up, array, constant, drjit, floats, fraction, mitsuba, scene_of, vector
-from embodied.light.colours import ColourMaps, albedo
-from embodied.light.compose import spread
-from embodied.light.cover import Cover, Texels, cover, rasterise, sheets_of
-from embodied.light.radiosity import ENV_ROWS, LIFT, points_of, sky_alone
-from embodied.light.sky import Outdoors
-from embodied.light.tone import Exposure, display
-from embodied.light.unwrap import SPARSEST
+from embodied.light.baking.compose import spread
+from embodied.light.pages.atlas import Atlas, atlas_of, things_of
+from embodied.light.pages.colours import ColourMaps, albedo
+from embodied.light.pages.cover import Cover, Texels, cover, rasterise, sheets_of
+from embodied.light.pages.tone import Exposure, display
+from embodied.light.pages.unwrap import SPARSEST
+from embodied.light.tracing import radiosity
+from embodied.light.tracing.radiosity import ENV_ROWS, LIFT, Together, points_of, sky_alone
+from embodied.light.tracing.sky import Outdoors
 from embodied.scene.backdrop import DOME, GLOW, dome
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
@@ -49,7 +49,7 @@ class Outside:
 
 
 def outside_of(
-    parts: Sequence[Part], indoors: Atlas, cache: Path, maps: ColourMaps, sharpness: float = 1.0
+    parts: Sequence[Part], indoors: RayScene, cache: Path, maps: ColourMaps, sharpness: float = 1.0
 ) -> Outside | None:
     """What light falls on outside; None for a house without outer parts.
 
@@ -76,7 +76,7 @@ def outside_of(
         covers,
         tuple(rasterise(p, 1, s) for p, s in zip(atlas.pages, sheets)),
         tuple(albedo(p, c, maps) for p, c in zip(atlas.pages, covers)),
-        scene_of(np.concatenate([p.corners for a in (indoors, atlas) for p in a.pages if not p.glass])),
+        Together((indoors, scene_of(np.concatenate([p.corners for p in atlas.pages if not p.glass])))),
     )
 
 

@@ -7,34 +7,45 @@ its checksum.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import functools
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 
 from assets.archives import open_arrays
-from assets.cache import atomic_path, digest, write_bytes
+from assets.cache import write_bytes
 from assets.json_file import read_json
 from embodied.house.house import House
-from embodied.light.atlas import Atlas
-from embodied.light.backend import LightError, device, warn
-from embodied.light.compose import Ingredients, Solved
-from embodied.light.emitters import Lamp
+from embodied.light.backend import LightError, warn
+from embodied.light.memory import Memory, once
+from embodied.light.pages.records import packed
+from embodied.light.pages.tone import Exposure
 from embodied.light.settings import light_code
-from embodied.light.solve import Radiosity
-from embodied.light.tone import Exposure
-from embodied.scene.house_meshes import owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 
 class StaleBake(LightError):
     """A bake that does not belong to the house at hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ingredients:
+    """One page before exposure, at texel size unless said otherwise."""
+
+    soft: np.ndarray
+    """(h luxels, w luxels, 3) float16 e of all light but the sun's own."""
+    sun: np.ndarray
+    """(h, w) uint8 share of the sun seen, times 255."""
+    albedo: np.ndarray
+    """(h, w, 3) uint8 sRGB."""
+    picture: np.ndarray
+    """(h, w, 3) uint8 sRGB, exposed: what the classic renderer shows."""
+    glow: np.ndarray
+    """(h luxels, w luxels, 3) float16 radiance of what shines itself; (0, 0, 3) where nothing does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +82,17 @@ class Bake:
             )
         return LitPages(meshes, pages, self.manifest["key"], tuple(self.manifest["owners"]))
 
+    @functools.cached_property
+    def gloss(self) -> tuple[np.ndarray | None, ...]:
+        """(m, 4) uint8 of each mesh's faces, from `pages.meshes`; None where nothing is known of them."""
+        with open_arrays(self.folder / "meshes.npz") as z:
+            return tuple(z[f"g{i}"] if f"g{i}" in z.files else None for i in range(len(self.manifest["meshes"])))
+
+    def glow(self, page: int) -> np.ndarray | None:
+        """(h, w, 3) float16 radiance of what shines itself on a page; None where nothing does."""
+        with open_arrays(self.folder / page_files(page)[0]) as z:
+            return z["glow"] if z["glow"].size else None
+
     def probe(self, room: str) -> np.ndarray:
         """(6, 3) float32 light that reaches the middle of a room from +x, -x, +y, -y, +z, -z, as sRGB in [0, 1].
 
@@ -83,7 +105,7 @@ class Bake:
 
     def ingredients(self, page: int) -> Ingredients:
         """One page before exposure."""
-        with open_arrays(self.folder / f"light_{page:03d}.npz") as z:
+        with open_arrays(self.folder / page_files(page)[0]) as z:
             soft, glow = z["soft"], z["glow"]
         sun = np.asarray(cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE))
         shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
@@ -113,7 +135,7 @@ def open_bake(folder: Path, house: House) -> Bake:
             "it was edited after it was lit; run `embodied light` again"
         )
     for name, mark in files.items():
-        if _mark(folder / name) != mark:
+        if checksum(folder / name) != mark:
             raise StaleBake(f"{folder / name} is missing or damaged; run `embodied light` again")
     return Bake(folder, manifest)
 
@@ -131,107 +153,40 @@ def reopened(folder: Path, house: House) -> Bake | None:
         return None
 
 
-def same_atlas(folder: Path, atlas: Atlas) -> None:
-    """Empty `folder` if what an interrupted run left there belongs to other meshes or textures."""
-    pages = [
-        digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes))
-        for p in atlas.pages
-    ]
-    mark, path = digest(pages), folder / "atlas.txt"
-    if not path.exists() or path.read_text() != mark:
-        for old in sorted(p for p in folder.iterdir() if not p.name.startswith(".")):  # which holds a lock, too
-            old.unlink()
-        write_bytes(path, mark.encode())
-
-
-def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
-    """What `work` returns, from disk if an interrupted run left it there whole."""
-    path = folder / "stage_light.npz" if folder else None
-    names = [f.name for f in dataclasses.fields(Radiosity)]
-    if path is not None and path.exists():
-        try:
-            with open_arrays(path) as z:
-                known = Radiosity(*(z[name] for name in names))
-            if all(len(getattr(known, name)) == n for name in names):
-                return known
-        except Exception as e:
-            warn(f"{path} is damaged ({type(e).__name__}); the stage is computed again")
-    made = work()
-    if path is not None:
-        with atomic_path(path) as temporary, open(temporary, "wb") as f:
-            np.savez(f, **{name: getattr(made, name) for name in names})
-    return made
-
-
 def page_files(i: int) -> tuple[str, ...]:
     """Names of the files of page i: its light, its sun, its colours, its picture."""
     return f"light_{i:03d}.npz", f"sun_{i:03d}.png", f"albedo_{i:03d}.jpg", f"page_{i:03d}.jpg"
 
 
-def write_page(folder: Path, i: int, page: Ingredients, quality: int) -> None:
-    """Page i: light as half floats, the sun as PNG, colours and picture as JPEG of `quality`."""
+def write_page(folder: Path, i: int, page: Ingredients, quality: int, memory: Memory | None = None) -> None:
+    """Page i: light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of
+    `quality`."""
     light, sun, shown, picture = page_files(i)
-    with atomic_path(folder / light) as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, soft=page.soft, glow=page.glow)
+    write_bytes(folder / light, packed({"soft": page.soft, "glow": page.glow}))
     write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
-    write_jpeg(folder / shown, page.albedo, quality)
+    write_bytes(folder / shown, once(memory, ("colours", i), lambda: _jpeg(page.albedo, quality)))
     write_jpeg(folder / picture, page.picture, quality)
 
 
 def write_jpeg(path: Path, picture: np.ndarray, quality: int) -> None:
     """`picture`: (h, w, 3) uint8 sRGB."""
+    write_bytes(path, _jpeg(picture, quality))
+
+
+def _jpeg(picture: np.ndarray, quality: int) -> bytes:
     data = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-    write_bytes(path, data.tobytes())
+    return data.tobytes()
 
 
-def write_meshes(folder: Path, meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> None:
+def packed_meshes(meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> bytes:
     """meshes.npz: corners, faces, places on the page and gloss of each mesh, in the manifest's order."""
-    with atomic_path(folder / "meshes.npz") as temporary, open(temporary, "wb") as f:
-        arrays: dict[str, Any] = {f"g{i}": g for i, g in enumerate(gloss)}
-        for i, m in enumerate(meshes):
-            arrays |= {f"v{i}": m.vertices, f"f{i}": m.faces, f"t{i}": m.uv}
-        np.savez_compressed(f, **arrays)
+    arrays = {f"g{i}": g for i, g in enumerate(gloss)}
+    for i, m in enumerate(meshes):
+        arrays |= {f"v{i}": m.vertices, f"f{i}": m.faces, f"t{i}": m.uv}
+    return packed(arrays)
 
 
-def write_lamps(folder: Path, lamps: Sequence[Lamp]) -> None:
-    """lamps.npz: the surfaces that glow, lamp after lamp."""
-    with atomic_path(folder / "lamps.npz") as temporary, open(temporary, "wb") as f:
-        arrays: dict[str, Any] = {
-            f"{k}{i}": np.asarray(getattr(x, k))
-            for i, x in enumerate(lamps)
-            for k in ("points", "normals", "radiance", "area", "weights")
-        }
-        np.savez_compressed(f, **arrays)
-
-
-def facts_of(s: Solved, meshes: Sequence[LitMesh], probes: Mapping[str, list], folder: Path) -> dict[str, object]:
-    """What the manifest says of a bake whose files are written, but how it was made."""
-    written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
-    return {
-        "code": light_code(),
-        "key": folder.name,
-        "house": s.house.digest,
-        "device": device(),
-        "own_pages": len(s.atlas.pages),
-        "owners": list(owners(s.house)),
-        "luxels": len(s.lux.position),
-        "exposure": {
-            "polygons": s.exposure.polygons,
-            "levels": s.exposure.levels.tolist(),
-            "gains": s.exposure.gains.tolist(),
-            "outdoors": s.exposure.outdoors.tolist(),
-        },
-        "meshes": [
-            {"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha, "gloss": m.gloss}
-            for m in meshes
-        ],
-        "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
-        "probes": dict(probes),
-        "files": {p.name: _mark(p) for p in written},
-    }
-
-
-def _mark(path: Path) -> list[int] | None:
+def checksum(path: Path) -> list[int] | None:
     """Size and CRC-32 of a file; None where there is none."""
     return [path.stat().st_size, zlib.crc32(path.read_bytes())] if path.is_file() else None
 
@@ -241,7 +196,7 @@ def _drop_damaged(folder: Path) -> None:
     path = folder / "manifest.json"
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         for name, mark in read_json(path)["files"].items():
-            if Path(name).name == name and _mark(folder / name) != mark:  # nothing outside
+            if Path(name).name == name and checksum(folder / name) != mark:  # nothing outside
                 (folder / name).unlink(missing_ok=True)
     path.unlink(missing_ok=True)
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.light import radiosity
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import array, constant, drjit, flags, floats, mitsuba, vector, wholes
-from embodied.light.emitters import Lamp, Portal
-from embodied.light.radiosity import Points, Space
-from embodied.light.sky import Outdoors
-from embodied.light.solve import AMBIENT, Luxels
+from embodied.light.backend import added_up, array, constant, drjit, flags, floats, mitsuba, number, vector, wholes
+from embodied.light.tracing import radiosity
+from embodied.light.tracing.emitters import Lamp, Portal
+from embodied.light.tracing.luxels import AMBIENT, Luxels
+from embodied.light.tracing.radiosity import Points, Space
+from embodied.light.tracing.sky import Outdoors
 
 DEEPEST = 14
 """Diffuse bounces followed; Russian roulette begins at the third."""
@@ -30,9 +30,9 @@ class Lights:
     """Everything that shines, pooled so that every path picks its own light; k lights, device arrays."""
 
     count: int
-    centre: np.ndarray
-    """(k, 3) metres."""
-    power: np.ndarray
+    centre: Array
+    """(k * 3) metres."""
+    power: Array
     """(k,) rough brightness, for choosing."""
     corner: Array
     along: Array
@@ -98,17 +98,18 @@ def lights_of(
     centre = np.array([p.corner + (p.along + p.up) / 2 for p in portals] + [x.points.mean(0) for x in lamps]).reshape(
         k, 3
     )
-    power = np.array(
+    power = np.maximum(
         [p.area * sky for p in portals]
-        + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1) for x in lamps]
+        + [float(x.radiance.mean()) * x.area * (4 if x.owner or not x.normals.any() else 1) for x in lamps],
+        1e-6,
     )
     fill = lambda a: a[np.arange(POINTS) % len(a)]
     scene = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
     none = [zero] * len(lamps)
     return Lights(
         k,
-        centre,
-        power,
+        floats(centre),
+        floats(power),
         floats([p.corner for p in portals] + none),
         floats([p.along for p in portals] + none),
         floats([p.up for p in portals] + none),
@@ -137,30 +138,29 @@ def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator,
         total = total + _one_light(space, lights, p, rng) / picks
     if lights.portal_scene is not None:
         share = radiosity.sun_share(space, p, lights.portal_scene, lights.towards_sun, 1)
-        total = total + mi.Color3f(*(float(x) for x in lights.sun)) * share
+        total = total + mi.Color3f(*(constant(x) for x in lights.sun)) * share
     return total
 
 
 def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator) -> Array:
     mi, dr = mitsuba(), drjit()
     u = rng.random((3, p.n), np.float32)
-    weights, whole = [], mi.Float(0.0)
-    for c, power in zip(lights.centre, lights.power):
-        far = mi.Point3f(*(constant(x) for x in c)) - p.position
-        weights.append(constant(max(power, 1e-6)) / (dr.squared_norm(far) + 0.3))
-        whole += weights[-1]
-    target, sum_, pick, chance, open_ = (
-        floats(u[0]) * whole,
-        mi.Float(0.0),
-        mi.UInt32(0),
-        mi.Float(1.0),
-        mi.Bool(True),
-    )
-    for i, w in enumerate(weights):
-        sum_ += w
-        here = open_ & ((target < sum_) | (i == lights.count - 1))
-        pick, chance = dr.select(here, i, pick), dr.select(here, w / whole, chance)
-        open_ &= ~here
+    count, zero = number(lights.count), dr.zeros(mi.Float, p.n)
+
+    def weight(i: Array) -> Array:
+        far = dr.gather(mi.Point3f, lights.centre, i) - p.position
+        return dr.gather(mi.Float, lights.power, i) / (dr.squared_norm(far) + 0.3)
+
+    (whole,) = added_up(lights.count, lambda i: (weight(i),), zero)
+    target = floats(u[0]) * whole
+
+    def until(i: Array, sum_: Array, pick: Array, chance: Array) -> tuple[Array, ...]:
+        w = weight(i)
+        here = (chance == 0) & ((target < sum_ + w) | (i + 1 == count))
+        return i + 1, sum_ + w, dr.select(here, i, pick), dr.select(here, w / whole, chance)
+
+    start = mi.UInt32(0), zero, dr.zeros(mi.UInt32, p.n), dr.zeros(mi.Float, p.n)
+    _, _, pick, chance = dr.while_loop(start, lambda i, *_: i < count, until)
     dr.eval(pick, chance)
     a, b = floats(u[1]), floats(u[2])
     at = lambda t: dr.gather(mi.Vector3f, t, pick)

@@ -10,23 +10,22 @@ import itertools
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from assets.archives import open_arrays
-from assets.cache import DAMAGED, atomic_path, digest
+from assets.cache import digest
 from assets.closure import code_digest
 from assets.records import MeshPart
 from embodied.geometry import r2
 from embodied.light.arrays import Array
 from embodied.light.backend import added_up, drjit, floats, fraction, mitsuba, scene_of, vector
+from embodied.light.pages.records import load_record, save_record
 
-T = TypeVar("T")
 ONCE = 6000.0
 """Budget for which models are unwrapped; other budgets get the same charts at another density."""
 SPARSEST = 0.36
@@ -77,6 +76,17 @@ def areas_of(corners: np.ndarray) -> np.ndarray:
     return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
 
 
+def distinct(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) first occurrence of each different row of (n, c) numbers, in the order of their columns, and (n,) which of
+    these each row is: what np.unique returns of axis 0, in a tenth of the time."""
+    order = np.lexsort(rows.T[::-1])
+    in_order, new = rows[order], np.ones(len(rows), bool)
+    new[1:] = (in_order[1:] != in_order[:-1]).any(1)
+    which = np.empty(len(rows), np.int64)
+    which[order] = np.cumsum(new) - 1
+    return order[new], which
+
+
 def face_normals(corners: np.ndarray) -> np.ndarray:
     """(m, 3) unit normals of triangles (m, 3, 3), counter-clockwise seen from outside."""
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -95,8 +105,7 @@ def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
     n = face_normals(corners)
     offset = np.einsum("mk,mk->m", n, corners[:, 0])
     keys = np.concatenate([np.round(n * 200), np.round(offset[:, None] * 500), part[:, None]], axis=1).astype(np.int64)
-    _, chart = np.unique(keys, axis=0, return_inverse=True)
-    chart = _strips(corners, chart.reshape(-1))
+    chart = _strips(corners, distinct(keys)[1])
     flat = np.zeros((len(corners), 3, 2))
     sizes = []
     for c in range(chart.max() + 1):
@@ -269,21 +278,6 @@ def unwrap_code() -> str:
     return code_digest(__name__, without=APART)
 
 
-def save_record(record: Any, path: Path) -> None:
-    """Write a dataclass of arrays as .npz, atomically."""
-    with atomic_path(path) as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, **{x.name: getattr(record, x.name) for x in fields(record)})
-
-
-def load_record(kind: type[T], path: Path) -> T | None:
-    """Read what `save_record` wrote; None when absent, cut short or of another shape."""
-    try:
-        with open_arrays(path) as z:
-            return kind(**{x.name: z[x.name] for x in fields(kind)})  # type: ignore[arg-type]  # a dataclass
-    except (OSError, *DAMAGED):
-        return None
-
-
 def pack(sizes: np.ndarray, width: int | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Place rectangles, tallest first, each where its top comes to lie lowest.
 
@@ -430,14 +424,13 @@ def _without_doubles(corners: np.ndarray) -> np.ndarray:
 
     Twice the triangles to draw is the lesser cost: edges with four faces break every chart of xatlas into crumbs.
     """
-    _, spot = np.unique(np.round(corners.reshape(-1, 3), 4), axis=0, return_inverse=True)
-    _, first = np.unique(np.sort(spot.reshape(-1, 3), axis=1), axis=0, return_index=True)
-    return np.sort(first)
+    _, spot = distinct(np.round(corners.reshape(-1, 3), 4))
+    return np.sort(distinct(np.sort(spot.reshape(-1, 3), axis=1))[0])
 
 
 def _with_rings(corners: np.ndarray, keep: np.ndarray, rings: int = 2) -> np.ndarray:
     """`keep` grown by vertex rings: faces beside a visible one are kept, else cracks open."""
-    _, spot = np.unique(np.round(corners.reshape(-1, 3), 4), axis=0, return_inverse=True)
+    _, spot = distinct(np.round(corners.reshape(-1, 3), 4))
     spot = spot.reshape(-1, 3)
     for _ in range(rings):
         touched = np.zeros(spot.max() + 1, bool)
@@ -449,7 +442,5 @@ def _with_rings(corners: np.ndarray, keep: np.ndarray, rings: int = 2) -> np.nda
 def _weld(corners: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Shared vertices (n, 6) of position and normal, and faces (m, 3) into them."""
     both = np.concatenate([corners, normals], -1).reshape(-1, 6)
-    _, first, index = np.unique(
-        np.round(both * [1, 1, 1, 0.02, 0.02, 0.02], 5), axis=0, return_index=True, return_inverse=True
-    )
+    first, index = distinct(np.round(both * [1, 1, 1, 0.02, 0.02, 0.02], 5))
     return both[first], index.reshape(-1, 3)

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 
 from embodied.light.arrays import Array, RayScene
-from embodied.light.atlas import Page
 from embodied.light.backend import constant, drjit, floats, mitsuba, number, scene_of
-from embodied.light.unwrap import face_normals
+from embodied.light.pages.atlas import Page
+from embodied.light.pages.unwrap import face_normals
 
 OFFSETS = (
     *((-0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (0.0, 0.47), (0.0, -0.47), (0.47, 0.0), (-0.47, 0.0)),

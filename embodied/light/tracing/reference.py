@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 
 from embodied.house.house import House
-from embodied.light import paths, radiosity
 from embodied.light.arrays import Array, Ray, Triple
 from embodied.light.backend import array, constant, drjit, floats, mitsuba, vector
-from embodied.light.files import Bake
-from embodied.light.radiosity import Points
-from embodied.light.tone import develop
-from embodied.light.trace import Hit, Panes, backdrop_at, look, picture_at, through, world_of
+from embodied.light.pages.files import Bake
+from embodied.light.pages.tone import develop
+from embodied.light.tracing import paths, radiosity
+from embodied.light.tracing.radiosity import Points
+from embodied.light.tracing.scene import Hit, Panes, backdrop_at, look, picture_at, through, world_of
 from embodied.render.film import light_of, shown_of
 from embodied.render.panorama import FACES, Panorama
 from embodied.seeds import stream

@@ -16,7 +16,6 @@ import numpy as np
 
 from embodied.geometry import r2
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.atlas import Atlas
 from embodied.light.backend import (
     added_up,
     array,
@@ -31,10 +30,11 @@ from embodied.light.backend import (
     vector,
     wholes,
 )
-from embodied.light.cover import Texels, nearest
-from embodied.light.emitters import GLASS, Lamp, Portal
 from embodied.light.memory import Memory
-from embodied.light.unwrap import face_normals
+from embodied.light.pages.atlas import Atlas
+from embodied.light.pages.cover import Texels, nearest
+from embodied.light.pages.unwrap import face_normals
+from embodied.light.tracing.emitters import GLASS, Lamp, Portal
 
 LIFT = 2e-3
 """Metres by which rays start above their surface."""
@@ -134,13 +134,29 @@ def with_env(space: Space, env: np.ndarray) -> Space:
     return replace(space, env=floats(_small(env)))
 
 
-def without(space: Space, atlas: Atlas, owner: str) -> Space:
-    """The same space for shadow rays that pass through everything of `owner`."""
-    if owner not in atlas.owners:
-        return space
+@dataclass(frozen=True)
+class Together:
+    """Several scenes as one, for shadow rays."""
+
+    scenes: tuple[RayScene, ...]
+
+    def ray_test(self, ray: Ray, active: Array = True) -> Array:
+        """Whether rays meet anything."""
+        found = self.scenes[0].ray_test(ray, active)
+        for scene in self.scenes[1:]:
+            found |= scene.ray_test(ray, active)
+        return found
+
+
+def spaces_without(space: Space, atlas: Atlas, owners: Sequence[str]) -> dict[str, Space]:
+    """For each of some owners of faces, the same space for shadow rays that pass through everything of it."""
     corners = np.concatenate([p.corners for p in atlas.pages])[space.opaque_faces]
-    owners = np.concatenate([p.owner for p in atlas.pages])[space.opaque_faces]
-    return replace(space, scene=scene_of(corners[owners != atlas.owners.index(owner)]))
+    whose = np.concatenate([p.owner for p in atlas.pages])[space.opaque_faces]
+    numbers = {o: atlas.owners.index(o) for o in owners}
+    theirs = np.isin(whose, list(numbers.values()))
+    rest = scene_of(corners[~theirs]) if numbers else None
+    others = {o: corners[theirs & (whose != k)] for o, k in numbers.items()}
+    return {o: replace(space, scene=Together((rest, scene_of(c))) if len(c) else rest) for o, c in others.items()}
 
 
 def nearest_luxel(atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray | None = None) -> np.ndarray:

@@ -7,18 +7,17 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from assets.archives import open_arrays
 from embodied.house.house import House
-from embodied.light import radiosity
 from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import drjit, flags, floats, mitsuba, scene_of, wholes
-from embodied.light.colours import linear
-from embodied.light.emitters import Lamp, portals_of
-from embodied.light.files import Bake
-from embodied.light.paths import Lights, Surfaces, lights_of
-from embodied.light.radiosity import Space
-from embodied.light.sky import Outdoors, outdoors
-from embodied.light.unwrap import face_normals
+from embodied.light.pages.colours import linear
+from embodied.light.pages.files import Bake
+from embodied.light.pages.unwrap import face_normals
+from embodied.light.tracing import radiosity
+from embodied.light.tracing.emitters import portals_of, read_lamps
+from embodied.light.tracing.paths import Lights, Surfaces, lights_of
+from embodied.light.tracing.radiosity import Space
+from embodied.light.tracing.sky import Outdoors, outdoors
 from embodied.scene.backdrop import KNOTS
 from embodied.scene.lit_pages import LitPages, glass_surfaces
 
@@ -130,10 +129,12 @@ def _pages_of(bake: Bake, own: int, sun: np.ndarray) -> _Pages:
 def world_of(bake: Bake, house: House) -> BakedScene:
     """Upload a bake."""
     lit = bake.lit
-    with open_arrays(bake.folder / "meshes.npz") as z:
-        gloss = [z[f"g{i}"][:, :3] if f"g{i}" in z.files else None for i in range(len(lit.meshes))]
     number = {o: i + 1 for i, o in enumerate(lit.owners)}
-    solid = [(m, g) for m, g in zip(lit.meshes, gloss) if m.alpha >= 0.9 and g is not None and len(m.faces)]
+    solid = [
+        (m, g[:, :3])
+        for m, g in zip(lit.meshes, bake.gloss, strict=True)
+        if m.alpha >= 0.9 and g is not None and len(m.faces)
+    ]
     corners = np.concatenate([m.vertices[m.faces] for m, _ in solid])
     uv = np.concatenate([m.uv[m.faces] for m, _ in solid])
     page = np.concatenate([np.full(len(m.faces), m.page) for m, _ in solid])
@@ -162,7 +163,9 @@ def world_of(bake: Bake, house: House) -> BakedScene:
     dark = np.zeros_like(pages.coarse_glow)
     surfaces = Surfaces(floats(pages.coarse_albedo), floats(dark if sampled else pages.coarse_glow), floats(dark))
     without = lambda o: replace(space, scene=scene_of(corners[owner != number[o]]))
-    lights = lights_of(space, without, portals_of(house), _lamps(bake), sun)
+    lights = lights_of(
+        space, without, portals_of(house), read_lamps(bake.folder / "lamps.npz", bake.manifest["lamps"]), sun
+    )
     return BakedScene(
         space,
         surfaces,
@@ -221,23 +224,6 @@ def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
         wholes(np.cumsum(texels) - texels),
         floats(np.concatenate([p.reshape(-1, 3) for p in pictures]) / 255),
     )
-
-
-def _lamps(bake: Bake) -> tuple[Lamp, ...]:
-    with open_arrays(bake.folder / "lamps.npz") as z:
-        return tuple(
-            Lamp(
-                x["id"],
-                x["room"],
-                z[f"points{i}"],
-                z[f"normals{i}"],
-                z[f"radiance{i}"],
-                float(z[f"area{i}"]),
-                x["owner"],
-                z[f"weights{i}"],
-            )
-            for i, x in enumerate(bake.manifest["lamps"])
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -13,9 +13,7 @@ import shapely
 
 from embodied.geometry import r2
 from embodied.house.house import House
-from embodied.light import radiosity
 from embodied.light.arrays import Array, RayScene
-from embodied.light.atlas import Atlas, Page
 from embodied.light.backend import (
     added_up,
     array,
@@ -29,40 +27,28 @@ from embodied.light.backend import (
     vector,
     wholes,
 )
-from embodied.light.colours import ColourMaps, colour_at, linear, paints_of, shown
-from embodied.light.cover import Cover, Texels, cover, nearest, surface
-from embodied.light.emitters import Lamp, portals_of
+from embodied.light.baking.solve import Radiosity
 from embodied.light.memory import Memory, once
-from embodied.light.radiosity import Space, points_of
+from embodied.light.pages.atlas import Atlas, Page
+from embodied.light.pages.colours import ColourMaps, colour_at, linear, paints_of, shown
+from embodied.light.pages.cover import Cover, Texels, cover, nearest, surface
+from embodied.light.pages.files import Ingredients
+from embodied.light.pages.tone import Exposure, developed
 from embodied.light.settings import Settings
-from embodied.light.sky import Outdoors
-from embodied.light.solve import AMBIENT, Luxels, Radiosity, glow_of
-from embodied.light.tone import Exposure, developed
+from embodied.light.tracing import radiosity
+from embodied.light.tracing.emitters import Lamp, portals_of
+from embodied.light.tracing.luxels import AMBIENT, Luxels, glow_of
+from embodied.light.tracing.radiosity import Space, points_of
+from embodied.light.tracing.sky import Outdoors
 
 METAL = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
 DULL, SHARP_RAYS, DULL_RAYS = 0.1, 1 / 3, 4
 """Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left;
-and the rays of sharp metals per texel and of dull ones per luxel, times the settings' `sky_rays`."""
+and the rays of sharp metals per texel and of dull ones per luxel, times the settings' `other_rays`."""
 AROUND = 0.15
 """What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it,
 too."""
-
-
-@dataclass(frozen=True, eq=False)
-class Ingredients:
-    """One page before exposure, at texel size unless said otherwise."""
-
-    soft: np.ndarray
-    """(h luxels, w luxels, 3) float16 e of all light but the sun's own."""
-    sun: np.ndarray
-    """(h, w) uint8 share of the sun seen, times 255."""
-    albedo: np.ndarray
-    """(h, w, 3) uint8 sRGB."""
-    picture: np.ndarray
-    """(h, w, 3) uint8 sRGB, exposed: what the classic renderer shows."""
-    glow: np.ndarray
-    """(h luxels, w luxels, 3) float16 radiance of what shines itself; (0, 0, 3) where nothing does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +64,8 @@ class Solved:
     exposure: Exposure
     space: Space
     """The house as rays meet it."""
+    without: Mapping[str, Space]
+    """As in `solve.Problem`."""
 
 
 Mirrors: TypeAlias = tuple[Array, Array, Array, Array, np.ndarray]
@@ -279,7 +267,7 @@ def _mirrored(
     cos = (normal * to_eye).sum(1, keepdims=True)
     bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
     p = points_of(position, normal, normal, np.zeros(len(face), bool))
-    rays = max(round((DULL_RAYS if dull else SHARP_RAYS) * composer.settings.sky_rays), 1)
+    rays = max(round((DULL_RAYS if dull else SHARP_RAYS) * composer.settings.other_rays), 1)
     width = np.square(rough) + AROUND * dull
     limit, table = composer.seen[dull]
     spread_of, straight = floats(width), vector(bounced)

@@ -14,10 +14,10 @@ import numpy as np
 from assets.cache import atomic_path, digest
 from assets.closure import code_digest
 from embodied.light.arrays import Array
-from embodied.light.atlas import Page
 from embodied.light.backend import array, drjit, floats, mitsuba, wholes
-from embodied.light.cover import Cover
-from embodied.light.unwrap import areas_of
+from embodied.light.pages.atlas import Page
+from embodied.light.pages.cover import Cover
+from embodied.light.pages.unwrap import areas_of
 
 DARKEST, LIGHTEST = 0.02, 0.88
 """Reflectances are kept between these."""
@@ -26,7 +26,7 @@ APART = (
     "assets.data",
     "embodied",
     "embodied.light",
-    *(f"embodied.light.{name}" for name in ("atlas", "cover", "unwrap")),
+    *(f"embodied.light.pages.{name}" for name in ("atlas", "cover", "unwrap")),
 )
 """What the code of halved maps does not count: packages' names, and the geometry that this module colours."""
 CODE = 1023

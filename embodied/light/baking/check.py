@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.light import paths, radiosity
 from embodied.light.backend import LightError, array
-from embodied.light.compose import Solved
-from embodied.light.emitters import portals_of
-from embodied.light.solve import AMBIENT, subset
+from embodied.light.baking.compose import Solved
+from embodied.light.tracing import paths, radiosity
+from embodied.light.tracing.emitters import portals_of
+from embodied.light.tracing.luxels import AMBIENT, subset
 from embodied.seeds import stream
 
-LUXELS, PATHS = 20, 6000
+LUXELS, PATHS = 20, 2400
 FEW = 3
 """More than so many of the first luxels that are off call for a verdict by `AGAIN`."""
-AGAIN, AGAIN_PATHS = 100, 2400
+AGAIN, AGAIN_PATHS = 100, 1200
 """Luxels, and paths for each, of that verdict."""
 LIMIT = 0.10
 """Largest relative difference that passes: for the median of the signed differences (a bias) always, and luxel by
@@ -51,9 +51,7 @@ def compare(
     rng = stream(s.house.seed, "light", "check", name)
     pick = rng.choice(np.nonzero(fit)[0], min(luxels, int(fit.sum())), replace=False)
     space = s.space
-    lights = paths.lights_of(
-        space, lambda o: radiosity.without(space, s.atlas, o), portals_of(s.house), s.lamps, s.outdoors
-    )
+    lights = paths.lights_of(space, lambda o: s.without.get(o, space), portals_of(s.house), s.lamps, s.outdoors)
     p = subset(s.lux, np.repeat(pick, paths_each))
     e = array(paths.irradiance(space, lights, paths.surfaces_of(s.lux), p, rng=rng))
     traced = np.nan_to_num(e).reshape(len(pick), paths_each, 3) @ y

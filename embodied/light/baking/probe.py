@@ -6,12 +6,12 @@ import numpy as np
 import shapely
 
 from embodied.house.house import Room
-from embodied.light import radiosity
 from embodied.light.backend import array
-from embodied.light.compose import Solved
-from embodied.light.emitters import portals_of
-from embodied.light.solve import AMBIENT
-from embodied.light.tone import develop
+from embodied.light.baking.compose import Solved
+from embodied.light.pages.tone import develop
+from embodied.light.tracing import radiosity
+from embodied.light.tracing.emitters import portals_of
+from embodied.light.tracing.luxels import AMBIENT
 
 AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
 """Sides of the cube in order."""

@@ -6,17 +6,21 @@ All intensities are radiosities or radiances in units of 100 cd/m2 (see sky.py).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from assets.archives import open_arrays
+from assets.cache import write_bytes
 from embodied.geometry import r2
 from embodied.house.house import House, Opening
 from embodied.light.arrays import Array, RayScene
-from embodied.light.atlas import Atlas
 from embodied.light.backend import added_up, constant, drjit, fraction, mitsuba, vector
-from embodied.light.unwrap import areas_of, face_normals
+from embodied.light.pages.atlas import Atlas
+from embodied.light.pages.records import packed
+from embodied.light.pages.unwrap import areas_of, face_normals
 
 GLAZED = ("window", "french_window")
 GLASS = 0.88
@@ -188,3 +192,25 @@ def _ball(k: int, n: int) -> np.ndarray:
     """Point k of n spread evenly over the unit sphere (Fibonacci lattice)."""
     z = 1 - 2 * (k + 0.5) / n
     return np.array([np.sqrt(1 - z * z) * np.cos(2.399963 * k), np.sqrt(1 - z * z) * np.sin(2.399963 * k), z])
+
+
+LAMP_ARRAYS = ("points", "normals", "radiance", "area", "weights")
+
+
+def write_lamps(path: Path, lamps: Sequence[Lamp]) -> None:
+    """The surfaces that glow, lamp after lamp."""
+    arrays = {f"{k}{i}": np.asarray(getattr(x, k)) for i, x in enumerate(lamps) for k in LAMP_ARRAYS}
+    write_bytes(path, packed(arrays))
+
+
+def read_lamps(path: Path, rows: Sequence[Mapping[str, str]]) -> tuple[Lamp, ...]:
+    """What `write_lamps` wrote.
+
+    Args:
+      rows: id, room and owner of each.
+    """
+    with open_arrays(path) as z:
+        return tuple(
+            Lamp(**row, **{k: float(z[f"{k}{i}"]) if k == "area" else z[f"{k}{i}"] for k in LAMP_ARRAYS})
+            for i, row in enumerate(rows)
+        )

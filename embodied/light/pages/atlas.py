@@ -14,7 +14,7 @@ import numpy as np
 
 from assets.records import Finish, MeshPart
 from embodied.geometry import rotation
-from embodied.light.unwrap import Unwrapped, areas_of, cached_model, pack, unwrap_planes
+from embodied.light.pages.unwrap import Unwrapped, areas_of, cached_model, pack, unwrap_planes
 
 SHELL = ("wall", "floor", "ceiling")
 

@@ -1,8 +1,7 @@
 """Smoothing light over surfaces without carrying it around corners or across edges of shadow.
 
-Flat, large charts (walls, floors, ceilings) are smoothed on the page by an a-trous filter with
-growing steps (Dammertz et al. 2010); everything else over nearest neighbours in space, so that
-chart borders never show. Both weigh by distance, normal and likeness of brightness.
+Every chart is smoothed on its page by an a-trous filter with growing steps (Dammertz et al. 2010), within its plane,
+weighed by likeness of brightness.
 """
 
 from __future__ import annotations
@@ -10,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from embodied.light.arrays import Array
-from embodied.light.atlas import Atlas
 from embodied.light.backend import array, constant, drjit, floats, mitsuba, signed, vector, wholes
-from embodied.light.cover import Texels
+from embodied.light.pages.atlas import Atlas
+from embodied.light.pages.cover import Texels
 
 KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 """B3 spline, as in Dammertz et al."""
@@ -149,109 +147,6 @@ class _Grid:
                 off = dr.abs(dr.dot(dr.gather(mi.Vector3f, self._places, q, inside) - self._p, self._n))
                 alike = dr.dot(dr.gather(mi.Vector3f, self._normals, q, inside), self._n)
                 yield i, j, q, inside & (off < 0.004) & (alike > 0.98)
-
-
-LAYER = (0.3, 0.002)
-"""A neighbour lies on the same layer where it is at most this share of its distance, and so many metres more, off the
-tangent plane."""
-
-
-def neighbours(
-    position: np.ndarray,
-    normal: np.ndarray,
-    good: np.ndarray,
-    chosen: np.ndarray,
-    k: int = 12,
-    turn: float = 0.15,
-    asked: int = 3,
-) -> np.ndarray:
-    """(m, k) int32, nearest good luxels of the chosen ones by place and facing, those on the same layer first.
-
-    The dark mattress below a blanket faces the blanket's way, and is nearer to its luxels than they are to each other.
-    """
-    pool = np.nonzero(good)[0]
-    if not len(pool):
-        pool = np.arange(len(position))
-    where = np.concatenate([position, normal * turn], axis=1)
-    tree = cKDTree(where[pool], balanced_tree=False, compact_nodes=False)
-    mine, k, asked = np.nonzero(chosen)[0], min(k, len(pool)), min(asked * k, len(pool))
-    out = np.empty((len(mine), k), np.int32)
-    for start in range(0, len(mine), 200_000):
-        part = mine[start : start + 200_000]
-        found = pool[tree.query(where[part], k=asked, workers=-1)[1].reshape(-1, asked)].astype(np.int32)
-        gap = position[found] - position[part][:, None]
-        off = np.abs(np.einsum("mkc,mc->mk", gap, normal[part]))
-        other = off > LAYER[0] * np.linalg.norm(gap, axis=2) + LAYER[1]
-        out[start : start + 200_000] = np.take_along_axis(found, np.argsort(other, axis=1, kind="stable")[:, :k], 1)
-    return out
-
-
-def smooth_sites(
-    e: np.ndarray,
-    position: np.ndarray,
-    normal: np.ndarray,
-    near: np.ndarray,
-    good: np.ndarray,
-    *,
-    variance: np.ndarray,
-    passes: int = 3,
-    likeness: float = 0.12,
-) -> np.ndarray:
-    """Smoothing over neighbours in space.
-
-    Args:
-      e, position, normal: (k, 3).
-      near: (k, m) from `neighbours`, each itself first.
-      good: (k,) bool, sites whose light counts.
-      variance: (k,) of each one's brightness; likeness is widened by the noise that is left, as in SVGF (Schied et
-        al. 2017, sec. 4.4): noise goes, contact shadows stay.
-      likeness: standard deviation of log brightness that still counts as the same light.
-    """
-    mi, dr = mitsuba(), drjit()
-    if not len(e):
-        return e
-    places, normals, trust = floats(position), floats(normal), floats(np.where(good, 1.0, 1e-4))
-    ids = [wholes(near[:, j]) for j in range(near.shape[1])]
-    p, n = vector(position), vector(normal)
-    reach = dr.norm(dr.gather(mi.Vector3f, places, ids[min(6, len(ids) - 1)]) - p) * 1.5 + 1e-4
-    out = np.array(e, np.float32)
-    bright = np.maximum(out.mean(1)[near].mean(1), 1e-5)
-    noise = np.minimum(np.sqrt(variance[near].mean(1)) / bright, 1.5).astype(np.float32)
-    least = floats(bright * np.minimum(noise, 1.0)) + 1e-4
-    for _ in range(passes):
-        values, noises = floats(out), floats(noise)
-        own = mi.Color3f(vector(out))
-        shade, total, weight, squares = dr.log(_brightness(own) + least), mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
-        tight = 1 / (constant(likeness**2) + dr.square(NOISES * noises))
-        for q in ids:
-            other = dr.gather(mi.Color3f, values, q)
-            d = dr.norm(dr.gather(mi.Vector3f, places, q) - p) / reach
-            facing = dr.maximum(dr.dot(dr.gather(mi.Vector3f, normals, q), n), 0.0)
-            far = dr.log(_brightness(other) + least) - shade
-            w = dr.exp(-0.5 * (dr.square(d) + dr.square(far) * tight)) * dr.square(dr.square(facing))
-            w = w * dr.gather(mi.Float, trust, q) + 1e-9
-            total += other * w
-            weight += w
-            squares += dr.square(w)
-        mean, left = total / weight, noises * dr.sqrt(squares) / weight
-        dr.eval(mean, left)
-        out, noise = array(mean), np.array(left)
-    return out
-
-
-def cap_sparks(
-    e: np.ndarray, near: np.ndarray, good: np.ndarray, *, variance: np.ndarray | float = 0.0, most: float = 1.5
-) -> np.ndarray:
-    """Sites brighter than `most` times the geometric mean of the good ones around them, cut to that.
-
-    One ray in a hundred that meets a lampshade makes such a site; smoothing would spread it into a blob. What noise of
-    this `variance` (k,) makes brighter by three standard deviations stays: to cut it would darken the room.
-    """
-    y, others = e.mean(1), near[:, 1:]
-    weight = good[others] + 1e-4
-    mean = np.exp((np.log(y + 1e-5)[others] * weight).sum(1) / weight.sum(1))
-    noise = np.sqrt(np.broadcast_to(variance, y.shape)[near].mean(1))
-    return e * np.minimum(1.0, (most * mean + 3.0 * noise) / np.maximum(y, 1e-7))[:, None].astype(np.float32)
 
 
 def _brightness(c: Array) -> Array:

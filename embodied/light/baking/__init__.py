@@ -1,0 +1,1 @@
+"""From a house to its lit pages: light at every luxel, smoothed, composed, checked and written."""

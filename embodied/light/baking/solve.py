@@ -1,0 +1,324 @@
+"""From an atlas to light: every luxel's e, by stages that can be kept on disk and taken up again."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from embodied.geometry import r2
+from embodied.house.house import House
+from embodied.house.shapes import inward
+from embodied.light.arrays import Array
+from embodied.light.backend import added_up, array, drjit, fraction, mitsuba
+from embodied.light.baking import denoise
+from embodied.light.memory import Memory, once
+from embodied.light.pages.atlas import Atlas
+from embodied.light.settings import Settings
+from embodied.light.tracing import radiosity
+from embodied.light.tracing.emitters import Lamp, Portal, portals_of
+from embodied.light.tracing.luxels import AMBIENT, Luxels, subset
+from embodied.light.tracing.radiosity import Patches, Space
+from embodied.light.tracing.sky import Outdoors
+
+SPARKS = 0.01
+"""Share of a room's light that may be lost to keep its brightest spots from sparkling."""
+TAMED = 2
+"""Last rounds of gathering in which they are kept from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Radiosity:
+    """What reaches each luxel: (n, 3) float32 each, radiosity e = E / pi in 100 cd/m2."""
+
+    direct: np.ndarray
+    """From sky and lamps."""
+    sun: np.ndarray
+    """(n,) cosine-weighted share of the sun seen."""
+    patches: np.ndarray
+    """First bounce of the sun."""
+    indirect: np.ndarray
+    """All other bounces."""
+    good: np.ndarray
+    """(n,) bool; false on walls, floors and ceilings behind things."""
+
+    @property
+    def soft(self) -> np.ndarray:
+        """All but the sun itself."""
+        return self.direct + self.patches + self.indirect
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A house to be lit, at one hour."""
+
+    house: House
+    atlas: Atlas
+    lux: Luxels
+    space: Space
+    outdoors: Outdoors
+    lamps: tuple[Lamp, ...]
+    settings: Settings
+    memory: Memory | None = None
+    """Where the house is lit more than once."""
+    without: Mapping[str, Space] = field(default_factory=dict)
+    """What the shadow rays of a bare bulb meet, by the owner that the bulb hangs in."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A light, as something that shines on luxels."""
+
+    shine: Callable
+    """From luxel numbers (m,), a number of rays, 0 for the settings', and a memory to e (m, 3)."""
+    id: str
+    lamp: Lamp | None = None
+
+
+def sources_of(problem: Problem) -> list[Source]:
+    """Sky and lamps."""
+    lux, space, settings = problem.lux, problem.space, problem.settings
+    found = []
+    for way in portals_of(problem.house):
+        found.append(Source(_sky_of(problem, way), way.id))
+    for x in problem.lamps:
+        own = problem.without.get(x.owner or "", space)
+        lamp = lambda i, rays, x=x, s=own: radiosity.lamp_light(s, subset(lux, i), x, rays or settings.lamp_rays)
+        found.append(Source(lambda i, rays, memory=None, f=lamp: array(f(i, rays)), x.id, x))
+    return found
+
+
+def _sky_of(problem: Problem, way: Portal) -> Callable:
+    """`Source.shine` of the sky through a portal."""
+
+    def shine(i: np.ndarray, rays: int, memory: Memory | None = None) -> np.ndarray:
+        p = subset(problem.lux, i)
+        return array(radiosity.sky_light(problem.space, p, way, rays or problem.settings.sky_rays, memory))
+
+    return shine
+
+
+@dataclass(frozen=True, eq=False)
+class Shone:
+    """What one light gives to luxels."""
+
+    which: np.ndarray
+    """Luxels that it may reach."""
+    e: np.ndarray
+    """(len(which), 3) float32."""
+
+
+def shone_on(problem: Problem, source: Source) -> Shone:
+    """The light of a source at the luxels; rooms that it reaches nowhere are left out."""
+    unit = problem.lux.unit
+
+    def shone() -> tuple[np.ndarray, np.ndarray]:
+        seen = lambda: radiosity.reached(unit, lambda i: source.shine(i, 4).sum(1) > 0)
+        which = once(problem.memory, ("reached", source.id), seen)
+        e = source.shine(which, 0, problem.memory) if len(which) else np.zeros((0, 3), np.float32)
+        return which, e
+
+    if source.lamp is None or problem.memory is None:
+        return Shone(*shone())
+    # of the same lamp with another colour or power
+    radiance = np.asarray(source.lamp.radiance, np.float32)
+    which, e = problem.memory.once(("shone", source.lamp.id), lambda: _per(radiance, *shone()))
+    return Shone(which, e * radiance)
+
+
+def _per(radiance: np.ndarray, which: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Light for each unit of a lamp's radiance."""
+    return which, e / radiance
+
+
+def outer_light(problem: Problem, samples: int = 24) -> np.ndarray:
+    """(n, 3) e that the outer side of windows and outer doors takes from the open sky.
+
+    What faces the room takes none: its luxels at the frame's edge lie in the plane of the lintel, from where
+    every second ray runs up inside the wall.
+    """
+    mi, dr = mitsuba(), drjit()
+    house, atlas, lux, space = problem.house, problem.atlas, problem.lux, problem.space
+    e = np.zeros((len(lux.position), 3), np.float32)
+    into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
+    outer = [k == "opening" and o.split("/")[0] in into for o, k in zip(atlas.owners, atlas.kinds)]
+    inwards = np.array([into[o.split("/")[0]] if x else [np.nan] * 2 for o, x in zip(atlas.owners, outer)]).reshape(
+        -1, 2
+    )
+    mine = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
+    if not len(mine):
+        return e
+    p = subset(lux, mine)
+    portals = radiosity.portal_scene(portals_of(house) or [_nowhere()])
+
+    def one(k: Array) -> tuple[Array, ...]:
+        a, b = r2(mi.Float(k) + 1)
+        u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
+        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        ray = mi.Ray3f(p.position + p.face_normal * radiosity.LIFT, d)
+        free = ~space.scene.ray_test(ray) & ~portals.ray_test(ray)
+        return (dr.select(free, radiosity.env_lookup(space, d, free), mi.Color3f(0.0)),)
+
+    e[mine] = array(added_up(samples, one, dr.zeros(mi.Color3f, p.n))[0]) / samples
+    return e
+
+
+def _nowhere() -> Portal:
+    return Portal("", "", np.array([0.0, 0.0, -1e4]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+
+
+def _lit_by(problem: Problem, patches: Patches, which: np.ndarray) -> np.ndarray:
+    """(k, 3) e of sunlit patches at some luxels; of none at none (a glint may reach no luxel)."""
+    if not len(which):
+        return np.zeros((0, 3), np.float32)
+    return radiosity.patch_light(problem.space, subset(problem.lux, which), patches)
+
+
+def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) share of the sun at luxels, and (n, 3) e of its first bounce."""
+    lux, space, outdoors = problem.lux, problem.space, problem.outdoors
+    portals = portals_of(problem.house)
+    share, e = np.zeros(len(lux.position), np.float32), np.zeros((len(lux.position), 3), np.float32)
+    if not portals or not outdoors.sun.any():
+        return share, e
+    through, towards = radiosity.portal_scene(portals), outdoors.sun_direction
+    seen = lambda i, rays: np.asarray(radiosity.sun_share(space, subset(lux, i), through, towards, rays))
+    mine = radiosity.reached(lux.unit, lambda i: seen(i, 1) > 0, tries=1000)
+    mine = mine[lux.thin[mine] | (lux.face_normal[mine] @ towards.astype(np.float32) > 0)]
+    if len(mine):
+        share[mine] = seen(mine, 4)
+    flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
+    for u in np.unique(lux.unit[share > 0]):
+        patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], problem.settings.patches)
+        if patches is not None:
+            lit = functools.partial(_lit_by, problem, patches)
+            which = radiosity.reached(lux.unit, lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
+            e[which] += lit(which)
+    return share, e
+
+
+def _patches(lux: Luxels, flux: np.ndarray, mine: np.ndarray, most: int) -> Patches | None:
+    """At most so many small lights for the sunlit luxels `mine` of one room; None for a glint."""
+    power = flux.mean(1)
+    at = np.round(lux.position[mine] * 4)
+    mine = mine[np.lexsort((at[:, 0], at[:, 1], at[:, 2]))]
+    cut = np.cumsum(power[mine])
+    if cut[-1] < 1e-4:
+        return None
+    k = int(np.clip(most * min(1.0, 0.8 * float(lux.area[mine].sum()) + 0.1), 4, most))
+    pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
+    strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
+    extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
+    return Patches(lux.position[pick], lux.normal[pick], lux.thin[pick], strength, extent)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounced:
+    """Indirect light at luxels."""
+
+    e: np.ndarray
+    """(n, 3)."""
+    good: np.ndarray
+    """(n,) bool; false inside or behind things."""
+    variance: np.ndarray
+    """(n,) of brightness, before it is smoothed."""
+
+
+def bounce(problem: Problem, soft: np.ndarray, tell: Callable[[float], None]) -> Bounced:
+    """All further bounces, by Jacobi rounds of gathering.
+
+    Args:
+      soft: (n, 3) first light, without the sun's own.
+    """
+    lux, settings = problem.lux, problem.settings
+    here = subset(lux, np.arange(len(lux.position)))
+    first, total, e = 0, sum(settings.bounces), np.zeros_like(soft)
+    seen = lux.albedo * (soft + AMBIENT.astype(np.float32)) + np.where(lux.sampled[:, None], 0.0, lux.glow).astype(
+        np.float32
+    )
+    for left, samples in zip(range(len(settings.bounces), 0, -1), settings.bounces, strict=True):
+        tell(first / total)
+        table = seen + lux.albedo * e
+        if left <= TAMED:
+            table = _tamed(lux, table)
+        more, bad, variance = radiosity.gather(problem.space, here, table, samples, first, problem.memory)
+        e = more if first else more + _endless(lux, more, bad < 0.5)
+        first += samples
+    return Bounced(e, bad < 0.5, variance)
+
+
+def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
+    """Radiosity cut, room by room, where at most `SPARKS` of the room's light is lost by it: what is smaller
+    than a hand beside a bulb would show as sparks on far walls, one ray in hundreds. What was cut is shared out
+    over the room, or every bounce would lose it anew."""
+    y = seen.mean(1)
+    out = np.array(seen, np.float32)
+    for unit in np.unique(lux.unit):
+        mine = np.nonzero(lux.unit == unit)[0]
+        most = max(_most(y[mine], lux.area[mine]), 1e-9)
+        out[mine] *= np.minimum(1.0, most / np.maximum(y[mine], 1e-9))[:, None]
+        before, after = ((a[mine] * lux.area[mine, None]).sum(0) for a in (seen, out))
+        out[mine] *= before / np.maximum(after, 1e-12)
+    return out
+
+
+def _most(y: np.ndarray, area: np.ndarray) -> float:
+    """The least brightness to which luxels can be cut where that loses at most `SPARKS` of their light."""
+    allowed = SPARKS * float((y * area).sum())
+    tenth = len(y) // 10 + 1
+    bright = float(np.partition(y, -tenth)[-tenth])
+    top = np.nonzero(y >= bright)[0]
+    if float(((y[top] - bright) * area[top]).sum()) < allowed:  # too little is lost there: look at all
+        top = np.arange(len(y))
+    order = top[np.argsort(y[top])]
+    rising, above = y[order], np.cumsum(area[order][::-1])[::-1]
+    lost = np.cumsum((np.diff(rising, append=rising[-1]) * np.append(above[1:], 0.0))[::-1])[::-1]
+    return float(rising[min(int(np.searchsorted(-lost, -allowed)), len(rising) - 1)])
+
+
+def _endless(lux: Luxels, once: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """First guess (n, 3) of all bounces after the first one `once`: each room as a sphere, e * rho / (1 - rho).
+
+    Jacobi rounds from nothing would miss a fifth of a white room's light after four of them. The
+    brightest luxels count at most three times the middle one: what lies between window and closed
+    curtain does not light the room.
+    """
+    out = np.zeros_like(once)
+    openings = 0.03  # share of a room's walls that lets light out
+    for u in np.unique(lux.unit):
+        mine = np.nonzero((lux.unit == u) & lux.shell & good)[0]
+        if len(mine):
+            weight = lux.area[mine, None] / lux.area[mine].sum()
+            rho = (lux.albedo[mine] * weight).sum(0) * (1 - openings)
+            arrived = np.minimum(once[mine], 3 * np.median(once[mine], axis=0))
+            out[lux.unit == u] = (arrived * weight).sum(0) * rho / (1 - rho)
+    return out
+
+
+def solve(
+    problem: Problem,
+    tell: Callable[[str, float], None] = lambda stage, done: None,
+    clock: Callable[[str], None] = lambda name: None,
+) -> Radiosity:
+    """The light of a house."""
+    atlas, lux = problem.atlas, problem.lux
+    sources, direct = sources_of(problem), np.zeros((len(lux.position), 3), np.float32)
+    for k, source in enumerate(sources):
+        tell("direct light", k / len(sources))
+        shone = shone_on(problem, source)
+        direct[shone.which] += shone.e
+    clock("direct")
+    share, patches = sun_light(problem)
+    clock("sun")
+    bounced = bounce(problem, direct + patches, lambda x: tell("bounces", x))
+    clock("bounces")
+    tell("smoothing", 0.0)
+    good, all_ = bounced.good, np.ones(len(direct), bool)
+    smooth = functools.partial(denoise.smooth_pages, atlas=atlas, luxels=lux.texels, good=good, chosen=all_)
+    indirect = smooth(bounced.e, steps=(1, 2, 4), likeness=(0.08, 0.08, 0.08), variance=bounced.variance)
+    grain = denoise.spatial_variance(direct, atlas, lux.texels, all_) * 0.8
+    direct = smooth(direct, steps=(1, 2), likeness=(0.3, 0.2), variance=grain)
+    clock("smooth")
+    return Radiosity(direct, share, patches, indirect + outer_light(problem), good | ~lux.shell)

@@ -1,0 +1,79 @@
+"""Stages of a bake that was interrupted, and what the manifest says of one that is done."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from assets.archives import open_arrays
+from assets.cache import atomic_path, digest, write_bytes
+from embodied.light.backend import device, warn
+from embodied.light.baking.compose import Solved
+from embodied.light.baking.solve import Radiosity
+from embodied.light.pages.atlas import Atlas
+from embodied.light.pages.files import checksum
+from embodied.light.settings import light_code
+from embodied.scene.house_meshes import owners
+from embodied.scene.lit_pages import LitMesh
+
+
+def same_atlas(folder: Path, atlas: Atlas) -> None:
+    """Empty `folder` if what an interrupted run left there belongs to other meshes or textures."""
+    pages = [
+        digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes))
+        for p in atlas.pages
+    ]
+    mark, path = digest(pages), folder / "atlas.txt"
+    if not path.exists() or path.read_text() != mark:
+        for old in sorted(p for p in folder.iterdir() if not p.name.startswith(".")):  # which holds a lock, too
+            old.unlink()
+        write_bytes(path, mark.encode())
+
+
+def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
+    """What `work` returns, from disk if an interrupted run left it there whole."""
+    path = folder / "stage_light.npz" if folder else None
+    names = [f.name for f in dataclasses.fields(Radiosity)]
+    if path is not None and path.exists():
+        try:
+            with open_arrays(path) as z:
+                known = Radiosity(*(z[name] for name in names))
+            if all(len(getattr(known, name)) == n for name in names):
+                return known
+        except Exception as e:
+            warn(f"{path} is damaged ({type(e).__name__}); the stage is computed again")
+    made = work()
+    if path is not None:
+        with atomic_path(path) as temporary, open(temporary, "wb") as f:
+            np.savez(f, **{name: getattr(made, name) for name in names})
+    return made
+
+
+def facts_of(s: Solved, meshes: Sequence[LitMesh], probes: Mapping[str, list], folder: Path) -> dict[str, object]:
+    """What the manifest says of a bake whose files are written, but how it was made."""
+    written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
+    return {
+        "code": light_code(),
+        "key": folder.name,
+        "house": s.house.digest,
+        "device": device(),
+        "own_pages": len(s.atlas.pages),
+        "owners": list(owners(s.house)),
+        "luxels": len(s.lux.position),
+        "exposure": {
+            "polygons": s.exposure.polygons,
+            "levels": s.exposure.levels.tolist(),
+            "gains": s.exposure.gains.tolist(),
+            "outdoors": s.exposure.outdoors.tolist(),
+        },
+        "meshes": [
+            {"owner": m.owner, "kind": m.kind, "room": m.room, "page": m.page, "alpha": m.alpha, "gloss": m.gloss}
+            for m in meshes
+        ],
+        "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
+        "probes": dict(probes),
+        "files": {p.name: checksum(p) for p in written},
+    }

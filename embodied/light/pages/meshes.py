@@ -1,0 +1,78 @@
+"""What renderers draw of an atlas: one mesh per owner and page."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from assets.records import DETAILS, Finish
+from embodied.light.pages.atlas import Atlas, Page
+from embodied.light.pages.unwrap import areas_of, distinct
+from embodied.scene.lit_pages import LitMesh
+
+
+def meshes_of(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]]:
+    """One mesh per owner and page, corners welded, thin faces listed twice, and the gloss of its faces.
+
+    Args:
+      first: number of the atlas's first page.
+
+    Returns:
+      Meshes, and for each (m, 4) uint8: roughness, specular and metallic times 255, and detail (see gloss_of and
+      detail_of).
+    """
+    out, shine = [], []
+    for number, page in enumerate(atlas.pages, first):
+        uv = page.luxels / np.array([page.width, page.height], np.float32)
+        for o in np.unique(page.owner):
+            mine = np.nonzero(page.owner == o)[0]
+            both = np.concatenate([page.corners[mine], uv[mine]], axis=-1).reshape(-1, 5)
+            corner, index = distinct(np.round(both, 5))
+            faces = index.reshape(-1, 3).astype(np.int32)
+            thin = page.thin[mine]
+            faces = np.concatenate([faces, faces[thin][:, ::-1]])
+            real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+            alpha = (
+                min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
+            )
+            out.append(
+                LitMesh(
+                    atlas.owners[o],
+                    atlas.kinds[o],
+                    atlas.rooms[o],
+                    number,
+                    both[corner, :3].astype(np.float32),
+                    faces[real],
+                    both[corner, 3:].astype(np.float32),
+                    float(alpha),
+                )
+            )
+            kind = np.array([gloss_of(f) for f in page.finishes], np.uint8)[page.finish[mine]]
+            kind = np.column_stack([kind, detail_of(page, mine)])
+            area = areas_of(page.corners[mine])
+            mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
+            out[-1] = dataclasses.replace(out[-1], gloss=mean)
+            shine.append(np.concatenate([kind, kind[thin]])[real])
+    return out, shine
+
+
+def gloss_of(finish: Finish) -> tuple[int, int, int]:
+    """Roughness, specular and metallic times 255; a mirror is smooth metal."""
+    if finish.mirror:
+        return 4, 255, 255
+    rough, specular, metal = (min(max(x, 0.0), 1.0) for x in (finish.roughness, finish.specular, finish.metallic))
+    return round(255 * rough), round(255 * specular), round(255 * metal)
+
+
+def detail_of(page: Page, faces: np.ndarray) -> np.ndarray:
+    """(k,) uint8 of some faces: number of what they show from nearby, from 1 on, and 16 times that of the axis along
+    which their texture's u runs, 3 for none; 0 for smooth ones."""
+    number = np.array([1 + DETAILS.index(f.detail) if f.detail else 0 for f in page.finishes], np.uint8)
+    corners, uv = page.corners[faces], page.uv[faces].astype(np.float64)
+    sides, turns = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
+    area = turns[:, 0, 0] * turns[:, 1, 1] - turns[:, 0, 1] * turns[:, 1, 0]
+    along = sides[:, 0] * turns[:, 1, 1, None] - sides[:, 1] * turns[:, 0, 1, None]
+    axis = np.where(np.abs(area) > 1e-12, np.abs(along).argmax(1), 3)
+    detail = number[page.finish[faces]]
+    return np.where(detail > 0, detail + 16 * axis, 0).astype(np.uint8)

@@ -1,0 +1,123 @@
+"""Luxels: the surface under every texel of light of a house."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from embodied.house.house import House
+from embodied.light.pages.atlas import SHELL, Atlas, Page
+from embodied.light.pages.colours import ColourMaps, albedo
+from embodied.light.pages.cover import Sheet, Texels, rasterise, sheets_of
+from embodied.light.pages.unwrap import areas_of
+from embodied.light.tracing.emitters import Lamp
+from embodied.light.tracing.radiosity import Points, points_of
+
+AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
+"""e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""
+
+
+@dataclass(frozen=True, eq=False)
+class Luxels:
+    """All luxels of a house in page order; n of them."""
+
+    texels: tuple[Texels, ...]
+    position: np.ndarray
+    normal: np.ndarray
+    face_normal: np.ndarray
+    """(n, 3) float32 each."""
+    thin: np.ndarray
+    """(n,) bool."""
+    albedo: np.ndarray
+    """(n, 3) float32."""
+    glow: np.ndarray
+    """(n, 3) float32 radiance of what shines itself."""
+    sampled: np.ndarray
+    """(n,) bool, glow that lamps already account for."""
+    area: np.ndarray
+    """(n,) square metres."""
+    owner: np.ndarray
+    """(n,) int32 into Atlas.owners."""
+    unit: np.ndarray
+    """(n,) int32: room or opening, for leaving out lights that cannot reach."""
+    shell: np.ndarray
+    """(n,) bool: walls, floors and ceilings."""
+    sheets: tuple[Sheet, ...]
+    """The layouts of the atlas's pages."""
+
+
+def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
+    """What lies under every luxel; nothing glows yet (`with_glow`)."""
+    sheets = sheets_of(atlas.pages)
+    texels = tuple(rasterise(p, 1, s) for p, s in zip(atlas.pages, sheets))
+    pairs = list(zip(atlas.pages, texels))
+    owner = np.concatenate([p.owner[t.face] for p, t in pairs])
+    ends = np.cumsum([len(t.index) for t in texels])
+    places = {k: np.concatenate([getattr(t, k) for t in texels]) for k in ("position", "normal", "face_normal")}
+    mine = lambda i: {k: a[ends[i] - len(texels[i].index) : ends[i]] for k, a in places.items()}
+    texels = tuple(replace(t, **mine(i)) for i, t in enumerate(texels))  # type: ignore[arg-type]  # views: once in memory, not twice
+    names = [o.split("/")[0] if k == "opening" else r for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)]
+    unit = {name: i for i, name in enumerate(dict.fromkeys(names))}
+    return Luxels(
+        texels,
+        places["position"],
+        places["normal"],
+        places["face_normal"],
+        np.concatenate([p.thin[t.face] for p, t in pairs]),
+        np.concatenate([albedo(p, t.cover, maps) for p, t in pairs]),
+        np.zeros((len(owner), 3), np.float32),
+        np.zeros(len(owner), bool),
+        np.concatenate([_share_of_area(p, t) for p, t in pairs]),
+        owner,
+        np.array([unit[name] for name in names], np.int32)[owner],
+        np.array([k in SHELL for k in atlas.kinds])[owner],
+        sheets,
+    )
+
+
+def with_glow(lux: Luxels, house: House, atlas: Atlas, lamps: Sequence[Lamp]) -> Luxels:
+    """The same luxels with what shines itself: the lamps that are on, screens."""
+    found = [glow_of(house, atlas, p, t.face, lamps) for p, t in zip(atlas.pages, lux.texels)]
+    glow = np.concatenate(
+        [np.zeros((len(t.face), 3), np.float32) if g is None else g for g, t in zip(found, lux.texels)]
+    )
+    lit = {x.id for x in lamps}
+    sampled = np.array([any(x.placement == o and x.id in lit for x in house.lights) for o in atlas.owners])
+    return replace(lux, glow=glow, sampled=sampled[lux.owner] & (glow.sum(1) > 0))
+
+
+def _share_of_area(page: Page, t: Texels) -> np.ndarray:
+    """(n,) square metres each luxel stands for: its face's area shared out, every owner's sum kept exact."""
+    faces = areas_of(page.corners)
+    count = np.bincount(t.face, minlength=len(faces))
+    given = np.where(count > 0, faces, 0.0)
+    size = int(page.owner.max()) + 1 if len(page.owner) else 0
+    whole, got = (np.bincount(page.owner, weights=w, minlength=size) for w in (faces, given))
+    scale = whole / np.maximum(got, 1e-12)
+    return (faces / np.maximum(count, 1) * scale[page.owner]).astype(np.float32)[t.face]
+
+
+def glow_of(house: House, atlas: Atlas, page: Page, face: np.ndarray, lamps: Sequence[Lamp]) -> np.ndarray | None:
+    """(n, 3) radiance that texels on faces (n,) of `page` give off themselves; None where nothing does."""
+    emission = np.array([f.emission or (0.0, 0.0, 0.0) for f in page.finishes], np.float32)[page.finish]
+    if not emission.any():
+        return None
+    out = np.zeros_like(emission)
+    by_light = {x.id: x for x in lamps}
+    for o in np.unique(page.owner[emission.any(1)]):
+        name = atlas.owners[o]
+        mine = (page.owner == o) & (emission.sum(1) > 0)
+        lights = [x for x in house.lights if x.placement == name]
+        if not lights:  # screens, stars on a nursery ceiling: they glow by themselves
+            out[mine] = emission[mine]
+        for x in lights:
+            if x.id in by_light:
+                out[mine] = by_light[x.id].radiance
+    return out[face]
+
+
+def subset(lux: Luxels, i: np.ndarray) -> Points:
+    """Some luxels on the device."""
+    return points_of(lux.position[i], lux.normal[i], lux.face_normal[i], lux.thin[i])
