@@ -2,15 +2,16 @@
 
     pip install stable-baselines3 && python examples/ppo_pixels.py --minutes 40 --out out/ppo
 
-The agent sees 64 x 64 pixels straight ahead (90 degrees) and its goal, and goes ahead, turns by 30 degrees or stops.
-Flats are generated from --seed and lit, once. --task point: the goal is how far a place is and in which direction,
-seen from where the agent stands (what a compass and a positioning system tell; it knows no map and no other place),
-and stopping there is right. --task find: the goal is one of --goals requests, as a number, and stopping within 2 m of
-such an object is right. Reward: 1 for stopping right, -0.3 for stopping elsewhere, -0.01 a step, and what a step brings
-the agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in
---unseen others, beside a random walk that stops as often as suits it best; the curve in OUT/curve.csv and curve.png,
-the numbers in OUT/result.json. --blind shows black pictures instead: what the goal alone gives. --eyes encoder shows
-what the encoder that ships, which does not learn, makes of three views around straight ahead.
+The same command goes on where it stopped; --minutes of processor time count over all that was done. The agent sees
+64 x 64 pixels straight ahead (90 degrees) and its goal, and goes ahead, turns by 30 degrees or stops. Flats are
+generated from --house-seed and lit, once. --task point: the goal is how far a place is and in which direction, seen
+from where the agent stands (what a compass and a positioning system tell; it knows no map and no other place), and
+stopping there is right. --task find: the goal is one of --goals requests, as a number, and stopping within 2 m of such
+an object is right. Reward: 1 for stopping right, -0.3 for stopping elsewhere, -0.01 a step, and what a step brings the
+agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in --unseen
+others, beside a random walk that stops as often as suits it best; the curve in OUT/curve.csv and curve.png, the numbers
+in OUT/result.json. --blind shows black pictures instead: what the goal alone gives. --eyes encoder shows what the
+encoder that ships, which does not learn, makes of three views around straight ahead.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents.vision.live import shipped_features
-from assets.cache import default_cache
+from assets.cache import atomic_path, default_cache
 from assets.catalogue import load_catalogue
 from embodied.action_spaces import MonocularMoves
 from embodied.datasets.build import make_dataset_house
@@ -63,6 +64,7 @@ AREA = (50.0, 75.0)
 HORIZON = 40
 """Steps of an episode."""
 WRONG_STOP = -0.3
+GOALS = ("bed", "cooker", "fridge", "sofa", "toilet", "wardrobe")
 HOPS = (1, 3)
 """Fewest and most edges between start and goal."""
 FAR = 10.0
@@ -70,6 +72,8 @@ FAR = 10.0
 SIDE, ANGLE = 64, math.radians(90.0)
 AHEAD = (-1, 0, 1)
 """Views that are seen through the encoder, in turns of 30 degrees from straight ahead."""
+SAVED_EVERY = 20
+"""Rollouts between savings."""
 STOPS = (0.25, 0.1, 0.05, 0.025)
 """How often the random walk may stop."""
 
@@ -140,7 +144,8 @@ class Sight(BaseFeaturesExtractor):
         super().__init__(space, size + space["goal"].shape[0])
         relu, flat = torch.nn.ReLU, torch.nn.Flatten
         if len(space["seen"].shape) == 1:
-            self.eyes = torch.nn.Sequential(torch.nn.Linear(space["seen"].shape[0], size), relu())
+            many = space["seen"].shape[0]
+            self.eyes = torch.nn.Sequential(torch.nn.LayerNorm(many), torch.nn.Linear(many, size), relu())
             return
         layers = [torch.nn.Conv2d(3, 16, 8, 4), relu(), torch.nn.Conv2d(16, 32, 4, 2), relu()]
         layers += [torch.nn.Conv2d(32, 32, 3, 1), relu(), flat(), torch.nn.Linear(32 * 4 * 4, size), relu()]
@@ -151,16 +156,26 @@ class Sight(BaseFeaturesExtractor):
 
 
 class Curve(BaseCallback):
-    """Writes how the episodes of every rollout ended, and stops when the time is over."""
+    """Writes how the episodes of every rollout ended, saves the agent, and stops when the time is over."""
 
-    def __init__(self, path: Path, minutes: float) -> None:
+    def __init__(self, out: Path, minutes: float) -> None:
         super().__init__()
-        self._path, self._until, self._ended = path, time.monotonic() + 60 * minutes, []
-        self._rows: list[dict[str, float]] = []
+        self._path, self._agent, self._ended = out / "curve.csv", out / "agent.zip", []
+        self._rows: list[dict[str, str | float]] = []
+        if self._agent.exists():
+            with self._path.open(newline="") as f:
+                self._rows = list(csv.DictReader(f))
+        self._spent = float(self._rows[-1]["seconds"]) if self._rows else 0.0
+        self._began, self._minutes = time.process_time(), minutes
+
+    @property
+    def seconds(self) -> float:
+        """Of processor time, earlier runs of the command included."""
+        return self._spent + time.process_time() - self._began
 
     def _on_step(self) -> bool:
         self._ended += [info for info in self.locals["infos"] if "episode" in info]
-        return time.monotonic() < self._until
+        return self.seconds < 60 * self._minutes
 
     def _on_rollout_end(self) -> None:
         if not self._ended:
@@ -168,31 +183,36 @@ class Curve(BaseCallback):
         success = float(np.mean([info.get("success", 0.0) for info in self._ended]))
         reward = float(np.mean([info["episode"]["r"] for info in self._ended]))
         row = {"steps": self.num_timesteps, "episodes": len(self._ended), "success": success, "reward": reward}
-        self._rows.append({k: round(v, 4) for k, v in row.items()} | {"seconds": round(time.process_time())})
+        self._rows.append({k: round(v, 4) for k, v in row.items()} | {"seconds": round(self.seconds)})
         self._ended = []
         print(", ".join(f"{k} {v:g}" for k, v in self._rows[-1].items()), flush=True)
-        with self._path.open("w", newline="") as f:
+        if len(self._rows) % SAVED_EVERY == 0:
+            self.save()
+
+    def save(self) -> None:
+        """Write the agent and the curve so far, atomically."""
+        with atomic_path(self._agent) as temporary, temporary.open("wb") as f:
+            self.model.save(f)
+        with atomic_path(self._path) as temporary, temporary.open("w", newline="") as f:
             table = csv.DictWriter(f, self._rows[0])
             table.writeheader()
             table.writerows(self._rows)
 
 
-def arena(args: argparse.Namespace, numbers: Sequence[int], goals: Sequence[str] = ()) -> Arena:
-    """The flats of these numbers, drawn where they are not yet; `goals`: only such requests."""
+def arena(args: argparse.Namespace, numbers: Sequence[int]) -> Arena:
+    """The flats of these numbers, drawn where they are not yet."""
     catalogue, worlds, tasks = load_catalogue(default_cache()), {}, []
     for n in numbers:
-        house, graph = make_dataset_house(args.seed, f"flat_{n}", HouseConfig(area=AREA), catalogue)
+        house, graph = make_dataset_house(args.house_seed, f"flat_{n}", HouseConfig(area=AREA), catalogue)
         drawn = PictureSettings(128, args.pictures)
         world = worlds[house.name] = open_world(house, catalogue, default_cache(), drawn, graph=graph)
         world.render_all()
-        tasks += point_tasks(world, args.seed) if args.task == "point" else find_tasks(world, args.seed)
+        world.close()  # the pictures are on disk; forty renderers would fill the memory
+        tasks += point_tasks(world, args.house_seed) if args.task == "point" else find_tasks(world, args.house_seed)
         print(f"{house.name}: {len(house.rooms)} rooms, {len(graph.positions)} viewpoints", flush=True)
     if args.task == "point":
         return Arena(worlds, tasks, ())
-    requests = [t.request for t in tasks]
-    most = sorted(set(requests), key=lambda r: (-requests.count(r), r))[: args.goals]
-    kept = tuple(goals) or tuple(sorted(most))
-    return Arena(worlds, [t for t in tasks if t.request in kept], kept)
+    return Arena(worlds, [t for t in tasks if t.request in args.goals], tuple(args.goals))
 
 
 def point_tasks(world: World, seed: int) -> list[Task]:
@@ -289,18 +309,19 @@ def draw_curve(table: Path, random: float, picture: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--task", default="point", choices=("point", "find"))
-    parser.add_argument("--minutes", type=float, default=40.0)
+    parser.add_argument("--minutes", type=float, default=40.0, help="of processor time, for learning")
     parser.add_argument("--steps", type=int, default=10_000_000, help="at most so many")
     parser.add_argument("--flats", type=int, default=3, help="how many flats it learns in")
     parser.add_argument("--unseen", type=int, default=1, help="in how many other flats it is judged")
     parser.add_argument("--eyes", default="pixels", choices=("pixels", "encoder"), help="colours, or frozen features")
-    parser.add_argument("--goals", type=int, default=4, help="how many different things it looks for")
+    parser.add_argument("--goals", nargs="+", default=GOALS, metavar="CLASS", help="what it looks for")
     parser.add_argument("--blind", action="store_true", help="black pictures, to compare with")
     parser.add_argument("--envs", type=int, default=16)
     parser.add_argument("--rollout", type=int, default=128, help="steps of each environment between updates")
     parser.add_argument("--judge", type=int, default=300, help="episodes")
     parser.add_argument("--pictures", default="fast", choices=("unlit", "fast", "normal"))
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=0, help="of the training")
+    parser.add_argument("--house-seed", type=int, default=0, help="of the flats and their tasks")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/ppo"))
     args = parser.parse_args()
@@ -310,29 +331,41 @@ def main() -> None:
     home = arena(args, range(args.flats))
     print(f"{len(home.tasks)} tasks {', '.join(home.goals)}", flush=True)
     make = maker(home, args.blind, args.eyes == "encoder")
-    learner = PPO(
-        "MultiInputPolicy",
-        DummyVecEnv([lambda: Monitor(make())] * args.envs),
-        policy_kwargs={"features_extractor_class": Sight, "net_arch": [64]},
-        n_steps=args.rollout,
-        batch_size=256,
-        n_epochs=4,
-        learning_rate=5e-4,
-        ent_coef=0.01,
-        gamma=0.97,
-        seed=args.seed,
-        device="cpu",
+    envs, agent = DummyVecEnv([lambda: Monitor(make())] * args.envs), args.out / "agent.zip"
+    learner = (
+        PPO.load(agent, envs, device="cpu")
+        if agent.exists()
+        else PPO(
+            "MultiInputPolicy",
+            envs,
+            policy_kwargs={"features_extractor_class": Sight, "net_arch": [64]},
+            n_steps=args.rollout,
+            batch_size=256,
+            n_epochs=4,
+            learning_rate=5e-4,
+            ent_coef=0.01,
+            gamma=0.97,
+            seed=args.seed,
+            device="cpu",
+        )
     )
-    learner.learn(args.steps, callback=Curve(args.out / "curve.csv", args.minutes))
-    learner.save(args.out / "agent.zip")
+    curve = Curve(args.out, args.minutes)
+    left = args.steps - learner.num_timesteps
+    if left > 0:
+        learner.learn(left, callback=curve, reset_num_timesteps=False)
+        curve.save()
     result = {"flats it learned in": report("flats it learned in", make, learner, args)}
     draw_curve(args.out / "curve.csv", result["flats it learned in"]["random walk"], args.out / "curve.png")
-    away = arena(args, range(args.flats, args.flats + args.unseen), home.goals)
+    away = arena(args, range(args.flats, args.flats + args.unseen))
     if away.tasks:
         others = maker(away, args.blind, args.eyes == "encoder")
         result["flats it never saw"] = report("flats it never saw", others, learner, args)
     settings = {name: value for name, value in vars(args).items() if name != "out"}
-    (args.out / "result.json").write_text(json.dumps({"settings": settings, "steps": learner.num_timesteps, **result}))
+    (args.out / "result.json").write_text(
+        json.dumps(
+            {"settings": settings, "steps": learner.num_timesteps, "processor seconds": round(curve.seconds), **result}
+        )
+    )
 
 
 if __name__ == "__main__":

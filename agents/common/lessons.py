@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from agents.vision.bank import FeatureBank
 from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
 from agents.vision.encoder import Encoder
 from agents.vision.features import feature_path, load_bank
+from agents.vision.occasions import OCCASIONS, showing
+from assets.cache import default_cache
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import AS_PUBLISHED
@@ -36,6 +39,10 @@ class Lessons:
     picture_kind: str | None = None
     """Of the pictures that the features come from, as in agents.vision.run.pictures_of."""
     device: str = "cpu"
+    shown: str = "same"
+    """When the pictures that helpers show were taken, one of agents.vision.occasions.OCCASIONS."""
+    cache: Path = field(default_factory=default_cache)
+    """Where the furniture is, for other pictures than the agent sees."""
 
     def split(
         self,
@@ -51,13 +58,17 @@ class Lessons:
         Args:
           lights: lightings of every house that the bank can show.
         """
-        return split_of(
-            self.data, name, self.encoder.digest, self.device, limit, houses, self.picture_kind, vnla, lights
+        encoder, kind = self.encoder.digest, self.picture_kind
+        split = split_of(self.data, name, encoder, self.device, limit, houses, kind, vnla, lights)
+        occasion = OCCASIONS[self.shown]
+        return replace(
+            split, bank=showing(split.bank, self.data, list(split.worlds), occasion, encoder, self.cache, kind)
         )
 
     def identity(self) -> dict[str, str]:
         """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""
-        return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train")}
+        shown = {} if self.shown == "same" else {"shown": self.shown}
+        return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train"), **shown}
 
     def pictures(self, name: str) -> str:
         """How the pictures of a split's houses were drawn, as in `drawings`."""

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 
 from agents.common.lessons import Lessons
 from agents.hanna.agent import HannaAgent
 from agents.hanna.evaluation import Keep, players
-from agents.vision.occasions import Occasion, showing
 from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import Row
-
-SAME = Occasion()
 
 
 def judge(
@@ -25,8 +21,6 @@ def judge(
     limit: int | None = None,
     batch: int = 32,
     only: Sequence[str] = (),
-    shown: Occasion = SAME,
-    cache: Path | None = None,
     keep: Keep | None = None,
     watch: Callable[[Iterable[str]], Iterable[str]] = iter,
     instead: Callable[[SplitData], SplitData] = lambda split: split,
@@ -36,8 +30,6 @@ def judge(
     Args:
       limit: at most so many tasks per split, from all houses alike.
       only: names of rows; none for those of the paper's tables.
-      shown: when the pictures that helpers show were taken.
-      cache: where the furniture is, for other pictures than the agent sees.
       watch: wraps the iterator over rows (a progress bar).
       instead: gives a split another assistant.
 
@@ -47,11 +39,7 @@ def judge(
     rows = []
     for split in splits:
         whole = instead(lessons.data.split(split))
-        bank = lessons.split(split).bank
-        if cache is not None:
-            encoder = lessons.encoder.digest
-            bank = showing(bank, lessons.data, list(whole.worlds), shown, encoder, cache, lessons.picture_kind)
-        judged = players(agent, bank, only)
+        judged = players(agent, lessons.split(split).bank, only)
         kept = None if keep is None else lambda name, episodes, split=split: keep(split, name, episodes)
         rows += evaluate(whole, judged, seed=seed, limit=limit, batch=batch, keep=kept, watch=watch)
     return rows

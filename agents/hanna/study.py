@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from agents.common.lessons import Lessons, drawings, split_of
+from agents.common.lessons import Lessons
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
@@ -18,6 +18,7 @@ from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
+from assets.cache import default_cache
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent, Episode
@@ -44,6 +45,18 @@ LEARNED = learned("Learned")
 HALF = learned("half curiosity", alpha=0.5)
 IMAGE_ONLY = learned("Target image only", read_assistance=False)
 LANGUAGE = learned("+ language instruction")
+OURS_SEEING = learned("Seeing")
+SIGHT_ROWS = (
+    learned("Blind", "blind"),
+    learned("Rules only", "rules only"),
+    learned("No help, trained so", ask_rule="never", alpha=0.5),
+    *(
+        learned(name.capitalize(), f"learned, {name}")
+        for name in ("ask every 5", "random ask", "perfect interpretation")
+    ),
+    without("Random walk", "random walk"),
+)
+"""What the seeing agent is compared with: without sight, without learning, without help, with other rules of asking."""
 LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
 NO_CURIOSITY = learned("Our model, alpha = 0", alpha=0.0)
 OURS = learned("Our model, alpha = 1")
@@ -72,6 +85,13 @@ TABLES: Mapping[str, StudyTable] = {
         ),
         FULL,
         TEST,
+    ),
+    "sight": StudyTable(
+        "HANNA with sight and without",
+        (OURS_SEEING, *SIGHT_ROWS),
+        ("success", "spl", "navigation error", "requests", "steps"),
+        ("test_unseen",),
+        tuple((OURS_SEEING, row) for row in SIGHT_ROWS if row.train is not None),
     ),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
     "4.5": StudyTable(
@@ -133,6 +153,9 @@ class HannaStudy(EpisodeStudy):
     """A trained agent whose weights and words every row begins with; None: random weights."""
     elsewhere: Path | None = None
     """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
+    shown: str = "same"
+    """When the pictures that helpers show were taken (agents.vision.occasions.OCCASIONS), in training and judging."""
+    cache: Path = field(default_factory=default_cache)
 
     name = "hanna"
     makers = ("agents.hanna.run",)
@@ -154,16 +177,13 @@ class HannaStudy(EpisodeStudy):
         return dataclasses.replace(self.config, seed=seed, **train)
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
-        data = dataset_of(self.data, "hanna")
-        drawn = drawings(data, data.names("train"), self.picture_kind)
         begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
-        return {"data": data.digest, "encoder": weights_digest(self.encoder), "pictures": drawn, **begun}
+        return {**self._lessons().identity(), "encoder": weights_digest(self.encoder), **begun}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
-        judged, encoder = self.judged_in({}), load_encoder(self.encoder).digest
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
-            split_of(judged, split, encoder, picture_kind=self.picture_kind)
+            self._lessons(self.elsewhere).split(split)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self._lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
@@ -176,8 +196,7 @@ class HannaStudy(EpisodeStudy):
         played = judge["played"]
         if agent is None:
             return agent_without_learning("hanna", played)
-        data, encoder = self.judged_in(judge), load_encoder(self.encoder).digest
-        bank = split_of(data, split.removesuffix(SHIPPED), encoder, picture_kind=self.picture_kind).bank
+        bank = self._lessons(self.elsewhere).split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
         return all_policies(agent, bank, by_the_text if by_text else as_shipped)[played]
 
@@ -188,9 +207,8 @@ class HannaStudy(EpisodeStudy):
         return dataset_of(self.elsewhere or self.data, "hanna")
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        data = self.judged_in(row.judge)
-        drawn = drawings(data, data.names(split.removesuffix(SHIPPED)), self.picture_kind)
-        return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn}
+        drawn = self._lessons(self.elsewhere).pictures(split.removesuffix(SHIPPED))
+        return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn, "shown": self.shown}
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         return counted(episodes, split.worlds)
@@ -202,11 +220,13 @@ class HannaStudy(EpisodeStudy):
             f" Judged in the data set {self.judged_in({}).digest[:16]}, not that of training." if self.elsewhere else ""
         )
         return (
-            f"{told}{judged} Pictures: {self.depends({})['pictures']}. {c.iterations} updates of {c.batch} "
-            f"episodes{begun}; judged at temperature {self.evaluation.evaluation_temperature:g} and by the rules of "
-            f"docs/sources.md, S36, S161, S162; in {', '.join(PRINTED)} so in the columns 'as shipped' alone, in the "
-            "others, beside the printed numbers, the likeliest action is taken."
+            f"{told}{judged} Pictures: {self.depends({})['pictures']}; goal images: {self.shown}. "
+            f"{c.iterations} updates of {c.batch} episodes{begun}; judged at temperature "
+            f"{self.evaluation.evaluation_temperature:g} and by the rules of docs/sources.md, S36, S161, S162; in "
+            f"{', '.join(PRINTED)} so in the columns 'as shipped' alone, in the others, beside the printed numbers, "
+            "the likeliest action is taken."
         )
 
-    def _lessons(self) -> Lessons:
-        return Lessons(dataset_of(self.data, "hanna"), load_encoder(self.encoder), self.picture_kind, self.device)
+    def _lessons(self, elsewhere: Path | None = None) -> Lessons:
+        data, encoder = dataset_of(elsewhere or self.data, "hanna"), load_encoder(self.encoder)
+        return Lessons(data, encoder, self.picture_kind, self.device, self.shown, self.cache)

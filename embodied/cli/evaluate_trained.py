@@ -70,12 +70,12 @@ def _hanna(args: Options, data: Path, file: Path, splits: Sequence[str], how: di
     from agents.hanna.agent import load_agent
     from agents.hanna.evaluation import WITHOUT_LEARNING
     from agents.hanna.judging import judge
-    from agents.vision.occasions import OCCASIONS
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
-    lessons = Lessons(dataset_of(data, "hanna"), encoder_of(args.encoder, args.network), args.pictures)
-    rows = judge(lessons, load_agent(file), splits, shown=OCCASIONS[args.shown], cache=args.cache, **how)
+    encoder, shown = encoder_of(args.encoder, args.network), {"shown": args.shown, "cache": args.cache}
+    lessons = Lessons(dataset_of(data, "hanna"), encoder, args.pictures, **shown)
+    rows = judge(lessons, load_agent(file), splits, **how)
     return rows, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
 
 

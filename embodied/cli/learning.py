@@ -47,6 +47,12 @@ class Encoded(EncoderFile):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Shown:
+    shown: Annotated[str, Option(words=SHOWN)] = "same"
+    """How the goal images of training differ from what the agent sees, as in `embodied features --shown`."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Threaded:
     threads: Count = 1
     """CPU threads of PyTorch."""

@@ -1,6 +1,7 @@
 """Train agents for each row of a table of a paper, evaluate them, and write the table beside the printed numbers.
 
     embodied study hanna 4.5 --data DATA --judged-in OTHER --out STUDY --seeds 3
+    embodied study find --data DATA --out STUDY
     embodied study vision encoders pictures --data DATA --out STUDY
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
@@ -11,12 +12,12 @@
     embodied study iliad nav 3.4 3.5 --data DATA --out STUDY
     embodied study check STUDY
 
-HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1 and D.2. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b' and 'figure 4.6'.
-VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and `algorithm-6`.
-Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table 3.2, Figures 3.4 and 3.5, `rates`, `held-out` and,
-with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`. `check` says which stored
-tables no longer belong to this code. Rows that tables share are trained once. Each table is written as JSON, Markdown
-and, for some, as a figure. Rerun an interrupted command to resume.
+HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2 and `sight`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b' and
+'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and
+`algorithm-6`. Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table 3.2, Figures 3.4 and 3.5, `rates`,
+`held-out` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`. `check` says
+which stored tables no longer belong to this code. Rows that tables share are trained once. Each table is written as
+JSON, Markdown and, for some, as a figure. Rerun an interrupted command to resume.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from agents.bandit.config import BanditConfig
 from agents.bandit.rating_config import DECISIONS, RatingConfig
 from agents.common.settings import EvaluationSettings
 from agents.common.shipped import SHIPPED_AGENT
+from agents.find.config import FinderConfig
 from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, IntentionConfig
 from agents.iliad.config import LearnerConfig
@@ -51,6 +53,7 @@ from embodied.cli.learning import (
     EncoderFile,
     NamedFiles,
     Nav,
+    Shown,
     Threaded,
     WithData,
     WithDevice,
@@ -129,11 +132,11 @@ class LikePeople:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, WithDevice):
+class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, WithDevice, Shown):
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1 or D.2."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2 or sight."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
@@ -143,6 +146,15 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Initialise with the weights of this agent."""
     config: Annotated[TrainingConfig, Settings(TRAINING, SCALES, skip=("training_houses", "lights"))]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FindOptions(Study, Trained, WithData, EncoderFile):
+    """Agents that find things without help, with sight and without."""
+
+    judged_tasks: Count = 50
+    """Evaluate on at most N tasks of each unseen house."""
+    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=("lights", "instruction_length"))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,6 +320,24 @@ def hanna(args: HannaOptions) -> int:
         picture_kind=args.pictures,
         begin=args.begin,
         elsewhere=args.judged_in,
+        shown=args.shown,
+        cache=args.cache,
+    )
+    return run_table(args, learner)
+
+
+def find(args: FindOptions) -> int:
+    from agents.find.study import FindStudy
+
+    learner = FindStudy(
+        args.data,
+        seeds_of(args, args.config.seed),
+        threads=args.threads,
+        encoder=args.encoder,
+        config=args.config,
+        cache=args.cache,
+        judged_tasks=args.judged_tasks,
+        picture_kind=args.pictures,
     )
     return run_table(args, learner)
 
@@ -434,6 +464,7 @@ def model_agent(args: AskOptions, places: object) -> Agent:
 
 COMMANDS: Mapping[str, Any] = {
     "hanna": (HannaOptions, hanna),
+    "find": (FindOptions, find),
     "vision": (VisionOptions, vision),
     "hari": (HariOptions, hari),
     "vnla": (VnlaOptions, vnla),

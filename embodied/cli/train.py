@@ -21,7 +21,19 @@ from agents.vision.config import VisionConfig
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import note
-from embodied.cli.learning import SMALL_SCALE, Drawn, Encoded, Lit, Nav, Run, Threaded, Timed, WithData, WithDevice
+from embodied.cli.learning import (
+    SMALL_SCALE,
+    Drawn,
+    Encoded,
+    Lit,
+    Nav,
+    Run,
+    Shown,
+    Threaded,
+    Timed,
+    WithData,
+    WithDevice,
+)
 from embodied.cli.options import Count, InputFolder, InputPath, OutputFolder, Settings
 
 if TYPE_CHECKING:
@@ -66,7 +78,7 @@ class Recorded:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainHanna(Recorded, Run, Encoded, WithDevice):
+class TrainHanna(Recorded, Run, Encoded, WithDevice, Shown):
     """The agent, on a HANNA data set with features.
 
     Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
@@ -190,7 +202,8 @@ def _lessons(args: TrainHanna | TrainVnla, kind: str) -> Lessons:
 
     use_threads(args.threads)
     encoder = encoder_of(args.encoder, args.network)
-    return Lessons(dataset_of(args.data, kind), encoder, args.pictures, join_launcher(args.device))
+    data, shown = dataset_of(args.data, kind), args.shown if isinstance(args, TrainHanna) else "same"
+    return Lessons(data, encoder, args.pictures, join_launcher(args.device), shown, args.cache)
 
 
 def train_execution(args: TrainExecution) -> int:

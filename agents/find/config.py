@@ -1,0 +1,49 @@
+"""Settings of agents that find things. Free of torch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agents.common.settings import AT_LEAST_ONE, NOT_ALL, NOT_NEGATIVE, ImitationSettings, require, require_word
+
+SEES_WHAT = ("all", "map", "nothing")
+THINGS = (
+    *("bed", "dining chair", "potted plant", "sofa", "television", "toilet"),
+    *("bathtub", "cooker", "desk", "fridge", "wardrobe", "washing machine"),
+)
+"""What is looked for: the six categories of Habitat's ObjectNav challenge of 2022 and six more of its kind."""
+AGENTS = ("network", "detector")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinderConfig(ImitationSettings):
+    """Of an agent that learns to find things (DAgger), or of the explorer with a detector beside it."""
+
+    agent: str = "network"
+    """'network' learns where to look; 'detector' explores the nearest frontier and goes to what it recognises."""
+    sees: str = "all"
+    """'all'; 'map': black for the network, while its map recognises places; 'nothing': black for both."""
+    hidden_size: int = 128
+    """Width of the network."""
+    dropout: float = 0.3
+    """Share of features and of hidden units that are dropped in training."""
+    iterations: int = 800
+    """Updates of the weights."""
+    glimpses: int = 600
+    """In the first so many updates only the readers of views learn, then from whole episodes, too (DAgger)."""
+    learning_rate: float = 3e-3
+    """Learning rate of Adam."""
+    cooldown: float = 0.5
+    """The last share of the updates, over which the learning rate falls to zero."""
+    house_tasks: int = 100
+    """Tasks of each training house."""
+    validate_every: int = 400
+    """Updates between validations."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_word(self, "agent", AGENTS)
+        require_word(self, "sees", SEES_WHAT)
+        require(self, AT_LEAST_ONE, "hidden_size", "house_tasks")
+        require(self, NOT_ALL, "dropout")
+        require(self, NOT_NEGATIVE, "glimpses")

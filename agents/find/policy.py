@@ -1,0 +1,254 @@
+"""FindPolicy: explores a house; weighs all untried ways on its map and all places to stop at, and goes there.
+
+As planners over topological maps do (DUET, Chen et al. 2022), it decides among everything it has seen, not only among
+what is beside it; a decision is carried out before the next one is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from agents.common.choosing import Chooser, choose_likeliest
+from agents.common.vocabulary import Vocabulary
+from agents.find.network import Scorer
+from agents.find.way_map import WayMap, directions
+from agents.vision.bank import FeatureBank
+from embodied.interface import Action, Move, Observation, Situation, Stop
+
+STOP = -1
+"""Stands for a way where an option is to stop."""
+WORDS = 12
+"""Of a request that are read."""
+LONG = 40.0
+"""Steps that count as a long time."""
+CERTAIN = 0.5
+"""Metres by which an option must be nearer to be much the better lesson."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What was weighed once, and what a teacher thinks of it."""
+
+    options: np.ndarray
+    """(m, 2) int64 spots and ways."""
+    facts: np.ndarray
+    """(m, FACTS) float32."""
+    wanted: np.ndarray
+    """(m,) float32, how likely each option should be."""
+
+
+@dataclass
+class Search:
+    """Owns what one episode has seen and decided."""
+
+    request: np.ndarray
+    map: WayMap = field(default_factory=WayMap)
+    seen: list[Tensor] = field(default_factory=list)
+    """(36, D) features of each spot, as the network sees them."""
+    views: list[np.ndarray] = field(default_factory=list)
+    """(n,) view of each way of each spot."""
+    ways: list[np.ndarray] = field(default_factory=list)
+    """(n,) logits of the ways of each spot."""
+    stops: list[float] = field(default_factory=list)
+    """Logit of stopping at each spot."""
+    plan: tuple[int, int] | None = None
+    """The option that is being carried out."""
+    nodes: list[int] = field(default_factory=list)
+    """Node of each spot: known to teachers only."""
+    ends: list[tuple[int, ...]] = field(default_factory=list)
+    """Node at the end of each way of each spot, as `nodes`."""
+    right: list[tuple[bool, np.ndarray]] = field(default_factory=list)
+    """Whether stopping at each spot is right, and (n,) how likely each of its ways should be, as `nodes`."""
+    decisions: list[Decision] = field(default_factory=list)
+    """All so far, where a teacher watches."""
+
+    def options(self) -> np.ndarray:
+        """(m, 2) int64: stopping at each spot, and each way that was not tried."""
+        stop = [(k, STOP) for k in range(len(self.map.spots))]
+        ways = [(k, w) for k, s in enumerate(self.map.spots) for w, end in enumerate(s.leads) if end is None]
+        return np.array(stop + ways, dtype=np.int64)
+
+
+def facts(options: np.ndarray, steps: np.ndarray, time: int) -> np.ndarray:
+    """(m, FACTS) float32: is it to stop; how far is its spot, and that for stopping; and how late it is, and how much
+    was seen, for stopping."""
+    stop = options[:, 1] == STOP
+    seen = np.log1p(np.count_nonzero(stop))
+    return np.stack([stop, steps / 10, stop * steps / 10, stop * time / LONG, stop * seen], 1).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class FindPolicy:
+    """A trained (or training) agent that finds things."""
+
+    scorer: Scorer
+    vocabulary: Vocabulary
+    bank: FeatureBank
+    """What the network sees."""
+    looks: FeatureBank
+    """What places are known again by."""
+    choose: Chooser = choose_likeliest
+
+    def act(
+        self, observations: Sequence[Observation | None], memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[list[Action | None], dict[int, Search]]:
+        """One step of every running episode; see embodied.interface.Policy."""
+        return self._act(observations, [None] * len(observations), memory, rngs)
+
+    def _act(
+        self,
+        observations: Sequence[Observation | None],
+        situations: Sequence[Situation | None],
+        memory: dict[int, Search] | None,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[list[Action | None], dict[int, Search]]:
+        running = [(i, o) for i, o in enumerate(observations) if o is not None]
+        memory = memory or {i: Search(self.vocabulary.encode(o.instruction, WORDS)) for i, o in running}
+        looks = self.looks.gather([o.sight for _, o in running]).float().numpy()
+        fresh = [(i, o) for (i, o), look in zip(running, looks, strict=True) if memory[i].map.arrive(o, look)]
+        self._score([(memory[i], o) for i, o in fresh])
+        for i, _ in fresh:
+            if (s := situations[i]) is not None:
+                memory[i].nodes.append(s.pose.node)
+                memory[i].ends.append(s.candidate_nodes)
+                costs = left_after(s.pose.node, s.candidate_nodes, s)
+                memory[i].right.append((s.pose.node in s.targets, wanted(costs)))
+        actions: list[Action | None] = [None] * len(observations)
+        for i, o in running:
+            actions[i] = self._next(memory[i], o, situations[i], rngs[i])
+        return actions, memory
+
+    def _score(self, fresh: Sequence[tuple[Search, Observation]]) -> None:
+        if not fresh:
+            return
+        seen = self.bank.gather([o.sight for _, o in fresh]).float()
+        views = padded([o.candidates.view for _, o in fresh])
+        with torch.no_grad():
+            ways, stops = self.scorer(seen, torch.from_numpy(np.stack([s.request for s, _ in fresh])), views)
+        for (search, o), row, way, stop in zip(fresh, seen, ways.numpy(), stops.tolist(), strict=True):
+            search.seen.append(row)
+            search.views.append(o.candidates.view)
+            search.ways.append(way[: len(o.candidates)])
+            search.stops.append(stop)
+
+    def _next(self, search: Search, o: Observation, situation: Situation | None, rng: np.random.Generator) -> Action:
+        """Go on with the plan, or make one."""
+        reach = search.map.reach()
+        if search.plan is None or search.plan[0] not in reach:
+            search.plan = self._decide(search, o, situation, reach, rng)
+        spot, way = search.plan
+        towards = reach[spot][1]
+        if towards is not None:  # another spot, which is reached along a way
+            way = towards
+        elif way == STOP:
+            return Stop()
+        else:
+            search.plan = None
+        search.map.leave(way)
+        turned = directions(o) - search.map.spots[search.map.here].ways[way]
+        return Move(int(np.cos(turned).argmax()))
+
+    def _decide(
+        self,
+        search: Search,
+        o: Observation,
+        situation: Situation | None,
+        reach: dict[int, tuple[int, int | None]],
+        rng: np.random.Generator,
+    ) -> tuple[int, int]:
+        options = search.options()
+        options = options[[int(k) in reach for k in options[:, 0]]]
+        steps = np.array([reach[int(k)][0] for k in options[:, 0]], dtype=np.float32)
+        known = facts(options, steps, o.time)
+        looks = np.array([search.stops[k] if w == STOP else search.ways[k][w] for k, w in options.tolist()])
+        logits = looks + known @ self.scorer.price.weight.detach().numpy()[0]
+        if situation is not None:
+            costs = costs_of(search, options, situation)
+            search.decisions.append(Decision(options, known, wanted(costs)))
+            if np.isfinite(costs).any():  # who learns walks on where stopping is wrong
+                logits = np.where(np.isfinite(costs), logits, -np.inf)
+        weights = np.exp(logits - logits.max())
+        spot, way = options[self.choose(weights / weights.sum(), rng)].tolist()
+        return spot, way
+
+
+def left_after(node: int, ends: Sequence[int], situation: Situation) -> np.ndarray:
+    """(n,) metres to go from a node over each of its neighbours to the nearest goal."""
+    distance = np.asarray(situation.world.graph.distance)
+    return distance[node, list(ends)] + distance[list(ends)][:, list(situation.targets)].min(1)
+
+
+def costs_of(search: Search, options: np.ndarray, situation: Situation) -> np.ndarray:
+    """(m,) metres still to go after each option, the way there included; infinite for stopping at a wrong place."""
+    back = np.asarray(situation.world.graph.distance)[situation.pose.node]
+    onward = [left_after(node, ends, situation) for node, ends in zip(search.nodes, search.ends, strict=True)]
+    there = lambda k, w: onward[k][w] if w != STOP else 0.0 if search.nodes[k] in situation.targets else np.inf
+    return np.array([back[search.nodes[k]] + there(k, w) for k, w in options.tolist()])
+
+
+def wanted(costs: np.ndarray) -> np.ndarray:
+    """(m,) float32: how likely options of these costs should be."""
+    weights = np.exp((costs.min() - costs) / CERTAIN)
+    return (weights / weights.sum()).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """The same policy while a teacher watches who says what each decision should have been."""
+
+    policy: FindPolicy
+
+    def act_privileged(
+        self,
+        observations: Sequence[Observation | None],
+        situations: Sequence[Situation | None],
+        memory: Any,
+        *,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[list[Action | None], dict[int, Search]]:
+        return self.policy._act(observations, situations, memory, rngs)
+
+
+def padded(rows: Sequence[np.ndarray]) -> Tensor:
+    """(N, A) int64 of rows of different lengths, filled with 0."""
+    return torch.nn.utils.rnn.pad_sequence([torch.from_numpy(np.asarray(r, dtype=np.int64)) for r in rows], True)
+
+
+def imitation_loss(scorer: Scorer, searches: Sequence[Search]) -> tuple[Tensor, Tensor]:
+    """What is to be descended, and the share of decisions that the teacher would take too.
+
+    The loss is the cross-entropy of all decisions with what the teacher wants, and, since decisions alone teach slowly,
+    that of the ways of each spot among themselves and of stopping at it, each averaged.
+    """
+    spots = [(s, k) for s in searches for k in range(len(s.seen))]
+    seen = torch.stack([s.seen[k] for s, k in spots])
+    request = torch.from_numpy(np.stack([s.request for s, _ in spots]))
+    ways, stops = scorer(seen, request, padded([s.views[k] for s, k in spots]))
+    here = torch.tensor([s.right[k][0] for s, k in spots])
+    loss = F.binary_cross_entropy_with_logits(stops, here.float())
+    loss = loss + entropy(ways, [s.right[k][1] for s, k in spots])[0]
+
+    flat = torch.cat([ways, stops[:, None]], 1)  # the last is STOP
+    first = np.cumsum([0, *(len(s.seen) for s in searches)])
+    cases = [(begin, d) for begin, s in zip(first, searches) for d in s.decisions]
+    rows = padded([d.options[:, 0] + begin for begin, d in cases])
+    columns = padded([d.options[:, 1] % flat.shape[1] for _, d in cases])
+    facts_of = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(d.facts) for _, d in cases], True)
+    decided, right = entropy(flat[rows, columns] + scorer.price(facts_of)[..., 0], [d.wanted for _, d in cases])
+    return loss + decided, right
+
+
+def entropy(logits: Tensor, goals: Sequence[np.ndarray]) -> tuple[Tensor, Tensor]:
+    """Mean cross-entropy of (N, M) logits with distributions over the first of them, and how often the likeliest is
+    the same."""
+    goal = torch.nn.utils.rnn.pad_sequence([torch.from_numpy(g) for g in goals], True)
+    there = torch.arange(goal.shape[1]) < torch.tensor([len(g) for g in goals])[:, None]
+    logs = logits[:, : goal.shape[1]].masked_fill(~there, -1e4).log_softmax(-1)
+    return -(goal * logs).sum(-1).mean(), (logs.argmax(-1) == goal.argmax(-1)).float().mean()

@@ -1,0 +1,275 @@
+"""Agents that find things, from the houses of any data set with features: their tasks, training and files."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+
+from agents.common import spine
+from agents.common.choosing import choose_sampled
+from agents.common.lessons import Lessons, Split
+from agents.common.playing import play_remembering
+from agents.common.session import Clock, Note, descend, dropout_of, falling_rate, seed_of, set_rate, tasks_of_update
+from agents.common.settings import EvaluationSettings
+from agents.common.tensor_file import put
+from agents.common.vocabulary import Vocabulary, build_vocabulary
+from agents.common.weights import load_weights, refuse_features, save_weights
+from agents.find.config import THINGS, FinderConfig
+from agents.find.network import READ, Explorer, SeekNetwork
+from agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
+from agents.vision.bank import FeatureBank
+from assets.catalogue import load_catalogue
+from embodied.action_spaces import PanoramicMoves
+from embodied.datasets.store import Dataset
+from embodied.envs.make import environment_maker
+from embodied.evaluation import metrics
+from embodied.evaluation.rollout import play
+from embodied.identity import Identity, identity_of
+from embodied.interface import STEP, TURNS, VIEWS, FindObject, Place, Pose, Sight, Task
+from embodied.language.plain import PlainLanguage
+from embodied.seeds import stream
+from embodied.tasks.find import find_pool, find_task
+
+CLIP = 5.0
+"""Norm to which gradients are cut."""
+SEEN_PIXELS = 12
+"""Pixels from which on something counts as visible, of the 24,576 of embodied.interface.Sighting."""
+LOOKS = 64
+"""Viewpoints whose views are read in one update."""
+BARS, PATIENCES = (-2.0, -1.0, 0.0, 1.0), (0.1, 0.3, 1.0)
+"""What the explorer's bar and patience are chosen from, in validation houses."""
+
+
+def tasks_in(places: Mapping[str, Place], per_house: int, things: Collection[str] = THINGS) -> list[Task]:
+    """At most so many find tasks of each house, all for one of `things`."""
+    language, found = PlainLanguage(), []
+    for place in places.values():
+        pool = find_pool(place, seed=0)
+        fitting = [k for k, (c, _) in enumerate(pool.pairs) if pool.classes[c].object_class in things]
+        found += [find_task(pool, k, seed=0, language=language) for k in fitting[:per_house]]
+    return found
+
+
+def find_split(lessons: Lessons, name: str, per_house: int, houses: int | None = None) -> Split:
+    """Find tasks in the houses of a split."""
+    split = lessons.split(name, limit=1, houses=houses)
+    tasks = tasks_in(split.worlds, per_house)
+    return dataclasses.replace(split, tasks=tasks, make_env=environment_maker("find", split.worlds))
+
+
+@dataclass(frozen=True)
+class FinderAbout:
+    """What stands beside the weights in an agent's file."""
+
+    config: FinderConfig
+    encoder: str
+    """Digest of the encoder whose features it learned from."""
+    feature_size: int
+    words: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Finder:
+    """An agent that finds things."""
+
+    about: FinderAbout
+    scorer: SeekNetwork
+
+    def policy(self, bank: FeatureBank) -> FindPolicy:
+        """The agent as it is judged.
+
+        Raises:
+          ValueError: features of another encoder.
+        """
+        refuse_features(bank.digest, self.about.encoder)
+        sees, scorer = self.about.config.sees, self.scorer
+        looks = bank.blind() if sees == "nothing" else bank
+        seen = bank if sees == "all" else bank.blind()
+        return FindPolicy(scorer, Vocabulary(self.about.words), seen, looks)
+
+    def save(self, path: Path, identity: Identity | None = None) -> None:
+        """Write the agent, atomically."""
+        save_weights(path, "find", self.scorer.state_dict(), self.about, identity)
+
+
+def new_finder(about: FinderAbout, requests: torch.Tensor) -> Finder:
+    """An untrained agent; its weights follow from the seed. `requests`: as of SeekNetwork."""
+    c, kind = about.config, {"network": SeekNetwork, "detector": Explorer}[about.config.agent]
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(c.seed)
+        return Finder(about, kind(about.feature_size, requests, c.hidden_size, c.dropout))
+
+
+def load_finder(path: Path) -> Finder:
+    """Read what Finder.save wrote.
+
+    Raises:
+      FileNotFoundError, OSError, ValueError.
+    """
+    tensors, about = load_weights(path, "find", FinderAbout, "train the agent again with `embodied study find`")
+    finder = new_finder(about, tensors["requests"])
+    put(finder.scorer, tensors, path)
+    finder.scorer.eval()
+    return finder
+
+
+class FindLearner:
+    """An agent in training; a Learner of agents.common.spine."""
+
+    evaluation = EvaluationSettings()
+
+    def __init__(self, finder: Finder, training: Split, labels: Labels) -> None:
+        self.finder, self.config, self.network, self._labels = finder, finder.about.config, finder.scorer, labels
+        self.optimizer: torch.optim.Optimizer = torch.optim.AdamW(
+            self.network.parameters(), self.config.learning_rate, weight_decay=self.config.weight_decay
+        )
+        self._training = training
+
+    def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
+        c, numbers, searches = self.config, dict[str, float](), list[Search]()
+        if update >= c.glimpses:
+            self.network.eval()
+            with clock.on("environment"):
+                searches, numbers = self._search(update)
+        self.network.train()
+        with clock.on("backward"), dropout_of(c.seed, update):
+            set_rate(self.optimizer, falling_rate(c.learning_rate, update, c.iterations, c.cooldown))
+            loss = self._labels.loss(self.network, looks_of(self._labels, c.seed, update))
+            numbers["reading"] = float(loss.detach())
+            if searches:
+                imitated, right = imitation_loss(self.network, searches)
+                loss, numbers["loss"], numbers["right"] = loss + imitated, float(imitated.detach()), float(right)
+            numbers["gradient"] = descend(loss, self.optimizer, f"update {update}", CLIP)
+        return numbers
+
+    def _search(self, update: int) -> tuple[list[Search], dict[str, float]]:
+        """Whole episodes, watched by a teacher."""
+        c, split = self.config, self._training
+        policy = Watched(dataclasses.replace(self.finder.policy(split.bank), choose=choose_sampled))
+        tasks = tasks_of_update(split.tasks, update, c.batch, c.seed)
+        episodes, searches, _ = play_remembering(split.make_env, policy, tasks, seed=seed_of(c.seed, update))
+        success = sum(metrics.success(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
+        return list(searches.values()), {"success": success, "steps": float(sum(len(e.steps) for e in episodes))}
+
+    def judged(self, split: Split) -> FindPolicy:
+        return self.finder.policy(split.bank)
+
+    def task(self, task: Task) -> Task:
+        return task
+
+    def keep(self, path: Path, identity: Identity) -> None:
+        self.finder.save(path, identity)
+
+
+def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:
+    """Train, or go on training, an agent; writes best.safetensors and what agents.common.session writes."""
+    training = find_split(lessons, "train", config.house_tasks, config.training_houses or None)
+    validation = find_split(lessons, "val_unseen", -(-config.validation_tasks // len(lessons.data.names("val_unseen"))))
+    words = build_vocabulary(t.request for t in training.tasks).words
+    about = FinderAbout(config, lessons.encoder.speaks, lessons.encoder.size, words)
+    classes = sorted({t.goal.object_class for t in training.tasks if isinstance(t.goal, FindObject)})
+    say = lambda c: PlainLanguage().request(FindObject(c), rng=stream(config.seed, "unused"))
+    requests = torch.stack([torch.from_numpy(Vocabulary(words).encode(say(c), WORDS)) for c in classes])
+    finder, identity = new_finder(about, requests), finder_identity(lessons, config)
+    looks = dataclasses.replace(training, bank=finder.policy(training.bank).bank)
+    labels = labels_of(lessons.data, looks, classes, cache)
+    note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {len(classes)} classes")
+    if config.agent == "detector":
+        explorer_of(finder, labels, validation, note=note).save(folder / "best.safetensors", identity)
+        return
+    spine.train(FindLearner(finder, training, labels), validation, folder, identity, note=note)
+
+
+def finder_identity(lessons: Lessons, config: FinderConfig) -> Identity:
+    """All that a trained agent depends on."""
+    return identity_of("agents.find.run", settings=config, **lessons.identity())
+
+
+# What there is to be read -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """What is true of all views of some houses: n viewpoints."""
+
+    seen: torch.Tensor
+    """(n, 36, D) features."""
+    read: torch.Tensor
+    """(n, 36, READ, C) bool."""
+    ways: torch.Tensor
+    """(n, 36) bool, whether a way begins in a view."""
+    there: torch.Tensor
+    """(n, C) bool, whether the house has such things."""
+
+    def loss(self, network: SeekNetwork, rows: torch.Tensor) -> torch.Tensor:
+        """Cross-entropy of what is read of some viewpoints, averaged over what there is, times 20."""
+        logits = network.read(self.seen[rows].float())
+        off = F.binary_cross_entropy_with_logits(logits, self.read[rows].float(), reduction="none")
+        leads = off[:, :, 2] * (self.ways[rows][..., None] & self.there[rows][:, None])
+        return 20 * off[:, :, :2].mean() + leads.sum() / (leads > 0).sum().clamp(min=1)
+
+
+def labels_of(data: Dataset, split: Split, classes: Sequence[str], cache: Path) -> Labels:
+    """The labels of a split's houses, by what the simulator knows."""
+    catalogue, number, moves = load_catalogue(cache), {c: i for i, c in enumerate(classes)}, PanoramicMoves()
+    parts = []
+    for name, place in split.worlds.items():
+        world, nodes = data.open_world(name, catalogue, cache), len(place.graph.positions)
+        read = np.zeros((nodes, VIEWS, len(READ), len(classes)), bool)
+        ways, there = np.zeros((nodes, VIEWS), bool), np.zeros(len(classes), bool)
+        left, goal = np.full((nodes, len(classes)), np.inf), np.zeros((nodes, len(classes)), bool)
+        distance = np.asarray(place.graph.distance)
+        for c in find_pool(place, seed=0).classes:
+            if c.object_class in number:
+                k, goals = number[c.object_class], list(c.goal_nodes)
+                there[k], goal[goals, k], left[:, k] = True, True, distance[:, goals].min(1)
+        for node in range(nodes):
+            for s in world.sightings(node):
+                if s.object_class in number and s.pixels >= SEEN_PIXELS:
+                    k, tilt = number[s.object_class], min(max(round(s.pitch / STEP), -1), 1)
+                    view = TURNS * (tilt + 1) + round(s.yaw / STEP) % TURNS
+                    read[node, view, 0, k], read[node, view, 1, k] = True, goal[node, k]
+            candidates, poses = moves.at(place, Pose(node))
+            ends = [p.node for p in poses]
+            costs = distance[node, ends][:, None] + left[ends]
+            ways[node, candidates.view] = True
+            for view, good in zip(candidates.view, costs <= costs.min(0) + CERTAIN, strict=True):
+                read[node, view, 2] |= good & there
+        seen = split.bank.gather([Sight(name, v) for v in range(nodes)])
+        parts.append((seen, *map(torch.from_numpy, (read, ways, np.tile(there, (nodes, 1))))))
+    return Labels(*(torch.cat(x) for x in zip(*parts, strict=True)))
+
+
+def explorer_of(finder: Finder, labels: Labels, validation: Split, *, note: Note) -> Finder:
+    """The finder that explores, with patience and bar chosen in validation houses, once its readers have learned."""
+    c, explorer = finder.about.config, finder.scorer
+    assert isinstance(explorer, Explorer)
+    optimizer = torch.optim.AdamW(explorer.parameters(), c.learning_rate, weight_decay=c.weight_decay)
+    for update in range(c.iterations):
+        with dropout_of(c.seed, update):
+            set_rate(optimizer, falling_rate(c.learning_rate, update, c.iterations, c.cooldown))
+            descend(labels.loss(explorer, looks_of(labels, c.seed, update)), optimizer, f"update {update}", CLIP)
+    explorer.eval()
+    scores = {}
+    for patience in PATIENCES:
+        for bar in BARS:
+            explorer.ruled(patience, bar)
+            with torch.inference_mode():
+                player = finder.policy(validation.bank)
+                episodes = play(validation.make_env, player, validation.tasks, seed=0, batch=32)
+            good = [metrics.success(e, validation.worlds[e.task.world].graph) for e in episodes]
+            scores[patience, bar] = sum(good) / len(good)
+            note(f"explorer, patience {patience:g}, bar {bar:g}: validation success {scores[patience, bar]:.3f}")
+    explorer.ruled(*max(scores, key=lambda k: scores[k]))
+    return finder
+
+
+def looks_of(labels: Labels, seed: int, update: int) -> torch.Tensor:
+    """(LOOKS,) viewpoints of one update."""
+    return torch.from_numpy(stream(seed, "looks", update).integers(len(labels.seen), size=LOOKS))
