@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,10 @@ class FindStudy(EpisodeStudy):
 
     def tables(self) -> Mapping[str, StudyTable]:
         return TABLES
+
+    def seeds(self, row: StudyRow) -> Sequence[int]:
+        """Who is only compared with learns once."""
+        return self.repeats if row in (SEEING, BLIND) else self.repeats[:1]
 
     def settings(self, train: Mapping[str, Any], seed: int) -> FinderConfig:
         return dataclasses.replace(self.config, seed=seed, **train)
