@@ -73,8 +73,8 @@ def _hanna(args: Options, data: Path, file: Path, splits: Sequence[str], how: di
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
-    encoder, shown = encoder_of(args.encoder, args.network), {"shown": args.shown, "cache": args.cache}
-    lessons = Lessons(dataset_of(data, "hanna"), encoder, args.pictures, **shown)
+    encoder = encoder_of(args.encoder, args.network)
+    lessons = Lessons(dataset_of(data, "hanna"), encoder, args.pictures, shown=args.shown, cache=args.cache)
     rows = judge(lessons, load_agent(file), splits, **how)
     return rows, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
 
