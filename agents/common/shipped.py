@@ -7,6 +7,8 @@ from pathlib import Path
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights"
 SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
 SHIPPED_HARI = WEIGHTS / "hari_mini.safetensors"
-SHIPPED_VNLA = WEIGHTS / "vnla_mini.safetensors"
+SHIPPED_VNLA, SHIPPED_VLN = WEIGHTS / "vnla_mini.safetensors", WEIGHTS / "vln_mini.safetensors"
+SHIPPED = {"hanna": SHIPPED_AGENT, "vnla": SHIPPED_VNLA, "hari": SHIPPED_HARI, "vln": SHIPPED_VLN}
+"""Agents, by the kind of task that they play."""
 SHIPPED_STUDENT = WEIGHTS / "iliad_regex_tiny.safetensors"
 SHIPPED_WALKER = WEIGHTS / "iliad_nav_tiny.safetensors"

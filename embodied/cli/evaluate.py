@@ -151,14 +151,12 @@ class Options(TaskOptions, Results, OfTrained, HariVariants, WithModel, Encoded,
 
 
 def run(args: Options) -> int:
-    from embodied.datasets.store import Dataset
+    from embodied.datasets.store import dataset_of
     from embodied.locks import locked
 
     if args.rrd and not args.out:
         raise ValueError("--rrd wants --out DIR beside it: recordings go to DIR/recordings")
-    data = Dataset(args.data) if args.data else None
-    if data is not None and data.kind != args.kind:
-        raise ValueError(f"{args.data} is a data set of {data.kind!r}, not of {args.kind!r}")
+    data = dataset_of(args.data, args.kind) if args.data else None
     names, files = _agents(args)
     if files and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
@@ -176,18 +174,17 @@ def _agents(args: Options) -> tuple[list[str], list[Path]]:
     Raises:
       ValueError: an unknown agent, or several trained ones.
     """
-    from agents.common.shipped import SHIPPED_AGENT, SHIPPED_HARI, SHIPPED_VNLA
+    from agents.common.shipped import SHIPPED
     from embodied.evaluation.evaluate import agent_names
     from embodied.policies.ask import baselines
 
-    shipped = {"hanna": SHIPPED_AGENT, "vnla": SHIPPED_VNLA, "hari": SHIPPED_HARI}
     known = [*baselines()] if args.kind == "ask" else agent_names(args.kind)
     names, files = [], []
-    for name in args.agent or (["shipped"] if args.kind in shipped and args.data else known):
+    for name in args.agent or (["shipped"] if args.kind in SHIPPED and args.data else known):
         path = Path(name)
-        if name == "shipped" and args.kind in shipped:
-            files.append(shipped[args.kind])
-        elif args.kind in shipped and (path.suffix == ".safetensors" or path.is_dir()):
+        if name == "shipped" and args.kind in SHIPPED:
+            files.append(SHIPPED[args.kind])
+        elif args.kind in SHIPPED and (path.suffix == ".safetensors" or path.is_dir()):
             files.append(path / "best.safetensors" if path.is_dir() else path)
         elif name in known or name == LLM or (args.kind == "ask" and (name.startswith("http") or path.is_dir())):
             names.append(name)

@@ -21,9 +21,10 @@ def columns_of(kind: str) -> Sequence[str]:
     """The measures of the paper's tables."""
     from agents.hanna.evaluation import COLUMNS as HANNA
     from agents.hari.judging import COLUMNS as HARI
+    from agents.vln.study import COLUMNS as VLN
     from agents.vnla.judging import COLUMNS as VNLA
 
-    return {"hanna": HANNA, "hari": HARI, "vnla": VNLA}[kind]
+    return {"hanna": HANNA, "hari": HARI, "vln": VLN, "vnla": VNLA}[kind]
 
 
 def evaluate_trained(
@@ -52,7 +53,8 @@ def evaluate_trained(
     use_threads(args.threads)
     how: dict[str, Any] = {"seed": args.seed, "limit": args.tasks, "batch": args.batch or 32}
     how |= {"only": rows, "keep": keep, "watch": lambda agents: bar(agents, "agents", "agent"), "instead": instead}
-    found, looking = {"hari": _hari, "vnla": _vnla, "hanna": _hanna}[args.kind](args, data.folder, file, splits, how)
+    judges = {"hari": _hari, "vln": _vln, "vnla": _vnla, "hanna": _hanna}
+    found, looking = judges[args.kind](args, data.folder, file, splits, how)
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}
     facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
@@ -92,6 +94,28 @@ def _vnla(args: Options, data: Path, file: Path, splits: Sequence[str], how: dic
     note(f"rules of play: {agent.config.rules}; trained on pictures {agent.pictures}")
     rows = judge(lessons, agent, splits, **how)
     return rows, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
+
+
+def _vln(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
+    """The follower beside agents without learning."""
+    from agents.common.lessons import Lessons
+    from agents.vision.run import encoder_of
+    from agents.vln.agent import load_agent
+    from embodied.datasets.store import dataset_of
+    from embodied.evaluation.evaluate import PLAIN, evaluate
+
+    agent, instead, only, keep = load_agent(file), how.pop("instead"), how.pop("only"), how.pop("keep")
+    lessons, rows = Lessons(dataset_of(data, "vln"), encoder_of(args.encoder, args.network), args.pictures), list[Any]()
+    note(f"trained on pictures {agent.about.pictures}")
+    for split in splits:
+        players: dict[str, Any] = {"learned": agent.policy(lessons.split(split).bank)}
+        players |= {name: make() for name, make in PLAIN.items()}
+        if unknown := sorted(set(only) - set(players)):
+            raise ValueError(f"unknown rows {unknown}; there are {list(players)}")
+        chosen = {n: p for n, p in players.items() if not only or n in only}
+        kept = lambda name, episodes, split=split: keep(split, name, episodes)
+        rows += evaluate(instead(lessons.data.split(split)), chosen, keep=kept, **how)
+    return rows, ["learned"]
 
 
 def _hari(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:

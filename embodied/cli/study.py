@@ -5,6 +5,7 @@
     embodied study vision encoders pictures --data DATA --out STUDY
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
+    embodied study vln followers speaker --data DATA --out STUDY
     embodied study ask houses classes curves --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
     embodied study stars --data DATA --out STUDY
@@ -14,10 +15,11 @@
 
 HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2 and `sight`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b' and
 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and
-`algorithm-6`. Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table 3.2, Figures 3.4 and 3.5, `rates`,
-`held-out` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`. `check` says
-which stored tables no longer belong to this code. Rows that tables share are trained once. Each table is written as
-JSON, Markdown and, for some, as a figure. Rerun an interrupted command to resume.
+`algorithm-6`. VLN's are `followers` and `speaker`. Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table
+3.2, Figures 3.4 and 3.5, `rates`, `held-out` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure
+3.7' and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share are
+trained once. Each table is written as JSON, Markdown and, for some, as a figure. Rerun an interrupted command to
+resume.
 """
 
 from __future__ import annotations
@@ -42,6 +44,8 @@ from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from agents.vision.config import RENDER_PRESETS, VisionConfig
+from agents.vln.config import SCALES as VLN_SCALES
+from agents.vln.config import SPEAKER_SCALES, FollowerSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from agents.vnla.config import VnlaSettings
 from embodied.cli.common import Cached, note
@@ -201,6 +205,22 @@ class VnlaOptions(Study, Trained, Judged, WithData, Encoded):
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
     config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "ask_rules", "rules"))]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VlnOptions(Study, Trained, Judged, WithData, Encoded):
+    """Agents that follow route instructions, and a speaker."""
+
+    tables: Tables
+    """Make these tables: followers or speaker."""
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    others: Count = 1
+    """Training seeds of all rows but the first."""
+    config: Annotated[
+        FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless", "spoken_share"))
+    ]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -398,6 +418,25 @@ def vnla(args: VnlaOptions) -> int:
     return run_table(args, learner)
 
 
+def vln(args: VlnOptions) -> int:
+    from agents.vln.study import VlnStudy
+
+    learner = VlnStudy(
+        args.data,
+        seeds_of(args, args.config.seed),
+        args.tasks,
+        threads=args.threads,
+        encoder=args.encoder,
+        network=args.network,
+        config=args.config,
+        speaker=SPEAKER_SCALES[args.scale],
+        evaluation=args.evaluation,
+        others=args.others,
+        picture_kind=args.pictures,
+    )
+    return run_table(args, learner)
+
+
 def bandit(args: BanditOptions) -> int:
     from agents.bandit.study import BanditStudy
 
@@ -468,6 +507,7 @@ COMMANDS: Mapping[str, Any] = {
     "vision": (VisionOptions, vision),
     "hari": (HariOptions, hari),
     "vnla": (VnlaOptions, vnla),
+    "vln": (VlnOptions, vln),
     "bandit": (BanditOptions, bandit),
     "stars": (StarsOptions, stars),
     "iliad": (

@@ -1,4 +1,4 @@
-"""Train the encoder, an agent (hanna, vnla, hari), or the ILIAD student.
+"""Train the encoder, an agent (hanna, vnla, vln, hari), or the ILIAD student.
 
 Rerun an interrupted command to resume; the result is the same. `tensorboard --logdir DIR` shows the curves. On several
 GPUs run `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`, and on several cores the same
@@ -18,10 +18,13 @@ from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from agents.vision.config import VisionConfig
+from agents.vln.config import FORCING, SPEAKER_SCALES, FollowerSettings, SpeakerSettings
+from agents.vln.config import SCALES as VLN_SCALES
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import note
 from embodied.cli.learning import (
+    SCALE,
     SMALL_SCALE,
     Drawn,
     Encoded,
@@ -101,6 +104,27 @@ class TrainVnla(Recorded, Run, Encoded, WithDevice):
     threads: Count = 2
     config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, words=VNLA_WORDS)]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainFollower(Recorded, Run, Encoded, WithDevice):
+    """An agent that follows route instructions, on a VLN or HANNA data set with features (imitation)."""
+
+    speaker: InputPath | None = None
+    """For --spoken-share: a file of `embodied train vln speaker`."""
+    config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, words={"forcing": FORCING})]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainSpeaker(WithData, Encoded):
+    """A network that describes walks, on a VLN or HANNA data set with features (maximum likelihood)."""
+
+    out: OutputFolder
+    """Run folder; rerun the command to resume an interrupted run."""
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    config: Annotated[SpeakerSettings, Settings(TRAINING, SPEAKER_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,7 +216,23 @@ def train_vnla(args: TrainVnla) -> int:
     return 0
 
 
-def _lessons(args: TrainHanna | TrainVnla, kind: str) -> Lessons:
+def train_follower(args: TrainFollower) -> int:
+    from agents.vln.run import train_follower
+
+    watch = _recorder(args) if args.rrd else None
+    how: dict[str, Any] = {"speaker": args.speaker, "minutes": args.minutes, "note": note, "on_validation": watch}
+    train_follower(_lessons(args, "vln"), args.config, args.evaluation, args.out, **how)
+    return 0
+
+
+def train_speaker(args: TrainSpeaker) -> int:
+    from agents.vln.speaker import train_speaker
+
+    train_speaker(_lessons(args, "vln"), args.config, args.out, note=note)
+    return 0
+
+
+def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: str) -> Lessons:
     """What an agent by imitation learns from; PyTorch has its threads and, under torchrun, its device."""
     from agents.common.device import use_threads
     from agents.common.lessons import Lessons
@@ -203,7 +243,8 @@ def _lessons(args: TrainHanna | TrainVnla, kind: str) -> Lessons:
     use_threads(args.threads)
     encoder = encoder_of(args.encoder, args.network)
     data, shown = dataset_of(args.data, kind), args.shown if isinstance(args, TrainHanna) else "same"
-    return Lessons(data, encoder, args.pictures, join_launcher(args.device), shown, args.cache)
+    device = "cpu" if isinstance(args, TrainSpeaker) else join_launcher(args.device)
+    return Lessons(data, encoder, args.pictures, device, shown, args.cache)
 
 
 def train_execution(args: TrainExecution) -> int:
@@ -258,7 +299,7 @@ def train_nav(args: TrainNav) -> int:
 
 
 def _recorder(
-    args: TrainHanna | TrainVnla | TrainIntention, *, sees: bool = True
+    args: TrainHanna | TrainVnla | TrainFollower | TrainIntention, *, sees: bool = True
 ) -> Callable[[int, Sequence[Episode]], None]:
     """Writes the first validation episodes of each validation as Rerun recordings, with what it saw if it sees."""
     from agents.vision.drawn import drawn_world, pictures_of
@@ -282,6 +323,10 @@ COMMANDS: Mapping[str, Any] = {
     "vision": (TrainVision, train_vision),
     "hanna": (TrainHanna, train_hanna),
     "vnla": (TrainVnla, train_vnla),
+    "vln": (
+        "Agents that follow route instructions, and a speaker that describes walks.",
+        {"follower": (TrainFollower, train_follower), "speaker": (TrainSpeaker, train_speaker)},
+    ),
     "hari": (
         "The agent that learns which question to ask, in two phases.",
         {"execution": (TrainExecution, train_execution), "intention": (TrainIntention, train_intention)},

@@ -340,6 +340,8 @@ def _r2r(data: Dataset, root: Path) -> list[Path]:
     return files + [_text(root / "tasks/R2R" / d / ".keep", []) for d in ("results", "snapshots", "plots")]
 
 
+TRAIN_SEEN = 50
+"""Paths of val_train_seen: as many as VLN-DUET reads; HAMT evaluates on all that are there."""
 SEEN_SPLITS = ("train", "val_seen", "val_unseen")
 """Splits whose words are in trainval_vocab.txt."""
 
@@ -352,7 +354,7 @@ def _duet(data: Dataset, root: Path) -> list[Path]:
         items = [{**i, "instr_encodings": [pieces(t) for t in i["instructions"]]} for i in _paths(data, split, numbers)]
         files.append(_json(home / f"R2R_{split}_enc.json", items))
         if split == "train":
-            files.append(_json(home / "R2R_val_train_seen_enc.json", items))
+            files.append(_json(home / "R2R_val_train_seen_enc.json", items[:TRAIN_SEEN]))
         if split == "test_unseen":
             files.append(_json(home / "R2R_test_enc.json", items))
     return files

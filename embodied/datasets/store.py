@@ -21,7 +21,8 @@ from embodied.datasets.checks import (
     read_config,
     read_index,
 )
-from embodied.datasets.scale import OOD, Scale, SplitPlan
+from embodied.datasets.parts import part_tasks
+from embodied.datasets.scale import OOD, Scale, SplitPlan, quota, scale
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
@@ -317,13 +318,36 @@ class Dataset:
         return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
 
 
+class RouteDataset(Dataset):
+    """A data set of `hanna` as one of `vln`: its tasks are to follow the routes that its assistants know."""
+
+    @property
+    def kind(self) -> str:
+        return "vln"
+
+    def tasks(self, split: str) -> tuple[Task, ...]:
+        """As many of a house as a data set of `vln` of this scale has."""
+        (plan,) = (s for s in scale(self.config.scale, "vln", self.config.ood).splits if s.name == split)
+        names, tasks = self.names(split), list[Task]()
+        for k, name in enumerate(names):
+            wanted = [(plan.part, quota(plan.tasks, len(names), k))]
+            routes, language = self.routes(name), PlainLanguage()  # routes have their words already
+            found = part_tasks("vln", self.place(name), routes, wanted, seed=self.config.seed, language=language)
+            tasks += found[plan.part]
+        return tuple(tasks)
+
+
 def dataset_of(folder: Path, kind: str, *others: str) -> Dataset:
     """The data set in `folder`, for a learner of one kind of task, or of some others that hold what it needs.
+
+    A data set of `hanna` serves as one of `vln`.
 
     Raises:
       DatasetError: it is of another kind, or as Dataset.
     """
     data = Dataset(folder)
+    if (data.kind, kind) == ("hanna", "vln") and not others:
+        return RouteDataset(folder)
     if data.kind not in (kind, *others):
         raise DatasetError(
             f"{folder} is a data set of {data.kind!r}, a learner of {kind!r} needs its own: "

@@ -23,9 +23,12 @@ from gymnasium import spaces
 from assets.cache import write_bytes
 from embodied.envs.continuous import POSITION
 from embodied.gym import continuous, drive
+from embodied.gym.driving import DriveSettings
 from embodied.gym.spaces import LARGE
 
 ENVS = ("VLNCE", "ObjectNav", "Drive")
+DRIVEN = ("motion", "touched", "goal")
+"""Parts of what Drive-v0 shows that agent_pos has, where they are there."""
 
 
 class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
@@ -87,12 +90,11 @@ class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         assert isinstance(known, spaces.Dict), "as drive.seen_space gives it"
         self.env = env
         self.action_space, self.render_mode = env.action_space, env.render_mode
-        self._parts = [name for name in ("motion", "touched", "goal") if name in known.spaces]
-        numbers = sum(int(np.prod(known[name].shape or ())) for name in self._parts)
-        self.observation_space = spaces.Dict(
-            {"pixels": known["rgb"], "agent_pos": spaces.Box(-LARGE, LARGE, (numbers,), np.float32)}
-        )
         settings = env.driving.settings
+        self._parts = [name for name in DRIVEN if name in known.spaces]
+        self.observation_space = spaces.Dict(
+            {"pixels": known["rgb"], "agent_pos": spaces.Box(-LARGE, LARGE, (_driven(settings),), np.float32)}
+        )
         self._max_episode_steps = round(settings.seconds / settings.control)
 
     @property
@@ -125,6 +127,25 @@ class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         return {"pixels": o["rgb"], "agent_pos": np.concatenate([o[name] for name in self._parts]).astype(np.float32)}
 
 
+def _driven(settings: DriveSettings) -> int:
+    known = drive.seen_space(settings)
+    return sum(known[name].shape[0] for name in DRIVEN if name in known)
+
+
+def sizes(env: str) -> tuple[int, int]:
+    """How many numbers an action and `agent_pos` have.
+
+    Raises:
+      ValueError: an unknown `env`.
+    """
+    if env not in ENVS:
+        raise ValueError(f"env is {env!r}; use one of {ENVS}")
+    if env == "Drive":
+        settings = DriveSettings()
+        return settings.numbers, _driven(settings)
+    return continuous.PRESETS[env.lower()][0].actions, len(POSITION)
+
+
 def make_env(
     n_envs: int = 1, use_async_envs: bool = False, cfg: Any = None, *, env: str = "VLNCE", **options: Any
 ) -> dict[str, dict[int, gym.vector.VectorEnv]]:
@@ -139,8 +160,7 @@ def make_env(
     Raises:
       ValueError: an unknown `env`.
     """
-    if env not in ENVS:
-        raise ValueError(f"env is {env!r}; use one of {ENVS}")
+    sizes(env)  # refuses unknown ones
     suite = f"embodied/{env}-v0"
     if use_async_envs and n_envs > 1:
         one = functools.partial(make_one, env, **options)

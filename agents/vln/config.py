@@ -1,0 +1,95 @@
+"""Settings of VLN's follower and speaker. Free of torch, so that the command line answers at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agents.common.settings import (
+    AT_LEAST_ONE,
+    NOT_ALL,
+    NOT_NEGATIVE,
+    SHARE,
+    ImitationSettings,
+    RunSettings,
+    require,
+    require_word,
+)
+
+FORCING = ("teacher", "student", "dagger")
+"""Whose actions an episode of training takes: the teacher's; the follower's own, sampled; or at first the teacher's,
+then more and more its own (Ross et al. 2011). The label is always the teacher's."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowerSettings(ImitationSettings):
+    """How a follower is trained."""
+
+    hidden_size: int = 512
+    """Width of the networks."""
+    dropout: float = 0.2
+    """Dropout rate in training."""
+    forcing: str = "dagger"
+    """Whose actions are taken in training: 'teacher', 'student' or 'dagger'."""
+    blind: bool = False
+    """Whether it sees nothing: all features are zero."""
+    wordless: bool = False
+    """Whether it is told nothing: the instruction is empty."""
+    progress_weight: float = 0.5
+    """Weight of the loss of guessing which share of the way is left (Ma et al. 2019)."""
+    room_weight: float = 0.5
+    """Weight of the loss of naming the kinds of the rooms that it is in and can go to."""
+    spoken_share: float = 0.0
+    """Share of the episodes in which it follows a speaker's words along random paths (back-translation)."""
+    iterations: int = 20_000
+    """Updates of the weights."""
+    batch: int = 64
+    """Episodes per update."""
+    instruction_length: int = 80
+    """Words of an instruction that are read."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_word(self, "forcing", FORCING)
+        require(self, AT_LEAST_ONE, "hidden_size")
+        require(self, NOT_ALL, "dropout")
+        require(self, NOT_NEGATIVE, "progress_weight", "room_weight")
+        require(self, SHARE, "spoken_share")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeakerSettings(RunSettings):
+    """How a speaker is trained."""
+
+    hidden_size: int = 256
+    """Width of the networks."""
+    heads: int = 8
+    """Of attention."""
+    iterations: int = 20_000
+    """Updates of the weights."""
+    learning_rate: float = 1e-4
+    """Highest learning rate of Adam."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(self, AT_LEAST_ONE, "hidden_size", "heads", "iterations")
+
+
+SCALES: dict[str, FollowerSettings] = {
+    "mini": FollowerSettings(
+        hidden_size=128,
+        batch=32,
+        iterations=3500,
+        learning_rate=1e-3,
+        cooldown=0.4,
+        environment_dropout=0.3,
+        instruction_length=60,
+        weight_decay=0.0,
+        validate_every=500,
+    ),
+    "paper": FollowerSettings(),
+}
+SPEAKER_SCALES: dict[str, SpeakerSettings] = {
+    "mini": SpeakerSettings(hidden_size=128, heads=4, iterations=2500, learning_rate=1e-3),
+    "paper": SpeakerSettings(),
+}
+"""'mini': ten minutes of one core; 'paper': for one GPU."""

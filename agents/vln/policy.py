@@ -1,0 +1,227 @@
+"""VlnPolicy: the follower's network as a Policy of embodied.interface, batched over episodes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+from agents.common.choosing import Chooser, choose_likeliest
+from agents.common.losses import IGNORE
+from agents.common.vocabulary import Vocabulary
+from agents.hanna.percept import orientation
+from agents.vision.bank import FeatureBank
+from agents.vln.network import COPIES, FollowerNetwork, Heard, Said, Seen
+from assets.records import ROOM_KINDS
+from embodied.geometry import wrap
+from embodied.interface import (
+    VIEW_PITCHES,
+    VIEW_YAWS,
+    Action,
+    Actions,
+    Move,
+    Observation,
+    Observations,
+    Situation,
+    Situations,
+    Stop,
+    Thought,
+)
+from embodied.seeds import stream
+from embodied.teachers.shortest import shortest_action
+
+SPOKEN = "_spoken_"
+"""In the ids of tasks that a speaker worded."""
+Guided = Callable[[Situation, np.random.Generator], bool]
+"""Whether the teacher acts in the follower's place."""
+
+
+@dataclass(frozen=True, eq=False)
+class VlnMoment:
+    """What the network said in one step of the k episodes that still run, and what is the case."""
+
+    said: Said
+    moves: Tensor
+    """(k,) int64, the teacher's action; 0 is stop."""
+    left: Tensor
+    """(k,) which share of the way is left."""
+    rooms: Tensor
+    """(k, A) int64, kinds of rooms, IGNORE where there is no action."""
+
+
+@dataclass(frozen=True, eq=False)
+class VlnMemory:
+    """What the policy carries between steps; rows belong to the episodes that still run."""
+
+    positions: tuple[int, ...]
+    heard: Heard
+    channels: Tensor | None = None
+    """(k, D) what each episode sees of every feature channel; None is everything."""
+    moments: tuple[VlnMoment, ...] = ()
+    """All steps so far, if there is a teacher."""
+
+    def keep(self, positions: tuple[int, ...]) -> VlnMemory:
+        """The memory of the episodes at `positions` only."""
+        if positions == self.positions:
+            return self
+        rows = torch.tensor([self.positions.index(p) for p in positions], device=self.heard.hidden.device)
+        channels = None if self.channels is None else self.channels[rows]
+        return dataclasses.replace(self, positions=positions, heard=self.heard.select(rows), channels=channels)
+
+
+@dataclass(frozen=True, eq=False)
+class VlnPolicy:
+    """A trained (or training) follower that acts."""
+
+    network: FollowerNetwork
+    vocabulary: Vocabulary
+    bank: FeatureBank
+    choose: Chooser = choose_likeliest
+    instruction_length: int = 80
+    wordless: bool = False
+    """Whether the instruction is empty to it."""
+    environment_dropout: float = 0.0
+    """Share of feature channels that an episode does not see at all (Tan et al. 2019). For training."""
+    _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
+
+    def act(
+        self, observations: Observations, memory: VlnMemory | None, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, VlnMemory]:
+        """One step of every running episode; see embodied.interface.Policy."""
+        return self.play(observations, None, memory, rngs=rngs)
+
+    def play(
+        self,
+        observations: Observations,
+        situations: Situations | None,
+        memory: VlnMemory | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+        guided: Guided | None = None,
+    ) -> tuple[Actions, VlnMemory]:
+        """One step of every running episode.
+
+        Args:
+          situations: for training: what was said is kept with its gradients, beside what the teacher says.
+          guided: whether the teacher acts.
+        """
+        positions = tuple(i for i, o in enumerate(observations) if o is not None)
+        seen = [o for o in observations if o is not None]
+        actions: Actions = [None] * len(observations)
+        if not seen:
+            assert memory is not None
+            return actions, memory.keep(positions)
+        with torch.set_grad_enabled(situations is not None and torch.is_grad_enabled()):
+            memory = self._begin(positions, seen, situations) if memory is None else memory.keep(positions)
+            said, heard = self.network(memory.heard, self._look(seen, memory.channels))
+            chances = said.moves.detach().softmax(-1).cpu().numpy()  # (k, A)
+            numbers = [
+                self.choose(chance[: 1 + len(o.candidates)], rngs[p])
+                for chance, o, p in zip(chances, seen, positions, strict=True)
+            ]
+            if situations is not None:
+                now = [s for p in positions if (s := situations[p]) is not None]
+                moment = _moment(said, now)
+                memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
+                if guided is not None:
+                    labels = moment.moves.tolist()
+                    drawn = zip(numbers, labels, now, positions, strict=True)
+                    numbers = [wanted if guided(s, rngs[p]) else own for own, wanted, s, p in drawn]
+            taken = said.tokens[torch.arange(len(seen)), torch.tensor(numbers)]
+        for position, number, chance, o in zip(positions, numbers, chances, seen, strict=True):
+            actions[position] = _action(number, chance[: 1 + len(o.candidates)])
+        return actions, dataclasses.replace(memory, heard=dataclasses.replace(heard, taken=taken))
+
+    def _begin(
+        self, positions: tuple[int, ...], seen: Sequence[Observation], situations: Situations | None
+    ) -> VlnMemory:
+        device = self.network.left.weight.device
+        rows = torch.from_numpy(np.stack([self._encode(o.instruction) for o in seen]))
+        words = rows[:, : int((rows != 0).sum(1).max())].to(device)
+        share, channels = self.environment_dropout, None
+        if share:
+            channels = F.dropout(torch.ones(len(seen), self.bank.size), share)
+            for row, position in enumerate(positions):
+                s = situations and situations[position]
+                if s and SPOKEN in s.task.id:
+                    channels[row] = channels_of(s.task.id, self.bank.size, share)
+        return VlnMemory(positions, self.network.begin(words), None if channels is None else channels.to(device))
+
+    def _encode(self, text: str) -> np.ndarray:
+        if text not in self._encoded:
+            self._encoded[text] = self.vocabulary.encode("" if self.wordless else text, self.instruction_length)
+        return self._encoded[text]
+
+    def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> Seen:
+        views = self.bank.gather([o.sight for o in seen])  # (k, 36, D)
+        views = views if channels is None else views * channels[:, None]
+        most, rows = max(len(o.candidates) for o in seen), np.arange(len(seen))
+        view = np.zeros((len(seen), most), dtype=np.int64)
+        angles = np.zeros((2, len(seen), most), dtype=np.float32)
+        mask = np.zeros((len(seen), 1 + most), dtype=bool)
+        mask[:, 0] = True
+        for row, o in zip(rows, seen, strict=True):
+            c, n = o.candidates, len(o.candidates)
+            view[row, :n], angles[0, row, :n], angles[1, row, :n] = c.view, c.bearing, c.slope
+            mask[row, 1 : 1 + n] = c.allowed
+        yaws = wrap(VIEW_YAWS - np.array([o.turn for o in seen])[:, None] * (np.pi / 6)).astype(np.float32)
+        pitches = np.broadcast_to(VIEW_PITCHES.astype(np.float32), yaws.shape)
+        towards = views[torch.from_numpy(rows)[:, None], torch.from_numpy(view)]
+        return Seen(
+            torch.cat([views, _directions(views, yaws, pitches)], -1),
+            torch.cat([towards, _directions(views, angles[0], angles[1])], -1),
+            torch.from_numpy(mask).to(views.device),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SupervisedVln:
+    """The follower as it learns, with the teacher's labels."""
+
+    policy: VlnPolicy
+    guided: Guided
+
+    def act_privileged(
+        self,
+        observations: Observations,
+        situations: Situations,
+        memory: VlnMemory | None,
+        *,
+        rngs: Sequence[np.random.Generator],
+    ) -> tuple[Actions, VlnMemory]:
+        return self.policy.play(observations, situations, memory, rngs=rngs, guided=self.guided)
+
+
+def channels_of(task: str, size: int, share: float) -> Tensor:
+    """(size,) what is seen of every feature channel in a task that a speaker worded: none of a `share` of them."""
+    kept = stream(0, "channels", task).random(size) >= share
+    return torch.from_numpy(kept / (1 - share)).float()
+
+
+def _directions(like: Tensor, yaws: np.ndarray, pitches: np.ndarray) -> Tensor:
+    return orientation(*(torch.tensor(x, device=like.device) for x in (yaws, pitches)), COPIES)
+
+
+def _action(number: int, chances: np.ndarray) -> Action:
+    thought = Thought(np.append(chances[1:], chances[0]))
+    return Stop(thought) if number == 0 else Move(number - 1, thought)
+
+
+def _moment(said: Said, situations: Sequence[Situation]) -> VlnMoment:
+    device = said.moves.device
+    moves, left = [], []
+    rooms = torch.full(said.moves.shape, IGNORE)
+    for row, s in enumerate(situations):
+        graph, house, goal = s.world.graph, s.world.house, s.targets
+        wanted = shortest_action(graph, s.pose, goal, s.candidate_nodes)
+        moves.append(0 if isinstance(wanted, Stop) else 1 + wanted.candidate)
+        whole, rest = (min(float(graph.distance[n, g]) for g in goal) for n in (s.task.start.node, s.pose.node))
+        left.append(min(1.0, rest / max(whole, 1e-6)))
+        for k, node in enumerate((s.pose.node, *s.candidate_nodes)):
+            rooms[row, k] = ROOM_KINDS.index(house.room_by_id[str(graph.room_of_node[node])].kind)
+    return VlnMoment(said, torch.tensor(moves, device=device), torch.tensor(left, device=device), rooms.to(device))

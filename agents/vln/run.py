@@ -1,0 +1,73 @@
+"""What the commands of VLN do: a data set with features becomes lessons, lessons a follower."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from agents.common.lessons import Lessons, Split
+from agents.common.parallel import rank_zero
+from agents.common.session import Note, Progress
+from agents.common.settings import EvaluationSettings
+from agents.common.spine import OnValidation
+from agents.common.vocabulary import build_vocabulary
+from agents.common.weights import weights_digest
+from agents.vln.agent import VlnAbout, new_agent
+from agents.vln.config import FollowerSettings
+from agents.vln.speaker import load_speaker, spoken_tasks
+from agents.vln.training import train
+from embodied.identity import Identity, identity_of
+from embodied.interface import Task
+
+
+def train_follower(
+    lessons: Lessons,
+    config: FollowerSettings,
+    evaluation: EvaluationSettings,
+    folder: Path,
+    *,
+    speaker: Path | None = None,
+    minutes: float | None = None,
+    note: Note = print,
+    on_validation: OnValidation | None = None,
+) -> Progress:
+    """Train, or go on training, the follower of a run folder; other arguments as in agents.vln.training.train.
+
+    Args:
+      speaker: whose words it learns from besides, in spoken_share of the episodes.
+
+    Raises:
+      ValueError: spoken_share without a speaker.
+    """
+    training = lessons.split("train", houses=config.training_houses or None, lights=config.lights)
+    if config.spoken_share:
+        training = dataclasses.replace(training, tasks=mixed(training, config, speaker))
+    validation = lessons.split("val_unseen", limit=config.validation_tasks)
+    words, encoder = build_vocabulary(t.request for t in training.tasks), lessons.encoder
+    about = VlnAbout(config, evaluation, encoder.speaks, encoder.size, words.words, lessons.pictures("train"))
+    agent = new_agent(about)
+    agent.network.to(lessons.device)
+    rank_zero(note)(
+        f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {len(words)} words, "
+        f"{sum(p.numel() for p in agent.network.parameters()):,} parameters, pictures: {about.pictures}"
+    )
+    identity, watch = training_identity(lessons, config, speaker), on_validation
+    return train(agent, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+
+
+def mixed(training: Split, config: FollowerSettings, speaker: Path | None) -> list[Task]:
+    """The tasks with so many that a speaker worded that these are spoken_share of all."""
+    if speaker is None or config.spoken_share >= 1:
+        raise ValueError(
+            f"spoken_share {config.spoken_share} wants --speaker, a file of `embodied train vln speaker`, and to be "
+            "below 1"
+        )
+    spoken = spoken_tasks(load_speaker(speaker), training, config.environment_dropout, seed=config.seed)
+    times = config.spoken_share / (1 - config.spoken_share) * len(training.tasks) / len(spoken)
+    return [*training.tasks, *spoken * int(times), *spoken[: round(times % 1 * len(spoken))]]
+
+
+def training_identity(lessons: Lessons, config: FollowerSettings, speaker: Path | None = None) -> Identity:
+    """All that a trained follower depends on."""
+    about = lessons.identity() | ({"speaker": weights_digest(speaker)} if speaker and config.spoken_share else {})
+    return identity_of("agents.vln.run", settings=config, **about)

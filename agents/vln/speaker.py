@@ -1,0 +1,201 @@
+"""The speaker L0(d | e): it describes walks, chooses between a follower's walks (Eq 2.19), and words random paths for
+followers to learn from (back-translation with environment dropout, Tan et al. 2019).
+
+The network is NAV's describer; a walk of more than agents.iliad.nav.world.HORIZON nodes is described by its first ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from agents.common.choosing import choose_sampled
+from agents.common.decoding import drawn_with
+from agents.common.lessons import Lessons, Split
+from agents.common.session import Note
+from agents.common.tensor_file import put
+from agents.common.vocabulary import Vocabulary, build_vocabulary
+from agents.common.weights import load_weights, refuse_features
+from agents.iliad.nav.network import WalkDescriber
+from agents.iliad.nav.student import COPIES, NavEyes
+from agents.iliad.nav.teacher import said, walked
+from agents.iliad.nav.world import HORIZON, Trip, walk_along
+from agents.iliad.stages import TeachingStage
+from agents.iliad.writing import log_likelihood
+from agents.vision.bank import FeatureBank
+from agents.vln.agent import VlnAgent
+from agents.vln.config import SpeakerSettings
+from agents.vln.policy import SPOKEN, channels_of
+from embodied.assistants.route_system import RouteConfig, sampled_paths
+from embodied.datasets.store import SplitData
+from embodied.evaluation.metrics import without_repeats
+from embodied.evaluation.rollout import play
+from embodied.identity import Identity, identity_of
+from embodied.interface import TURNS, Episode, FollowRoute, Place, Route, Task
+from embodied.seeds import stream
+from embodied.tasks.vln import vln_task
+
+LONGEST = 60
+"""Words of a description."""
+JUDGED = 200
+"""Walks that the speaker is judged on between its updates."""
+BATCH = 64
+
+
+@dataclass(frozen=True)
+class SpeakerAbout:
+    """What stands beside the weights in a speaker's file."""
+
+    config: SpeakerSettings
+    encoder: str
+    """Digest of the encoder whose features it learned from."""
+    feature_size: int
+    words: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Speaker:
+    network: WalkDescriber
+    about: SpeakerAbout
+
+    def eyes(self, places: dict[str, Place], bank: FeatureBank) -> NavEyes:
+        """What it sees in some houses.
+
+        Raises:
+          ValueError: features of another encoder.
+        """
+        refuse_features(bank.digest, self.about.encoder)
+        return NavEyes(places, bank, Vocabulary(self.about.words))
+
+
+def new_speaker(about: SpeakerAbout) -> Speaker:
+    """An untrained speaker; its weights follow from the seed."""
+    c = about.config
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(int(stream(c.seed, "speaker", "begin").integers(2**31)))
+        size = about.feature_size + 4 * COPIES
+        network = WalkDescriber(len(about.words), c.hidden_size, c.heads, about.feature_size, size, HORIZON)
+    return Speaker(network, about)
+
+
+def load_speaker(path: Path) -> Speaker:
+    """
+    Raises:
+      FileNotFoundError, OSError.
+      ValueError: truncated, changed, or of another format.
+    """
+    tensors, about = load_weights(path, "vln-speaker", SpeakerAbout, "train it again with `embodied train vln speaker`")
+    speaker = new_speaker(about)
+    put(speaker.network, tensors, path)
+    speaker.network.eval()
+    return speaker
+
+
+def train_speaker(lessons: Lessons, config: SpeakerSettings, folder: Path, *, note: Note = print) -> Path:
+    """Train, or go on training, the speaker of a folder by maximum likelihood; returns its file."""
+    training, judged = lessons.split("train"), lessons.split("val_unseen", limit=JUDGED)
+    words = build_vocabulary(t.request for t in training.tasks).words
+    speaker = new_speaker(SpeakerAbout(config, lessons.encoder.speaks, lessons.encoder.size, words))
+    eyes = speaker.eyes(dict(training.worlds), training.bank)
+
+    def loss_of(rng: np.random.Generator) -> Tensor:
+        chosen = [training.tasks[int(i)] for i in rng.integers(len(training.tasks), size=config.batch)]
+        log, written = _scored(speaker, eyes, chosen, [_path(t) for t in chosen])
+        return -log.sum() / (written != 0).sum()
+
+    @torch.no_grad()
+    def judge() -> dict[str, float]:
+        looking = speaker.eyes(dict(judged.worlds), judged.bank)
+        log, written = _scored(speaker, looking, judged.tasks, [_path(t) for t in judged.tasks])
+        return {"unseen loss": float(-log.sum() / (written != 0).sum())}
+
+    identity = speaker_identity(lessons, config)
+    stage = TeachingStage(
+        "vln-speaker", "speaker", folder, config.iterations, config.learning_rate, config.seed, identity, speaker.about
+    )
+    stage.train(speaker.network, loss_of, judge, note)
+    return Path(folder) / "speaker.safetensors"
+
+
+def speaker_identity(lessons: Lessons, config: SpeakerSettings) -> Identity:
+    """All that a trained speaker depends on."""
+    return identity_of("agents.vln.speaker", settings=config, **lessons.identity())
+
+
+def _path(task: Task) -> tuple[int, ...]:
+    assert isinstance(task.goal, FollowRoute), "tasks of VLN follow routes"
+    return task.goal.path
+
+
+def _scored(
+    speaker: Speaker, eyes: NavEyes, tasks: Sequence[Task], paths: Sequence[Sequence[int]]
+) -> tuple[Tensor, Tensor]:
+    """(B, W) log L0 of each word of the tasks' requests, given walks along `paths`, and the words."""
+    trips = [Trip(t.world, t.start, tuple(p), (t.request,)) for t, p in zip(tasks, paths, strict=True)]
+    words = eyes.words([t.request for t in tasks])[:, :LONGEST]
+    logits = speaker.network(*walked(eyes, trips, [walk_along(p) for p in paths]), words)
+    return log_likelihood(logits, words), words
+
+
+@torch.no_grad()
+def reranked(
+    split: SplitData,
+    tasks: Sequence[Task],
+    follower: VlnAgent,
+    speaker: Speaker,
+    bank: FeatureBank,
+    *,
+    candidates: int,
+    seed: int,
+) -> list[Episode]:
+    """Of each task, the one of the follower's walks of which the speaker would most likely say d* (Eq 2.19).
+
+    Args:
+      candidates: K, the likeliest walk and K - 1 that are sampled.
+    """
+    policy = follower.policy(bank)
+    sampling = dataclasses.replace(policy, choose=choose_sampled)
+    tries = [play(split.make_env, policy, tasks, seed=seed, batch=BATCH)]
+    tries += [
+        play(split.make_env, sampling, tasks, seed=int(stream(seed, "candidate", k).integers(2**31)), batch=BATCH)
+        for k in range(1, candidates)
+    ]
+    eyes, scores = speaker.eyes(dict(split.worlds), bank), []
+    for episodes in tries:
+        rows = []
+        for i in range(0, len(tasks), BATCH):
+            some = episodes[i : i + BATCH]
+            paths = [without_repeats(e.nodes) for e in some]
+            rows.append(_scored(speaker, eyes, tasks[i : i + BATCH], paths)[0].sum(1))
+        scores.append(torch.cat(rows))
+    best = torch.stack(scores).argmax(0).tolist()
+    return [tries[k][i] for i, k in enumerate(best)]
+
+
+@torch.no_grad()
+def spoken_tasks(speaker: Speaker, training: Split, dropout: float, *, seed: int) -> list[Task]:
+    """Every path of 4 to 6 edges between random nodes, as many in each house as it has tasks, in the speaker's words:
+    what it says of a house of which it sees only some channels, those that a follower will see (`channels_of`)."""
+    tasks: list[Task] = []
+    eyes = speaker.eyes(dict(training.worlds), training.bank)
+    for name, place in training.worlds.items():
+        count, rng = sum(t.world == name for t in training.tasks), stream(seed, "spoken", name)
+        paths = sampled_paths(place.graph, count, rng=rng, config=RouteConfig())
+        routes = [Route(f"{name}{SPOKEN}{k}", p, int(rng.integers(TURNS)), 0, "") for k, p in enumerate(paths)]
+        unworded = [vln_task(name, r) for r in routes]
+        views, actions, mask = walked(
+            eyes, [Trip(name, t.start, _path(t), ("",)) for t in unworded], [walk_along(p) for p in paths]
+        )
+        seen = torch.stack([channels_of(t.id, training.bank.size, dropout) for t in unworded])[:, None]
+        actions = torch.cat([actions[..., : training.bank.size] * seen, actions[..., training.bank.size :]], -1)
+        choose = drawn_with(rng.random((len(paths), LONGEST)))
+        numbers = speaker.network.write(views * seen[:, :, None], actions, mask, choose, LONGEST)
+        texts = said(eyes.vocabulary, numbers)
+        tasks += [dataclasses.replace(t, request=text) for t, text in zip(unworded, texts, strict=True)]
+    return tasks

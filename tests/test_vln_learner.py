@@ -1,0 +1,151 @@
+"""VLN's follower and speaker on a grid: losses by hand, no leak, no dependence on the batch, and learning."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+import torch
+from hand_data import built
+from hand_worlds import grid_world
+
+from agents.common.lessons import Split
+from agents.common.losses import IGNORE
+from agents.common.session import Clock
+from agents.common.settings import EvaluationSettings
+from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
+from agents.common.vocabulary import build_vocabulary
+from agents.vision.bank import FeatureBank
+from agents.vision.encoder import load_encoder
+from agents.vln.agent import VlnAbout, load_agent, new_agent, save_agent
+from agents.vln.config import FollowerSettings, SpeakerSettings
+from agents.vln.network import Said
+from agents.vln.policy import VlnMoment, channels_of
+from agents.vln.run import mixed
+from agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
+from agents.vln.training import VlnLearner, losses_of, teacher_share
+from embodied.assistants.route_system import build_routes
+from embodied.datasets.store import SplitData, dataset_of
+from embodied.envs.make import environment_maker
+from embodied.evaluation.rollout import play
+from embodied.interface import Move
+from embodied.language.plain import PlainLanguage
+from embodied.policies.baselines import Forward10
+from embodied.tasks.vln import vln_task
+
+TINY = FollowerSettings(hidden_size=32, dropout=0.0, iterations=40, batch=12, learning_rate=5e-3, instruction_length=30)
+
+
+@pytest.fixture(scope="module")
+def split() -> Split:
+    world = grid_world(spacing=4.0)
+    bank = FeatureBank({"grid": np.random.default_rng(0).standard_normal((36, 36, 16)).astype(np.float16)}, "hand")
+    routes = build_routes(world, seed=0, language=PlainLanguage(), house_split="train")
+    tasks = [vln_task("grid", r) for r in routes][:12]
+    return Split({"grid": world}, tasks, environment_maker("vln", {"grid": world}), bank)
+
+
+def new(split: Split, **changes):
+    words = build_vocabulary(t.request for t in split.tasks).words
+    config = dataclasses.replace(TINY, **changes)
+    return new_agent(VlnAbout(config, EvaluationSettings(), "hand", 16, words, "unlit_192"))
+
+
+def walks(episodes):
+    return [[s.next_pose.node for s in e.steps] for e in episodes]
+
+
+def test_losses_are_sums_over_steps_and_means_over_episodes():
+    half = torch.tensor([[0.0, 0.0, -math.inf], [0.0, 0.0, 0.0]])
+    rooms = torch.zeros(2, 3, 4)
+    said = Said(half, torch.tensor([0.5, 1.0]), rooms, torch.zeros(2, 3, 8))
+    moment = VlnMoment(said, torch.tensor([1, 2]), torch.tensor([0.0, 1.0]), torch.tensor([[0, 1, IGNORE], [2, 3, 1]]))
+    moves, left, near = losses_of([moment, moment], episodes=4)
+    assert moves.item() == pytest.approx(2 * (math.log(2) + math.log(3)) / 4)
+    assert left.item() == pytest.approx(2 * 0.25 / 4)
+    assert near.item() == pytest.approx(2 * (math.log(4) + math.log(4)) / 4), "a mean over the actions of a step"
+
+
+def test_forcing_says_who_acts():
+    share = lambda update, forcing: teacher_share(dataclasses.replace(TINY, forcing=forcing), update)
+    assert [share(k, "dagger") for k in (0, 20, 30, 40)] == [1.0, 1.0, 0.5, 0.0]
+    assert share(5, "teacher") == 1.0 and share(0, "student") == 0.0
+
+
+def test_a_walk_does_not_depend_on_the_batch(split):
+    policy = new(split).policy(split.bank)
+    together = play(split.make_env, policy, split.tasks, seed=0, batch=12)
+    alone = play(split.make_env, policy, split.tasks[::-1], seed=0, batch=1)[::-1]
+    assert walks(together) == walks(alone)
+
+
+def test_the_blind_see_nothing_and_the_wordless_read_nothing(split, tmp_path):
+    reworded = [dataclasses.replace(t, request="turn right and stop") for t in split.tasks]
+    other = FeatureBank({"grid": np.ones((36, 36, 16), np.float16)}, "hand")
+    for change, bank, tasks in (("blind", other, split.tasks), ("wordless", split.bank, reworded)):
+        path = tmp_path / f"{change}.safetensors"
+        save_agent(new(split, **{change: True}), path)
+        agent = load_agent(path)
+        one = play(split.make_env, agent.policy(split.bank), split.tasks, seed=0, batch=12)
+        two = play(split.make_env, agent.policy(bank), tasks, seed=0, batch=12)
+        assert walks(one) == walks(two)
+    with pytest.raises(ValueError, match="features come from encoder"):
+        agent.policy(FeatureBank({"grid": np.ones((36, 36, 16), np.float16)}, "other"))
+
+
+def test_a_follower_learns_its_routes(split):
+    agent = new(split, iterations=24, learning_rate=1e-2)
+    learner, first = VlnLearner(agent, split), None
+    for update in range(24):
+        numbers = learner.learn(update, Clock())
+        first = first or numbers["loss navigation"]
+    assert numbers["loss navigation"] < first / 2
+    agent.network.eval()
+    done = play(split.make_env, agent.policy(split.bank), split.tasks, seed=0, batch=12)
+    near = [split.worlds["grid"].graph.distance[e.nodes[-1], e.task.goal_nodes[0]] <= 3 for e in done]
+    assert np.mean(near) >= 0.5
+    speaker = new_speaker(SpeakerAbout(SpeakerSettings(hidden_size=16, heads=2), "hand", 16, agent.vocabulary.words))
+    whole = SplitData("grid", split.worlds, tuple(split.tasks), split.make_env)
+    one = reranked(whole, split.tasks, agent, speaker, split.bank, candidates=1, seed=0)
+    assert walks(one) == walks(done), "the first candidate is the likeliest walk"
+    many = reranked(whole, split.tasks, new(split), speaker, split.bank, candidates=4, seed=0)
+    assert walks(many) != walks(reranked(whole, split.tasks, new(split), speaker, split.bank, candidates=1, seed=0))
+    assert [e.task.id for e in many] == [t.id for t in split.tasks]
+
+
+def test_a_speaker_words_other_paths_in_the_houses_that_followers_see(split):
+    words = build_vocabulary(t.request for t in split.tasks).words
+    speaker = new_speaker(SpeakerAbout(SpeakerSettings(hidden_size=16, heads=2), "hand", 16, words))
+    tasks = spoken_tasks(speaker, split, 0.5, seed=0)
+    assert len(tasks) == len(split.tasks) and all(4 <= len(t.goal.path) - 1 <= 6 for t in tasks)
+    assert len({t.request for t in tasks}) > 1
+    seen = channels_of(tasks[0].id, 4000, 0.5)
+    assert set(seen.tolist()) == {0.0, 2.0} and float(seen.mean()) == pytest.approx(1, abs=0.1)
+    policy = dataclasses.replace(new(split).policy(split.bank), environment_dropout=0.5)
+    env = split.make_env()
+    observations = [env.reset(tasks[0])]
+    _, memory = policy.play(observations, [env.situation], None, rngs=[np.random.default_rng(0)])
+    assert torch.equal(memory.channels[0], channels_of(tasks[0].id, 16, 0.5))
+    with pytest.raises(ValueError, match="wants --speaker"):
+        mixed(split, dataclasses.replace(TINY, spoken_share=0.5), None)
+
+
+def test_routes_of_a_hanna_data_set_are_tasks_of_vln(tmp_path):
+    hanna = built(tmp_path / "data")
+    data = dataset_of(hanna.folder, "vln")
+    assert data.kind == "vln" and data.digest == hanna.digest
+    for split in data.splits:
+        routes = {r.id: r for n in data.names(split) for r in data.routes(n)}
+        tasks = data.split(split).tasks
+        assert tasks and all(t.request == routes[t.goal.route].instruction for t in tasks)
+    (episode,) = play(data.split("val_unseen").make_env, Forward10(), data.tasks("val_unseen")[:1], seed=0)
+    assert episode.task.kind == "vln" and isinstance(episode.steps[0].action, Move)
+
+
+def test_the_shipped_follower_learned_from_the_shipped_encoder():
+    agent = load_agent(SHIPPED_VLN)
+    assert SHIPPED_VLN.stat().st_size < 4e6
+    assert agent.about.encoder == load_encoder(SHIPPED_ENCODER).speaks
+    assert len(agent.vocabulary) > 900 and not agent.about.config.blind
