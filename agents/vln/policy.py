@@ -204,7 +204,7 @@ def channels_of(task: str, size: int, share: float) -> Tensor:
 
 
 def _directions(like: Tensor, yaws: np.ndarray, pitches: np.ndarray) -> Tensor:
-    return orientation(*(torch.tensor(x, device=like.device) for x in (yaws, pitches)), COPIES)
+    return orientation(torch.tensor(yaws, device=like.device), torch.tensor(pitches, device=like.device), COPIES)
 
 
 def _action(number: int, chances: np.ndarray) -> Action:
