@@ -46,7 +46,7 @@ def key(root: Path, *modules: str, without: tuple[str, ...] = ()) -> str:
 def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
     lit = makers(PictureSettings(kind="normal-filament"))
     before = key(tree, *lit)
-    edit(tree / "embodied/cli/demo.py", "import argparse", "import argparse\nEXTRA = 1")
+    edit(tree / "embodied/cli/demo.py", "import contextlib", "import contextlib\nEXTRA = 1")
     edit(tree / "embodied/render/filament.py", "PROBE = 64", "PROBE = 64  # texels")
     edit(tree / "embodied/render/filament.py", '"""Colours by Filament', '"""Colors by Filament')
     assert key(tree, *lit) == before, "code that draws nothing, comments and docstrings"
