@@ -286,7 +286,7 @@ def solve_house(
     lamps = tuple(in_the_open(x, space.scene) for x in lamps_of(house, atlas))
     lux = with_glow(shared.lux, house, atlas, lamps)
     clock("luxels")
-    bare = tuple(sorted({x.owner for x in lamps if x.owner in atlas.owners}))  # type: ignore[type-var]  # no None
+    bare = tuple(sorted({x.owner for x in lamps if x.owner in atlas.owners}))
     without = once(shared.memory, ("without", bare), lambda: spaces_without(space, atlas, bare))
     problem = Problem(house, atlas, lux, space, outdoors, lamps, settings, shared.memory, without)
     light = kept_light(folder, len(lux.position), lambda: solve(problem, progress, clock))

@@ -9,6 +9,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -203,14 +204,13 @@ def write_lamps(path: Path, lamps: Sequence[Lamp]) -> None:
     write_bytes(path, packed(arrays))
 
 
-def read_lamps(path: Path, rows: Sequence[Mapping[str, str]]) -> tuple[Lamp, ...]:
+def read_lamps(path: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Lamp, ...]:
     """What `write_lamps` wrote.
 
     Args:
       rows: id, room and owner of each.
     """
     with open_arrays(path) as z:
-        return tuple(
-            Lamp(**row, **{k: float(z[f"{k}{i}"]) if k == "area" else z[f"{k}{i}"] for k in LAMP_ARRAYS})
-            for i, row in enumerate(rows)
-        )
+        arrays = [{k: z[f"{k}{i}"] for k in LAMP_ARRAYS} for i in range(len(rows))]
+    stored = zip(rows, arrays, strict=True)
+    return tuple(Lamp(**{**row, **held, "area": float(held["area"])}) for row, held in stored)
