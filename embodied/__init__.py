@@ -29,7 +29,7 @@ Other
     stream                         named random generators of one seed
 
 Each name is imported when it is first used. Environments: embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0,
-Ask-v0 and Drive-v0, registered by `import embodied`.
+Ask-v0, VLNCE-v0, ObjectNav-v0 and Drive-v0, registered by `import embodied`.
 """
 
 from __future__ import annotations
