@@ -164,6 +164,7 @@ REVIEWED = {
     "embodied/bench/serve.py": "what people did in a study that it has just written",
     "embodied/datasets/lerobot.py": "an empty folder",
     "embodied/light/baking/house.py": "a bake in the cache",
+    "embodied/light/baking/stages.py": "stages of a bake in the cache",
     "embodied/light/pages/files.py": "a bake in the cache",
     "embodied/scene/collision.py": "a file in the cache",
     "embodied/scene/export.py": "house.xml, which it writes anew",

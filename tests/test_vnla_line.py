@@ -105,7 +105,7 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
 
 def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, monkeypatch):
     recorded = []
-    monkeypatch.setattr("embodied.cli.view.record_again", lambda run, data, episode, *_: recorded.append(episode))
+    monkeypatch.setattr("embodied.cli.view.record_again", lambda run, data, episode, *_, **__: recorded.append(episode))
     train = ("train", "vnla", "--data", data.folder, "--out", tmp_path, *SMALL, "--asker", "first", "--iterations", 1)
     assert run(*train) == 0
     judge = ("evaluate", "vnla", "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random")

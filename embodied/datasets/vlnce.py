@@ -28,6 +28,7 @@ from assets.cache import write_bytes, write_json
 from embodied.datasets.habitat import with_experts, write_vlnce
 from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
 from embodied.envs.continuous import POSITION, Body, ContinuousEnv, Excursion, Follower, Grounds, Move, Walk, own_way
+from embodied.locks import LOCK
 from embodied.render.camera import camera_at
 from embodied.seeds import stream
 from embodied.world import World
@@ -160,7 +161,7 @@ def export_walks(
     if form == "internnav" and wander:
         raise ValueError("InternData-N1 learns from the poses of a walk, which should be the expert's; leave wander 0")
     folder, episodes = Path(folder), list(excursions)
-    if folder.exists() and any(folder.iterdir()):
+    if folder.exists() and any(p.name != LOCK for p in folder.iterdir()):
         raise ValueError(f"{folder} is not empty; choose another folder")
     if not episodes:
         raise ValueError("there are no episodes to play; choose another split")
