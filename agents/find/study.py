@@ -64,7 +64,7 @@ class FindStudy(EpisodeStudy):
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         """Who is only compared with learns once."""
-        return self.repeats if row in (SEEING, BLIND) else self.repeats[:1]
+        return self.repeats if dataclasses.replace(row, minus=None) in (SEEING, BLIND) else self.repeats[:1]
 
     def settings(self, train: Mapping[str, Any], seed: int) -> FinderConfig:
         return dataclasses.replace(self.config, seed=seed, **train)
