@@ -7,10 +7,11 @@ leaves the agent where it came from.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import mujoco
 import numpy as np
@@ -147,7 +148,8 @@ class Driver:
         self._motors = [self.model.actuator(f"robot/{side}").id for side in ("left", "right")]
         self._names = [self.model.geom(g).name for g in range(self.model.ngeom)]
         self._mine = np.array([name.startswith("robot/") for name in self._names])
-        self._substeps = max(1, round(CONTROL / self.model.opt.timestep))
+        self.substeps = max(1, round(CONTROL / self.model.opt.timestep))
+        """Steps of the physics in a control period."""
 
     @property
     def position(self) -> np.ndarray:
@@ -165,7 +167,7 @@ class Driver:
         height = position[2] - 1.5 + 0.005
         self.data.qpos[self._free] = [position[0], position[1], height, math.cos(yaw / 2), 0, 0, math.sin(yaw / 2)]
         self._command(0.0, 0.0)
-        mujoco.mj_step(self.model, self.data, 10 * self._substeps)
+        mujoco.mj_step(self.model, self.data, 10 * self.substeps)
         self._last_touch = {}
 
     def roll(self, speed: float, turn: float, periods: int = 1) -> Roll:
@@ -174,17 +176,35 @@ class Driver:
         Args:
           speed, turn: metres and radians per second, as far as the motors can.
         """
-        self._command(float(np.clip(speed, -FASTEST, FASTEST)), float(np.clip(turn, -TURNING, TURNING)))
-        metres, bumps, touched = 0.0, list[str](), False
+        self.command(speed, turn)
+        rolled = Roll(0.0, (), False)
         for _ in range(periods):
             before = self.position
-            mujoco.mj_step(self.model, self.data, self._substeps)
-            metres += float(np.linalg.norm(self.position - before))
-            now, time = self._touched(), self.data.time
-            bumps += sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
-            self._last_touch |= dict.fromkeys(now, time)
-            touched = touched or bool(now)
-        return Roll(metres, tuple(bumps), touched)
+            mujoco.mj_step(self.model, self.data, self.substeps)
+            rolled = self.noted(rolled, before, self._touched())
+        return rolled
+
+    def command(self, speed: float, turn: float) -> None:
+        """Set the motors, as far as they go."""
+        self._command(float(np.clip(speed, -FASTEST, FASTEST)), float(np.clip(turn, -TURNING, TURNING)))
+
+    def noted(self, rolled: Roll, before: np.ndarray, now: frozenset[str]) -> Roll:
+        """`rolled` after one more period that began at `before` (2,), at whose end the body touches `now`."""
+        metres, time = float(np.linalg.norm(self.position - before)), self.data.time
+        bumps = sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
+        self._last_touch |= dict.fromkeys(now, time)
+        return Roll(rolled.metres + metres, (*rolled.bumps, *bumps), rolled.touched or bool(now))
+
+    def take_over(self, qpos: np.ndarray, qvel: np.ndarray, seconds: float) -> None:
+        """Be in a state that was computed elsewhere, so many seconds after the last; `eye` follows mj_kinematics."""
+        self.data.qpos[:], self.data.qvel[:] = qpos, qvel
+        self.data.time += seconds
+
+    def twin(self) -> Self:
+        """Another body in the same house; they do not meet."""
+        other = copy.copy(self)
+        other.data, other._last_touch = mujoco.MjData(self.model), {}
+        return other
 
     @property
     def eye(self) -> tuple[np.ndarray, np.ndarray]:
@@ -219,7 +239,7 @@ class Driver:
             turn = float(np.clip(5.0 * error, -TURNING, TURNING))
             speed = 0.0 if abs(error) > 0.2 else min(FASTEST, 2.0 * distance + 0.05)
             self._command(speed, turn)
-            mujoco.mj_step(self.model, self.data, self._substeps)
+            mujoco.mj_step(self.model, self.data, self.substeps)
             metres += float(np.linalg.norm(self.position - before))
             now = self._touched()
             bumps += sorted(now - touching)
@@ -233,9 +253,12 @@ class Driver:
 
     def _touched(self) -> frozenset[str]:
         """Owners of what the body touches now, floors apart."""
-        contact = self.data.contact
+        return self.owners_met(self.data.contact.geom1, self.data.contact.geom2)
+
+    def owners_met(self, geoms: np.ndarray, others: np.ndarray) -> frozenset[str]:
+        """Owners, floors apart, of what the body touches, by pairs of geoms in contact (n,)."""
         touched = set()
-        for a, b in zip(contact.geom1, contact.geom2, strict=True):
+        for a, b in zip(geoms, others, strict=True):
             if self._mine[a] != self._mine[b]:
                 owner = self._owners.get(self._names[b if self._mine[a] else a], "")
                 if not owner.endswith("/floor"):

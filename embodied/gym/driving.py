@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver
+from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
 from embodied.gym.eyes import FAR, PIXELS
 from embodied.gym.spaces import codes_of, word_number
@@ -103,10 +103,19 @@ class Outcome:
 class Driving:
     """Owns the physics and the pictures of some houses, and plays one episode at a time."""
 
-    def __init__(self, worlds: Mapping[str, World], settings: DriveSettings) -> None:
+    def __init__(
+        self,
+        worlds: Mapping[str, World],
+        settings: DriveSettings,
+        stage_of: Callable[[World], tuple[Driver, FloorWays]] = lambda w: (
+            Driver(w.house, w.catalogue),
+            FloorWays(w.house),
+        ),
+    ) -> None:
         """
         Args:
           worlds: by House.name, lit or not; what draws them is opened when an episode plays there.
+          stage_of: makes the physics and the floor of a world.
 
         Raises:
           ValueError: no worlds.
@@ -114,7 +123,7 @@ class Driving:
         if not worlds:
             raise ValueError("there are no houses to drive in; choose another split")
         self.worlds, self.settings = dict(worlds), settings
-        self._names = sorted(self.worlds)
+        self._names, self._stage_of = sorted(self.worlds), stage_of
         self._stages: OrderedDict[str, tuple[Driver, FloorWays]] = OrderedDict()
         self.request = ""
 
@@ -128,7 +137,7 @@ class Driving:
         name = self._names[int(rng.integers(len(self._names)))] if world is None else world
         self.world, s = self.worlds[name], self.settings
         if name not in self._stages:
-            self._stages[name] = Driver(self.world.house, self.world.catalogue), FloorWays(self.world.house)
+            self._stages[name] = self._stage_of(self.world)
         self._stages.move_to_end(name)
         if len(self._stages) > KEPT:
             self.worlds[self._stages.popitem(last=False)[0]].close()
@@ -153,16 +162,28 @@ class Driving:
           ValueError: another number of numbers, or something that is none.
           RuntimeError: the episode is over.
         """
-        s, command = self.settings, np.asarray(action, dtype=np.float64).reshape(-1)
-        if len(command) != s.numbers or not np.isfinite(command).all():
-            raise ValueError(f"an action should be {s.numbers} finite numbers from -1 to 1, got {action!r}")
+        command = self.command(action)
+        return self.judged(command, self.driver.roll(FASTEST * command[0], TURNING * command[1], self.periods))
+
+    @property
+    def periods(self) -> int:
+        """Control periods that a command is held."""
+        return max(1, round(self.settings.control / CONTROL))
+
+    def command(self, action: Sequence[float] | np.ndarray) -> np.ndarray:
+        """(numbers,) an action that can be carried out, cut to -1 to 1; raises as `step`."""
+        command = np.asarray(action, dtype=np.float64).reshape(-1)
+        if len(command) != self.settings.numbers or not np.isfinite(command).all():
+            raise ValueError(f"an action should be {self.settings.numbers} finite numbers from -1 to 1, got {action!r}")
         if self.ended is not None:
             raise RuntimeError(f"the episode is over ({self.ended}); reset before another step")
-        command = np.clip(command, -1.0, 1.0)
-        periods = max(1, round(s.control / CONTROL))
-        rolled = self.driver.roll(FASTEST * command[0], TURNING * command[1], periods)
+        return np.clip(command, -1.0, 1.0)
+
+    def judged(self, command: np.ndarray, rolled: Roll) -> Outcome:
+        """What came of a command that moved the body so."""
+        s = self.settings
         self.metres += rolled.metres
-        self.seconds += periods * CONTROL
+        self.seconds += self.periods * CONTROL
         self.bumps += rolled.bumps
         self.touched = rolled.touched
         before, self._left = self._left, self.left
@@ -204,7 +225,11 @@ class Driving:
 
     def look(self) -> dict[str, np.ndarray]:
         """What the body knows: pixels, its motion, whether it touches something, and its goal."""
-        found = self._pixels()
+        return {**self._pixels(), **self.feel()}
+
+    def feel(self) -> dict[str, np.ndarray]:
+        """`look` with closed eyes."""
+        found = {}
         found["motion"] = np.array(self.driver.motion, np.float32)
         found["touched"] = np.array([self.touched], np.float32)
         if self.settings.task == "reach":
