@@ -10,6 +10,7 @@ pictures are MuJoCo Warp's, so an episode is not the same to the last digit.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -60,7 +61,10 @@ class Bodies:
             for _ in range(periods):
                 before = [d.position for d in self.drivers]
                 self._step()
-                rolled = [d.noted(*x) for d, *x in zip(self.drivers, rolled, before, self._taken_over(), strict=True)]
+                rolled = [
+                    d.noted(r, b, t)
+                    for d, r, b, t in zip(self.drivers, rolled, before, self._taken_over(), strict=True)
+                ]
         for driver in self.drivers:
             mujoco.mj_kinematics(driver.model, driver.data)
         return rolled
@@ -124,9 +128,8 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
         self.action_space = batch_space(self.single_action_space, count)
         self._bodies = Bodies(Driver(world.house, world.catalogue), count, self._device)
         ground = FloorWays(world.house)
-        self._all = [
-            Driving({world.name: world}, settings, lambda _, driver=d: (driver, ground)) for d in self._bodies.drivers
-        ]
+        stages = [(driver, ground) for driver in self._bodies.drivers]
+        self._all = [Driving({world.name: world}, settings, functools.partial(_given, stage)) for stage in stages]
         self._rngs: list[np.random.Generator] = []
         self._renderer = None
         if settings.sees:
@@ -227,4 +230,8 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
             found |= {name: wp.clone(getattr(batch, name)) for name in SEEN if name in self.settings.sees}
             if "depth" in found:
                 wp.map(wp.min, found["depth"], float(FAR), out=found["depth"])
-        return {name: self._out(found[name]) for name in self.single_observation_space}
+        return {name: self._out(found[name]) for name in seen_space(self.settings)}
+
+
+def _given(stage: tuple[Driver, FloorWays], _: World) -> tuple[Driver, FloorWays]:
+    return stage
