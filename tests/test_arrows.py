@@ -75,7 +75,6 @@ def wrong_arrows(path: Path) -> list[str]:
     return wrong
 
 
-@pytest.mark.slow
 def test_imports_follow_the_arrows_of_the_design():
     wrong = [w for path in sources() for w in wrong_arrows(path)]
     assert not wrong, "\n".join(wrong)

@@ -196,9 +196,13 @@ class Driver:
         return Roll(rolled.metres + metres, (*rolled.bumps, *bumps), rolled.touched or bool(now))
 
     def take_over(self, qpos: np.ndarray, qvel: np.ndarray, seconds: float) -> None:
-        """Be in a state that was computed elsewhere, so many seconds after the last; `eye` follows mj_kinematics."""
+        """Be in a state that was computed elsewhere, so many seconds after the last; `eye` follows `update_poses`."""
         self.data.qpos[:], self.data.qvel[:] = qpos, qvel
         self.data.time += seconds
+
+    def update_poses(self) -> None:
+        """Compute the poses of all parts from the state."""
+        mujoco.mj_kinematics(self.model, self.data)
 
     def twin(self) -> Self:
         """Another body in the same house; they do not meet."""

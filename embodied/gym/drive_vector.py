@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium as gym
-import mujoco
 import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -66,7 +65,7 @@ class Bodies:
                     for d, r, b, t in zip(self.drivers, rolled, before, self._taken_over(), strict=True)
                 ]
         for driver in self.drivers:
-            mujoco.mj_kinematics(driver.model, driver.data)
+            driver.update_poses()
         return rolled
 
     def _step(self) -> None:
