@@ -19,6 +19,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
+import psutil
 
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
 from embodied.datasets.scale import own_size
@@ -42,7 +43,7 @@ idle_seconds = 600
 
 [[parts]]
 name = "pairs"
-split = "val_seen"
+split = "train"
 tasks = 1000
 answers = 100000
 per_person = 100000
@@ -136,8 +137,8 @@ async def _fetch(host: str, port: int, path: str) -> bytes:
 
 
 @contextlib.contextmanager
-def served(study: Path) -> Iterator[tuple[str, str]]:
-    """A server of a study in a process of its own: its address and the word of its link."""
+def served(study: Path) -> Iterator[tuple[str, str, psutil.Process]]:
+    """A server of a study in a process of its own: its address, the word of its link, and the process."""
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
@@ -151,7 +152,7 @@ def served(study: Path) -> Iterator[tuple[str, str]]:
                 raise RuntimeError("the server did not start; run `embodied serve` to see why")
             time.sleep(0.1)
         links = json.loads((study.with_suffix(".people") / "links.json").read_text())
-        yield f"http://127.0.0.1:{port}", links["join"][0].split("=")[1]
+        yield f"http://127.0.0.1:{port}", links["join"][0].split("=")[1], psutil.Process(process.pid)
     finally:
         process.terminate()
         process.wait(30)
@@ -162,23 +163,28 @@ def measure(
 ) -> LoadReport:
     """Build a small study in `out`, serve it, and let people take part."""
     folder = out / "serve"
-    config = DatasetConfig("hanna", own_size(1, 10), seed, (80.0, 110.0), people=False)
+    config = DatasetConfig("hanna", own_size(1, 40), seed, (80.0, 110.0), people=False)
     progress("a data set of three small houses")
     build_dataset(config, folder / "data", cache, workers=1)
     draw_panoramas(config, folder / "data", cache, pictures=PictureSettings(512, "unlit"), workers=1)
     study = folder / "study.toml"
     study.write_text(STUDY, encoding="utf-8")
     shutil.rmtree(study.with_suffix(".people"), ignore_errors=True)
-    with served(study) as (address, word):
+    with served(study) as (address, word, server):
         progress(f"{people} people for {seconds:g} seconds")
+        begun = sum(server.cpu_times()[:2])
         times = asyncio.run(load(address, word, people, seconds, seed=seed))
-    return report(times, people, seconds)
+        busy = sum(server.cpu_times()[:2]) - begun
+    return report(times, people, seconds, busy)
 
 
-def report(times: Times, people: int, seconds: float) -> LoadReport:
-    """Percentiles in milliseconds."""
-    facts: dict[str, object] = {"people": people, "seconds": seconds, "refused": times.refused}
-    lines = [f"{people} people for {seconds:g} s, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}"]
+def report(times: Times, people: int, seconds: float, busy: float) -> LoadReport:
+    """Percentiles in milliseconds; `busy`: processor seconds of the server."""
+    facts: dict[str, object] = {"people": people, "seconds": seconds, "refused": times.refused, "server busy s": busy}
+    lines = [
+        f"{people} people for {seconds:g} s, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}",
+        f"server    {busy:.1f} processor seconds",
+    ]
     for name, values in (("step", times.steps), ("panorama", times.pictures)):
         p50, p95 = (1000 * np.percentile(values, [50, 95])).tolist() if values else (float("nan"),) * 2
         facts |= {name: {"count": len(values), "p50 ms": p50, "p95 ms": p95}}
