@@ -35,6 +35,9 @@ def default_cache() -> Path:
 
     EMBODIED_CACHE may be a list, as PATH is one: what the later folders hold is read from there, and all is written
     to the first.
+
+    Examples:
+      >>> folder = embodied.default_cache()
     """
     first, *others = (os.environ.get("EMBODIED_CACHE") or _users_cache()).split(os.pathsep)
     try:

@@ -38,7 +38,12 @@ Params = tuple[tuple[str, str | float], ...]
 
 
 class Catalogue:
-    """All assets by key, and their meshes on demand."""
+    """All assets by key, and their meshes on demand.
+
+    Examples:
+      >>> catalogue.of_class('mug')[0].colours
+      ('black',)
+    """
 
     def __init__(
         self,
@@ -194,6 +199,11 @@ def load_catalogue(
       packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json, or of furniture groups, a groups.toml, or both
         (docs/assets.md).
+
+    Examples:
+      >>> catalogue = embodied.load_catalogue()
+      >>> 'mug' in catalogue.classes
+      True
     """
     packs_given, own_given = ((Path(p),) if isinstance(p, (str, Path)) else p for p in (packs, own))
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))

@@ -28,8 +28,9 @@ Other
     default_cache                  where expensive products are kept
     stream                         named random generators of one seed
 
-Each name is imported when it is first used. Environments: embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0,
-Ask-v0, VLNCE-v0, ObjectNav-v0 and Drive-v0, registered by `import embodied`.
+Each name is imported when it is first used; `help(embodied.open_world)` shows an example. Environments:
+embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, VLNCE-v0, ObjectNav-v0 and Drive-v0, registered by
+`import embodied`.
 """
 
 from __future__ import annotations

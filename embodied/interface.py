@@ -237,6 +237,12 @@ Goal = FindObject | FollowRoute | FindDescribed
 
 @dataclass(frozen=True)
 class Task:
+    """One thing to do: where it starts, what is asked, and what counts as success.
+
+    Examples:
+      >>> request = split.tasks[0].request
+    """
+
     id: str
     """Unique in a data set: '<world>/<kind>/<number>'."""
     kind: str
@@ -276,7 +282,12 @@ class Route:
 
 
 class Intention(enum.Enum):
-    """What a request for help asks for."""
+    """What a request for help asks for.
+
+    Examples:
+      >>> embodied.Intention('help')
+      <Intention.HELP: 'help'>
+    """
 
     HELP = "help"
     """VNLA and HANNA: the assistant decides what to say."""
@@ -338,7 +349,11 @@ class Thought:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Turn to a candidate and go there."""
+    """Turn to a candidate and go there.
+
+    Examples:
+      >>> observation = play.step(embodied.Move(0))
+    """
 
     candidate: int
     """Index into Observation.candidates."""
@@ -347,7 +362,12 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Ask the assistant; possible only when Observation.can_ask holds the intention."""
+    """Ask the assistant; possible only when Observation.can_ask holds the intention.
+
+    Examples:
+      >>> embodied.Ask(embodied.Intention.FREE, question='Which door?').question
+      'Which door?'
+    """
 
     intention: Intention = Intention.HELP
     thought: Thought | None = field(default=None, compare=False, repr=False)
@@ -357,7 +377,12 @@ class Ask:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Say that the current task or sub-task is done (HARI: DONE)."""
+    """Say that the current task or sub-task is done (HARI: DONE).
+
+    Examples:
+      >>> play.step(embodied.Stop()) is None  # the episode has ended
+      True
+    """
 
     thought: Thought | None = field(default=None, compare=False, repr=False)
 
@@ -396,7 +421,12 @@ class Mode(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Subtask:
-    """What stands behind a reply. Privileged: for the environment, teachers and metrics."""
+    """What stands behind a reply. Privileged: for the environment, teachers and metrics.
+
+    Examples:
+      >>> embodied.Subtask('subgoal', target=3).target
+      3
+    """
 
     id: str
     """Route id in HANNA, 'subgoal' elsewhere."""
@@ -414,7 +444,12 @@ class Subtask:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What the assistant says: a text, an image, a description, or several of them."""
+    """What the assistant says: a text, an image, a description, or several of them.
+
+    Examples:
+      >>> embodied.Reply(text='Turn left.').text
+      'Turn left.'
+    """
 
     text: str | None = None
     image: Viewpoint | None = None
@@ -444,7 +479,14 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """Everything a policy may know at one step, and nothing else."""
+    """Everything a policy may know at one step, and nothing else.
+
+    Examples:
+      >>> play = split.make_env()
+      >>> observation = play.reset(split.tasks[0], seed=0)
+      >>> observation.time, len(observation.candidates) > 0
+      (0, True)
+    """
 
     sight: Sight = field(compare=False)
     """The panorama around the agent, for a FeatureSource."""
@@ -479,7 +521,11 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """The privileged view of one step: for assistants, teachers and metrics, never for a policy."""
+    """The privileged view of one step: for assistants, teachers and metrics, never for a policy.
+
+    Examples:
+      >>> node = play.situation.pose.node
+    """
 
     world: Place
     task: Task
@@ -534,6 +580,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Episode:
+    """A task as it was played, step by step.
+
+    Examples:
+      >>> episodes[0].ended, episodes[0].steps[-1].action
+      ('stop', Stop())
+    """
+
     task: Task
     steps: tuple[Step, ...]
     ended: str

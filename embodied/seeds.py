@@ -35,6 +35,10 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
 
     Raises:
       TypeError: a seed that is no whole number.
+
+    Examples:
+      >>> int(embodied.stream(7, 'house', 3).integers(100))
+      31
     """
     text = "\x1f".join([f"{checked_seed(seed):d}", *(f"{type(n).__name__}:{n}" for n in names)])
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")

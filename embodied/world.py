@@ -41,7 +41,15 @@ log = logging.getLogger(__name__)
 
 
 class World:
-    """Owns, while open, a renderer (made on first need) and the panorama file (where there is one)."""
+    """Owns, while open, a renderer (made on first need) and the panorama file (where there is one).
+
+    Examples:
+      >>> view = world.camera((2.0, 3.0, 1.5), yaw=0.5, size=(120, 160))
+      >>> view.rgb.shape, view.depth.shape
+      ((120, 160, 3), (120, 160))
+      >>> classes = {world.classes[i] for i in set(view.ids.flat)}
+      >>> objects = [s.object_class for s in world.sightings(0)]
+    """
 
     def __init__(
         self,
@@ -327,6 +335,11 @@ def open_world(
         embodied.render.pictures.KINDS, or settings.
       graph: the navigation graph; built when not given.
       changes: fields of PictureSettings, instead of those of `pictures`: size=512.
+
+    Examples:
+      >>> world = embodied.open_world(house, size=64)  # pictures='fast' lights it first
+      >>> world.panorama(0).rgb.shape
+      (6, 64, 64, 3)
     """
     graph, cache = graph or build_graph(house), cache or default_cache()
     return World(house, catalogue or load_catalogue(cache), graph, cache, PictureSettings.of(pictures, **changes))
@@ -343,6 +356,11 @@ def open_folder(
 
     Args:
       catalogue, cache, pictures, changes: as in `open_world`.
+
+    Examples:
+      >>> with embodied.open_folder(Path('.')) as stored:  # where house.json is
+      ...     stored.house == house
+      True
     """
     folder, cache = Path(folder), cache or default_cache()
     catalogue = catalogue or load_catalogue(cache)

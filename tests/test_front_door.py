@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+import doctest
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import shapely
+from hand_data import built, small_house
 
 import embodied
 from embodied.generate.plan_file import house_of_plan, load_plan
@@ -20,6 +24,11 @@ ROOMS = [
     {"kind": "main_bedroom", "polygon": [[-3.6, 0], [0, 0], [0, 4], [-3.6, 4]]},
     {"kind": "bathroom", "polygon": [[-3.6, 4], [0, 4], [0, 7], [-3.6, 7]]},
 ]
+
+
+MADE = """load_catalogue HouseConfig generate_house House load_house load_plan house_of_plan open_world open_folder
+build_graph DatasetConfig build_dataset draw_panoramas Dataset baseline play evaluate Observation Move Stop"""
+"""Names whose examples make what those of other names use, in this order."""
 
 
 def written(tmp_path, rooms):
@@ -36,6 +45,28 @@ def test_import_embodied_loads_nothing_heavy_and_completes_names():
     missing = [name for name in embodied.__all__ if name not in embodied.__doc__ and name != "__version__"]
     assert missing == ["Renderer", "build_graph"], "help(embodied) names all but two"
     assert embodied.__version__.split(".")[0].isdigit()
+
+
+def drawn_house(*facts):
+    """small_house with things that can be drawn."""
+    house, graph = small_house(*facts)
+    things = tuple(dataclasses.replace(p, asset="built/mug_black") for p in house.placements)
+    return dataclasses.replace(house, placements=things), graph
+
+
+@pytest.mark.slow
+def test_the_example_of_every_public_name_runs(tmp_path, monkeypatch):
+    built(tmp_path / "data" / "hanna", make_house=drawn_house)
+    written(tmp_path, ROOMS)
+    monkeypatch.chdir(tmp_path)
+    names = {"embodied": embodied, "Path": Path}
+    runner, finder = doctest.DocTestRunner(), doctest.DocTestFinder(recurse=False)
+    for name in [*MADE.split(), *(n for n in embodied.__all__ if n not in MADE.split() and n != "__version__")]:
+        (example,) = finder.find(getattr(embodied, name), name, module=False, globs=names)
+        assert example.examples, f"{name} has no example"
+        example.globs = names
+        assert runner.run(example, clear_globs=False).failed == 0, name
+    names["world"].close()
 
 
 def test_a_floor_plan_from_a_file_becomes_a_furnished_house_with_these_very_rooms(tmp_path):

@@ -52,7 +52,11 @@ SEEDS = 12
 
 @dataclass(frozen=True)
 class DatasetConfig:
-    """All that a data set depends on."""
+    """All that a data set depends on.
+
+    Examples:
+      >>> config = embodied.DatasetConfig('hanna', 'tiny', seed=4, language='plain')
+    """
 
     kind: str
     """'find', 'vln', 'vnla', 'hanna' or 'hari'."""
@@ -159,6 +163,9 @@ def build_dataset(
     Raises:
       ValueError: the folder holds another data set.
       LockedError: another process builds it.
+
+    Examples:
+      >>> index = embodied.build_dataset(config, Path('data/hanna'), embodied.default_cache())
     """
     folder = Path(folder)
     work = units(config.plan)
@@ -191,6 +198,10 @@ def draw_panoramas(
 
     Raises:
       LockedError: another process writes into the folder.
+
+    Examples:
+      >>> pictures = embodied.PictureSettings(size=64)
+      >>> embodied.draw_panoramas(config, Path('data/hanna'), embodied.default_cache(), pictures=pictures)
     """
     arguments = (Path(folder).resolve(), Path(cache), PictureSettings.of(pictures), packs)
     work = units(config.plan)

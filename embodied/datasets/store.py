@@ -79,7 +79,12 @@ class SplitData:
 
 
 class Dataset:
-    """A data set on disk. Houses, graphs and tasks are read when first asked for and kept."""
+    """A data set on disk. Houses, graphs and tasks are read when first asked for and kept.
+
+    Examples:
+      >>> data = embodied.Dataset(Path('data/hanna'))
+      >>> split = data.split('val_seen')
+    """
 
     def __init__(self, folder: Path) -> None:
         """

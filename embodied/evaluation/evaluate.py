@@ -73,6 +73,9 @@ def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None, r
 
     Raises:
       ValueError: unknown for this kind of task, or one that looks and was given no worlds.
+
+    Examples:
+      >>> agent = embodied.baseline('hanna', 'shortest')
     """
     if (kind, name) == ("vnla", "shortest"):
         return Shortest(teacher_of(rules))
@@ -111,6 +114,9 @@ def evaluate(
       limit: at most so many tasks, from all houses alike.
       keep: is given each agent's name and episodes (to save them).
       watch: wraps the iterator over agent names (a progress bar).
+
+    Examples:
+      >>> rows = embodied.evaluate(split, {'shortest': agent}, limit=10)
     """
     tasks = spread(split.tasks, limit)
     graphs = {name: world.graph for name, world in split.worlds.items()}

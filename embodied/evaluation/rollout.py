@@ -53,7 +53,11 @@ def rollout(
 def play(
     make_env: Callable[[], HelpEnv], player: Agent, tasks: Iterable[Task], *, seed: int, batch: int = 1, agent: str = ""
 ) -> list[Episode]:
-    """The finished episodes of `rollout`, in the order of the tasks."""
+    """The finished episodes of `rollout`, in the order of the tasks.
+
+    Examples:
+      >>> episodes = embodied.play(split.make_env, agent, split.tasks, seed=0)
+    """
     frames = rollout(make_env, player, tasks, seed=seed, batch=batch, agent=agent)
     done = {f.index: f.episode for f in frames if f.episode is not None}
     return [done[i] for i in sorted(done)]

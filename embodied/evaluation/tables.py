@@ -231,7 +231,11 @@ def heading(name: str) -> str:
 
 
 def markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
-    """One line per row, with the episode and house counts and the seed."""
+    """One line per row, with the episode and house counts and the seed.
+
+    Examples:
+      >>> table = embodied.markdown(rows, ['success', 'spl'])
+    """
     columns = list(columns or dict.fromkeys(name for r in rows for name in r.values))
     nothing = Estimate(math.nan, math.nan, 0)
     head = ["agent", "split", *(heading(c) for c in columns), "episodes", "houses", "seed"]

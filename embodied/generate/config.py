@@ -38,7 +38,11 @@ RETRIES = Retries()
 
 @dataclass(frozen=True)
 class HouseConfig:
-    """The knobs of the generator. None means: draw it from the seed."""
+    """The knobs of the generator. None means: draw it from the seed.
+
+    Examples:
+      >>> config = embodied.HouseConfig(area=(38, 46), hour=17.5)
+    """
 
     area: tuple[float, float] | None = None
     """Lowest and highest floor area in square metres, drawn uniformly between them."""

@@ -33,6 +33,9 @@ def load_plan(path: Path) -> Plan:
 
     Raises:
       HouseError: not such a file, rooms that overlap, or one that cannot be entered; says which.
+
+    Examples:
+      >>> plan = embodied.load_plan(Path('plan.json'))
     """
     try:
         body = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -76,6 +79,9 @@ def house_of_plan(
 
     Raises:
       HouseError: no doors leave every room open.
+
+    Examples:
+      >>> mine = embodied.house_of_plan(plan, seed=3)
     """
     area = sum(c.area for c in plan.cells)
     spaces = tuple(WantedRoom(c.kind, c.area) for c in plan.cells)

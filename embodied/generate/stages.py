@@ -245,6 +245,9 @@ def generate_house(
     Raises:
       HouseError: the configuration cannot be built, or a stage lacks what an earlier one should make.
       TypeError: a seed that is no whole number.
+
+    Examples:
+      >>> house = embodied.generate_house(7, config)
     """
     seed, catalogue = checked_seed(seed), (catalogue or load_catalogue()).furnishing
     best: tuple[int, House] | None = None

@@ -361,6 +361,12 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     Args:
       options: fields of StageSettings (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
         (shaping, strict, patience, needs_stop).
+
+    Examples:
+      >>> env = embodied.make_env('hanna', data='data/hanna', sees='oracle')
+      >>> _, info = env.reset(seed=0)
+      >>> action = info['candidates'][0]['action']
+      >>> _, reward, terminated, truncated, info = env.step(action)
     """
     own = {name: options.pop(name) for name in OWN if name in options}
     check_options(render_mode, **own)

@@ -67,7 +67,12 @@ class Closed:
 
 @dataclass(frozen=True)
 class ViewSettings:
-    """How pixels are framed."""
+    """How pixels are framed.
+
+    Examples:
+      >>> embodied.ViewSettings('views36', height=224).shape
+      (36, 224, 224)
+    """
 
     frame: str = "view"
     """One of FRAMES."""

@@ -166,6 +166,14 @@ class Stair:
 
 @dataclass(frozen=True)
 class House:
+    """A furnished house as data; immutable, and written to JSON.
+
+    Examples:
+      >>> sorted({room.kind for room in house.rooms})
+      ['bathroom', 'hall', 'kitchen', 'living_room', 'main_bedroom']
+      >>> house.save(Path('house.json'))
+    """
+
     seed: int
     name: str
     storeys: tuple[Storey, ...]

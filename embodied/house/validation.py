@@ -16,7 +16,12 @@ STYLES = ("light", "warm", "dark", "classic", "colourful")
 
 
 def load_house(path: Path, catalogue: Catalogue) -> House:
-    """House.load, refusing what `catalogue` does not know; raises HouseError with the file's name."""
+    """House.load, refusing what `catalogue` does not know; raises HouseError with the file's name.
+
+    Examples:
+      >>> embodied.load_house(Path('house.json'), catalogue) == house
+      True
+    """
     house = House.load(path)
     try:
         check_known(house, catalogue)

@@ -42,7 +42,14 @@ LONGEST = 2.0
 
 @dataclass(frozen=True, eq=False)
 class NavGraph:
-    """Viewpoints and the straight walks between them."""
+    """Viewpoints and the straight walks between them.
+
+    Examples:
+      >>> nodes = graph.path(0, 3)
+      >>> nodes[0], nodes[-1]
+      (0, 3)
+      >>> metres = graph.distance[0, 3]
+    """
 
     positions: np.ndarray
     """(n, 3) float64, metres, world: the eye, 1.5 m above the floor."""
@@ -131,6 +138,9 @@ def build_graph(house: House, *, spacing: float = 2.25) -> NavGraph:
 
     Raises:
       HouseError: a room that cannot be entered on foot.
+
+    Examples:
+      >>> graph = embodied.build_graph(house)
     """
     positions: list[tuple[float, float, float]] = []
     rooms: list[str] = []

@@ -65,6 +65,10 @@ class Renderer:
 
     All renderers of a process share its one OpenGL context (embodied.gl), in which threads take turns; one renderer
     is used by one thread at a time.
+
+    Examples:
+      >>> with embodied.Renderer(house, catalogue) as renderer:
+      ...     depth = renderer.view((2.0, 3.0, 1.5), yaw=0.5).depth
     """
 
     @gl.drawing()

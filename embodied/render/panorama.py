@@ -37,7 +37,14 @@ CREASE = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Panorama:
-    """Six cube faces around a point."""
+    """Six cube faces around a point.
+
+    Examples:
+      >>> world.panorama(0).view_rgb(yaw=0.5, pitch=-0.1).shape
+      (480, 640, 3)
+      >>> world.panorama(0).views36(32).shape
+      (36, 32, 32, 3)
+    """
 
     rgb: np.ndarray
     """(6, s, s, 3) uint8 sRGB."""

@@ -35,7 +35,12 @@ SIZES = (8, 4096)
 
 @dataclass(frozen=True)
 class PictureSettings:
-    """All that decides what pictures of a house look like, besides the house."""
+    """All that decides what pictures of a house look like, besides the house.
+
+    Examples:
+      >>> embodied.PictureSettings.of('fast', size=512).lit
+      True
+    """
 
     size: int = 256
     """Side of a cube face, pixels."""
