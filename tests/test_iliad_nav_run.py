@@ -63,8 +63,8 @@ def test_held_out_paths_and_houses_are_nobodys_to_learn_from(grounds, source):
 
 def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch):
     """Said plainly here: houses made by hand hold nothing that people have words for."""
-    monkeypatch.setattr("agents.iliad.nav.data.load_catalogue", lambda cache: None)
-    monkeypatch.setattr("agents.iliad.nav.data.People", PlainLanguage)
+    monkeypatch.setattr("agents.common.more_paths.load_catalogue", lambda cache: None)
+    monkeypatch.setattr("agents.common.more_paths.People", PlainLanguage)
     monkeypatch.setattr(Dataset, "open_world", lambda self, name, catalogue, cache: self.place(name))
     more = dataclasses.replace(SMALL, more_paths=7)
     found, few = source.data(more).splits, grounds.data.splits
@@ -75,7 +75,7 @@ def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch
     assert not known & {(t.world, t.path) for t in added}
     monkeypatch.delattr(Dataset, "open_world")
     assert source.data(more).splits["train"] == found["train"]
-    assert len(list((source.cache / "nav_paths").iterdir())) == len({t.world for t in few["train"]})
+    assert len(list((source.cache / "paths").iterdir())) == len({t.world for t in few["train"]})
 
 
 @pytest.mark.parametrize("learner", ["adel", "dagger", "binary"])

@@ -40,6 +40,10 @@ class FollowerSettings(ImitationSettings):
     """Weight of the loss of naming the kinds of the rooms that it is in and can go to."""
     spoken_share: float = 0.0
     """Share of the episodes in which it follows a speaker's words along random paths (back-translation)."""
+    more_paths: int = 0
+    """Additional paths per training house, each worded three times."""
+    least_teacher: float = 0.0
+    """Share of the steps in which the teacher acts at the end of 'dagger'."""
     iterations: int = 20_000
     """Updates of the weights."""
     batch: int = 64
@@ -53,7 +57,8 @@ class FollowerSettings(ImitationSettings):
         require(self, AT_LEAST_ONE, "hidden_size")
         require(self, NOT_ALL, "dropout")
         require(self, NOT_NEGATIVE, "progress_weight", "room_weight")
-        require(self, SHARE, "spoken_share")
+        require(self, NOT_NEGATIVE, "more_paths")
+        require(self, SHARE, "spoken_share", "least_teacher")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ import dataclasses
 from pathlib import Path
 
 from agents.common.lessons import Lessons, Split
+from agents.common.more_paths import more_routes
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.settings import EvaluationSettings
@@ -18,6 +19,7 @@ from agents.vln.speaker import load_speaker, spoken_tasks
 from agents.vln.training import train
 from embodied.identity import Identity, identity_of
 from embodied.interface import Task
+from embodied.tasks.vln import vln_task
 
 
 def train_follower(
@@ -40,6 +42,8 @@ def train_follower(
       ValueError: spoken_share without a speaker.
     """
     training = lessons.split("train", houses=config.training_houses or None, lights=config.lights)
+    if config.more_paths:
+        training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(lessons, training, config)])
     if config.spoken_share:
         training = dataclasses.replace(training, tasks=mixed(training, config, speaker))
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
@@ -53,6 +57,13 @@ def train_follower(
     )
     identity, watch = training_identity(lessons, config, speaker), on_validation
     return train(agent, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+
+
+def more_tasks(lessons: Lessons, training: Split, config: FollowerSettings) -> list[Task]:
+    """Tasks of further paths through the training houses; the same for all training seeds."""
+    source, count = lessons.data, config.more_paths
+    routes = {name: more_routes(source, name, count, seed=0, cache=lessons.cache) for name in training.worlds}
+    return [vln_task(name, route) for name, many in routes.items() for route in many]
 
 
 def mixed(training: Split, config: FollowerSettings, speaker: Path | None) -> list[Task]:

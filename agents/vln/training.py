@@ -93,9 +93,9 @@ class VlnLearner:
 
 
 def teacher_share(config: FollowerSettings, update: int) -> float:
-    """Share of the steps of an update in which the teacher acts; of 'dagger' it falls to zero over the second half."""
+    """Share of the steps in which the teacher acts: of "dagger" it falls to the least over the second half."""
     if config.forcing == "dagger":
-        return min(1.0, 2.0 - 2.0 * update / config.iterations)
+        return min(1.0, max(config.least_teacher, 2.0 - 2.0 * update / config.iterations))
     return float(config.forcing == "teacher")
 
 

@@ -16,7 +16,7 @@ from typing import Annotated
 from embodied.cli.common import Cached, Printed, show
 from embodied.cli.options import Option, whole
 
-KINDS = ("assets", "materials", "collision", "landscapes", "light", "panoramas", "sightings", "semantic", "nav_paths")
+KINDS = ("assets", "materials", "collision", "landscapes", "light", "panoramas", "sightings", "semantic", "paths")
 """Folders that the program makes in a cache; nothing else in it is counted or removed."""
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from agents.common.more_paths import more_routes
 from agents.common.vocabulary import build_vocabulary
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.student import NavEyes
@@ -14,13 +15,7 @@ from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
 from agents.vision.features import feature_path, load_bank
 from assets.cache import digest
-from assets.catalogue import load_catalogue
-from assets.closure import code_digest
-from embodied.assistants.route_system import RouteConfig, sampled_paths, worded
 from embodied.datasets.store import Dataset
-from embodied.interface import Route
-from embodied.language import People
-from embodied.records import load_lines, save_lines
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task
 
@@ -71,7 +66,8 @@ def nav_data(
         splits["train"] += [t for i, t in enumerate(trips) if i not in held]
         splits["validation"] += [one for i in sorted(held) for one in each_wording(trips[i])]
         if cache is not None and config.more_paths:
-            splits["train"] += more_trips(source, name, trips, config, cache)
+            routes = more_routes(source, name, config.more_paths, seed=config.data_seed, cache=cache)
+            splits["train"] += trips_of([vln_task(name, route) for route in routes])
     splits["test"] = [one for name in unseen for trip in house_trips(source, name) for one in each_wording(trip)]
     names = (*training, *unseen)
     places = {name: source.place(name) for name in names}
@@ -86,23 +82,6 @@ def nav_data(
 def house_trips(source: Dataset, name: str) -> list[Trip]:
     """The paths of a house with all of their wordings."""
     return trips_of([vln_task(name, route) for route in source.routes(name)])
-
-
-def more_trips(source: Dataset, name: str, known: Sequence[Trip], config: NavConfig, cache: Path) -> list[Trip]:
-    """Other paths of a house, of the same lengths, worded three times by the same people; fewer where it has fewer."""
-    code = code_digest("embodied.language.voice", "embodied.assistants.route_system")
-    key = digest([source.digest, name, config.more_paths, config.data_seed, code])
-    path = cache / "nav_paths" / f"{key[:32]}.jsonl"
-    if path.exists():
-        return trips_of([vln_task(name, route) for route in load_lines(path, Route)])
-    world = source.open_world(name, load_catalogue(cache), cache)
-    taken = {trip.path for trip in known}
-    rng = stream(config.data_seed, "nav", "more", name)
-    every = sampled_paths(world.graph, len(world.graph.positions) ** 2, rng=rng, config=RouteConfig())
-    paths = [p for p in every if p not in taken][: config.more_paths]
-    routes = worded(world, paths, ("train_seen",) * 3, seed=config.data_seed, language=People())
-    save_lines(path, routes)
-    return trips_of([vln_task(name, route) for route in routes])
 
 
 def each_wording(trip: Trip) -> list[Trip]:
