@@ -69,7 +69,7 @@ def said(capsys, *words: str) -> str:
         (("train", "hanna", "--data", "x", "--out", "y", "--nothing"), "`embodied --help` explains"),
         (("dataset", "find", "--out", "x", "--area", "5", "10"), "area should be"),
         (("dataset", "find", "--out", "x", "--workers", "0"), "--workers: should be a whole number of at least 1"),
-        (("dataset", "find", "--out", "x", "--own", "y"), "--own: data sets are made of the furniture"),
+        (("dataset", "find", "--out", "x", "--own", "y"), "should hold a groups.toml and no catalogue.json"),
     ],
 )
 def test_wrong_words_get_one_line_with_the_remedy(words, message, capsys, tmp_path, monkeypatch):

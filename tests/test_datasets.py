@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_data import build, built, content, hand_house
+from hand_data import build, built, content, hand_house, small_house
 
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
 from embodied.datasets.parts import object_part, room_part
@@ -22,6 +22,7 @@ from embodied.evaluation.rollout import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
+from embodied.records import RecordError
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import PictureSettings
@@ -171,6 +172,33 @@ def test_what_another_program_began_is_not_finished_by_this_one(tmp_path, monkey
     shutil.rmtree(data.folder / "houses" / "train_0001")
     with pytest.raises(ValueError, match="begun by another version of the program"):
         build(data.folder, tmp_path / "cache")
+
+
+def test_a_data_set_of_other_furniture_groups_is_another_one_and_is_not_continued(tmp_path):
+    """And without groups of one's own nothing is said of them, so that digests stay."""
+    config = DatasetConfig("find", "tiny", seed=4, language="plain")
+
+    def made(group: str, folder: str) -> Dataset:
+        shop = tmp_path / group
+        shop.mkdir(exist_ok=True)
+        (shop / "groups.toml").write_text(f'[rooms.living_room]\nwishes = [{{ group = "{group}" }}]\n')
+        build_dataset(config, tmp_path / folder, tmp_path / "cache", make_house=small_house, own=(shop,))
+        return Dataset(tmp_path / folder)
+
+    first = made("greenery", "a")
+    assert made("greenery", "a").digest == first.digest and first.config.own
+    assert made("tv_seats", "b").config.own != first.config.own and made("tv_seats", "b").digest != first.digest
+    for own, remedy in (
+        ((tmp_path / "tv_seats",), "another data set"),
+        ((), "another data set"),
+        ((tmp_path,), "hold a"),
+    ):
+        with pytest.raises(ValueError, match=remedy):
+            build_dataset(config, tmp_path / "a", tmp_path / "cache", make_house=small_house, own=own)
+    with pytest.raises(RecordError, match="groups.toml"):
+        made("no_such_group", "c")
+    assert not (tmp_path / "c").exists()
+    assert "own" not in (built(tmp_path / "plain").folder / "config.json").read_text()
 
 
 def test_wrong_folders_and_splits_are_refused(tmp_path):

@@ -15,7 +15,7 @@ from test_hanna_learner import agent_for, setting
 
 from agents.common.lessons import Split
 from agents.hanna.evaluation import sight_policies
-from agents.hanna.places import Query, auc, precision_recall, threshold
+from agents.hanna.places import Query, auc, measured, precision_recall, threshold
 from agents.vision.bank import FeatureBank
 from agents.vision.features import VIEW_SIZE, strip_of
 from agents.vision.occasions import OCCASIONS, strip_around
@@ -23,6 +23,7 @@ from agents.vision.strip import VFOV
 from embodied.cli.learning import SHOWN
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
+from embodied.evaluation.tables import interval
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
 from embodied.render.panorama import Panorama, face_rays
 
@@ -144,6 +145,9 @@ def test_precision_and_recall_count_places_that_are_found_where_they_are():
     ]
     assert precision_recall(asked, 0.35) == (1 / 3, 1 / 2), "right once, wrong twice, of two that are on the map"
     assert precision_recall(asked, 0.8) == (1.0, 1 / 2) and 0.6 < threshold(asked) < 0.9
+    found = measured(asked, 0.35)
+    shares = [interval([found[k]]).mean for k in ("right place first", "precision", "recall")]
+    assert shares == [1 / 2, 1 / 3, 1 / 2]
     assert auc(np.array([1.0, 2.0]), np.array([0.0, 1.5])) == 3 / 4
 
 

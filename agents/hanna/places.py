@@ -1,38 +1,40 @@
 """How well pictures are recognised that were taken at another time: precision, recall and AUC in houses never seen.
 
-    python -m agents.hanna.places --validation VAL --data TEST --pictures fast-matte --out docs/results/data
-
 An agent has walked through a house; a helper shows a picture of one of its places. Which of the places that it saw is
-it, if any? Thresholds are those of the validation houses at which F1 is best.
+it, if any? It is told by the agent's own thresholds (agents.hanna.recognition), which were chosen by `threshold`.
 """
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import scipy.stats
 
-from agents.common.shipped import SHIPPED_ENCODER
-from agents.hanna.recognition import matches
+from agents.hanna.recognition import MATCH, SAME, VIEW_MATCH, matches
 from agents.vision.drawn import pictures_of
-from agents.vision.encoder import load_encoder
 from agents.vision.features import feature_path, load_features
 from agents.vision.occasions import OCCASIONS, shown_path
-from assets.cache import write_json
 from embodied.datasets.store import Dataset
-from embodied.evaluation.tables import estimate
+from embodied.evaluation.tables import Samples
 from embodied.navigation.graph import NavGraph
 from embodied.seeds import stream
 
+AGAIN = "again"
+"""Pictures that are the agent's own panoramas through a robot's camera, whose headings it knows."""
 WALKS, MOVES = 12, 15
 """Walks through each house, and moves of each: what the agent has seen when it is shown a picture."""
 RINGS = ((0.0, 2.0), (2.0, 4.0), (4.0, np.inf))
 """From how far to how far the places are, in metres along the graph, that the right one is told from."""
-SPLITS = ("val_unseen", "test_unseen")
+COLUMNS = (
+    "right place first",
+    "precision",
+    "recall",
+    "AUC",
+    *(f"AUC {low:g} to {high:g} m" for low, high in RINGS),
+    "best threshold",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,122 +116,38 @@ def threshold(asked: Sequence[Query]) -> float:
     return float(grid[best[len(best) // 2]])
 
 
-def facts(asked: Sequence[Query], least: float) -> dict[str, dict[str, float | int | None]]:
-    """The columns of one row, shares in per cent."""
-    scores, distance = np.concatenate([q.scores for q in asked]), np.concatenate([q.distance for q in asked])
-    same = scores[distance == 0]
-    known = [q for q in asked if q.known]
-    houses = sorted({q.house for q in asked})
-    out: dict[str, dict[str, float | int | None]] = {}
+def recognised(data: Dataset, split: str, shown: str, encoder: str, picture_kind: str | None) -> dict[str, Samples]:
+    """COLUMNS over all places of a split's houses; shares of pictures, the others one value per house.
 
-    def put(key: str, value: float, per_house: Sequence[float] = (), n: int | None = None) -> None:
-        half = estimate(list(per_house), houses).half if len(per_house) > 1 else None
-        out[key] = {"mean": round(value, 4), "half_width": None if half is None else round(half, 4), "n": n}
-
-    first = [100.0 * q.right for q in known]
-    by = estimate(first, [q.house for q in known])
-    out["first"] = {"mean": round(by.mean, 2), "half_width": round(by.half, 2), "n": by.n}
-    p, r = precision_recall(asked, least)
-    each = [precision_recall([q for q in asked if q.house == h], least) for h in houses]
-    put("precision", 100 * p, [100 * a for a, _ in each], sum(q.best >= least for q in asked))
-    put("recall", 100 * r, [100 * b for _, b in each], len(known))
-    put("auc", auc(same, scores[distance > 0]), n=len(scores))
-    for low, high in RINGS:
-        put(f"auc_{low:g}", auc(same, scores[(distance > low) & (distance <= high)]))
-    put("threshold", least)
-    return out
+    Args:
+      shown: AGAIN, or when the pictures were taken, one of OCCASIONS.
+      encoder: its digest.
+    """
+    asked, own = list[Query](), shown == AGAIN
+    for name in data.names(split):
+        drawn, graph = pictures_of(data, name, picture_kind), data.place(name).graph
+        seen, _ = load_features(feature_path(data.folder / "features", encoder, name, drawn), encoder=encoder)
+        path = shown_path(data, name, OCCASIONS["camera" if own else shown], encoder, drawn)
+        asked += queries(name, graph, seen, load_features(path, encoder=encoder)[0], turned=not own)
+    return measured(asked, SAME if own else VIEW_MATCH if shown.endswith("view") else MATCH)
 
 
-Asked = Mapping[str, list[Query]]
+def measured(asked: Sequence[Query], least: float) -> dict[str, Samples]:
+    """COLUMNS, where a match of `least` is the same place."""
+    known, found = [q for q in asked if q.known], [q for q in asked if q.best >= least]
+    by_house = {h: [q for q in asked if q.house == h] for h in sorted({q.house for q in asked})}
 
+    def each(queries: Sequence[Query], least: float = -np.inf) -> Samples:
+        right = tuple(float(q.right and q.best >= least) for q in queries)
+        return Samples(right, tuple(q.house for q in queries), share=True)
 
-def ask(data: Dataset, splits: Sequence[str], quality: str | None, houses: int | None = None) -> Asked:
-    """Queries by occasion, of all of OCCASIONS whose features are there for every house; 'again' are the agent's own
-    panoramas through a camera, with their headings."""
-    encoder, out = load_encoder(SHIPPED_ENCODER).digest, dict[str, list[Query]]()
-    for name in dict.fromkeys(n for s in splits for n in data.names(s)[:houses]):
-        drawn, graph = pictures_of(data, name, quality), data.place(name).graph
-        own, _ = load_features(feature_path(data.folder / "features", encoder, name, drawn), encoder=encoder)
-        for word, occasion in OCCASIONS.items():
-            path = shown_path(data, name, occasion, encoder, drawn)
-            if path.exists():
-                shown = load_features(path, encoder=encoder)[0]
-                out.setdefault(word, []).extend(queries(name, graph, own, shown))
-                if word == "camera":
-                    out.setdefault("again", []).extend(queries(name, graph, own, shown, turned=False))
-    return out
+    def told(low: float, high: float) -> Samples:
+        values = []
+        for some in by_house.values():
+            scores, metres = np.concatenate([q.scores for q in some]), np.concatenate([q.distance for q in some])
+            values.append(auc(scores[metres == 0], scores[(metres > low) & (metres <= high)]))
+        return Samples(tuple(values), tuple(by_house))
 
-
-COLUMNS = (
-    {"key": "first", "title": "right place first, of those on the map", "unit": "%"},
-    {"key": "precision", "title": "precision", "unit": "%"},
-    {"key": "recall", "title": "recall", "unit": "%"},
-    {"key": "auc", "title": "AUC", "unit": ""},
-    {"key": "auc_0", "title": "AUC against places within 2 m", "unit": ""},
-    {"key": "auc_2", "title": "AUC against places 2 to 4 m away", "unit": ""},
-    {"key": "auc_4", "title": "AUC against places farther away", "unit": ""},
-    {"key": "threshold", "title": "threshold, of validation houses", "unit": ""},
-)
-
-
-def thresholds(asked: Asked) -> dict[str, float]:
-    """By what is shown: the agent's own panoramas, panoramas of another time, single views."""
-    pooled = {
-        "own": asked.get("again", []),
-        "panorama": [
-            q
-            for word, some in asked.items()
-            if word.startswith(("day", "later")) and kind_of(word) == "panorama"
-            for q in some
-        ],
-        "view": [q for word, some in asked.items() if kind_of(word) == "view" for q in some],
-    }
-    return {kind: threshold(some) for kind, some in pooled.items() if some}
-
-
-def kind_of(word: str) -> str:
-    return "own" if word == "again" else "view" if word.endswith("view") else "panorama"
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--validation", type=Path, required=True, help="data set whose unseen houses choose thresholds")
-    parser.add_argument("--data", type=Path, help="data set in whose houses they are judged; without it none are")
-    parser.add_argument("--pictures", help="how the pictures are drawn, as `embodied features --pictures`")
-    parser.add_argument("--validation-splits", nargs="+", default=SPLITS, help="of whose houses (default: both unseen)")
-    parser.add_argument("--split", nargs="+", default=["test_unseen"], help="of whose houses (default: test_unseen)")
-    parser.add_argument("--houses", type=int, help="of the first so many houses of each split (default: all)")
-    parser.add_argument("--table", default="sight-places", help="name of the table (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("docs/results/data"))
-    args = parser.parse_args()
-
-    chosen = thresholds(ask(Dataset(args.validation), args.validation_splits, args.pictures))
-    print(f"thresholds {chosen}")
-    judged = args.data or args.validation
-    asked = ask(Dataset(judged), args.split if args.data else args.validation_splits, args.pictures, args.houses)
-    rows = [
-        {"label": word, "values": facts(some, chosen[kind_of(word)]), "printed": {}} for word, some in asked.items()
-    ]
-    houses = len({q.house for some in asked.values() for q in some})
-    table = {
-        "table": args.table,
-        "title": "Recognising pictures that were taken at another time",
-        "paper": None,
-        "command": f"python -m agents.hanna.places --validation VAL --data TEST --pictures {args.pictures} "
-        f"--split {' '.join(args.split)} --table {args.table}" + (f" --houses {args.houses}" if args.houses else ""),
-        "identity": {"data": Dataset(judged).digest, "validation": Dataset(args.validation).digest},
-        "settings": f"{houses} house{'s' * (houses > 1)} used for no training "
-        f"(data seed {Dataset(judged).config.seed}), pictures {args.pictures or 'of the data set'}; "
-        f"{WALKS} walks of {MOVES} moves in each",
-        "columns": COLUMNS,
-        "rows": rows,
-        "notes": ["'again': the agent's own panoramas through a robot's camera, compared without turning."],
-    }
-    for row in rows:
-        print(row["label"], {k: v["mean"] for k, v in row["values"].items()})  # type: ignore[attr-defined]
-    if args.data:
-        write_json(args.out / f"{args.table}.json", table, indent=1)
-
-
-if __name__ == "__main__":
-    main()
+    rings = [told(*ring) for ring in ((0.0, np.inf), *RINGS)]
+    best = Samples(tuple(threshold(some) for some in by_house.values()), tuple(by_house))
+    return dict(zip(COLUMNS, (each(known), each(found), each(known, least), *rings, best), strict=True))

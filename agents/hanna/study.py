@@ -13,11 +13,13 @@ from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
 from agents.hanna.evaluation import all_policies, as_shipped, by_the_text, counted
+from agents.hanna.places import AGAIN, COLUMNS, recognised
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
+from agents.vision.occasions import OCCASIONS
 from assets.cache import default_cache
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
@@ -57,6 +59,8 @@ SIGHT_ROWS = (
     without("Random walk", "random walk"),
 )
 """What the seeing agent is compared with: without sight, without learning, without help, with other rules of asking."""
+PICTURE = "picture"
+"""In a row's `judge`: no agent plays; places are recognised in pictures that were taken then."""
 LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
 NO_CURIOSITY = learned("Our model, alpha = 0", alpha=0.0)
 OURS = learned("Our model, alpha = 1")
@@ -92,6 +96,12 @@ TABLES: Mapping[str, StudyTable] = {
         ("success", "spl", "navigation error", "requests", "steps"),
         ("test_unseen",),
         tuple((OURS_SEEING, row) for row in SIGHT_ROWS if row.train is not None),
+    ),
+    "places": StudyTable(
+        "Recognising places in pictures from another time",
+        tuple(StudyRow(name, None, {PICTURE: name}) for name in (AGAIN, *OCCASIONS)),
+        COLUMNS,
+        ("test_unseen",),
     ),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
     "4.5": StudyTable(
@@ -140,7 +150,7 @@ def in_both_ways(table: StudyTable) -> StudyTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(EpisodeStudy):
-    """Tables 4.3 to 4.6, D.1 and D.2."""
+    """Tables 4.3 to 4.6, D.1 and D.2, what sight is worth, and how well places are recognised."""
 
     encoder: Path
     config: TrainingConfig
@@ -159,7 +169,7 @@ class HannaStudy(EpisodeStudy):
 
     name = "hanna"
     makers = ("agents.hanna.run",)
-    judges = (*JUDGES, "agents.hanna.evaluation")
+    judges = (*JUDGES, "agents.hanna.evaluation", "agents.hanna.places")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
@@ -205,6 +215,12 @@ class HannaStudy(EpisodeStudy):
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return dataset_of(self.elsewhere or self.data, "hanna")
+
+    def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
+        if PICTURE not in row.judge:
+            return super().judge(weights, row, split, seed, folder, keep)
+        encoder = load_encoder(self.encoder).digest
+        return recognised(self.judged_in({}), split, row.judge[PICTURE], encoder, self.picture_kind)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         drawn = self._lessons(self.elsewhere).pictures(split.removesuffix(SHIPPED))

@@ -7,7 +7,6 @@
   memory                    memory while houses are loaded and released
   bakes                     light a flat repeatedly
   light                     compare the ways of rendering with a path tracer
-  growth                    light houses of 40 to 400 m² and fit how the cost grows
   serve                     people in a study at once: time of a step from the browser to the disk and back
 
 Close other programs first.
@@ -29,21 +28,7 @@ if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from embodied.bench.timing import Measure
 
-PARTS = (
-    "houses",
-    "pictures",
-    "steps",
-    "views",
-    "plays",
-    "seen",
-    "drive",
-    "gpu",
-    "memory",
-    "bakes",
-    "light",
-    "growth",
-    "serve",
-)
+PARTS = ("houses", "pictures", "steps", "views", "plays", "seen", "drive", "gpu", "memory", "bakes", "light", "serve")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +42,7 @@ class Options(Furnished, Printed):
     houses: Count = 1000
     """memory: load and release N houses."""
     out: OutputFolder = Path("out/bench")
-    """Folder for the files of light, growth and serve."""
+    """Folder for the files of light and serve."""
     people: Annotated[int, Option(whole(2), "N")] = 50
     """serve: N people take part at once."""
     seconds: Count = 60
@@ -66,7 +51,7 @@ class Options(Furnished, Printed):
 
 def run(args: Options) -> int:
     from embodied import gl
-    from embodied.bench import bakes, drive, episodes, growth, light, seen, timing, views, world
+    from embodied.bench import bakes, drive, episodes, light, seen, timing, views, world
 
     parts = args.part or ["houses", "pictures", "steps"]
     if unknown := sorted(set(parts) - set(PARTS)):
@@ -92,7 +77,6 @@ def run(args: Options) -> int:
         "serve": lambda: serve.measure(
             args.out, args.cache, people=args.people, seconds=args.seconds, seed=args.seed, progress=note
         ),
-        "growth": lambda: growth.growth(catalogue, args.cache, args.out, seed=args.seed, quality=lit, progress=note),
     }
     measures = []
     for m in itertools.chain.from_iterable(lines[p]() for p in parts if p in lines):

@@ -114,11 +114,6 @@ def run(args: Options) -> int:
     from embodied.datasets.store import Dataset
     from embodied.generate import HouseConfig
 
-    if args.own:
-        raise ValueError(
-            "--own: data sets are made of the furniture that everybody has, since whoever reads one must find the "
-            "same; leave it out, or use it with `embodied house`, `light`, `render` and `rollout`"
-        )
     HouseConfig(area=args.area)  # refuses what no house can have, before a folder is made
     programs = [name for name, p in PROGRAMS.items() if p.kind == args.kind and not p.needs]
     if args.export and not programs:
@@ -139,7 +134,14 @@ def run(args: Options) -> int:
         return tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
 
     build_dataset(
-        config, args.out, args.cache, workers=args.workers, watch=watch, packs=args.pack, ray_address=args.ray
+        config,
+        args.out,
+        args.cache,
+        workers=args.workers,
+        watch=watch,
+        packs=args.pack,
+        own=args.own,
+        ray_address=args.ray,
     )
     data = Dataset(args.out)
     pictures = chosen_pictures(args.kind, args.pictures, args.size, data.pictures)

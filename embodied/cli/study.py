@@ -13,8 +13,8 @@
     embodied study iliad nav 3.4 3.5 --data DATA --out STUDY
     embodied study check STUDY
 
-HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2 and `sight`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b' and
-'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and
+HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `sight` and `places`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b'
+and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and
 `algorithm-6`. VLN's are `followers` and `speaker`. Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table
 3.2, Figures 3.4 and 3.5, `rates`, `held-out` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure
 3.7' and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share are
@@ -140,7 +140,7 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2 or sight."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight or places."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""

@@ -15,12 +15,13 @@ import joblib
 from joblib.externals.loky import process_executor
 
 from assets.cache import digest, drafts, sweep, write_bytes
-from assets.catalogue import Catalogue, load_catalogue
+from assets.catalogue import GROUPS, Catalogue, load_catalogue
 from assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, SplitPlan, quota, scale
 from embodied.generate import HouseConfig, generate_house
+from embodied.generate.furnish.tables import tables_of
 from embodied.generate.novelty import furnishable
 from embodied.generate.people import add_people, meet
 from embodied.house.house import House, HouseError
@@ -44,7 +45,7 @@ VOICES: Mapping[str, Callable[[str | None], Language]] = {
 """Name to a maker of voices, by the novelty of who speaks."""
 GROWTH = 3 * 2**30
 """Bytes by which a worker may grow before it is ended and another one begun."""
-LATER: Mapping[str, object] = {"rooms": True, "ood": 0}
+LATER: Mapping[str, object] = {"rooms": True, "ood": 0, "own": ""}
 """Settings that data sets have not always had, with their defaults."""
 SEEDS = 12
 """House seeds tried before giving up on a house of the data set."""
@@ -76,6 +77,8 @@ class DatasetConfig:
     ood: int = 0
     """Houses out of distribution, split 'test_ood': of models, looks, speakers and words that occur in no other split
     (embodied.novelty). With any, all other houses are of familiar ones only, so they differ from those without."""
+    own: str = ""
+    """Digest of the user's own groups.toml files that the houses are furnished by, too; `build_dataset` fills it in."""
 
     def __post_init__(self) -> None:
         if self.routes not in ("sampled", "spanning"):
@@ -150,6 +153,7 @@ def build_dataset(
     make_house: HouseMaker | None = None,
     watch: Watch | None = None,
     packs: tuple[Path, ...] = (),
+    own: tuple[Path, ...] = (),
     ray_address: str | None = None,
 ) -> Path:
     """Build what is missing of the data set in `folder` and write its index; returns the index.
@@ -158,18 +162,21 @@ def build_dataset(
 
     Args:
       watch: wraps the iterator over finished house names, with their number (a progress bar).
+      own: folders with a groups.toml of the user's own each (docs/assets.md); without models, which readers would lack.
       ray_address: run on a Ray cluster, which must see `folder` under the same path.
 
     Raises:
-      ValueError: the folder holds another data set.
+      ValueError: the folder holds another data set; a folder of `own` has no groups.toml, or a wrong one, or models.
       LockedError: another process builds it.
 
     Examples:
       >>> index = embodied.build_dataset(config, Path('data/hanna'), embodied.default_cache())
     """
     folder = Path(folder)
-    work = units(config.plan)
-    arguments = (config, folder.resolve(), Path(cache), make_house or make_dataset_house, packs)
+    work, own = units(config.plan), tuple(p.resolve() for p in own)
+    if own:
+        config = dataclasses.replace(config, own=_groups_digest(own, cache, packs))
+    arguments = (config, folder.resolve(), Path(cache), make_house or make_dataset_house, packs, own)
     with locked(folder):
         _claim(folder, config)
         for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
@@ -266,7 +273,13 @@ def _lasting(job: Callable[..., str], *arguments: Any) -> str:
 
 
 def build_unit(
-    unit: Unit, config: DatasetConfig, folder: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...] = ()
+    unit: Unit,
+    config: DatasetConfig,
+    folder: Path,
+    cache: Path,
+    make_house: HouseMaker,
+    packs: tuple[Path, ...] = (),
+    own: tuple[Path, ...] = (),
 ) -> str:
     """Build one house's folder unless it is there; returns its name.
 
@@ -283,7 +296,7 @@ def build_unit(
     with drafts(home.parent) as private:
         draft = private / unit.name
         draft.mkdir()
-        _write_unit(unit, config, draft, cache, make_house, packs)
+        _write_unit(unit, config, draft, load_catalogue(cache, packs, own), make_house)
         draft.rename(home)
     return unit.name
 
@@ -306,11 +319,9 @@ def make_dataset_house(seed: int, name: str, config: HouseConfig, catalogue: Cat
     raise HouseError(f"no house for {name!r} after {SEEDS} seeds; the last said {problems[-1]}")
 
 
-def _write_unit(
-    unit: Unit, config: DatasetConfig, home: Path, cache: Path, make_house: HouseMaker, packs: tuple[Path, ...]
-) -> None:
+def _write_unit(unit: Unit, config: DatasetConfig, home: Path, catalogue: Catalogue, make_house: HouseMaker) -> None:
     novelty = config.novelty_of(unit.group)
-    catalogue, language = load_catalogue(cache, packs), VOICES[config.language](novelty)
+    language = VOICES[config.language](novelty)
     house, graph = make_house(config.seed, unit.name, HouseConfig(area=config.area, novelty=novelty), catalogue)
     house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
     wording = WORDINGS[house_split]
@@ -323,7 +334,7 @@ def _write_unit(
         else:
             paths = route_paths(graph, unit.name, seed=config.seed, house_split=house_split, starts=met)
         house = house if met is None else add_people(house, met, (p[0] for p in paths))
-    with open_world(house, catalogue, cache, graph=graph) as world:
+    with open_world(house, catalogue, catalogue.cache, graph=graph) as world:
         routes = worded(world, paths, wording, seed=config.seed, language=language)
         tasks = part_tasks(
             config.kind,
@@ -383,6 +394,20 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
         if any(f.name != LOCK for f in folder.iterdir()):
             raise ValueError(f"{folder} is not empty and holds no data set; choose an empty folder")
         write_bytes(path, (json.dumps({**mine, "program": program()}, sort_keys=True, indent=1) + "\n").encode())
+
+
+def _groups_digest(own: Sequence[Path], cache: Path, packs: Sequence[Path]) -> str:
+    """
+    Raises:
+      ValueError: a folder of `own` holds models, no groups.toml, or one that is wrong.
+    """
+    if foreign := [p for p in own if (p / "catalogue.json").exists() or not (p / GROUPS).is_file()]:
+        raise ValueError(
+            f"{foreign[0]} should hold a {GROUPS} and no catalogue.json: whoever reads a data set has the furniture "
+            "that ships, not your models; leave it out, or use it with `embodied house`, `light` and so on"
+        )
+    tables_of(load_catalogue(cache, packs, own))
+    return digest(*((p / GROUPS).read_bytes() for p in own))[:16]
 
 
 def program() -> str:

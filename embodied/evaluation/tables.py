@@ -36,6 +36,9 @@ PERCENT = (
     "room success (VNLA)",
     "success (R2R)",
     "oracle success (R2R)",
+    "right place first",
+    "precision",
+    "recall",
 )
 """Columns shown in per cent."""
 SHARES = ("success", "strict success", "oracle success", "room success")

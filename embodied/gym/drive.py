@@ -3,8 +3,7 @@
     env = gymnasium.make("embodied/Drive-v0", task="find", sees=("rgb", "depth"), data="DIR", split="train")
 
 An action says how fast ahead and how fast to the left, each from -1 to 1, and is held for a tenth of a second while
-physics goes on; to find something, a third number above 0.5 says that it is here. The same as a dm_env environment, in
-the way of dm_control's suite: embodied.gym.suite.
+physics goes on; to find something, a third number above 0.5 says that it is here.
 """
 
 from __future__ import annotations

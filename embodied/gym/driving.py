@@ -1,6 +1,6 @@
 """Driving: a body on wheels in a lit house, driven by velocities, that sees what its camera sees at every command.
 
-The rules behind embodied/Drive-v0 (embodied.gym.drive) and its dm_env twin (embodied.gym.suite).
+The rules behind embodied/Drive-v0 (embodied.gym.drive).
 """
 
 from __future__ import annotations
