@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from hand_worlds import grid_world
 
-from agents.common.lessons import Split
 from agents.common.vocabulary import build_vocabulary
 from agents.vision.bank import FeatureBank
+from agents.vision.lessons import Split
 from agents.vnla.agent import new_agent
 from agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from embodied.envs.make import environment_maker, tasks_under

@@ -28,12 +28,12 @@ from agents.bandit.ratings import CLEAN, Rater
 from agents.bandit.stars_study import StarsStudy, raters, rise
 from agents.common.actor_critic import advantages
 from agents.common.checkpoint import CheckpointError, read_checkpoint
-from agents.common.lessons import Split
 from agents.common.vocabulary import build_vocabulary
 from agents.hanna.agent import HannaAgent, new_agent, save_agent
 from agents.hanna.training_config import SCALES
 from agents.studies.engine import run_study
 from agents.vision.bank import FeatureBank
+from agents.vision.lessons import Split
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
@@ -177,7 +177,7 @@ def test_settings_are_checked():
     with pytest.raises(ValueError, match="score must be one of"):
         RatingConfig(score="stars")
     with pytest.raises(ValueError, match="decisions must be one of"):
-        StarsStudy(Path("data"), (0,), agent=Path("agent"), encoder="", config=STARS, decisions="best")
+        StarsStudy(Path("data"), (0,), agent=Path("agent"), encoder=None, config=STARS, decisions="best")
     assert navigation.StateCritic(4)(torch.zeros(3, 2, 4)).shape == (3, 2)
 
 
@@ -186,10 +186,10 @@ def test_a_study_learns_judges_and_writes_once(split, tmp_path, monkeypatch):
     save_agent(agent_for(split), tmp_path / "agent.safetensors")
     data = SimpleNamespace(digest="d", names=lambda name: [name], split=lambda name: SimpleNamespace(**vars(split)))
     monkeypatch.setattr("agents.bandit.stars_study.dataset_of", lambda *_: data)
-    monkeypatch.setattr("agents.bandit.stars_study.split_of", lambda *_: split)
+    monkeypatch.setattr(StarsStudy, "_split", lambda self, name: split)
     for module in ("bandit.stars_study", "studies.episodes"):
         monkeypatch.setattr(f"agents.{module}.Dataset", lambda _: data)
-    study = StarsStudy(tmp_path, (0, 1), 8, (0,), agent=tmp_path / "agent.safetensors", encoder="tests", config=STARS)
+    study = StarsStudy(tmp_path, (0, 1), 8, (0,), agent=tmp_path / "agent.safetensors", encoder=None, config=STARS)
     study = dataclasses.replace(study, rater=Rater(granularity=4, skew=2.0))
     monkeypatch.setattr(StarsStudy, "about", lambda self: "Stars.")
     wanted = ["people", "granularity 4"]

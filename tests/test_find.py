@@ -9,7 +9,6 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
-from agents.common.lessons import Split
 from agents.common.session import Clock
 from agents.common.vocabulary import build_vocabulary
 from agents.find.config import FinderConfig
@@ -18,6 +17,7 @@ from agents.find.policy import STOP, WORDS, Search, Watched, costs_of
 from agents.find.run import Finder, FinderAbout, FindLearner, Labels, load_finder, new_finder, tasks_in
 from agents.find.way_map import WayMap
 from agents.vision.bank import FeatureBank
+from agents.vision.lessons import Split
 from embodied.envs.make import environment_maker
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

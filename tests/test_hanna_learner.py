@@ -23,7 +23,6 @@ from hand_worlds import grid_world
 
 from agents.common.checkpoint import CheckpointError, restore
 from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
-from agents.common.lessons import Split
 from agents.common.session import Clock, DivergedError, Session, as_good, falling_rate, metrics_of, tasks_of_update
 from agents.common.spine import ADDED, NUMBERS
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
@@ -35,6 +34,7 @@ from agents.hanna.policy import for_training
 from agents.hanna.training import learn_once, train
 from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from agents.vision.bank import FeatureBank
+from agents.vision.lessons import Split
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes

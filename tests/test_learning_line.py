@@ -11,7 +11,6 @@ import pytest
 import torch
 from hand_data import build
 
-from agents.common.lessons import Lessons, split_of
 from agents.common.session import metrics_of
 from agents.common.shipped import WEIGHTS
 from agents.common.weights import origin_of, weights_digest
@@ -23,6 +22,7 @@ from agents.studies.engine import run_study
 from agents.vision.config import PLAIN
 from agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from agents.vision.features import feature_path, save_features
+from agents.vision.lessons import Lessons
 from agents.vision.run import encoder_of
 from embodied.cli import features, main, options
 from embodied.cli.train import TrainHanna
@@ -125,7 +125,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
     config = parsed(TrainHanna, "--data", ".", "--out", ".", *SMALL).config
-    bank = split_of(data, "test_unseen", random_encoder(seed=0).digest).bank
+    bank = Lessons(data, random_encoder(seed=0)).split("test_unseen").bank
     agent = new_agent(config, vocabulary_of(data), bank.digest, bank.size)
     agent.network.eval()
     agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
@@ -274,7 +274,7 @@ def test_more_training_houses_than_there_are_are_refused(study, tmp_path):
 
 def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
     encoder = random_encoder(seed=0)
-    some, every = (split_of(data, "train", encoder.digest, houses=n) for n in (1, None))
+    some, every = (Lessons(data, encoder).split("train", houses=n) for n in (1, None))
     assert {t.world for t in some.tasks} == {data.names("train")[0]}
     assert 0 < len(some.tasks) < len(every.tasks)
     assert len(vocabulary_of(data, 1).words) <= len(vocabulary_of(data).words)

@@ -13,11 +13,11 @@ from hand_vnla import TINY as VNLA
 from hand_vnla import lesson
 from test_hanna_learner import agent_for, setting
 
-from agents.common.lessons import Split
 from agents.hanna.evaluation import sight_policies
 from agents.hanna.places import Query, auc, measured, precision_recall, threshold
 from agents.vision.bank import FeatureBank
 from agents.vision.features import VIEW_SIZE, strip_of
+from agents.vision.lessons import Split
 from agents.vision.occasions import OCCASIONS, strip_around
 from agents.vision.strip import VFOV
 from embodied.cli.learning import SHOWN

@@ -11,7 +11,6 @@ import torch
 from hand_data import built
 from hand_worlds import grid_world
 
-from agents.common.lessons import Split
 from agents.common.losses import IGNORE
 from agents.common.session import Clock
 from agents.common.settings import EvaluationSettings
@@ -19,6 +18,7 @@ from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
 from agents.common.vocabulary import build_vocabulary
 from agents.vision.bank import FeatureBank
 from agents.vision.encoder import load_encoder
+from agents.vision.lessons import Split
 from agents.vln.agent import VlnAbout, load_agent, new_agent, save_agent
 from agents.vln.config import FollowerSettings, SpeakerSettings
 from agents.vln.network import Said

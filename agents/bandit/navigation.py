@@ -21,7 +21,6 @@ from torch import Tensor, nn
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
 from agents.common.actor_critic import Decisions, actor_loss, critic_loss
-from agents.common.lessons import Split
 from agents.common.session import Note, Session, descend, seed_of, tasks_of_update
 from agents.common.tensor_file import checksum_of
 from agents.hanna.agent import HannaAgent, save_agent
@@ -29,6 +28,7 @@ from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
 from agents.hanna.policy import HannaMemory, HannaPolicy, for_training
+from agents.vision.lessons import Split
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import identity_of

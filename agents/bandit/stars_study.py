@@ -15,7 +15,6 @@ from agents.bandit.navigation import learn_from_stars, score_of
 from agents.bandit.rating_config import DECISIONS, RatingConfig
 from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.common.checkpoint import read_checkpoint
-from agents.common.lessons import split_of
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
@@ -23,6 +22,8 @@ from agents.hanna.asking import RULES
 from agents.hanna.policy import for_training
 from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
+from agents.vision.encoder import Encoder
+from agents.vision.lessons import Lessons, Split
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation import metrics
 from embodied.evaluation.tables import Samples
@@ -58,8 +59,8 @@ class StarsStudy(EpisodeStudy):
 
     agent: Path
     """The imitation-trained agent that all begin with."""
-    encoder: str
-    """Digest of the encoder whose features it knows."""
+    encoder: Encoder
+    """Whose features it knows."""
     config: RatingConfig
     split: str = "test_unseen"
     """Whose houses are judged in; nobody rated an episode there."""
@@ -101,12 +102,12 @@ class StarsStudy(EpisodeStudy):
                 f"{len(both)} houses of {self.split!r} are rated in, too ({self.rated!r}); judge in others"
             )
         for name in (self.rated, self.split):
-            split_of(data, name, self.encoder)
+            self._split(name)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         if train["rater"] == "none":
             return self.agent
-        rated, begun = split_of(dataset_of(self.data, "hanna"), self.rated, self.encoder), weights_digest(self.agent)
+        rated, begun = self._split(self.rated), weights_digest(self.agent)
         who, config = train["rater"], self.settings(train, seed)
         rater = Rater(**who) if isinstance(who, dict) else raters()[who]
         learn_from_stars(load_agent(self.agent), rated, rater, config, home, begun_with=begun, note=note)
@@ -116,10 +117,13 @@ class StarsStudy(EpisodeStudy):
         return load_agent(weights)
 
     def policies(self, agent: HannaAgent, judge: Mapping[str, Any], split: str) -> Agent:
-        policy = agent.policy(split_of(dataset_of(self.data, "hanna"), split, self.encoder).bank)
+        policy = agent.policy(self._split(split).bank)
         if self.decisions == "usual":
             return policy
         return dataclasses.replace(for_training(policy, RULES[agent.config.ask_rule][0]), keep_moments=False)
+
+    def _split(self, name: str) -> Split:
+        return Lessons(dataset_of(self.data, "hanna"), self.encoder).split(name)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split), "decisions": self.decisions, "untaught": self.config.critic_updates}

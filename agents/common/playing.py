@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import rollout
-from embodied.interface import Actions, Agent, Episode, Observations, Situations, Task, act
+from embodied.interface import Actions, Agent, Episode, Observations, Place, Situations, Task, act
 
 
 class _Remembering:
@@ -28,6 +29,15 @@ class _Remembering:
         actions, self.memory = act(self._agent, observations, situations, memory, rngs=rngs)
         self.seconds += time.perf_counter() - began
         return actions, self.memory
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Tasks of some houses and the environment they are played in."""
+
+    worlds: Mapping[str, Place]
+    tasks: Sequence[Task]
+    make_env: Callable[[], HelpEnv]
 
 
 def play_remembering(

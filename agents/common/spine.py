@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from agents.common import parallel
-from agents.common.lessons import Split
+from agents.common.playing import Ground
 from agents.common.session import Clock, Note, Progress, Session, descend, dropout_of, falling_rate, set_rate
 from agents.common.settings import MAY_CHANGE, EvaluationSettings, ImitationSettings
 from embodied.errors import UnableError
@@ -45,7 +45,7 @@ class Learner(Protocol):
         """One update; the numbers to report: NUMBERS and, where help could be asked for, ASKING."""
         ...
 
-    def judged(self, split: Split) -> Agent:
+    def judged(self, split: Any) -> Agent:
         """The agent as it is judged, with the features of `split`."""
         ...
 
@@ -60,7 +60,7 @@ class Learner(Protocol):
 
 def train(
     learner: Learner,
-    validation: Split,
+    validation: Ground,
     folder: Path,
     identity: Identity,
     *,
@@ -170,7 +170,7 @@ ADDED: Collection[str] = ("loss navigation", "loss asking", "steps")
 """Those that are sums over the batch, of which every process has a share."""
 
 
-def validate(learner: Learner, split: Split, session: Session) -> Sequence[Episode]:
+def validate(learner: Learner, split: Ground, session: Session) -> Sequence[Episode]:
     """Play validation tasks as in evaluation; keep the agent if it is as good as the best so far."""
     config = learner.config
     tasks = [learner.task(t) for t in split.tasks[: config.validation_tasks]]

@@ -13,7 +13,6 @@ import torch.nn.functional as F
 
 from agents.common import spine
 from agents.common.choosing import choose_sampled
-from agents.common.lessons import Lessons, Split
 from agents.common.playing import play_remembering
 from agents.common.session import Clock, Note, descend, dropout_of, falling_rate, seed_of, set_rate, tasks_of_update
 from agents.common.settings import EvaluationSettings
@@ -24,6 +23,7 @@ from agents.find.config import THINGS, FinderConfig
 from agents.find.network import READ, Explorer, SeekNetwork
 from agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
 from agents.vision.bank import FeatureBank
+from agents.vision.lessons import Lessons, Split
 from assets.catalogue import load_catalogue
 from embodied.action_spaces import PanoramicMoves
 from embodied.datasets.store import Dataset

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.common.lessons import Lessons
 from agents.common.session import Note
 from agents.find.config import FinderConfig
 from agents.find.run import Finder, finder_identity, load_finder, tasks_in, train_finder
 from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
+from agents.vision.lessons import Lessons
 from embodied.datasets.store import SplitData
 from embodied.envs.make import environment_maker
 from embodied.evaluation.evaluate import agent as agent_without_learning

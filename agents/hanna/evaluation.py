@@ -144,17 +144,10 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     }
 
 
-def players(agent: HannaAgent, bank: FeatureBank, only: Sequence[str] = ()) -> dict[str, Agent]:
-    """Who plays the rows `only`; without names the variants of the paper's tables and who does not learn.
-
-    Raises:
-      ValueError: a row that is none.
-    """
+def players(agent: HannaAgent, bank: FeatureBank) -> tuple[dict[str, Agent], list[str]]:
+    """All rows that an agent gives, and the names of those of the paper's tables, of the sighted and the unsighted."""
     without = {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
-    every = {**without, **all_policies(agent, bank)}
-    if unknown := sorted(set(only) - set(every)):
-        raise ValueError(f"unknown rows {unknown}; there are {list(every)}")
-    return {name: every[name] for name in only or (*without, *hanna_policies(agent, bank), "blind", "rules only")}
+    return {**without, **all_policies(agent, bank)}, [*without, *hanna_policies(agent, bank), "blind", "rules only"]
 
 
 def counted(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
@@ -224,7 +217,3 @@ def _ratios(counts: Mapping[str, Sequence[tuple[float, float]]], houses: Iterabl
     return {
         name: Samples(tuple(a for a, _ in pairs), groups, tuple(b for _, b in pairs)) for name, pairs in counts.items()
     }
-
-
-Keep = Callable[[str, str, Sequence[Episode]], None]
-"""Is given split, row and episodes (to save them)."""

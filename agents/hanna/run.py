@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.common.lessons import Lessons
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
@@ -14,6 +13,7 @@ from agents.common.weights import weights_digest
 from agents.hanna.agent import load_agent, new_agent, take_weights
 from agents.hanna.training import train
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
+from agents.vision.lessons import Lessons
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Episode

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from agents.common.lessons import Lessons
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent, load_agent
@@ -19,6 +18,7 @@ from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.vision.encoder import load_encoder
+from agents.vision.lessons import Lessons
 from agents.vision.occasions import OCCASIONS
 from assets.cache import default_cache
 from embodied.datasets.store import Dataset, SplitData, dataset_of

@@ -14,7 +14,6 @@ from pathlib import Path
 import torch
 
 from agents.common import parallel, spine
-from agents.common.lessons import Split
 from agents.common.losses import IGNORE
 from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
 from agents.hanna.agent import HannaAgent, save_agent
@@ -22,6 +21,7 @@ from agents.hanna.asking import RULES
 from agents.hanna.collect import Experience, collect, imitation_loss
 from agents.hanna.policy import HannaPolicy, for_training
 from agents.hanna.training_config import TrainingConfig
+from agents.vision.lessons import Split
 from embodied.evaluation import metrics
 from embodied.identity import Identity
 from embodied.interface import Agent, Episode, Place, Task, Teacher

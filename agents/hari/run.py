@@ -14,7 +14,7 @@ from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import TaskSplit, train
 from agents.hari.pretraining import PretrainingData, pretrain
 from agents.hari.words import feature_words
-from embodied.datasets.store import Dataset, dataset_of
+from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
 from embodied.evaluation.evaluate import spread
@@ -23,15 +23,6 @@ from embodied.interface import Episode, Place
 
 CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
 """What validation and test splits are named by, after 'val_' and 'test_' (4.3.5)."""
-
-
-def hari_data(folder: Path) -> Dataset:
-    """A HARI data set.
-
-    Raises:
-      ValueError: it is of another kind.
-    """
-    return dataset_of(folder, "hari")
 
 
 def lessons_of(data: Dataset, kept: float) -> PretrainingData:

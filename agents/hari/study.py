@@ -14,10 +14,10 @@ from agents.hari.agent import HariAgent, load_agent, load_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.judging import RANDOM, TEST, policies, validation_means
 from agents.hari.networks import INTENTIONS
-from agents.hari.run import CONDITIONS, hari_data, rules_of, train_execution, train_intention
+from agents.hari.run import CONDITIONS, rules_of, train_execution, train_intention
 from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
-from embodied.datasets.store import SplitData
+from embodied.datasets.store import SplitData, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 from embodied.interface import Agent, Ask, Episode, Move
@@ -96,7 +96,7 @@ class HariStudy(EpisodeStudy):
 
     def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution that there are come beside those of the tests."""
-        ood = hari_data(self.data).ood
+        ood = dataset_of(self.data, "hari").ood
         extended = lambda t: dataclasses.replace(t, splits=(*t.splits, *ood)) if t.splits == TEST else t
         return {name: extended(table) for name, table in TABLES.items()}
 
@@ -106,17 +106,17 @@ class HariStudy(EpisodeStudy):
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         walking = self._walking(folder)
         begin = weights_digest(walking) if walking.exists() else None
-        data = hari_data(self.data).digest
+        data = dataset_of(self.data, "hari").digest
         return identity_of(*self.makers, settings=self.settings(train, seed), data=data, begin=begin)
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Train the execution policy that intention policies use."""
         if self.executor is None:
-            train_execution(hari_data(self.data), self.execution, self._walking(folder).parent, note=note)
+            train_execution(dataset_of(self.data, "hari"), self.execution, self._walking(folder).parent, note=note)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         executor = load_executor(self._walking(folder))
-        train_intention(hari_data(self.data), executor, self.settings(train, seed), home, note=note)
+        train_intention(dataset_of(self.data, "hari"), executor, self.settings(train, seed), home, note=note)
         return home / "best.safetensors"
 
     def load(self, weights: Path) -> HariAgent:
@@ -124,12 +124,12 @@ class HariStudy(EpisodeStudy):
 
     def policies(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> Agent:
         means = validation_means(
-            hari_data(self.data), agent, seed=self.judging[0], tasks=agent.config.validation_tasks
+            dataset_of(self.data, "hari"), agent, seed=self.judging[0], tasks=agent.config.validation_tasks
         ) if judge["played"] == RANDOM else {"cur": 0.0, "goal": 0.0, "sub": 0.0, "do": 0.0}  # fmt: skip
         return policies(agent, means)[judge["played"]]
 
     def where(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> SplitData:
-        return hari_data(self.data).split(split, hari=rules_of(agent.config))
+        return dataset_of(self.data, "hari").split(split, hari=rules_of(agent.config))
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         if judge.get(TIMES):
@@ -140,7 +140,7 @@ class HariStudy(EpisodeStudy):
         """The execution policy that intention policies use."""
         if self.executor is not None:
             return self.executor
-        mine = identity_of(settings=self.execution, data=hari_data(self.data).digest)
+        mine = identity_of(settings=self.execution, data=dataset_of(self.data, "hari").digest)
         return folder / f"execution_{key_of(mine)}" / "best.safetensors"
 
 

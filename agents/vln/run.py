@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from agents.common.lessons import Lessons, Split
 from agents.common.more_paths import more_routes
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
@@ -13,6 +12,7 @@ from agents.common.settings import EvaluationSettings
 from agents.common.spine import OnValidation
 from agents.common.vocabulary import build_vocabulary
 from agents.common.weights import weights_digest
+from agents.vision.lessons import Lessons, Split
 from agents.vln.agent import VlnAbout, new_agent
 from agents.vln.config import FollowerSettings
 from agents.vln.speaker import load_speaker, spoken_tasks

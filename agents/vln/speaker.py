@@ -17,7 +17,6 @@ from torch import Tensor
 
 from agents.common.choosing import choose_sampled
 from agents.common.decoding import drawn_with
-from agents.common.lessons import Lessons, Split
 from agents.common.session import Note
 from agents.common.tensor_file import put
 from agents.common.vocabulary import Vocabulary, build_vocabulary
@@ -29,6 +28,7 @@ from agents.iliad.nav.world import HORIZON, Trip, walk_along
 from agents.iliad.stages import TeachingStage
 from agents.iliad.writing import log_likelihood
 from agents.vision.bank import FeatureBank
+from agents.vision.lessons import Lessons, Split
 from agents.vln.agent import VlnAgent
 from agents.vln.config import SpeakerSettings
 from agents.vln.policy import SPOKEN, channels_of

@@ -10,11 +10,11 @@ from typing import Any
 
 import torch
 
-from agents.common.lessons import Lessons
 from agents.common.session import Note
 from agents.common.settings import EvaluationSettings
 from agents.studies.engine import Measured, StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
+from agents.vision.lessons import Lessons
 from agents.vision.run import encoder_of
 from agents.vln.agent import VlnAgent, load_agent
 from agents.vln.config import FollowerSettings, SpeakerSettings

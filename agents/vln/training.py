@@ -17,10 +17,10 @@ from torch import Tensor
 
 from agents.common import parallel, spine
 from agents.common.choosing import choose_sampled
-from agents.common.lessons import Split
 from agents.common.losses import IGNORE, negative_log_likelihood
 from agents.common.playing import play_remembering
 from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.vision.lessons import Split
 from agents.vln.agent import VlnAgent, save_agent
 from agents.vln.config import FollowerSettings
 from agents.vln.policy import SupervisedVln, VlnMoment

@@ -6,29 +6,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.common.lessons import Lessons
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import Vocabulary, build_vocabulary
+from agents.vision.lessons import Lessons
 from agents.vnla.agent import new_agent
 from agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from agents.vnla.training import train
 from embodied.action_spaces import WORDS
 from embodied.assistants.advisor import HELP_STEPS
-from embodied.datasets.store import Dataset, dataset_of
+from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Episode
 from embodied.language.plain import PlainLanguage
-
-
-def vnla_data(folder: Path) -> Dataset:
-    """A VNLA data set.
-
-    Raises:
-      ValueError: it is of another kind.
-    """
-    return dataset_of(folder, "vnla")
 
 
 def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:

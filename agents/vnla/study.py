@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.common.lessons import Lessons
 from agents.common.session import Note
 from agents.common.settings import EvaluationSettings
 from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES, EpisodeStudy
+from agents.vision.lessons import Lessons
 from agents.vision.run import encoder_of
 from agents.vnla.agent import VnlaAgent, load_agent
 from agents.vnla.config import VnlaSettings
 from agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
-from agents.vnla.run import train_agent, vnla_data
-from embodied.datasets.store import Dataset, SplitData
+from agents.vnla.run import train_agent
+from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.interface import Agent
 
 EVALUATION_SEEDS = (123, 435, 6757, 867, 983)
@@ -115,7 +115,7 @@ class VnlaStudy(EpisodeStudy):
 
     def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution that there are come beside the others."""
-        splits = (*SPLITS, *vnla_data(self.data).ood)
+        splits = (*SPLITS, *dataset_of(self.data, "vnla").ood)
         return {name: dataclasses.replace(table, splits=splits) for name, table in TABLES.items()}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
@@ -166,7 +166,7 @@ class VnlaStudy(EpisodeStudy):
                 "the table 'rooms' needs requests that name no room: `embodied dataset vnla --no-rooms --out DIR2`, "
                 "features for it, and --without-rooms DIR2"
             )
-        data = vnla_data(folder)
+        data = dataset_of(folder, "vnla")
         if data.config.rooms != rooms:
             raise ValueError(
                 f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"

@@ -16,10 +16,10 @@ import torch
 from torch import Tensor
 
 from agents.common import parallel, spine
-from agents.common.lessons import Split
 from agents.common.losses import negative_log_likelihood
 from agents.common.playing import play_remembering
 from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.vision.lessons import Split
 from agents.vnla.agent import VnlaAgent, rules_of, save_agent
 from agents.vnla.config import TRAINED_UNDER
 from agents.vnla.policy import VnlaMoment, for_training

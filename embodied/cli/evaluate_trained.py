@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from embodied.cli.common import bar, note
 
 if TYPE_CHECKING:
+    from agents.vision.lessons import Lessons
     from embodied.cli.evaluate import Options
     from embodied.datasets.store import Dataset, SplitData
     from embodied.evaluation.tables import Row
-    from embodied.interface import Episode
+    from embodied.interface import Agent, Episode
 
 
 def columns_of(kind: str) -> Sequence[str]:
@@ -32,29 +35,46 @@ def evaluate_trained(
     data: Dataset,
     file: Path,
     splits: Sequence[str],
-    rows: Sequence[str],
+    wanted: Sequence[str],
     keep: Callable[[str, str, Sequence[Episode]], None],
     instead: Callable[[SplitData], SplitData],
 ) -> tuple[list[Row], dict[str, object]]:
-    """Rows of a trained agent and of agents beside it, and facts for run.json.
+    """Rows of a trained agent and of agents beside it, over the same tasks, and facts for run.json.
 
     Args:
-      rows: names of rows; none for all of the paper's tables.
+      wanted: names of rows; none for all of the paper's tables.
       keep: is given split, name and episodes (to save them).
       instead: the split with another assistant.
+
+    Raises:
+      ValueError: an unknown row.
     """
+    import torch
+
     from agents.common.device import use_threads
     from agents.common.weights import weights_digest
     from agents.studies.episodes import JUDGES
     from agents.vision.drawn import pictures_of
     from agents.vision.occasions import OCCASIONS
+    from embodied.evaluation.evaluate import evaluate
     from embodied.identity import identity_of
 
     use_threads(args.threads)
-    how: dict[str, Any] = {"seed": args.seed, "limit": args.tasks, "batch": args.batch or 32}
-    how |= {"only": rows, "keep": keep, "watch": lambda agents: bar(agents, "agents", "agent"), "instead": instead}
-    judges = {"hari": _hari, "vln": _vln, "vnla": _vnla, "hanna": _hanna}
-    found, looking = judges[args.kind](args, data.folder, file, splits, how)
+    rows_of = {"hari": _hari, "vln": _vln, "vnla": _vnla, "hanna": _hanna}[args.kind](args, data, file)
+    found, blind = list[Any](), set[str]()
+    for split in splits:
+        known = rows_of(split)
+        if unknown := sorted(set(wanted) - set(known.players)):
+            raise ValueError(f"unknown rows {unknown}; there are {list(known.players)}")
+        for name in bar(wanted or known.usual, "agents", "agent"):
+            whole, player = known.players[name]
+            with torch.inference_mode():
+                found += evaluate(
+                    instead(whole), {name: player}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
+                    keep=functools.partial(keep, split),
+                )  # fmt: skip
+        blind |= set(known.blind)
+    looking = sorted({r.agent for r in found} - blind)
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}
     facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
@@ -62,69 +82,88 @@ def evaluate_trained(
     return found, facts
 
 
-Found = tuple["list[Row]", list[str]]
-"""Rows, and names of those whose agents see pictures."""
+@dataclass(frozen=True)
+class Known:
+    """Who can play a split."""
+
+    players: Mapping[str, tuple[SplitData, Agent]]
+    """By row, with the split under the rules that the row is judged by."""
+    usual: Sequence[str]
+    """Rows of the paper's tables."""
+    blind: Collection[str]
+    """Rows whose agents need no pictures."""
 
 
-def _hanna(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
+def _hanna(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """Tables 4.3 to 4.5."""
-    from agents.common.lessons import Lessons
     from agents.hanna.agent import load_agent
-    from agents.hanna.evaluation import WITHOUT_LEARNING
-    from agents.hanna.judging import judge
-    from agents.vision.run import encoder_of
-    from embodied.datasets.store import dataset_of
+    from agents.hanna.evaluation import WITHOUT_LEARNING, players
 
-    encoder = encoder_of(args.encoder, args.network)
-    lessons = Lessons(dataset_of(data, "hanna"), encoder, args.pictures, shown=args.shown, cache=args.cache)
-    rows = judge(lessons, load_agent(file), splits, **how)
-    return rows, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
+    lessons, agent = _lessons(args, data), load_agent(file)
+
+    def known(split: str) -> Known:
+        whole, (all_, usual) = data.split(split), players(agent, lessons.split(split).bank)
+        return Known({name: (whole, player) for name, player in all_.items()}, usual, WITHOUT_LEARNING)
+
+    return known
 
 
-def _vnla(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
+def _vnla(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """The learned asker beside other askers, direct intervention and agents without learning."""
-    from agents.common.lessons import Lessons
-    from agents.vision.run import encoder_of
     from agents.vnla.agent import load_agent
-    from agents.vnla.judging import WITHOUT_LEARNING, judge
-    from agents.vnla.run import vnla_data
+    from agents.vnla.judging import WITHOUT_LEARNING, player, row_names, rules_of_row
+
+    lessons, agent = _lessons(args, data), load_agent(file)
+    note(f"rules of play: {agent.config.rules}; trained on pictures {agent.pictures}")
+
+    def known(split: str) -> Known:
+        bank, names = lessons.split(split).bank, row_names(agent)
+        under = functools.cache(lambda rules: data.split(split, vnla=rules))
+        players = {name: (under(rules_of_row(agent, name)), player(agent, bank, name)) for name in names}
+        return Known(players, names, WITHOUT_LEARNING)
+
+    return known
+
+
+def _vln(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
+    """The follower beside agents without learning."""
+    from agents.vln.agent import load_agent
+    from embodied.evaluation.evaluate import PLAIN
+
+    lessons, agent = _lessons(args, data), load_agent(file)
+    note(f"trained on pictures {agent.about.pictures}")
+
+    def known(split: str) -> Known:
+        whole, learned = data.split(split), agent.policy(lessons.split(split).bank)
+        players = {"learned": (whole, learned), **{name: (whole, make()) for name, make in PLAIN.items()}}
+        return Known(players, list(players), PLAIN)
+
+    return known
+
+
+def _hari(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
+    """Rows of Table 4.7 for one agent, in the environment that it was trained for."""
+    from agents.hari.agent import load_agent
+    from agents.hari.judging import policies, validation_means
+    from agents.hari.run import rules_of
 
     agent = load_agent(file)
-    lessons = Lessons(vnla_data(data), encoder_of(args.encoder, args.network), args.pictures)
-    note(f"rules of play: {agent.config.rules}; trained on pictures {agent.pictures}")
-    rows = judge(lessons, agent, splits, **how)
-    return rows, sorted({r.agent for r in rows} - set(WITHOUT_LEARNING))
+    means = validation_means(data, agent, seed=args.seed, tasks=agent.config.validation_tasks)
+    players = policies(agent, means)
+
+    def known(split: str) -> Known:
+        one = data.split(split, hari=rules_of(agent.config))
+        return Known({name: (one, player) for name, player in players.items()}, list(players), players)
+
+    return known
 
 
-def _vln(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
-    """The follower beside agents without learning."""
-    from agents.common.lessons import Lessons
+def _lessons(args: Options, data: Dataset) -> Lessons:
+    from agents.vision.lessons import Lessons
     from agents.vision.run import encoder_of
-    from agents.vln.agent import load_agent
-    from embodied.datasets.store import dataset_of
-    from embodied.evaluation.evaluate import PLAIN, evaluate
 
-    agent, instead, only, keep = load_agent(file), how.pop("instead"), how.pop("only"), how.pop("keep")
-    lessons, rows = Lessons(dataset_of(data, "vln"), encoder_of(args.encoder, args.network), args.pictures), list[Any]()
-    note(f"trained on pictures {agent.about.pictures}")
-    for split in splits:
-        players: dict[str, Any] = {"learned": agent.policy(lessons.split(split).bank)}
-        players |= {name: make() for name, make in PLAIN.items()}
-        if unknown := sorted(set(only) - set(players)):
-            raise ValueError(f"unknown rows {unknown}; there are {list(players)}")
-        chosen = {n: p for n, p in players.items() if not only or n in only}
-        kept = lambda name, episodes, split=split: keep(split, name, episodes)
-        rows += evaluate(instead(lessons.data.split(split)), chosen, keep=kept, **how)
-    return rows, ["learned"]
-
-
-def _hari(args: Options, data: Path, file: Path, splits: Sequence[str], how: dict[str, Any]) -> Found:
-    """Rows of Table 4.7 for one agent."""
-    from agents.hari.agent import load_agent
-    from agents.hari.judging import judge
-    from agents.hari.run import hari_data
-
-    return judge(hari_data(data), load_agent(file), splits, **how), []
+    encoder, shown = encoder_of(args.encoder, args.network), args.shown if args.kind == "hanna" else "same"
+    return Lessons(data, encoder, args.pictures, shown=shown, cache=args.cache)
 
 
 def record_trained(args: Options, data: Dataset, run: Path, first: int) -> None:

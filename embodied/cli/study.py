@@ -446,6 +446,7 @@ def bandit(args: BanditOptions) -> int:
 
 def stars(args: StarsOptions) -> int:
     from agents.bandit.stars_study import StarsStudy
+    from agents.vision.run import encoder_of
 
     learner = StarsStudy(
         args.data,
@@ -454,7 +455,7 @@ def stars(args: StarsOptions) -> int:
         tuple(range(args.judgings)),
         args.threads,
         agent=args.agent,
-        encoder=args.encoder_digest(),
+        encoder=encoder_of(args.encoder, args.network),
         config=args.config,
         split=args.split,
         rated=args.rated,

@@ -40,7 +40,7 @@ from embodied.cli.learning import (
 from embodied.cli.options import Count, InputFolder, InputPath, OutputFolder, Settings
 
 if TYPE_CHECKING:
-    from agents.common.lessons import Lessons
+    from agents.vision.lessons import Lessons
     from embodied.interface import Episode
 
 WATCHED = 2
@@ -235,8 +235,8 @@ def train_speaker(args: TrainSpeaker) -> int:
 def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: str) -> Lessons:
     """What an agent by imitation learns from; PyTorch has its threads and, under torchrun, its device."""
     from agents.common.device import use_threads
-    from agents.common.lessons import Lessons
     from agents.common.parallel import join_launcher
+    from agents.vision.lessons import Lessons
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
@@ -249,10 +249,11 @@ def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: 
 
 def train_execution(args: TrainExecution) -> int:
     from agents.common.device import use_threads
-    from agents.hari.run import hari_data, train_execution
+    from agents.hari.run import train_execution
+    from embodied.datasets.store import dataset_of
 
     use_threads(args.threads)
-    data = hari_data(args.data)
+    data = dataset_of(args.data, "hari")
     train_execution(data, args.config, args.out, begin=args.begin, minutes=args.minutes, note=note)
     return 0
 
@@ -260,10 +261,11 @@ def train_execution(args: TrainExecution) -> int:
 def train_intention(args: TrainIntention) -> int:
     from agents.common.device import use_threads
     from agents.hari.agent import load_executor
-    from agents.hari.run import hari_data, train_intention
+    from agents.hari.run import train_intention
+    from embodied.datasets.store import dataset_of
 
     use_threads(args.threads)
-    data = hari_data(args.data)
+    data = dataset_of(args.data, "hari")
     walking = load_executor(args.execution)
     watch = _recorder(args, sees=False) if args.rrd else None
     train_intention(data, walking, args.config, args.out, minutes=args.minutes, note=note, on_validation=watch)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from agents.common.playing import Ground
 from agents.vision.bank import FeatureBank
 from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
@@ -14,19 +15,14 @@ from agents.vision.features import feature_path, load_bank
 from agents.vision.occasions import OCCASIONS, showing
 from assets.cache import default_cache
 from embodied.datasets.store import Dataset
-from embodied.envs.base import HelpEnv
 from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.evaluate import spread
-from embodied.interface import Place, Task
 
 
 @dataclass(frozen=True, eq=False)
-class Split:
-    """Tasks of some houses and the environment they are played in."""
+class Split(Ground):
+    """Tasks of some houses, the environment they are played in, and what is seen there."""
 
-    worlds: Mapping[str, Place]
-    tasks: Sequence[Task]
-    make_env: Callable[[], HelpEnv]
     bank: FeatureBank
 
 
@@ -57,13 +53,21 @@ class Lessons:
 
         Args:
           lights: lightings of every house that the bank can show.
+
+        Raises:
+          ValueError: more houses than there are.
+          FileNotFoundError: features are missing.
         """
-        encoder, kind = self.encoder.digest, self.picture_kind
-        split = split_of(self.data, name, encoder, self.device, limit, houses, kind, vnla, lights)
-        occasion = OCCASIONS[self.shown]
-        return replace(
-            split, bank=showing(split.bank, self.data, list(split.worlds), occasion, encoder, self.cache, kind)
-        )
+        data, encoder, kind = self.data, self.encoder.digest, self.picture_kind
+        if houses is not None and houses > (there := len(data.names(name))):
+            raise ValueError(f"{houses} houses of {name!r} are wanted, {data.folder} has {there}; ask for fewer")
+        split = data.split(name, houses=houses, vnla=vnla)
+        pictures = {n: pictures_of(data, n, kind) for n in split.worlds}
+        paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
+        tasks = split.tasks if limit is None else spread(split.tasks, limit)
+        bank = load_bank(paths, encoder, split.worlds, pictures, lights).to(self.device)
+        shown = showing(bank, data, list(split.worlds), OCCASIONS[self.shown], encoder, self.cache, kind)
+        return Split(split.worlds, tasks, split.make_env, shown)
 
     def identity(self) -> dict[str, str]:
         """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""
@@ -78,35 +82,3 @@ class Lessons:
 def drawings(data: Dataset, houses: Iterable[str], picture_kind: str | None) -> str:
     """How the pictures of some houses were drawn, in words: 'unlit_192', or several of them."""
     return ", ".join(sorted({drawing(pictures_of(data, n, picture_kind)) for n in houses}))
-
-
-def split_of(
-    data: Dataset,
-    name: str,
-    encoder: str,
-    device: str = "cpu",
-    limit: int | None = None,
-    houses: int | None = None,
-    picture_kind: str | None = None,
-    vnla: str = AS_PUBLISHED,
-    lights: int = 1,
-) -> Split:
-    """A split of a data set, ready to be played with features; at most `limit` tasks, of its first `houses` houses.
-
-    Args:
-      encoder: its digest.
-      picture_kind: of the pictures that the features come from, as in agents.vision.run.pictures_of.
-      vnla: VNLA's rule of play, as in Dataset.split.
-      lights: lightings of every house that the bank can show.
-
-    Raises:
-      ValueError: more houses than there are.
-    """
-    if houses is not None and houses > (there := len(data.names(name))):
-        raise ValueError(f"{houses} houses of {name!r} are wanted, {data.folder} has {there}; ask for fewer")
-    split = data.split(name, houses=houses, vnla=vnla)
-    pictures = {n: pictures_of(data, n, picture_kind) for n in split.worlds}
-    paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
-    tasks = split.tasks if limit is None else spread(split.tasks, limit)
-    bank = load_bank(paths, encoder, split.worlds, pictures, lights)
-    return Split(split.worlds, tasks, split.make_env, bank.to(device))
