@@ -21,6 +21,7 @@ import torch
 import torch.distributed as dist
 from hand_worlds import grid_world
 
+from agents.common import spine
 from agents.common.checkpoint import CheckpointError, restore
 from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
 from agents.common.session import Clock, DivergedError, Session, as_good, falling_rate, metrics_of, tasks_of_update
@@ -31,7 +32,7 @@ from agents.hanna.asking import RULES, ask_above
 from agents.hanna.collect import collect, imitation_loss
 from agents.hanna.losses import IGNORE, curiosity, help_loss, navigation_loss, negative_log_likelihood, reason_loss
 from agents.hanna.policy import for_training
-from agents.hanna.training import learn_once, train
+from agents.hanna.training import HannaLearner, learn_once
 from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Split
@@ -105,7 +106,8 @@ def identity(agent):
 def run(folder, config=TINY, split=None, **options):
     split = split or setting()
     agent = agent_for(split, config)
-    progress = train(agent, split, split, HannaTeacher(), folder, identity(agent), note=lambda line: None, **options)
+    learner = HannaLearner(agent, split, HannaTeacher())
+    progress = spine.train(learner, split, folder, identity(agent), note=lambda line: None, **options)
     return agent, progress
 
 
@@ -485,7 +487,7 @@ def test_an_agent_learns_in_every_lighting_and_is_validated_in_each_houses_own(t
     config = dataclasses.replace(TINY, iterations=3, validate_every=1)
     with pytest.raises(DivergedError, match="loss") if shown else contextlib.nullcontext():
         agent, shown_in = agent_for(split, config), dataclasses.replace(split, bank=bank)
-        train(agent, shown_in, split, HannaTeacher(), tmp_path, identity(agent), note=str)
+        spine.train(HannaLearner(agent, shown_in, HannaTeacher()), split, tmp_path, identity(agent), note=str)
 
 
 def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):

@@ -12,6 +12,7 @@ import pytest
 import torch
 from hand_vnla import TINY, lesson, split_under
 
+from agents.common import spine
 from agents.common.checkpoint import CheckpointError
 from agents.common.playing import play_remembering
 from agents.common.session import Clock, DivergedError
@@ -31,7 +32,7 @@ from agents.vnla.network import (
     VnlaPercept,
 )
 from agents.vnla.policy import SupervisedVnla, VnlaMoment, carried_out, for_training
-from agents.vnla.training import VnlaLearner, losses_of, train
+from agents.vnla.training import VnlaLearner, losses_of
 from embodied.action_spaces import WORDS
 from embodied.envs.vnla import RULES, teacher_of
 from embodied.evaluation.rollout import play
@@ -256,7 +257,7 @@ def test_it_learns_one_batch_by_heart():
 @pytest.mark.parametrize("rules", RULES)
 def test_a_run_under_every_rule_writes_an_agent_that_plays(rules, tmp_path):
     agent, training, validation = lesson(dataclasses.replace(TINY, rules=rules, iterations=2, validate_every=2))
-    progress = train(agent, training, validation, tmp_path, identity(agent), note=quiet)
+    progress = spine.train(VnlaLearner(agent, training), validation, tmp_path, identity(agent), note=quiet)
     assert progress.update == 2
     found = load_agent(tmp_path / "best.safetensors")
     assert (found.pictures, found.config.rules) == ("unlit_192", rules)
@@ -280,18 +281,18 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
     def run(folder, *iterations):
         for n in iterations:
             agent, training, validation = lesson(dataclasses.replace(TINY, iterations=n, validate_every=10))
-            train(agent, training, validation, folder, identity(agent), note=quiet)
+            spine.train(VnlaLearner(agent, training), validation, folder, identity(agent), note=quiet)
         return agent.network.state_dict()
 
     whole, parts = run(tmp_path / "whole", 4), run(tmp_path / "parts", 2, 4)
     assert all(torch.equal(whole[k], parts[k]) for k in whole)
     with pytest.raises(CheckpointError, match="hidden_size 24 -> 32|settings changed"):
         agent, training, validation = lesson(dataclasses.replace(TINY, batch=5))
-        train(agent, training, validation, tmp_path / "parts", identity(agent), note=quiet)
+        spine.train(VnlaLearner(agent, training), validation, tmp_path / "parts", identity(agent), note=quiet)
     with pytest.raises(CheckpointError, match="pictures 'unlit_192' -> 'fast_256'"):
         agent, training, validation = lesson(dataclasses.replace(TINY, iterations=5))
         other = identity(dataclasses.replace(agent, pictures="fast_256"))
-        train(agent, training, validation, tmp_path / "parts", other, note=quiet)
+        spine.train(VnlaLearner(agent, training), validation, tmp_path / "parts", other, note=quiet)
 
 
 def test_an_agent_comes_back_from_its_file(tmp_path):

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from agents.common import spine
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.weights import weights_digest
 from agents.hanna.agent import load_agent, new_agent, take_weights
-from agents.hanna.training import train
+from agents.hanna.training import HannaLearner
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.vision.lessons import Lessons
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
-from embodied.interface import Episode
 from embodied.teachers.hanna import HannaTeacher
 
 
@@ -36,9 +35,9 @@ def train_agent(
     minutes: float | None = None,
     begin: Path | None = None,
     note: Note = print,
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+    on_validation: spine.OnValidation | None = None,
 ) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.hanna.training.train.
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.spine.train.
 
     Args:
       begin: a trained agent whose weights and words a new run begins with.
@@ -61,10 +60,8 @@ def train_agent(
     count = len({t.world for t in training.tasks})
     note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
     identity = training_identity(lessons, config, begin)
-    return train(
-        agent, training, validation, HannaTeacher(), folder, identity,
-        minutes=minutes, note=note, on_validation=on_validation,
-    )  # fmt: skip
+    learner, watch = HannaLearner(agent, training, HannaTeacher()), on_validation
+    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
 
 
 def training_identity(lessons: Lessons, config: TrainingConfig, begin: Path | None = None) -> dict[str, Any]:

@@ -8,14 +8,14 @@ loss = L_main + L_ask  (4.9, 4.10, 4.13, 4.14)            (losses)
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import torch
 
 from agents.common import parallel, spine
 from agents.common.losses import IGNORE
-from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.common.session import Clock, seed_of, tasks_of_update
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import Experience, collect, imitation_loss
@@ -24,25 +24,8 @@ from agents.hanna.training_config import TrainingConfig
 from agents.vision.lessons import Split
 from embodied.evaluation import metrics
 from embodied.identity import Identity
-from embodied.interface import Agent, Episode, Place, Task, Teacher
+from embodied.interface import Agent, Place, Task, Teacher
 from embodied.seeds import stream
-
-
-def train(
-    agent: HannaAgent,
-    training: Split,
-    validation: Split,
-    teacher: Teacher,
-    folder: Path,
-    identity: Identity,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
-) -> Progress:
-    """Train `agent` in place; see agents.common.spine.train for what is written, stopped and raised."""
-    learner = HannaLearner(agent, training, teacher)
-    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=on_validation)
 
 
 class HannaLearner:

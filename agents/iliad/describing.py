@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Generic, TypeVar
 
 import numpy as np
 
 from agents.iliad.protocol import NOTHING
+
+T, E = TypeVar("T"), TypeVar("E")
 
 
 def kept(candidates: Sequence[str], performances: Sequence[float], threshold: float) -> list[str]:
@@ -25,3 +29,73 @@ def by_the_program(pragmatic: Sequence[str]) -> str:
     """The authors' program: the first that passed, the likeliest one before the sampled ones, or nothing
     (docs/sources.md, S93)."""
     return pragmatic[0] if pragmatic else NOTHING
+
+
+class DescribingNetworks(ABC, Generic[T, E]):
+    """Eq 3.15 and 3.16: a describer whose words count where an executor carries them out as the execution went."""
+
+    threshold: float
+    """Tau: from which performance on a description fits."""
+    longest: int
+    """Words of a description."""
+
+    def __init__(self, candidates: int, pragmatics: str) -> None:
+        self.candidates, self.pragmatics = candidates, pragmatics
+
+    @abstractmethod
+    def spoken_of(self, task: T, execution: E) -> bool:
+        """Whether there is anything to say."""
+
+    @abstractmethod
+    def near_optimal(self, task: T, execution: E) -> bool:
+        """perf >= tau of Eq 3.15: people's own words describe it."""
+
+    @abstractmethod
+    def human(self, task: T, *, rng: np.random.Generator) -> str:
+        """Unif(D*)."""
+
+    @abstractmethod
+    def candidates_of(
+        self, tasks: Sequence[T], executions: Sequence[E], uniforms: np.ndarray | None = None
+    ) -> list[list[str]]:
+        """The likeliest description of each execution, or different ones sampled with `uniforms` (B, K, words)."""
+
+    @abstractmethod
+    def performances(self, cases: Sequence[tuple[T, E, str]]) -> list[float]:
+        """perf(e^d, e): how nearly the executor, told d, does the same."""
+
+    def describe(self, tasks: Sequence[T], executions: Sequence[E], *, rng: np.random.Generator) -> list[str | None]:
+        uniforms = rng.random((len(tasks), self.candidates - 1, self.longest))
+        said: list[str | None] = [None] * len(tasks)
+        left = []
+        for i, (task, execution) in enumerate(zip(tasks, executions, strict=True)):
+            if self.spoken_of(task, execution):
+                if self.near_optimal(task, execution):
+                    said[i] = self.human(task, rng=rng)
+                else:
+                    left.append(i)
+        found = self._pragmatic([tasks[i] for i in left], [executions[i] for i in left], uniforms[left])
+        for i, pragmatic in zip(left, found, strict=True):
+            text = by_the_text(pragmatic, rng=rng) if self.pragmatics == "text" else by_the_program(pragmatic)
+            said[i] = text or None
+        return said
+
+    def _pragmatic(self, tasks: Sequence[T], executions: Sequence[E], uniforms: np.ndarray) -> list[list[str]]:
+        """D_prag of each execution, the likeliest description first; of the program's rule, which wants the first one
+        only, no more than that."""
+        if not tasks:
+            return []
+        found = self._kept(tasks, executions, self.candidates_of(tasks, executions))
+        rest = [i for i in range(len(tasks)) if self.pragmatics == "text" or not found[i]]
+        if rest and self.candidates > 1:
+            some, those = [tasks[i] for i in rest], [executions[i] for i in rest]
+            several = self._kept(some, those, self.candidates_of(some, those, uniforms[rest]))
+            for i, more in zip(rest, several):
+                found[i] = list(dict.fromkeys([*found[i], *more]))
+        return found
+
+    def _kept(self, tasks: Sequence[T], executions: Sequence[E], several: Sequence[Sequence[str]]) -> list[list[str]]:
+        """Those that the executor carries out as the execution went."""
+        cases = [(q, e, d) for q, e, many in zip(tasks, executions, several) for d in many]
+        scores = iter(self.performances(cases))
+        return [kept(many, [next(scores) for _ in many], self.threshold) for many in several]

@@ -5,18 +5,18 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+from agents.common import spine
 from agents.common.more_paths import more_routes
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.settings import EvaluationSettings
-from agents.common.spine import OnValidation
 from agents.common.vocabulary import build_vocabulary
 from agents.common.weights import weights_digest
 from agents.vision.lessons import Lessons, Split
 from agents.vln.agent import VlnAbout, new_agent
 from agents.vln.config import FollowerSettings
 from agents.vln.speaker import load_speaker, spoken_tasks
-from agents.vln.training import train
+from agents.vln.training import VlnLearner
 from embodied.identity import Identity, identity_of
 from embodied.interface import Task
 from embodied.tasks.vln import vln_task
@@ -31,9 +31,9 @@ def train_follower(
     speaker: Path | None = None,
     minutes: float | None = None,
     note: Note = print,
-    on_validation: OnValidation | None = None,
+    on_validation: spine.OnValidation | None = None,
 ) -> Progress:
-    """Train, or go on training, the follower of a run folder; other arguments as in agents.vln.training.train.
+    """Train, or go on training, the follower of a run folder; other arguments as in agents.common.spine.train.
 
     Args:
       speaker: whose words it learns from besides, in spoken_share of the episodes.
@@ -56,7 +56,8 @@ def train_follower(
         f"{sum(p.numel() for p in agent.network.parameters()):,} parameters, pictures: {about.pictures}"
     )
     identity, watch = training_identity(lessons, config, speaker), on_validation
-    return train(agent, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+    learner = VlnLearner(agent, training)
+    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
 
 
 def more_tasks(lessons: Lessons, training: Split, config: FollowerSettings) -> list[Task]:

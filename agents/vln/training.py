@@ -19,7 +19,7 @@ from agents.common import parallel, spine
 from agents.common.choosing import choose_sampled
 from agents.common.losses import IGNORE, negative_log_likelihood
 from agents.common.playing import play_remembering
-from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.common.session import Clock, seed_of, tasks_of_update
 from agents.vision.lessons import Split
 from agents.vln.agent import VlnAgent, save_agent
 from agents.vln.config import FollowerSettings
@@ -31,22 +31,6 @@ from embodied.seeds import stream
 
 LONGEST = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
-
-
-def train(
-    agent: VlnAgent,
-    training: Split,
-    validation: Split,
-    folder: Path,
-    identity: Identity,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: spine.OnValidation | None = None,
-) -> Progress:
-    """Train `agent` in place; see agents.common.spine.train for what is written, stopped and raised."""
-    learner = VlnLearner(agent, training)
-    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=on_validation)
 
 
 class VlnLearner:

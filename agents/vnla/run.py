@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from agents.common import spine
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.settings import EvaluationSettings
@@ -13,12 +13,11 @@ from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.vision.lessons import Lessons
 from agents.vnla.agent import new_agent
 from agents.vnla.config import TRAINED_UNDER, VnlaSettings
-from agents.vnla.training import train
+from agents.vnla.training import VnlaLearner
 from embodied.action_spaces import WORDS
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
-from embodied.interface import Episode
 from embodied.language.plain import PlainLanguage
 
 
@@ -38,9 +37,9 @@ def train_agent(
     *,
     minutes: float | None = None,
     note: Note = print,
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+    on_validation: spine.OnValidation | None = None,
 ) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.vnla.training.train."""
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.spine.train."""
     houses, note = config.training_houses or None, rank_zero(note)
     training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
@@ -54,7 +53,8 @@ def train_agent(
         f"pictures: {agent.pictures}"
     )
     identity, watch = training_identity(lessons, config), on_validation
-    return train(agent, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+    learner = VnlaLearner(agent, training)
+    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
 
 
 def training_identity(lessons: Lessons, config: VnlaSettings) -> dict[str, Any]:

@@ -8,7 +8,7 @@ loss = - log pi_main(a*) - log pi_ask(a*), summed over steps, averaged over epis
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from torch import Tensor
 from agents.common import parallel, spine
 from agents.common.losses import negative_log_likelihood
 from agents.common.playing import play_remembering
-from agents.common.session import Clock, Note, Progress, seed_of, tasks_of_update
+from agents.common.session import Clock, seed_of, tasks_of_update
 from agents.vision.lessons import Split
 from agents.vnla.agent import VnlaAgent, rules_of, save_agent
 from agents.vnla.config import TRAINED_UNDER
@@ -28,26 +28,6 @@ from embodied.evaluation import metrics
 from embodied.identity import Identity
 from embodied.interface import Agent, Episode, Place, Task
 from embodied.seeds import stream
-
-
-def train(
-    agent: VnlaAgent,
-    training: Split,
-    validation: Split,
-    folder: Path,
-    identity: Identity,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
-) -> Progress:
-    """Train `agent` in place; see agents.common.spine.train for what is written, stopped and raised.
-
-    Args:
-      training: played under TRAINED_UNDER[config.rules], `validation` under config.rules itself.
-    """
-    learner = VnlaLearner(agent, training)
-    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=on_validation)
 
 
 class VnlaLearner:

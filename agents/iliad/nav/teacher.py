@@ -11,7 +11,7 @@ from torch import Tensor
 
 from agents.common.decoding import drawn_with, likeliest
 from agents.common.vocabulary import PAD, Vocabulary
-from agents.iliad.describing import by_the_program, by_the_text, kept
+from agents.iliad.describing import DescribingNetworks
 from agents.iliad.nav.network import WORD_END, WalkDescriber
 from agents.iliad.nav.student import NavEyes, NavStudent, Track
 from agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
@@ -59,65 +59,39 @@ def said(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
     return found
 
 
-class LearnedNavTeacher:
+class LearnedNavTeacher(DescribingNetworks[Trip, NavWalk]):
     """Eq 3.15 and 3.16 with two networks."""
+
+    threshold, longest = THRESHOLD, LONGEST
 
     def __init__(
         self, world: NavWorld, describer: WalkDescriber, executor: NavStudent, candidates: int, pragmatics: str
     ) -> None:
-        self.world, self.describer, self.executor = world, describer.eval(), executor
-        self.eyes, self.candidates, self.pragmatics = executor.eyes, candidates, pragmatics
+        super().__init__(candidates, pragmatics)
+        self.world, self.describer, self.executor, self.eyes = world, describer.eval(), executor, executor.eyes
 
-    def describe(
-        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
-    ) -> list[str | None]:
-        uniforms = rng.random((len(tasks), self.candidates - 1, LONGEST))
-        found: list[str | None] = [None] * len(tasks)
-        left = []
-        for i, (trip, walk) in enumerate(zip(tasks, executions, strict=True)):
-            if performance(self.world, trip, walk.nodes, trip.path) >= THRESHOLD:
-                found[i] = self.world.request(trip, rng=rng)
-            else:
-                left.append(i)
-        if left:
-            trips, walks = [tasks[i] for i in left], [executions[i] for i in left]
-            for i, pragmatic in zip(left, self._pragmatic(trips, walks, uniforms[left])):
-                text = by_the_text(pragmatic, rng=rng) if self.pragmatics == "text" else by_the_program(pragmatic)
-                found[i] = text or None
-        return found
+    def spoken_of(self, task: Trip, execution: NavWalk) -> bool:
+        return True
 
-    def _pragmatic(self, trips: Sequence[Trip], walks: Sequence[NavWalk], uniforms: np.ndarray) -> list[list[str]]:
-        """D_prag of each walk, the likeliest description first; of the program's rule, which wants the first one only,
-        no more than that."""
-        drawn = self.candidates_of(trips, walks)
-        found = self._kept(trips, walks, drawn)
-        rest = [i for i in range(len(trips)) if self.pragmatics == "text" or not found[i]]
-        if rest and self.candidates > 1:
-            some, those = [trips[i] for i in rest], [walks[i] for i in rest]
-            several = self._kept(some, those, self.candidates_of(some, those, uniforms[rest]))
-            for i, more in zip(rest, several):
-                found[i] = list(dict.fromkeys([*found[i], *more]))
-        return found
+    def near_optimal(self, task: Trip, execution: NavWalk) -> bool:
+        return performance(self.world, task, execution.nodes, task.path) >= THRESHOLD
+
+    def human(self, task: Trip, *, rng: np.random.Generator) -> str:
+        return self.world.request(task, rng=rng)
 
     def candidates_of(
-        self, trips: Sequence[Trip], walks: Sequence[NavWalk], uniforms: np.ndarray | None = None
+        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], uniforms: np.ndarray | None = None
     ) -> list[list[str]]:
-        """The likeliest description of each walk, or different ones sampled with `uniforms` (B, K, words)."""
         copies = 1 if uniforms is None else uniforms.shape[1]
         choose = likeliest if uniforms is None else drawn_with(uniforms.reshape(-1, LONGEST))
-        numbers = self.describer.write(*walked(self.eyes, trips, walks), choose, LONGEST, copies)
+        numbers = self.describer.write(*walked(self.eyes, tasks, executions), choose, LONGEST, copies)
         drawn = said(self.eyes.vocabulary, numbers)
-        return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(trips))]
+        return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(tasks))]
 
-    def _kept(
-        self, trips: Sequence[Trip], walks: Sequence[NavWalk], several: Sequence[Sequence[str]]
-    ) -> list[list[str]]:
-        """Those that the executor carries out as the walk went."""
-        cases = [(trip, walk, d) for trip, walk, many in zip(trips, walks, several) for d in many]
-        done = self.executor.greedy([c[0] for c in cases], [c[2] or NOTHING for c in cases])
+    def performances(self, cases: Sequence[tuple[Trip, NavWalk, str]]) -> list[float]:
+        done = self.executor.greedy([trip for trip, _, _ in cases], [d or NOTHING for _, _, d in cases])
         perf = performance if self.pragmatics == "text" else arrival
-        scores = iter([perf(self.world, c[0], e.nodes, c[1].nodes) for c, e in zip(cases, done)])
-        return [kept(many, [next(scores) for _ in many], THRESHOLD) for many in several]
+        return [perf(self.world, trip, e.nodes, walk.nodes) for (trip, walk, _), e in zip(cases, done)]
 
 
 class Wording(Protocol):

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from agents.common.decoding import drawn_with, likeliest
-from agents.iliad.describing import by_the_program, by_the_text, kept
+from agents.iliad.describing import DescribingNetworks
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
 from agents.iliad.regex.config import RegexConfig
@@ -37,55 +37,24 @@ def human(task: WordTask, *, rng: np.random.Generator) -> str:
     return task.requests[int(rng.integers(len(task.requests)))]
 
 
-class LearnedTeacher:
+class LearnedTeacher(DescribingNetworks[WordTask, Written]):
     """Eq 3.15 and 3.16 with two networks; it sees words before and after, never a rule."""
+
+    threshold, longest = 1.0, LONGEST_REQUEST
 
     def __init__(
         self, describer: ChangeDescriber, executor: Speller, requests: Requests, candidates: int, pragmatics: str
     ) -> None:
+        super().__init__(candidates, pragmatics)
         self.describer, self.executor, self.requests = describer.eval(), executor.eval(), requests
-        self.candidates, self.pragmatics = candidates, pragmatics
 
-    def describe(
-        self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator
-    ) -> list[str | None]:
-        uniforms = rng.random((len(tasks), self.candidates - 1, LONGEST_REQUEST))
-        said: list[str | None] = [None] * len(tasks)
-        open_ones = []
-        for i, (q, e) in enumerate(zip(tasks, executions, strict=True)):
-            if describable(q, e):
-                if near_optimal(q, e):
-                    said[i] = human(q, rng=rng)
-                else:
-                    open_ones.append(i)
-        found = self._pragmatic([tasks[i] for i in open_ones], [executions[i] for i in open_ones], uniforms[open_ones])
-        for i, pragmatic in zip(open_ones, found, strict=True):
-            text = by_the_text(pragmatic, rng=rng) if self.pragmatics == "text" else by_the_program(pragmatic)
-            said[i] = text or None
-        return said
-
-    def _pragmatic(
-        self, tasks: Sequence[WordTask], executions: Sequence[Written], uniforms: np.ndarray
-    ) -> list[list[str]]:
-        """D_prag of each execution; of the program's rule, which wants the first one only, no more than that."""
-        if not tasks:
-            return []
-        greedy = self.candidates_of(tasks, executions)
-        cases = [(q, e, d[0]) for q, e, d in zip(tasks, executions, greedy)]
-        found = [kept([d], [p], 1.0) for (_, _, d), p in zip(cases, self.performances(cases))]
-        rest = [i for i in range(len(tasks)) if self.pragmatics == "text" or not found[i]]
-        if rest and self.candidates > 1:
-            several = self.candidates_of([tasks[i] for i in rest], [executions[i] for i in rest], uniforms[rest])
-            cases = [(tasks[i], executions[i], d) for i, many in zip(rest, several) for d in many]
-            performances = iter(self.performances(cases))
-            for i, many in zip(rest, several):
-                found[i] = list(dict.fromkeys(found[i] + kept(many, [next(performances) for _ in many], 1.0)))
-        return found
+    spoken_of = staticmethod(describable)
+    near_optimal = staticmethod(near_optimal)
+    human = staticmethod(human)
 
     def candidates_of(
         self, tasks: Sequence[WordTask], executions: Sequence[Written], uniforms: np.ndarray | None = None
     ) -> list[list[str]]:
-        """The likeliest description of each execution, or different ones sampled with `uniforms` (B, K, steps)."""
         changed = changes([list(zip(q.words, e.outputs or (), strict=True)) for q, e in zip(tasks, executions)])
         copies = 1 if uniforms is None else uniforms.shape[1]
         choose = likeliest if uniforms is None else drawn_with(uniforms.reshape(-1, uniforms.shape[2]))
