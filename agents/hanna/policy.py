@@ -135,13 +135,9 @@ class HannaPolicy:
             n, rng = len(o.candidates), rngs[position]
             reason = None if reasons is None else tuple(float(r) for r in reasons[row])
             thought = thought_of(moves[row], asks[row], reason, n, trails[row].match if trails else None)
-            weights = moves[row, : n + 1]
-            known = False
+            weights, known = moves[row, : n + 1], False
             if trails:
-                weights = weigh(trails[row], o, weights, self.revisit_weight)
-            if trails and self.use_goal_image:
-                trails[row] = trails[row].thinking(o, moves[row, 1 : n + 1])
-                weights, known = weigh_by_image(trails[row], o, weights, self.frontier_discount)
+                trails[row], weights, known = self._weighed(trails[row], o, weights)
             index = self.choose(weights, rng)  # drawn before asking, so asking shifts no draw
             given = None if imposed is None else imposed[position]
             index = index if given is None else given
@@ -169,6 +165,15 @@ class HannaPolicy:
             moments,
             tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
         )
+
+    def _weighed(self, trail: Trail, o: Observation, moves: np.ndarray) -> tuple[Trail, np.ndarray, bool]:
+        """What of the probabilities of stop and moves the map and the goal image leave, and whether its place is known;
+        and the trail that has seen them."""
+        weights = weigh(trail, o, moves, self.revisit_weight)
+        if not self.use_goal_image:
+            return trail, weights, False
+        trail = trail.thinking(o, moves[1:])
+        return trail, *weigh_by_image(trail, o, weights, self.frontier_discount)
 
     def _trails(self, trails: Sequence[Trail], observations: Sequence[Observation]) -> list[Trail]:
         """The trails when a step begins, by what the agents see."""

@@ -466,12 +466,11 @@ class _Reader:
                     roughness=round(float(np.average(rough[chosen], weights=area[chosen])), 3),
                     metallic=round(float(np.average(metal[chosen], weights=area[chosen])), 3),
                 )
-                corners = None if uv is None else uv[chosen]
                 yield RawPart(
                     surface.name or mesh,
                     vertices,
                     faces[chosen],
-                    corners,
+                    None if uv is None else uv[chosen],
                     finish,
                     image,
                     two_sided=surface.two_sided,

@@ -1,33 +1,24 @@
-"""House, scene, panorama and step benchmarks: the table of what the main line costs."""
+"""House, scene and panorama benchmarks: the table of what the main line costs."""
 
 from __future__ import annotations
 
-import gc
-import resource
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-import psutil
-from tqdm import tqdm
 
 from assets.catalogue import Catalogue
-from embodied.bench.timing import Measure, from_values, measure, ratio, share
-from embodied.envs.base import HelpEnv
+from embodied.bench.timing import Measure, measure, ratio, share
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
-from embodied.interface import Move
-from embodied.language.plain import PlainLanguage
-from embodied.navigation.graph import NavGraph, build_graph
+from embodied.navigation.graph import build_graph
 from embodied.render.camera import Camera, face_cameras
 from embodied.render.classic import Renderer
 from embodied.scene.model import compile_scene
-from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 
 LARGE = HouseConfig(area=(400.0, 440.0))
 """A house of about 125 viewpoints; Matterport3D has 117 per building."""
-TYPICAL = HouseConfig(area=(110.0, 130.0))
 
 
 def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
@@ -105,39 +96,3 @@ def naive_view(house: House, catalogue: Catalogue, eye: np.ndarray) -> Callable[
             renderer.render()
 
     return draw
-
-
-def steps(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
-    """Environment steps, no pixels decoded."""
-    house = generate_house(seed, LARGE, catalogue)
-    with open_world(house, catalogue, cache) as world:
-        task = find_task(find_pool(world, seed=seed), 0, seed=seed, language=PlainLanguage())
-        env = HelpEnv({world.name: world})
-        count = 4000
-
-        def walk() -> None:
-            observation = None
-            for i in range(count):
-                if observation is None:
-                    observation = env.reset(task)
-                observation = env.step(Move(i % len(observation.candidates)))
-
-        yield measure("environment steps, no pixels decoded", walk, "1/s", per=count, repeats=7, aim=20_000.0)
-
-
-def memory(catalogue: Catalogue, cache: Path, seed: int, count: int) -> Iterator[Measure]:
-    """Resident memory while `count` houses are made, drawn once and dropped."""
-    process, values = psutil.Process(), []
-    for i in tqdm(range(count), "houses loaded and dropped", unit="house"):
-        house = generate_house(seed + i, TYPICAL, catalogue)
-        graph: NavGraph = build_graph(house)
-        with Renderer(house, catalogue, size=64) as renderer:
-            renderer.panorama(graph.positions[0])
-        gc.collect()
-        values.append(process.memory_info().rss / 2**20)
-    third = max(count // 3, 1)
-    yield from_values(f"memory after {count} houses", values[-1:], "MiB", aim=2048.0)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10  # Linux counts KiB
-    yield from_values("peak memory on the way", [peak], "MiB", aim=2048.0)
-    growth = np.median(values[-third:]) - np.median(values[third : 2 * third] if count >= 3 else values)
-    yield from_values("growth over the last third", [float(growth)], "MiB", aim=100.0)

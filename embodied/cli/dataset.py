@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, note, pause, show
 from embodied.cli.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
@@ -133,30 +133,13 @@ def run(args: Options) -> int:
     def watch(jobs: Iterable[str], total: int) -> Iterable[str]:
         return tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
 
-    build_dataset(
-        config,
-        args.out,
-        args.cache,
-        workers=args.workers,
-        watch=watch,
-        packs=args.pack,
-        own=args.own,
-        ray_address=args.ray,
-    )
+    how: dict[str, Any] = {"workers": args.workers, "watch": watch, "packs": args.pack, "ray_address": args.ray}
+    build_dataset(config, args.out, args.cache, own=args.own, **how)
     data = Dataset(args.out)
     pictures = chosen_pictures(args.kind, args.pictures, args.size, data.pictures)
     if pictures.kind != "none":
         note(f"drawing panoramas: {pictures.kind}, faces of {pictures.size} pixels; what is drawn already is kept")
-        draw_panoramas(
-            config,
-            args.out,
-            args.cache,
-            pictures=pictures,
-            workers=args.workers,
-            watch=watch,
-            packs=args.pack,
-            ray_address=args.ray,
-        )
+        draw_panoramas(config, args.out, args.cache, pictures=pictures, **how)
     if args.export:
         files = [f for name in programs for f in export_folder(name, data, args.export / name)]
         note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -219,13 +220,7 @@ def _evaluate(
         if data is not None and files and args.kind == "hanna" and name == "learned":
             found[split] = behaviour(episodes, data.places(split))
 
-    clients: list[Any] = []
-
-    def client() -> Any:
-        if not clients:
-            clients.append(client_of(args))
-        return clients[0]
-
+    client = functools.cache(lambda: client_of(args))
     changes = _Changes(args, client)
     rows, heard = _play(args, data, names, splits, changes, client, keep) if names else ([], {})
     about: dict[str, object] = {"data": data and data.digest, "seed": args.seed, "tasks": args.tasks, "agents": names}
@@ -255,8 +250,8 @@ def _evaluate(
         text += f"\nAs the authors' program computes it:\n\n{tables.markdown(theirs)}"
     for name, (right, total) in heard.items():
         text += f"\n{name}: a scripted listener arrives with {right} of the {total} routes that it was told"
-    if clients:
-        text += f"\n{clients[0].sent} requests were sent; all other answers were in {args.answers}"
+    if client.cache_info().currsize:
+        text += f"\n{client().sent} requests were sent; all other answers were in {args.answers}"
     show(args, result, text)
     if args.rrd and args.out and files and data is not None:
         from embodied.cli.evaluate_trained import record_trained
