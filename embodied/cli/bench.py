@@ -1,10 +1,9 @@
 """Measure speed and memory on this machine, as medians.
 
-  houses, pictures, steps   generation, rendering, environment steps
-  views, plays, seen        views of a panorama, steps with help, steps with pixels
+  houses, pictures, plays   generation, rendering, environment steps with help
+  views, seen               views of a panorama, steps with pixels
   drive                     live pictures, and the steps of a body on wheels that sees them
   gpu                       pictures, features and learning on a CUDA device; without one, a short check on the CPU
-  memory                    memory while houses are loaded and released
   bakes                     light a flat repeatedly
   light                     compare the ways of rendering with a path tracer
   serve                     people in a study at once: time of a step from the browser to the disk and back
@@ -28,19 +27,17 @@ if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from embodied.bench.timing import Measure
 
-PARTS = ("houses", "pictures", "steps", "views", "plays", "seen", "drive", "gpu", "memory", "bakes", "light", "serve")
+PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes", "light", "serve")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Furnished, Printed):
     part: Annotated[tuple[str, ...], Option(metavar="PART", name="part")] = ()
-    """Benchmarks to run (default: houses, pictures, steps)."""
+    """Benchmarks to run (default: houses, pictures, plays)."""
     seed: int = 7
     """Seed of the houses."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
     """How pictures, seen and drive draw the house."""
-    houses: Count = 1000
-    """memory: load and release N houses."""
     out: OutputFolder = Path("out/bench")
     """Folder for the files of light and serve."""
     people: Annotated[int, Option(whole(2), "N")] = 50
@@ -53,7 +50,7 @@ def run(args: Options) -> int:
     from embodied import gl
     from embodied.bench import bakes, drive, episodes, light, seen, timing, views, world
 
-    parts = args.part or ["houses", "pictures", "steps"]
+    parts = args.part or ["houses", "pictures", "plays"]
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     catalogue = catalogue_of(args)
@@ -63,14 +60,12 @@ def run(args: Options) -> int:
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
-        "steps": lambda: world.steps(catalogue, args.cache, args.seed),
         "views": lambda: views.views(catalogue, args.cache, args.seed),
         "plays": lambda: episodes.plays(catalogue, args.seed),
         "seen": lambda: seen.seen(catalogue, args.cache, args.seed, args.pictures),
         "drive": lambda: drive.drive(catalogue, args.cache, args.seed, args.pictures),
         "gpu": lambda: _gpu(catalogue, args.cache, args.seed, lit),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
-        "memory": lambda: world.memory(catalogue, args.cache, args.seed, args.houses),
     }
     reports: dict[str, Callable[[], Any]] = {
         "light": lambda: light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note),
