@@ -104,7 +104,7 @@ def test_a_board_is_filled_without_overlaps_until_nothing_fits():
 @pytest.mark.slow
 def test_untidy_houses_show_it():
     mess = ("heap of clothes", "duvet", "mug", "glass", "plate", "slippers", "building blocks")
-    tidy, untidy = (sum(of_class(lived_in(s, d), *mess) for s in SEEDS[:5]) for d in (0.02, 0.95))
+    tidy, untidy = (sum(of_class(lived_in(s, d), *mess) for s in SEEDS[:3]) for d in (0.02, 0.95))
     assert untidy > 1.5 * tidy
 
 

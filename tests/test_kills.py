@@ -52,7 +52,7 @@ def test_a_bake_that_is_killed_three_times_ends_as_one_that_was_not(tmp_path):
     for _ in range(3):
         process = subprocess.Popen([sys.executable, "-c", script], env=env, stderr=subprocess.DEVNULL)
         try:
-            process.wait(timeout=float(rng.uniform(2.0, 6.0)))
+            process.wait(timeout=float(rng.uniform(1.5, 4.0)))
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGKILL)
             killed += process.wait() == -signal.SIGKILL

@@ -10,7 +10,8 @@ import numpy as np
 
 from agents.iliad.protocol import NOTHING
 
-T, E = TypeVar("T"), TypeVar("E")
+T = TypeVar("T")
+E = TypeVar("E")
 
 
 def kept(candidates: Sequence[str], performances: Sequence[float], threshold: float) -> list[str]:
