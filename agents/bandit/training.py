@@ -213,24 +213,20 @@ def bandit(
         said = sampled(translator, m, data, chosen, "bandit", turn)
         scores = scores_of(said, m, data, chosen)
         numbers = {"score": float(sum(scores)), "sentences": len(chosen)}
-        where = f"{learner}, update {update}"
+        source, where = rows(data.source, chosen), f"{learner}, update {update}"
         if learner == "supervised":
-            loss = supervised_loss(translator, rows(data.source, chosen), rows(data.target, chosen))
+            loss = supervised_loss(translator, source, rows(data.target, chosen))
             descend(loss, optimizers["translator"], where, config.clip)
         if learner == "a2c":
             rngs = [stream(config.seed, "rating", turn, int(i)) for i in chosen]
             ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs)]
-            source = rows(data.source, chosen)
             learn_from_ratings(translator, critic, optimizers, source, padded(said), ratings, config.clip, where)
             numbers["rating"] = float(sum(ratings))
         return numbers
 
     def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
-        found = {
-            "per-sentence BLEU": 100 * sums["score"] / sums["sentences"],
-            "held-out BLEU": judged(translator, m, "test"),
-            "dev BLEU": judged(translator, m, "dev"),
-        }
+        found = {"per-sentence BLEU": 100 * sums["score"] / sums["sentences"]}
+        found |= {"held-out BLEU": judged(translator, m, "test"), "dev BLEU": judged(translator, m, "dev")}
         return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
     found = _run(Passes("bandit", passes, step, finish), folder, identity, parts, config, data, note)

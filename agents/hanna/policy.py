@@ -125,16 +125,15 @@ class HannaPolicy:
             scores, networks = self.network(memory.networks, percept)
         moves = scores.navigation.detach().softmax(-1).cpu().numpy()  # (k, A), stop first
         asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
-        reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().cpu().numpy()  # (k, 3)
-
+        said = None if scores.reasons is None else scores.reasons.detach().sigmoid().tolist()  # (k, 3)
+        reasons = [None] * len(seen) if said is None else [tuple(r) for r in said]
         trails = self._trails(memory.trails, seen) if memory.trails else []
         actions: list[Action | None] = [None] * len(observations)
         guided = round(self.guided_asking * len(observations))
         chosen, last_ask = [], []
         for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
             n, rng = len(o.candidates), rngs[position]
-            reason = None if reasons is None else tuple(float(r) for r in reasons[row])
-            thought = thought_of(moves[row], asks[row], reason, n, trails[row].match if trails else None)
+            thought = thought_of(moves[row], asks[row], reasons[row], n, trails[row].match if trails else None)
             weights, known = moves[row, : n + 1], False
             if trails:
                 trails[row], weights, known = self._weighed(trails[row], o, weights)
@@ -152,17 +151,14 @@ class HannaPolicy:
                 last_ask.append(memory.last_ask[row])
 
         device = percept.actions.device
-        rows = torch.arange(len(positions), device=device)
-        asked = [isinstance(actions[p], Ask) for p in positions]
-        moments = (*memory.moments, Moment(positions, scores)) if self.keep_moments else ()
         return actions, HannaMemory(
             positions,
             networks,
-            percept.actions[rows, torch.tensor(chosen, device=device)],
-            torch.tensor([REQUEST if a else DO_NOTHING for a in asked], device=device),
+            percept.actions[torch.arange(len(positions), device=device), torch.tensor(chosen, device=device)],
+            torch.tensor([REQUEST if isinstance(actions[p], Ask) else DO_NOTHING for p in positions], device=device),
             tuple(last_ask),
             memory.channels,
-            moments,
+            (*memory.moments, Moment(positions, scores)) if self.keep_moments else (),
             tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
         )
 
