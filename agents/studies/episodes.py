@@ -12,7 +12,7 @@ import torch
 from agents.common.session import Note
 from agents.studies.engine import Measured, StudyRow, StudyTable
 from embodied.datasets.store import Dataset, SplitData
-from embodied.evaluation.evaluate import spread
+from embodied.evaluation.evaluate import evaluate, spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import measured
 from embodied.identity import Identity, identity_of
@@ -21,6 +21,8 @@ from embodied.records import save_lines
 
 JUDGES = ("embodied.evaluation.evaluate", "embodied.datasets.store")
 """Modules that decide how every agent is judged."""
+evaluate_frozen = torch.inference_mode()(evaluate)
+"""As embodied.evaluation.evaluate.evaluate, without gradients."""
 
 
 @dataclass(frozen=True)

@@ -49,14 +49,11 @@ def evaluate_trained(
     Raises:
       ValueError: an unknown row.
     """
-    import torch
-
     from agents.common.device import use_threads
     from agents.common.weights import weights_digest
-    from agents.studies.episodes import JUDGES
+    from agents.studies.episodes import JUDGES, evaluate_frozen
     from agents.vision.drawn import pictures_of
     from agents.vision.occasions import OCCASIONS
-    from embodied.evaluation.evaluate import evaluate
     from embodied.identity import identity_of
 
     use_threads(args.threads)
@@ -68,11 +65,10 @@ def evaluate_trained(
             raise ValueError(f"unknown rows {unknown}; there are {list(known.players)}")
         for name in bar(wanted or known.usual, "agents", "agent"):
             whole, player = known.players[name]
-            with torch.inference_mode():
-                found += evaluate(
-                    instead(whole), {name: player}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
-                    keep=functools.partial(keep, split),
-                )  # fmt: skip
+            found += evaluate_frozen(
+                instead(whole), {name: player}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
+                keep=functools.partial(keep, split),
+            )  # fmt: skip
         blind |= set(known.blind)
     looking = sorted({r.agent for r in found} - blind)
     names = [n for split in splits for n in data.names(split)] if looking else []
