@@ -98,6 +98,7 @@ BAD = {
     "HTML": (200, {"Content-Type": "text/html"}, b"<html>log in</html>"),
     "ten megabytes": (200, {"Content-Type": "application/json"}, b"[" + b"1," * 5_000_000 + b"1]"),
     "deep": (200, {"Content-Type": "application/json"}, b"[" * 100_000),
+    "gzip that is none": (200, {"Content-Encoding": "gzip"}, b"{}"),
     "an object of another kind": (200, {}, b'{"error": "none"}'),
     "choices that are a number": (200, {}, b'{"choices": 3}'),
     "no JSON": said("I would rather not say"),
@@ -146,6 +147,15 @@ def test_a_rejected_request_is_an_error_that_does_not_show_the_key(answers, monk
         with pytest.raises(UnableError, match="401") as e:
             client_of(server, answers).ask(ASKED, ONE)
         assert "secret" not in str(e.value) and len(server.requests) == 1
+
+
+@pytest.mark.parametrize("status", [302, 400])
+def test_the_body_of_an_error_is_not_read_without_a_limit(status, answers):
+    body = json.dumps({"error": {"message": "a plain word"}, "more": "x" * 2 * MOST_BYTES}).encode()
+    with ChatServer(lambda r: (status, {"Content-Type": "application/json"}, body)) as server:
+        with pytest.raises(UnableError, match=f"status {status}") as e:
+            client_of(server, answers).ask(ASKED, ONE)
+        assert "a plain word" not in str(e.value) and len(server.requests) == 1
 
 
 def test_a_server_that_drips_is_given_up(answers):

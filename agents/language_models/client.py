@@ -6,12 +6,13 @@ counted and kept like any other. Keys come from the environment and go into the 
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import random
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -171,7 +172,7 @@ class Client:
     def _send(self, request: Mapping[str, Any]) -> _Kept:
         if self.offline:
             raise UnableError(f"{self.cache.path} does not hold the answer to this request; leave --offline out")
-        openai, s = _openai(), self.settings
+        openai, httpx, s = _openai(), _httpx(), self.settings
         told = 0.0
         for attempt in range(s.tries):
             if attempt:
@@ -179,29 +180,37 @@ class Client:
                 time.sleep(pause * random.uniform(0.75, 1.25))  # so that clients do not come back together
             try:
                 with self._connection().chat.completions.with_streaming_response.create(**request) as response:
-                    body = _body(response, time.monotonic() + s.timeout)
+                    body = _body(response.iter_bytes(), time.monotonic() + s.timeout)
             except openai.APIStatusError as e:
                 problem = self._hidden(f"status {e.status_code}: {e}")
                 if e.status_code not in AGAIN:
                     raise UnableError(f"{s.base_url} refuses the request: {problem}") from None
                 told = _seconds(e.response.headers.get("retry-after"))
-            except (openai.APIConnectionError, *_transport_errors()) as e:
+            except httpx.DecodingError:
+                return self._counted(_Kept(problem="the response cannot be decompressed"))
+            except (openai.APIConnectionError, httpx.HTTPError) as e:
                 problem = type(e).__name__
             else:
-                with self._lock:
-                    self.sent += 1
-                return _said(body)
+                return self._counted(_said(body))
         raise UnableError(
             f"no answer from {s.base_url} after {s.tries} tries ({problem}); start the server and run the same command "
             f"again: {len(self.cache)} answers are kept in {self.cache.path}, it goes on from there"
         )
+
+    def _counted(self, said: _Kept) -> _Kept:
+        with self._lock:
+            self.sent += 1
+        return said
 
     def _connection(self) -> Any:
         with self._lock:
             if self._api is None:
                 s = self.settings
                 key = os.environ.get(s.key_variable) or "none"
-                self._api = _openai().OpenAI(base_url=s.base_url, api_key=key, timeout=s.timeout, max_retries=0)
+                hooks = {"response": [functools.partial(_cut_short, seconds=s.timeout)]}
+                own = _openai().DefaultHttpxClient(base_url=s.base_url, timeout=s.timeout, event_hooks=hooks)
+                settings = {"base_url": s.base_url, "timeout": s.timeout, "max_retries": 0}
+                self._api = _openai().OpenAI(api_key=key, http_client=own, **settings)
         return self._api
 
     def _hidden(self, text: str) -> str:
@@ -310,15 +319,23 @@ def _object_in(text: str) -> str:
     return text[begin : end + 1] if 0 <= begin < end else text
 
 
-def _body(response: Any, deadline: float) -> bytes | None:
+def _body(chunks: Iterable[bytes], deadline: float) -> bytes | None:
     """The bytes of a response; None for more than MOST_BYTES, or when the time is up."""
     parts, size = [], 0
-    for chunk in response.iter_bytes():
+    for chunk in chunks:
         size += len(chunk)
         if size > MOST_BYTES or time.monotonic() > deadline:
             return None
         parts.append(chunk)
     return b"".join(parts)
+
+
+def _cut_short(response: Any, seconds: float) -> None:
+    """Bound the body of an error or a redirection, which the client's library reads without a limit."""
+    if not response.is_success:
+        whole = response.stream
+        response.stream = _httpx().ByteStream(_body(whole, time.monotonic() + seconds) or b"")
+        whole.close()
 
 
 def _read(kept: str) -> _Kept:
@@ -342,8 +359,7 @@ def _openai() -> Any:
     return openai
 
 
-def _transport_errors() -> tuple[type[Exception], ...]:
-    """What may be raised while a body is read, past the client's own errors."""
+def _httpx() -> Any:
     import httpx2  # comes with openai
 
-    return (httpx2.HTTPError,)
+    return httpx2
