@@ -1,4 +1,4 @@
-"""The one place where JSON that comes from a file is read: strictly, and as the records it should hold.
+"""The one place where JSON and TOML that come from a file are read: strictly, and as the records they should hold.
 
 What is read has the types of its fields, finite numbers, no unknown, missing or repeated fields, and keeps the ranges
 of RULES. Every failure is a RecordError, which names the file.
@@ -11,6 +11,7 @@ import enum
 import functools
 import json
 import math
+import tomllib
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -61,6 +62,28 @@ def parse_file(path: Path, what: str = "a file") -> object:
         return parse(Path(path).read_bytes(), what)
     except RecordError as e:
         raise RecordError(f"{path}: {e}") from e
+
+
+def read_text(path: Path) -> str:
+    """The text of a file, with or without a byte order mark; raises RecordError with file and line if not UTF-8."""
+    data = Path(path).read_bytes()
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as e:
+        line = data[: e.start].count(b"\n") + 1
+        raise RecordError(f"{path}:{line}: not UTF-8 ({e.reason}); save it as UTF-8") from e
+
+
+def read_toml(path: Path) -> dict[str, typing.Any]:
+    """The tables of a TOML file, unchecked but for depth; raises RecordError with the file's name."""
+    try:
+        value = tomllib.loads(read_text(path))
+        _refuse_deep(value)
+        return value
+    except RecordError:
+        raise
+    except (ValueError, RecursionError) as e:
+        raise RecordError(f"{path}: expected TOML ({e})") from e
 
 
 def read_json(path: Path) -> dict[str, typing.Any]:

@@ -123,7 +123,7 @@ def _first_available() -> str:
 def _egl_works() -> bool:
     """Whether some EGL device initialises, tried without PyOpenGL, which binds one platform for good."""
     name = ctypes.util.find_library("EGL")
-    if name is None:
+    if name is None or not any(map(ctypes.util.find_library, ("OpenGL", "GLESv2", "GLESv1_CM"))):  # PyOpenGL needs one
         return False
     _load_triton_first()
     try:

@@ -1,7 +1,8 @@
 """Libraries that `embodied doctor --fix` brings to machines where nobody may install packages of the system.
 
 The wheel lavavu-osmesa (Linux, x86-64) carries software OpenGL (OSMesa) and LLVM; nothing of LavaVu itself is used.
-libatomic, which Dr.Jit's wheel expects of the system, is unpacked from Debian's package into the environment.
+libatomic, which Dr.Jit's wheel expects of the system, is unpacked from Debian's package into the environment; so are
+the furniture libraries where pip finds no wheel of them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any
+
+from assets.cache import atomic_path
 
 ATOMIC = "libatomic.so.1"
 FOLDER = "lavavu_osmesa.libs"
@@ -77,13 +80,22 @@ def load_atomic(folder: Path = Path(sys.prefix, "lib")) -> bool:
 
 def bring_atomic(folder: Path = Path(sys.prefix, "lib")) -> bool:
     """Unpack libatomic of the Debian or Ubuntu package into `folder`, without root; whether it is there then."""
+    return unpack("libatomic1", ATOMIC, folder) and load_atomic(folder)
+
+
+def unpack(package: str, pattern: str, folder: Path) -> bool:
+    """Copy the files of a Debian or Ubuntu package whose names match into `folder`, without root; whether any did."""
     with tempfile.TemporaryDirectory() as place, contextlib.suppress(OSError, subprocess.SubprocessError):
         Path(place, "lists", "partial").mkdir(parents=True)
         lists = ["-o", f"Dir::State::lists={place}/lists", "-o", f"Dir::Cache={place}"]
-        for order in (["apt-get", *lists, "update"], ["apt-get", *lists, "download", "libatomic1"]):
+        for order in (["apt-get", *lists, "update"], ["apt-get", *lists, "download", package]):
             subprocess.run(order, cwd=place, check=True, capture_output=True)
-        (package,) = Path(place).glob("libatomic1_*.deb")
-        subprocess.run(["dpkg-deb", "-x", package.name, "whole"], cwd=place, check=True, capture_output=True)
-        (library,) = Path(place, "whole").rglob(ATOMIC)
-        shutil.copyfile(library, folder / ATOMIC)  # of the file that this name links to
-    return load_atomic(folder)
+        (file,) = Path(place).glob(f"{package}_*.deb")
+        subprocess.run(["dpkg-deb", "-x", file.name, "whole"], cwd=place, check=True, capture_output=True)
+        found = list(Path(place, "whole").rglob(pattern))
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in found:  # where a name links to another file, that file
+            with atomic_path(folder / path.name) as draft:
+                shutil.copyfile(path, draft)
+        return bool(found)
+    return False

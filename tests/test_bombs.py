@@ -1,4 +1,4 @@
-"""Small files that unpack to much are refused by the size that they declare, before anything is unpacked."""
+"""Small files that unpack to much, or nest deeply, are refused before anything is unpacked."""
 
 from __future__ import annotations
 
@@ -15,16 +15,29 @@ import numpy as np
 import pytest
 
 from agents.common.checkpoint import CheckpointError, read_checkpoint
+from agents.common.session import metrics_of
+from agents.iliad.regex.words import read_words
+from agents.language_models.prompts import read_prompt
 from agents.vision.labels import HouseStrips
-from assets.archives import open_arrays
-from assets.json_file import RecordError
+from assets.archives import open_arrays, read_picture
+from assets.closure import ROOT
+from assets.json_file import RecordError, read_toml
 from embodied.datasets import habitat
+from embodied.errors import UnableError
+from embodied.generate.furnish.tables import tables
+from embodied.generate.plan_file import load_plan
+from embodied.light.pages import colours
 from embodied.light.pages.records import load_record
 from embodied.light.pages.unwrap import Unwrapped
+from embodied.mattersim import pictures
 from embodied.render import panorama_file
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.sightings import load_table
+from embodied.scene import model
+from embodied.seeds import stream
+from embodied.serve.store import Event, Store
+from embodied.serve.study import load_study
 
 FACES = Panorama(np.zeros((6, 8, 8, 3), np.uint8), np.ones((6, 8, 8), np.float32), np.zeros((6, 8, 8), np.int32))
 
@@ -92,9 +105,103 @@ def test_a_picture_is_not_decoded_where_it_declares_another_size(kind, tmp_path,
                 read(0)
 
 
-def wide_png(data: bytes) -> bytes:
-    """A PNG that says to be 60000 x 30000, with the checksum of that."""
-    header = b"IHDR" + struct.pack(">II", 60000, 30000) + data[24:29]
+@pytest.mark.parametrize("size", [(60000, 30000), (12000, 12000)])
+def test_no_picture_is_decoded_that_declares_to_be_huge(size, tmp_path, monkeypatch):
+    (tmp_path / "a.png").write_bytes(wide_png(cv2.imencode(".png", np.zeros((8, 48, 3), np.uint8))[1].tobytes(), size))
+    monkeypatch.setattr(cv2, "imread", lambda *_: pytest.fail("it is decoded"))
+    assert read_picture(tmp_path / "a.png") is None
+    for read in (colours.read_colours, model.load_texture, lambda path: pictures._read(Path(path), cv2.IMREAD_COLOR)):
+        with pytest.raises((ValueError, OSError), match=r"a\.png"):
+            read(str(tmp_path / "a.png"))
+
+
+def test_pictures_are_read_through_what_knows_their_size():
+    found = [
+        p.name
+        for top in ("assets", "embodied", "agents", "viz")
+        for p in (ROOT / top).rglob("*.py")
+        if "cv2.imread(" in p.read_text(encoding="utf-8")
+    ]
+    assert found == ["archives.py"]
+
+
+DEEP = "[" * 5000 + "]" * 5000
+
+
+@pytest.mark.parametrize(
+    "body", [f"a = {DEEP}", "a = " + "[" * 60 + "]" * 60, "a = 1\na = 2", "a = " + "9" * 9000, "\ud83d"]
+)
+@pytest.mark.parametrize("read", [load_study, lambda path: tables((path,)), read_toml])
+def test_toml_that_is_deep_or_none_is_refused_by_name(read, body, tmp_path):
+    (tmp_path / "a.toml").write_bytes(body.encode("utf-8", "surrogatepass"))
+    with pytest.raises(ValueError, match=r"a\.toml.*(expected TOML|not UTF-8)"):
+        read(tmp_path / "a.toml")
+
+
+ROOM = '{"kind": "hall", "polygon": [[0, 0], [%s, 0], [%s, 6], [0, 6]]}'
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        f'{{"rooms": {DEEP}}}',
+        '{"rooms": [%s]}' % (ROOM % (("1" + "0" * 400,) * 2)),
+        '{"rooms": [%s]}' % (ROOM % ("1e999", "1e999")),
+        '{"rooms": [%s]}' % (ROOM % ("NaN", "NaN")),
+        '{"rooms": [], "rooms": [%s]}' % (ROOM % (2, 2)),
+        '{"rooms": [%s]}' % ", ".join([ROOM % (2, 2)] * 5000),
+        "[]",
+        '{"rooms": {"kind": "hall"}}',
+    ],
+    ids=["deep", "long", "infinite", "nan", "twice", "many", "list", "object"],
+)
+def test_a_floor_plan_is_read_as_strictly_as_all_json(body, tmp_path):
+    (tmp_path / "plan.json").write_text(body)
+    with pytest.raises(ValueError, match=r"plan\.json"):
+        load_plan(tmp_path / "plan.json")
+
+
+@pytest.mark.parametrize("body", [b"\xff\xfea\x00b\x00", b"abc\n\xe9t\xe9\n"])
+@pytest.mark.parametrize("read", [read_words, lambda path: read_prompt("a", (), path.parent)])
+def test_a_text_that_is_not_utf_8_is_named_with_its_line(read, body, tmp_path):
+    (tmp_path / "a.md").write_bytes(body)
+    with pytest.raises(ValueError, match=r"a\.md:[12]: not UTF-8"):
+        read(tmp_path / "a.md")
+
+
+@pytest.mark.parametrize("body", [b'"' + b"x" * 200_000, b"update,minutes,metric,value\n1,2", b"\xff", b'a\n1,2,m,"'])
+def test_a_damaged_log_of_a_training_is_named(body, tmp_path):
+    (tmp_path / "metrics.csv").write_bytes(body)
+    with pytest.raises(ValueError, match=r"metrics\.csv"):
+        metrics_of(tmp_path)
+
+
+def test_a_damaged_log_of_what_people_did_is_named(tmp_path):
+    (tmp_path / "no.db").write_bytes(b"no database" * 500)
+    with pytest.raises(UnableError, match=r"no\.db is damaged"):
+        Store(tmp_path / "no.db")
+    store = Store(tmp_path / "people.db")
+    store._write([Event("came", 1.0, body={"a": "b"}) for _ in range(200)])
+    store.close()
+    sound, refused = (tmp_path / "people.db").read_bytes(), 0
+    for k in range(60):
+        rng = stream(0, "people.db", k)
+        damaged = bytearray(sound)
+        for at in rng.integers(len(sound), size=8):
+            damaged[at] ^= 1 << int(rng.integers(8))
+        (tmp_path / "people.db").write_bytes(damaged)
+        try:
+            store = Store(tmp_path / "people.db")
+            list(store.events())
+            store.close()
+        except UnableError as e:
+            refused += "people.db is damaged" in str(e)
+    assert refused > 10
+
+
+def wide_png(data: bytes, size: tuple[int, int] = (60000, 30000)) -> bytes:
+    """A PNG that says to be of `size`, with the checksum of that."""
+    header = b"IHDR" + struct.pack(">II", *size) + data[24:29]
     return data[:12] + header + struct.pack(">I", zlib.crc32(header)) + data[33:]
 
 

@@ -13,6 +13,7 @@ from embodied.generate.lacking import lacking
 
 def test_a_house_without_models_lacks_nothing_and_is_the_same_every_time(tmp_path, monkeypatch):
     monkeypatch.setattr(packs, "SYSTEM_FOLDER", tmp_path / "none")
+    monkeypatch.setattr(packs, "OWN_FOLDER", tmp_path / "none")
     monkeypatch.setattr(packs, "WHEEL", "no_such_package")
     _tell_once.cache_clear()
     with warnings.catch_warnings(record=True) as told:

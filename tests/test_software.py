@@ -10,7 +10,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from embodied import software
+from assets.importing import packs
+from embodied import gl, software
+from embodied.cli import doctor
 
 
 @pytest.fixture
@@ -75,3 +77,36 @@ def test_where_apt_is_not_nothing_is_brought(tmp_path, monkeypatch):
     monkeypatch.setattr(software, "_try", lambda path: False)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert not software.bring_atomic(tmp_path)
+
+
+@pytest.mark.parametrize("apt", [True, False])
+def test_where_pip_has_no_furniture_debians_is_brought_or_the_way_to_make_it_is_said(apt, tmp_path, monkeypatch):
+    def run(order, *, cwd=None, **_):
+        if "pip" in order:
+            return subprocess.CompletedProcess(order, 1)
+        if not apt:
+            raise FileNotFoundError(order[0])
+        if order[0] == "apt-get" and "download" in order:
+            Path(cwd, f"{order[-1]}_1.8_all.deb").write_bytes(b"")
+        elif order[0] == "dpkg-deb":
+            place = Path(cwd, order[3], "usr/share/sweethome3d/furniture")
+            place.mkdir(parents=True)
+            (place / "Scopia.sh3f").write_bytes(b"models")
+        return subprocess.CompletedProcess(order, 0)
+
+    own = tmp_path / "share"
+    monkeypatch.setattr(subprocess, "run", run)
+    for name, value in (("SYSTEM_FOLDER", tmp_path / "none"), ("OWN_FOLDER", own), ("WHEEL", "no_such_package")):
+        monkeypatch.setattr(packs, name, value)
+    for where, name in ((gl, "available"), (doctor, "load_atomic")):
+        monkeypatch.setattr(where, name, lambda: True)
+    monkeypatch.setattr("embodied.light.backend.find_llvm", lambda: "here")
+    said = list(doctor.fix(()))
+    assert said[:2] == [
+        "pip install embodied-houses-furniture",
+        "pip finds no such wheel; apt-get download sweethome3d-furniture, which goes into this environment",
+    ]
+    if apt:
+        assert len(said) == 2 and packs.find_packs() == (own / "Scopia.sh3f",) and not list(doctor.fix(()))
+    else:
+        assert len(said) == 3 and "make wheels" in said[2] and packs.find_packs() == ()

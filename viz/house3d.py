@@ -12,6 +12,7 @@ import numpy as np
 import rerun as rr
 from scipy.spatial import cKDTree
 
+from assets.archives import read_picture
 from assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.scene.house_meshes import Part
@@ -223,7 +224,7 @@ def vertex_colors(mesh: MeshPart) -> np.ndarray:
 @functools.lru_cache(maxsize=512)
 def _blurred(path: str) -> np.ndarray:
     """The texture at 32 px, so that a vertex shows the colour around it. (h, w, 3) RGB."""
-    image = cv2.imread(path, cv2.IMREAD_COLOR)
+    image = read_picture(path)
     if image is None:
         raise ValueError(f"texture {path} cannot be read; delete the cache folder and run again")
     return cv2.cvtColor(cv2.resize(image, (32, 32), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2RGB)

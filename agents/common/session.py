@@ -26,6 +26,7 @@ import torch
 from agents.common import parallel
 from agents.common.checkpoint import Stateful, restore, write_checkpoint
 from assets.cache import write_bytes, write_json
+from assets.json_file import read_text
 from embodied.errors import UnableError
 from embodied.identity import Identity
 from embodied.locks import locked
@@ -288,12 +289,22 @@ def metrics_of(folder: Path) -> list[tuple[int, str, float]]:
     if not path.exists():
         return []
     found = []
-    for number, line in enumerate(csv.DictReader(path.open(newline="", encoding="utf-8")), 2):
+    for number, line in enumerate(_lines(path)):
         try:
-            found.append((int(line["update"]), line["metric"], float(line["value"])))
-        except (TypeError, KeyError, ValueError) as e:
-            raise ValueError(f"{path}:{number}: expected {', '.join(HEADS)}; delete that line") from e
+            if number:
+                update, _, metric, value = line
+                found.append((int(update), metric, float(value)))
+        except ValueError as e:
+            raise ValueError(f"{path}:{number + 1}: expected {', '.join(HEADS)}; delete that line") from e
     return found
+
+
+def _lines(path: Path) -> list[list[str]]:
+    """The lines of a CSV file; raises ValueError, with its name, where there are none to be told apart."""
+    try:
+        return [row for row in csv.reader(io.StringIO(read_text(path), newline="")) if row]
+    except csv.Error as e:
+        raise ValueError(f"{path}: it is damaged ({e}); move it away, its training goes on without it") from e
 
 
 def _forget_after(path: Path, update: int) -> None:
@@ -302,10 +313,9 @@ def _forget_after(path: Path, update: int) -> None:
         return
     kept = io.StringIO()
     writer = csv.writer(kept, lineterminator="\n")
-    with open(path, newline="", encoding="utf-8") as f:
-        for k, row in enumerate(csv.reader(f)):
-            if k == 0 or (row and row[0].isdigit() and int(row[0]) <= update):
-                writer.writerow(row)
+    for k, row in enumerate(_lines(path)):
+        if k == 0 or (row[0].isdecimal() and int(row[0]) <= update):
+            writer.writerow(row)
     write_bytes(path, kept.getvalue().encode())
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.language_models.client import Message
+from assets.json_file import read_text
 
 FOLDER = Path(__file__).parent / "prompts"
 
@@ -44,7 +45,7 @@ def read_prompt(name: str, names: tuple[str, ...], folder: Path | None = None) -
     """
     own = None if folder is None else Path(folder) / f"{name}.md"
     path = own if own is not None and own.exists() else FOLDER / f"{name}.md"
-    system, dashes, template = path.read_text(encoding="utf-8").partition("\n---\n")
+    system, dashes, template = read_text(path).partition("\n---\n")
     found = string.Template(template)
     if not dashes or not found.is_valid():
         raise ValueError(f"{path} should hold a system message, a line of three dashes, and a template with $names")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,12 +12,15 @@ from assets.importing.sh3f import Pack, PackError, open_pack
 
 SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
 """Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""
+OWN_FOLDER = Path(sys.prefix, "share", "sweethome3d", "furniture")
+"""Where `embodied doctor --fix` puts those of that package."""
 WHEEL = "embodied_furniture"
 """The package of `pip install embodied-houses[furniture]`: the models of those libraries that the catalogue uses."""
 
 
 def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
-    """The .sh3f files of `packs` (files or folders), or, if none are given, those of the system or of the wheel.
+    """The .sh3f files of `packs` (files or folders), or, if none are given, those of the system, of this environment
+    or of the wheel.
 
     Raises:
       PackError: a path in `packs` does not exist.
@@ -34,8 +38,9 @@ def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
 
 
 def _installed() -> tuple[Path, ...]:
-    if SYSTEM_FOLDER.is_dir():
-        return (SYSTEM_FOLDER,)
+    for folder in (SYSTEM_FOLDER, OWN_FOLDER):
+        if folder.is_dir():
+            return (folder,)
     spec = importlib.util.find_spec(WHEEL)
     return tuple(Path(folder) for folder in (spec and spec.submodule_search_locations) or ())
 
@@ -60,7 +65,7 @@ def pack_of(key: str, packs: Sequence[Path] = ()) -> Pack:
             return pack
     if not found:
         raise PackError(
-            f"no furniture models are installed, so {key!r} cannot be imported; pip install embodied-houses-furniture, "
+            f"no furniture models are installed, so {key!r} cannot be imported; embodied doctor --fix, "
             "or apt-get install sweethome3d-furniture, or name .sh3f files with --pack"
         )
     raise PackError(

@@ -20,7 +20,7 @@ from embodied.cli import message_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.cli.origins import REMEDY, strangers
 from embodied.distribution import DISTRIBUTION
-from embodied.software import bring_atomic, load_atomic
+from embodied.software import bring_atomic, load_atomic, unpack
 
 LIBRARIES = (
     DISTRIBUTION, "mujoco-core", "trimesh", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",
@@ -84,23 +84,33 @@ def line(f: Finding) -> str:
 
 def fix(catalogue_packs: tuple[Path, ...]) -> Iterator[str]:
     """Install what can be had without root and this machine lacks; yields what is done."""
-    from assets.importing.packs import find_packs
+    from assets.importing.packs import OWN_FOLDER, find_packs
     from embodied import gl
     from embodied.light.backend import find_llvm
 
-    wanted = []
     if not find_packs(catalogue_packs):
-        wanted.append("embodied-houses-furniture")
+        yield "pip install embodied-houses-furniture"
+        if not _pip("embodied-houses-furniture"):
+            yield "pip finds no such wheel; apt-get download sweethome3d-furniture, which goes into this environment"
+            if not unpack("sweethome3d-furniture", "*.sh3f", OWN_FOLDER):
+                yield (
+                    "that failed; in a clone, make wheels and pip install dist/embodied_houses_furniture-*.whl. "
+                    "Until then houses hold the simple furniture that is built in code"
+                )
     if sys.platform == "linux" and platform.machine() == "x86_64" and not (gl.available() and find_llvm()):
-        wanted.append("lavavu-osmesa")
-    for name in wanted:
-        yield f"pip install {name}"
-        # without what that package needs itself: only libraries in it are used
-        subprocess.run([sys.executable, "-m", "pip", "install", "-q", "--no-deps", name], check=False)
+        yield "pip install lavavu-osmesa"
+        if not _pip("lavavu-osmesa"):
+            yield f"that failed. {gl.REMEDY}"
     if not load_atomic():
         yield "apt-get download libatomic1, of which the library goes into this environment"
         if not bring_atomic():
             yield "that failed; have an administrator install libatomic1"
+
+
+def _pip(name: str) -> bool:
+    """Install a package without what it needs itself: only files in it are used; whether that went well."""
+    order = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", name]
+    return subprocess.run(order, capture_output=True, check=False).returncode == 0
 
 
 def versions(_: Options) -> Finding:
@@ -154,7 +164,8 @@ def packs(args: Options) -> Finding:
     from assets.importing.packs import find_packs
 
     remedy = (
-        "embodied doctor --fix, or pip install embodied-houses-furniture, or apt-get install sweethome3d-furniture; "
+        "embodied doctor --fix, or in a clone make wheels and pip install dist/embodied_houses_furniture-*.whl, or "
+        "apt-get install sweethome3d-furniture; "
         "until then houses hold the simple furniture that is built in code"
     )
     try:

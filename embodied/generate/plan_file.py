@@ -10,10 +10,10 @@ room is two rectangles of its kind. A house has exactly one storey and at least 
 from __future__ import annotations
 
 import itertools
-import json
 from pathlib import Path
 
 from assets.catalogue import Catalogue
+from assets.json_file import read_json
 from assets.records import ROOM_KINDS
 from embodied.generate.access import connect, has_outer_doors, walls_between
 from embodied.generate.config import HouseConfig
@@ -26,6 +26,7 @@ from embodied.house.house import House, HouseError
 
 GRID = 10
 """Steps of the grid in a metre."""
+MOST_ROOMS = 200
 
 
 def load_plan(path: Path) -> Plan:
@@ -38,12 +39,14 @@ def load_plan(path: Path) -> Plan:
       >>> plan = embodied.load_plan(Path('plan.json'))
     """
     try:
-        body = json.loads(Path(path).read_text(encoding="utf-8"))
+        body = read_json(path)
         rooms = [(str(room["kind"]), room["polygon"]) for room in body["rooms"]]
     except (ValueError, KeyError, TypeError) as e:
         raise HouseError(
             f'{path} should hold {{"rooms": [{{"kind": ..., "polygon": [[x, y], ...]}}, ...]}}; {type(e).__name__}: {e}'
         ) from e
+    if len(rooms) > MOST_ROOMS:
+        raise HouseError(f"{path} has {len(rooms)} rooms, a plan may have {MOST_ROOMS}")
     return plan_of([_cell(number, kind, polygon) for number, (kind, polygon) in enumerate(rooms)])
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from assets.archives import read_picture
 from embodied.geometry import yaw_of_heading
 from embodied.render.panorama import (
     PixelGrid,
@@ -122,7 +123,7 @@ def _apart(strip: np.ndarray) -> list[np.ndarray]:
 
 
 def _read(path: Path, mode: int) -> np.ndarray:
-    picture = cv2.imread(str(path), mode)
+    picture = read_picture(path, mode)
     if picture is None:
         raise ValueError(
             f"MatterSim: Could not open skybox files at: {path}; write them with `embodied export matterport`, "

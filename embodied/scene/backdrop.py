@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
+from assets.archives import read_picture
 from assets.cache import digest, write_bytes
 from assets.closure import code_digest
 from embodied.house.house import House
@@ -220,7 +221,7 @@ def kept_picture(place: Scenery, seed: int, cache: Path | None) -> np.ndarray:
         return plain_picture(place, seed)
     told = (place.landscape, place.season, place.height, place.outlook if place.table.water else 0.0, seed % VARIANTS)
     file = Path(cache) / "landscapes" / f"{digest(code_digest(__name__), *told)[:24]}.png"
-    known = cv2.imread(str(file)) if file.exists() else None
+    known = read_picture(file)
     if known is not None:
         return known[..., ::-1]
     made = plain_picture(place, seed)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from assets.archives import read_picture
 from embodied import gl
 
 gl.prepare()
@@ -370,7 +371,7 @@ def add_texture(spec: mujoco.MjSpec, name: str, image: np.ndarray) -> None:
 @functools.lru_cache(maxsize=64)
 def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
     """(h, w, 3) uint8 RGB, or (h, w, 4) where the picture has holes; at most `largest` pixels a side."""
-    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    image = read_picture(path, cv2.IMREAD_UNCHANGED)
     if image is None:
         raise OSError(f"texture {path} is missing or damaged; delete {Path(path).parent}, it is made again")
     if image.ndim == 2:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import sqlite3
 from collections.abc import Iterator
@@ -10,6 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+from embodied.errors import UnableError
 
 SCHEMA = """
 PRAGMA journal_mode = WAL;
@@ -39,8 +42,10 @@ class Store:
     """One SQLite file in WAL mode. Events that come while a transaction is being written share the next one."""
 
     def __init__(self, path: Path) -> None:
-        self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
-        self._db.executescript(SCHEMA)
+        self._path = path
+        with self._readable():
+            self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+            self._db.executescript(SCHEMA)
         self._thread = ThreadPoolExecutor(1, "store")
         self._waiting: list[tuple[Event, asyncio.Future[None]]] = []
         self._writing: asyncio.Task[None] | None = None
@@ -52,10 +57,19 @@ class Store:
 
     def events(self) -> Iterator[Event]:
         """All events, in their order."""
-        for kind, time, person, message, body in self._db.execute(
-            "SELECT kind, time, person, message, body FROM events ORDER BY number"
-        ):
-            yield Event(kind, time, person, message, json.loads(body))
+        with self._readable():
+            for kind, time, person, message, body in self._db.execute(
+                "SELECT kind, time, person, message, body FROM events ORDER BY number"
+            ):
+                yield Event(kind, time, person, message, json.loads(body))
+
+    @contextlib.contextmanager
+    def _readable(self) -> Iterator[None]:
+        """Say of which file it is that it is damaged."""
+        try:
+            yield
+        except (sqlite3.DatabaseError, UnicodeDecodeError, json.JSONDecodeError, TypeError) as e:
+            raise UnableError(f"{self._path} is damaged ({e}); put a copy of it back, or name another folder") from e
 
     async def append(self, event: Event) -> None:
         """Returns when the event is on disk; events are kept in the order of the calls."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+from assets.json_file import read_toml
 from embodied.records import RecordError, from_plain
 
 KINDS = ("play", "rate", "describe")
@@ -138,6 +138,6 @@ def load_study(path: Path) -> Study:
       StudyError: no TOML, or not a study; says where.
     """
     try:
-        return from_plain(Study, tomllib.loads(Path(path).read_text(encoding="utf-8")), "study")
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecordError) as e:
-        raise StudyError(f"{path}: {e}") from e
+        return from_plain(Study, read_toml(path), "study")
+    except RecordError as e:
+        raise StudyError(str(e) if str(e).startswith(str(path)) else f"{path}: {e}") from e

@@ -28,6 +28,7 @@ from agents.iliad.regex.words import read_words
 from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written
 from agents.iliad.training import IliadProblem, train
 from assets.cache import digest
+from assets.json_file import read_text
 from embodied.identity import differences, identity_of, read_finished, write_finished
 from embodied.records import from_plain, to_json
 from embodied.seeds import stream
@@ -125,7 +126,7 @@ def load_student(path: Path) -> tuple[RegexStudent, RegexConfig]:
 
 def _data(config: RegexConfig, path: Path, words: Path | None, templates: Path | None) -> RegexData:
     """The data of a folder, made if it is not there."""
-    own = {name: p.read_text(encoding="utf-8") for name, p in (("words", words), ("templates", templates)) if p}
+    own = {name: read_text(p) for name, p in (("words", words), ("templates", templates)) if p}
     identity = {**data_of(config), **{k: digest(v) for k, v in own.items()}}
     if path.exists():
         made_of, body = read_finished(path)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from assets.json_file import read_text
 from embodied.seeds import stream
 
 _PARTS = {
@@ -44,7 +45,7 @@ def read_words(path: Path) -> tuple[str, ...]:
     Raises:
       ValueError: there are fewer than a thousand.
     """
-    lines = Path(path).read_text(encoding="utf-8").split("\n")
+    lines = read_text(path).split("\n")
     found = tuple(dict.fromkeys(line for line in lines if _WORD.fullmatch(line)))
     if len(found) < 1000:
         raise ValueError(

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import difflib
 import functools
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from assets.catalogue import Catalogue
-from assets.json_file import RecordError, from_plain
+from assets.json_file import RecordError, from_plain, read_toml
 
 FILES = ("groups.toml", "rooms.toml", "smalls.toml")
 BUILT = ("kitchen_line",)
@@ -364,8 +363,9 @@ def tables(own: tuple[Path, ...] = ()) -> Tables:
     """
     plain: dict[str, Any] = {}
     for path in (*(Path(__file__).with_name(name) for name in FILES), *own):
+        added = read_toml(path)
         try:
-            plain = _joined(plain, tomllib.loads(path.read_text()))
+            plain = _joined(plain, added)
             plain = {section: _alike(section, entries) for section, entries in plain.items()}
             found = from_plain(Tables, plain, "furniture") if path.name == FILES[-1] or path in own else None
             if found is not None:
@@ -384,7 +384,7 @@ def tables_of(catalogue: Catalogue) -> Tables:
     """
     found = tables(catalogue.groups)
     for path in catalogue.groups:
-        known, plain = {*found.roles, *catalogue.classes}, tomllib.loads(path.read_text())
+        known, plain = {*found.roles, *catalogue.classes}, read_toml(path)
         for name in plain.get("groups", {}):
             for role in (r for p in found.groups[name].parts for r in (p.role, *p.other) if r):
                 if role not in known:

@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from assets.archives import read_picture
 from assets.cache import atomic_path, digest
 from assets.closure import code_digest
 from embodied.light.arrays import Array
@@ -79,7 +80,7 @@ def maps_code() -> str:
 
 def read_colours(path: str) -> np.ndarray:
     """(h, w, 3) uint8 sRGB of an image file."""
-    image = cv2.imread(path, cv2.IMREAD_COLOR)
+    image = read_picture(path)
     if image is None:
         raise OSError(f"texture {path} is missing or damaged; delete {Path(path).parent}, it is made again")
     return np.ascontiguousarray(image[..., ::-1])

@@ -16,7 +16,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from assets.archives import open_arrays
+from assets.archives import open_arrays, read_picture
 from assets.cache import write_bytes
 from assets.json_file import read_json
 from embodied.house.house import House
@@ -107,7 +107,7 @@ class Bake:
         """One page before exposure."""
         with open_arrays(self.folder / page_files(page)[0]) as z:
             soft, glow = z["soft"], z["glow"]
-        sun = np.asarray(cv2.imread(str(self.folder / f"sun_{page:03d}.png"), cv2.IMREAD_GRAYSCALE))
+        sun = _read_picture(self.folder / f"sun_{page:03d}.png", cv2.IMREAD_GRAYSCALE)
         shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
         return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
 
@@ -201,8 +201,8 @@ def _drop_damaged(folder: Path) -> None:
     path.unlink(missing_ok=True)
 
 
-def _read_picture(path: Path) -> np.ndarray:
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+def _read_picture(path: Path, mode: int = cv2.IMREAD_COLOR) -> np.ndarray:
+    image = read_picture(path, mode)
     if image is None:
         raise StaleBake(f"{path} is missing or damaged; run `embodied light` again")
-    return np.ascontiguousarray(image[..., ::-1])
+    return image if image.ndim == 2 else np.ascontiguousarray(image[..., ::-1])
