@@ -149,7 +149,7 @@ ROOM = '{"kind": "hall", "polygon": [[0, 0], [%s, 0], [%s, 6], [0, 6]]}'
         '{"rooms": [%s]}' % (ROOM % ("1e999", "1e999")),
         '{"rooms": [%s]}' % (ROOM % ("NaN", "NaN")),
         '{"rooms": [], "rooms": [%s]}' % (ROOM % (2, 2)),
-        '{"rooms": [%s]}' % ", ".join([ROOM % (2, 2)] * 5000),
+        f'{{"rooms": [{", ".join([ROOM % (2, 2)] * 5000)}]}}',
         "[]",
         '{"rooms": {"kind": "hall"}}',
     ],
