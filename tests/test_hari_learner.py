@@ -13,10 +13,11 @@ from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.checkpoint import CheckpointError
+from agents.common.playing import Ground
 from agents.hari import pretraining
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import IntentionRun, TaskSplit, counts_of, learn_once, train, values
+from agents.hari.intention import IntentionRun, counts_of, learn_once, train, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from agents.hari.policy import DO, DONE, Belief, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from agents.hari.pretraining import (
@@ -454,7 +455,7 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
     agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
     run = IntentionRun(agent, new_heads(config, SMALL.hidden_size)[1])
     world = fork_world()
-    ground = TaskSplit({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
+    ground = Ground({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
     for update in range(config.updates):
         learn_once(run, ground, update)
     episodes = play(fork_env, policy_of(agent, sample=False), [fork_task(1), fork_task(2)], seed=0)
@@ -503,7 +504,7 @@ def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
         pretrain(other, lessons, tmp_path / "parts", identity(other.config), note=silent)
 
     say = lessons.describer
-    ground = TaskSplit(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
+    ground = Ground(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
     runs = {}
     for name, stops in (("one", (3,)), ("two", (1, 3))):
         for updates in stops:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -20,34 +19,25 @@ from torch import Tensor
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.checkpoint import Stateful
+from agents.common.playing import Ground
 from agents.common.session import Note, Progress, Session, descend, seed_of, tasks_of_update
 from agents.hari.agent import HariAgent, save_agent
 from agents.hari.networks import INTENTIONS, RecurrentHead
 from agents.hari.policy import Choice, policy_of
-from embodied.envs.base import HelpEnv
 from embodied.envs.hari import shaped_costs
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
-from embodied.interface import Ask, Episode, Move, Place, Task
+from embodied.interface import Ask, Episode, Move, Place
 
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
-
-
-@dataclass(frozen=True, eq=False)
-class TaskSplit:
-    """Where the intention policy learns and is validated."""
-
-    places: Mapping[str, Place]
-    tasks: Sequence[Task]
-    make_env: Callable[[], HelpEnv]
 
 
 def train(
     agent: HariAgent,
     critic: RecurrentHead,
-    training: TaskSplit,
-    validation: TaskSplit,
+    training: Ground,
+    validation: Ground,
     folder: Path,
     identity: Identity,
     *,
@@ -88,7 +78,7 @@ def train(
             if session.due(config.validate_every):
                 episodes = _validation_of(agent, validation)
                 cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
-                session.record({"episodes": len(episodes), "cost": cost, **numbers_of(episodes, validation.places)})
+                session.record({"episodes": len(episodes), "cost": cost, **numbers_of(episodes, validation.worlds)})
                 if session.improved(-cost):  # what is optimised: the mean cost, task errors included
                     save_agent(agent, session.folder / "best.safetensors", identity)
                 if on_validation:
@@ -113,7 +103,7 @@ class IntentionRun:
         return {**heads, "actor optimizer": self.actor_optimizer, "critic optimizer": self.critic_optimizer}
 
 
-def learn_once(run: IntentionRun, ground: TaskSplit, update: int) -> dict[str, float]:
+def learn_once(run: IntentionRun, ground: Ground, update: int) -> dict[str, float]:
     """One update: of the critic alone among the first `critic_iterations`, else of both; returns numbers to report."""
     config = run.agent.config
     tasks = tasks_of_update(ground.tasks, update, config.batch, config.seed)
@@ -121,14 +111,14 @@ def learn_once(run: IntentionRun, ground: TaskSplit, update: int) -> dict[str, f
     choices: list[Choice] = []
     run.policy.choices = choices
     episodes = play(ground.make_env, run.policy, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
-    costs, mask = padded([shaped_costs(e, ground.places[e.task.world].graph.hops) for e in episodes])
+    costs, mask = padded([shaped_costs(e, ground.worlds[e.task.world].graph.hops) for e in episodes])
     log_p, entropy = chosen(choices, len(tasks))
     decisions = Decisions(log_p, -values(run.critic, choices, len(tasks)), -costs_to_go(costs, mask), mask)
     descend(critic_loss(decisions), run.critic_optimizer, f"update {update}, critic", config.clip)
     if update >= config.critic_iterations:
         bonus = config.entropy * (entropy * mask).sum() / len(tasks)
         descend(actor_loss(decisions) - bonus, run.actor_optimizer, f"update {update}, actor", config.clip)
-    return numbers_of(episodes, ground.places) | {
+    return numbers_of(episodes, ground.worlds) | {
         "cost": float((costs * mask).sum() / len(tasks)),
         "critic": float(critic_loss(decisions).detach()),
         "entropy": float((entropy.detach() * mask).sum() / mask.sum()),
@@ -189,7 +179,7 @@ def numbers_of(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict
     return {"success": success, **counts_of(episodes)}
 
 
-def _validation_of(agent: HariAgent, ground: TaskSplit) -> Sequence[Episode]:
+def _validation_of(agent: HariAgent, ground: Ground) -> Sequence[Episode]:
     config, tasks = agent.config, ground.tasks[: agent.config.validation_tasks]
     with torch.inference_mode():
         return play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)

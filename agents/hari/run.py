@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from agents.common.playing import Ground
 from agents.common.session import Note, Progress
 from agents.common.tensor_file import checksum_of
 from agents.common.weights import weights_digest
 from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import TaskSplit, train
+from agents.hari.intention import train
 from agents.hari.pretraining import PretrainingData, pretrain
 from agents.hari.words import feature_words
 from embodied.datasets.store import Dataset
@@ -38,13 +39,13 @@ def rules_of(config: IntentionConfig) -> HariRules:
     return HariRules(costs, config.stack, config.longest, config.cooperative, horizon=config.horizon, kept=config.kept)
 
 
-def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> TaskSplit:
+def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:
     """Some splits as one place to learn or to be validated in; at most `limit` tasks, from all splits alike."""
     parts = [data.split(s, hari=rules_of(config)) for s in splits]
     each = None if limit is None else -(-limit // len(splits))
     tasks = [t for part in parts for t in spread(part.tasks, each)]
     places: Mapping[str, Place] = {name: place for part in parts for name, place in part.worlds.items()}
-    return TaskSplit(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
+    return Ground(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
 
 
 def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[[], HelpEnv]:
@@ -106,7 +107,7 @@ def train_intention(
     training = task_split_of(data, ["train"], config)
     validation = task_split_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)
     size = sum(p.numel() for p in actor.parameters())
-    note(f"{len(training.tasks)} tasks in {len(training.places)} houses, {size:,} parameters of each head")
+    note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {size:,} parameters of each head")
     agent, watch = HariAgent(executor, actor, config), on_validation
     identity = intention_identity(data, executor, config)
     return train(agent, critic, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
