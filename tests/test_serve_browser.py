@@ -73,6 +73,7 @@ class Someone:
         self.page.on("dialog", lambda d: d.accept())
         self.page.goto(server.links["join"][0])
         self.press("I have read this and take part")
+        self.press("Begin")
 
     def press(self, name):
         self.page.get_by_role("button", name=name, exact=True).click()

@@ -28,7 +28,7 @@ from embodied.serve.driving import Live
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.results import summary
-from embodied.serve.screens import houses_of, live_name, plan_of, screen_of
+from embodied.serve.screens import coming, houses_of, live_name, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions
 from embodied.serve.store import Event, Store
 from embodied.serve.study import LONGEST_TEXT
@@ -235,9 +235,8 @@ class Server:
         person.connected = 1
         if older is not None:
             with suppress(RuntimeError, WebSocketDisconnect):
-                await older.send_text(
-                    json.dumps({"screen": "refused", "text": "This study is open in another window."})
-                )
+                text = "This study is open in another window."
+                await older.send_text(json.dumps({"screen": "refused", "text": text, "elsewhere": True}))
                 await older.close(4409)
         await socket.send_text(json.dumps({"token": token}))
         await self.settle(person)
@@ -295,7 +294,7 @@ class Server:
             person.ready = True
         elif do == "consent":
             await self.happen(Event("consented", now, person.id, name))
-            person.ready = True
+            person.ready = not any(coming(self.sessions, person).values())  # else they read that first
         elif do == "leave":
             await self.happen(Event("ended", now, person.id, name, {"person": person.id, "why": "left"}))
             await self.late()

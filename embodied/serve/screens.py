@@ -56,7 +56,8 @@ def coming(sessions: Sessions, person: Person) -> Screen:
         if person.done[part.name] < part.per_person and part.name not in person.without:
             role = person.roles.get(part.name) or (part.roles[0] if len(part.roles) == 1 else None)
             practise = sessions.study.practice and part.kind == "play" and role not in person.practised
-            return {"advice": part.advice, "role": role, "practise": practise}
+            shown = "alone" if role == "agent" and part.assistant == "none" else role
+            return {"advice": part.advice, "role": shown, "practise": practise}
     return {"advice": "", "role": None, "practise": False}
 
 

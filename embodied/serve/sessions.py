@@ -217,34 +217,35 @@ class Sessions:
         yield from (unit for unit, game in self._episodes[part.of] if not mine & set(game.people.values()))
 
     def next(self, person: Person, now: float) -> list[Event]:
-        """What begins for somebody who is ready: events to happen; none while they wait."""
+        """What begins for somebody: events to happen; none while they read or wait."""
         waited, person.waiting = person.waiting, None
-        if person.ended or not (person.consented and person.ready) or person.game or person.viewing:
+        if person.ended or not person.consented or person.game or person.viewing:
             return []
         for part in self.study.parts:
             if person.done[part.name] >= part.per_person or part.name in person.without:
                 continue
-            if part.kind != "play":
-                if (unit := self.wanted(part, person)) is not None:
-                    return [_event("viewing", now, person=person.id, part=part.name, unit=unit)]
-                continue
-            if self.wanted(part, person) is None:
+            if (unit := self.wanted(part, person)) is None:
                 continue
             role = person.roles.get(part.name)
+            if part.kind == "play" and role is None:  # before they are ready, who read what to do
+                return [_event("role", now, person=person.id, part=part.name, role=self._scarce_role(part))]
+            if not person.ready:
+                return []
             if role is None:
-                role = self._scarce_role(part)
-                return [_event("role", now, person=person.id, part=part.name, role=role)]
+                return [_event("viewing", now, person=person.id, part=part.name, unit=unit)]
             if self.study.practice and role not in person.practised:
                 return [self._begin(part, {role: person}, None, now)]
             if len(part.roles) == 1:
-                return [self._begin(part, {role: person}, self.wanted(part, person), now)]
+                return [self._begin(part, {role: person}, unit, now)]
             for other in self._waiting(part, role):
-                if (unit := self.wanted(part, person, other)) is not None:
-                    return [self._begin(part, {role: person, other.roles[part.name]: other}, unit, now)]
+                if (shared := self.wanted(part, person, other)) is not None:
+                    return [self._begin(part, {role: person, other.roles[part.name]: other}, shared, now)]
             since = waited[1] if waited is not None and waited[0] == part.name else now
             if now - since > self.study.wait_seconds:
                 return [_event("alone", now, person=person.id, part=part.name)]
             person.waiting = part.name, since
+            return []
+        if not person.ready:
             return []
         served = sum(person.done.values()) > 0 or person.without  # whoever waited in vain did their share
         return [_event("ended", now, person=person.id, why="done" if served else "nothing")]

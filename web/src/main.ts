@@ -79,6 +79,7 @@ function leave(): void {
 
 const ROLES: Record<string, string> = {
   agent: "You walk through a house and look for something. You can ask for help.",
+  alone: "You go through a house and look for something.",
   assistant: "You help somebody who walks through a house. You see the plan; they do not.",
   rater: "You watch how an agent did what it was asked, and give stars.",
   describer: "You watch somebody walk, and describe the way in words.",
@@ -135,7 +136,7 @@ class PlainView implements View<Plain> {
         this.put(
           title("This page cannot go on"),
           h("p", {}, screen.text ?? ""),
-          button("Continue here", () => connection.open(true), "primary"),
+          button(screen.elsewhere ? "Continue here" : "Try again", () => connection.open(true), "primary"),
         );
         break;
       default:

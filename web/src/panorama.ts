@@ -92,6 +92,7 @@ export class Panorama {
 
   /** Shows ways to go as buttons in the picture. */
   offer(ways: Way[], go: (way: Way) => void): void {
+    if (this.marks.contains(document.activeElement)) this.root.focus({ preventScroll: true }); // the next Tab goes on here
     this.marks.replaceChildren();
     this.ways = ways.map((way) => {
       const mark = h("button", { type: "button", class: "mark", click: () => go(way) });

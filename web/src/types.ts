@@ -99,6 +99,7 @@ export interface Plain extends Base {
   thanks?: string;
   code?: string | null;
   why?: string;
+  elsewhere?: boolean;
   people?: Record<string, number>;
   dropout?: number | null;
   parts?: Record<string, string | number | null>[];
