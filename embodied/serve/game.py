@@ -144,7 +144,8 @@ class Game:
     def __post_init__(self) -> None:
         if self.practice:
             self.relay = Relay()
-            self.env: HelpEnv = TalkEnv(self.table.places, self.relay, PanoramicMoves())
+            helped = self.table.part.assistant != "none"
+            self.env: HelpEnv = TalkEnv(self.table.places, self.relay if helped else None, PanoramicMoves())
             self.agent: Agent | None = None if "agent" in self.people else Follower()
             self.assistant: Any = None if "assistant" in self.people else PathSpeaker()
         else:
