@@ -19,9 +19,16 @@ from hand_serve import TOGETHER, Human, Served, make_data, pair, write_study
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from agents.common.shipped import SHIPPED_ENCODER
+from agents.vision.encoder import load_encoder
+from agents.vision.features import feature_path, save_features
 from embodied.bench.serve import load
+from embodied.cli.serve import agents_of
+from embodied.datasets.store import Dataset
+from embodied.evaluation.rollout import play
 from embodied.interface import Episode
 from embodied.records import load_lines
+from embodied.render.pictures import PictureSettings
 
 ROOT = Path(__file__).resolve().parent.parent
 pytestmark = pytest.mark.slow
@@ -228,3 +235,15 @@ def test_the_caddyfile_of_the_tutorial_serves_a_study_behind_tls(folder, tmp_pat
     finally:
         caddy.terminate()
         server.stop()
+
+
+def test_the_shipped_agent_takes_part_with_what_embodied_features_left(folder):
+    data = Dataset(folder / "data")
+    encoder, places = load_encoder(SHIPPED_ENCODER), data.split("val_seen").worlds
+    for name, place in places.items():
+        blank, pictures = np.zeros((len(place.graph.ids), 36, encoder.size)), PictureSettings(64)
+        path = feature_path(data.folder / "features", encoder.digest, name, pictures)
+        save_features(path, blank, encoder, place.house.digest, pictures)
+    agent = agents_of(data.folder, lambda: None)["shipped"](places)
+    (episode,) = play(data.split("val_seen").make_env, agent, data.tasks("val_seen")[:1], seed=0)
+    assert episode.steps[0].action.thought is not None

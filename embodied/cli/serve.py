@@ -147,16 +147,18 @@ def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentM
     data = Dataset(folder)
 
     def shipped(places: Mapping[str, Place]) -> Agent:
-        from agents.common.shipped import SHIPPED_AGENT, SHIPPED_VNLA
+        from agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER, SHIPPED_VNLA
         from agents.hanna.agent import load_agent as hanna
         from agents.vision.drawn import pictures_of
+        from agents.vision.encoder import load_encoder
         from agents.vision.features import feature_path, load_bank
         from agents.vnla.agent import load_agent as vnla
 
         agent = vnla(SHIPPED_VNLA) if data.kind == "vnla" else hanna(SHIPPED_AGENT)
         pictures = {n: pictures_of(data, n, None) for n in places}
-        paths = {n: feature_path(data.folder / "features", agent.encoder_digest, n, pictures[n]) for n in places}
-        return agent.policy(load_bank(paths, agent.encoder_digest, places, pictures))
+        encoder = load_encoder(SHIPPED_ENCODER).digest
+        paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in places}
+        return agent.policy(load_bank(paths, encoder, places, pictures))
 
     def model(places: Mapping[str, Place]) -> Agent:
         from agents.language_models.agent import LanguageModelAgent
