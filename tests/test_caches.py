@@ -3,14 +3,7 @@
 from __future__ import annotations
 
 import os
-import shutil
-import subprocess
-import sys
-import tempfile
 import time
-from pathlib import Path
-
-import pytest
 
 import assets.cache
 from embodied.cli import main
@@ -58,48 +51,3 @@ def test_shared_caches_that_lead_back_or_are_not_there_do_no_harm(tmp_path, monk
         assert assets.cache.default_cache() == mine
         assert [p.relative_to(mine).as_posix() for p in sorted(mine.rglob("*"))] == ["light", "light/a.npz"]
     assert f"EMBODIED_CACHE names {tmp_path / 'nowhere'}, which is left out: " in caplog.text
-
-
-def as_somebody(words: list[str], **more: str) -> subprocess.CompletedProcess[str]:
-    """A command line run by a user who owns nothing here."""
-    who = {"user": 65534, "group": 65534, "extra_groups": []} if os.geteuid() == 0 else {}
-    env = {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), **more}
-    return subprocess.run([sys.executable, *words], capture_output=True, text=True, env=env, cwd="/", **who)
-
-
-@pytest.fixture
-def lent():
-    """A folder that everybody may enter, where a user who owns nothing may write to `out` only."""
-    try:
-        as_somebody(["-c", "import embodied"]).check_returncode()
-    except (PermissionError, subprocess.CalledProcessError):
-        pytest.skip("this Python may not be run by other users")
-    folder = Path(tempfile.mkdtemp())
-    folder.chmod(0o755)
-    (folder / "out").mkdir()
-    (folder / "out").chmod(0o777)
-    yield folder
-    for path in folder.rglob("*"):
-        path.chmod(0o700)
-    shutil.rmtree(folder)
-
-
-@pytest.mark.slow
-def test_somebody_who_may_only_read_the_cache_is_told_or_reads_it_behind_one_of_their_own(lent):
-    filled = lent / "cache"
-    order = ["house", "--seed", "1", "--area", "38", "46", "--cache"]
-    assert main([*order, str(filled), "--out", str(lent / "first")]) == 0
-    before = sorted((p, p.stat().st_mtime_ns) for p in filled.rglob("*"))
-    for path in (filled, *filled.rglob("*")):
-        path.chmod(0o555 if path.is_dir() else 0o444)
-    alone = as_somebody(["-m", "embodied", *order, str(filled), "--out", str(lent / "out" / "alone")])
-    assert alone.returncode == 0 or (alone.returncode == 2 and "--cache" in alone.stderr), alone.stderr
-    assert "Traceback" not in alone.stderr
-    both = os.pathsep.join((str(lent / "out" / "mine"), str(filled)))
-    behind = as_somebody(["-m", "embodied", *order[:-1], "--out", str(lent / "out" / "h")], EMBODIED_CACHE=both)
-    assert behind.returncode == 0, behind.stderr
-    assert (lent / "out" / "h" / "house.json").read_bytes() == (lent / "first" / "house.json").read_bytes()
-    assert sorted((p, p.stat().st_mtime_ns) for p in filled.rglob("*")) == before
-    filled.chmod(0o000)
-    closed = as_somebody(["-m", "embodied", *order, str(filled), "--out", str(lent / "out" / "closed")])
-    assert closed.returncode == 2 and str(filled) in closed.stderr and "Traceback" not in closed.stderr, closed.stderr
