@@ -27,7 +27,10 @@ from agents.vision.features import (
     save_features,
 )
 from agents.vision.strip import HEIGHT, VFOV, WIDTH
+from assets.cache import digest, write_json
 from assets.catalogue import load_catalogue
+from assets.closure import code_digest
+from assets.json_file import read_json
 from embodied.datasets.store import Dataset
 from embodied.generate.another_day import another_day
 from embodied.house.house import House
@@ -83,6 +86,16 @@ def house_at(data: Dataset, name: str, occasion: Occasion, cache: Path) -> House
     starts = [r.path[0] for r in routes]
     house = another_day(place.house, place.graph, load_catalogue(cache), starts, day=occasion.day)
     return lightings_of(house, occasion.lighting + 1)[-1]
+
+
+def digest_at(data: Dataset, name: str, occasion: Occasion, cache: Path) -> str:
+    """The digest of that house, kept in the cache: another day takes a second to make."""
+    code = code_digest("agents.vision.occasions")
+    key = digest([data.digest, name, occasion.lighting, occasion.day, code])
+    path = cache / "days" / f"{key[:32]}.json"
+    if not path.exists():
+        write_json(path, {"house": house_at(data, name, occasion, cache).digest})
+    return str(read_json(path)["house"])
 
 
 def make_shown(
@@ -165,7 +178,7 @@ def showing(
     shown = {}
     for name in names:
         pictures = pictures_of(data, name, picture_kind)
-        path, source = shown_path(data, name, occasion, encoder, pictures), house_at(data, name, occasion, cache).digest
+        path, source = shown_path(data, name, occasion, encoder, pictures), digest_at(data, name, occasion, cache)
         shown[name], _ = load_features(path, encoder=encoder, source=source, pictures=pictures)
     return bank.showing(shown)
 

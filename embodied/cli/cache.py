@@ -16,7 +16,18 @@ from typing import Annotated
 from embodied.cli.common import Cached, Printed, show
 from embodied.cli.options import Option, whole
 
-KINDS = ("assets", "materials", "collision", "landscapes", "light", "panoramas", "sightings", "semantic", "paths")
+KINDS = (
+    "assets",
+    "materials",
+    "collision",
+    "landscapes",
+    "light",
+    "panoramas",
+    "sightings",
+    "semantic",
+    "paths",
+    "days",
+)
 """Folders that the program makes in a cache; nothing else in it is counted or removed."""
 
 
