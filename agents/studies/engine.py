@@ -338,7 +338,7 @@ def result(
     key = f"{learner.name}-{name}".lower().replace(" ", "-")
     printed = _printed().get(key, {})
     shown, missing, columns, runs = [], [], dict[str, dict[str, str]](), dict[str, list[str]]()
-    seconds, codes = 0.0, dict[str, Any]()
+    seconds, codes = dict[str, float](), dict[str, Any]()
     for row in table.rows:
         found = {} if rows is not None and row.label not in rows else _found(learner, table, row, out)
         if not found:
@@ -356,12 +356,12 @@ def result(
             home = _home(learner, out, row, seed)
             identity, facts = read_finished(home / "trained.json")
             runs.setdefault(row.label, []).append(home.name)
-            seconds += float(facts["seconds"])
+            seconds[home.name] = float(facts["seconds"])  # several rows may judge one run
             codes = {k: identity.get(k) for k in (MAKERS, CODE)}
         shown.append({"label": row.label, "values": values, "printed": printed.get("rows", {}).get(row.label, {})})
     notes = [*(f"Not run: {', '.join(missing)}." for _ in missing[:1]), *_comparisons(learner, table, out, rows)]
     if seconds:
-        notes.append(f"Processor time of training: {seconds / 3600:.2f} hours.")
+        notes.append(f"Processor time of training: {sum(seconds.values()) / 3600:.2f} hours.")
     identity = {"judged": identity_of(*learner.judges), "trained": codes or identity_of(*learner.judges), "runs": runs}
     identity |= {"settings": learner.about()}
     return {
