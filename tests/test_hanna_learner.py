@@ -551,7 +551,8 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
         "config = dataclasses.replace(t.TINY, iterations=10**6, validate_every=10**6)\n"
         "split = t.setting(); agent = t.agent_for(split, config)\n"
         "note = lambda line: print(line, flush=True)\n"
-        "t.train(agent, split, split, t.HannaTeacher(), Path(sys.argv[1]), t.identity(agent), note=note)\n"
+        "learner = t.HannaLearner(agent, split, t.HannaTeacher())\n"
+        "t.spine.train(learner, split, Path(sys.argv[1]), t.identity(agent), note=note)\n"
     )
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}
     process = subprocess.Popen(

@@ -296,7 +296,7 @@ def build_unit(
     with drafts(home.parent) as private:
         draft = private / unit.name
         draft.mkdir()
-        _write_unit(unit, config, draft, load_catalogue(cache, packs, own), make_house)
+        _write_unit(unit, config, draft, load_catalogue(cache, packs, own), cache, make_house)
         draft.rename(home)
     return unit.name
 
@@ -319,7 +319,9 @@ def make_dataset_house(seed: int, name: str, config: HouseConfig, catalogue: Cat
     raise HouseError(f"no house for {name!r} after {SEEDS} seeds; the last said {problems[-1]}")
 
 
-def _write_unit(unit: Unit, config: DatasetConfig, home: Path, catalogue: Catalogue, make_house: HouseMaker) -> None:
+def _write_unit(
+    unit: Unit, config: DatasetConfig, home: Path, catalogue: Catalogue, cache: Path, make_house: HouseMaker
+) -> None:
     novelty = config.novelty_of(unit.group)
     language = VOICES[config.language](novelty)
     house, graph = make_house(config.seed, unit.name, HouseConfig(area=config.area, novelty=novelty), catalogue)
@@ -334,7 +336,7 @@ def _write_unit(unit: Unit, config: DatasetConfig, home: Path, catalogue: Catalo
         else:
             paths = route_paths(graph, unit.name, seed=config.seed, house_split=house_split, starts=met)
         house = house if met is None else add_people(house, met, (p[0] for p in paths))
-    with open_world(house, catalogue, catalogue.cache, graph=graph) as world:
+    with open_world(house, catalogue, cache, graph=graph) as world:
         routes = worded(world, paths, wording, seed=config.seed, language=language)
         tasks = part_tasks(
             config.kind,
