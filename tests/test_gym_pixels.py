@@ -6,6 +6,7 @@ import math
 
 import gymnasium as gym
 import numpy as np
+import psutil
 import pytest
 from conftest import two_rooms
 from hand_data import built
@@ -20,7 +21,7 @@ from embodied.envs.base import HelpEnv
 from embodied.gym import eyes as module
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import FAR, AllEyes, Closed, FeatureEyes, PanoramaStore, PictureEyes, ViewSettings, checked_sees
-from embodied.gym.in_step import SharedSyncVectorEnv, refuse_too_many
+from embodied.gym.in_step import SharedSyncVectorEnv, free_memory, refuse_too_many
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import FindObject, Move, Pose, Sight, Stop, Task
 from embodied.navigation.graph import graph_of
@@ -170,7 +171,8 @@ def test_pixels_of_a_place_that_nobody_can_draw_are_refused(tmp_path):
 
 def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monkeypatch):
     space = gym.spaces.Dict({"rgb": gym.spaces.Box(0, 255, (1024, 1024, 3), np.uint8)})
-    monkeypatch.setattr("psutil.virtual_memory", lambda: type("Memory", (), {"available": 2**30})())
+    assert free_memory() == pytest.approx(psutil.virtual_memory().available, rel=0.1)
+    monkeypatch.setattr("embodied.gym.in_step.free_memory", lambda: 2**30)
     refuse_too_many(8, space)
     with pytest.raises(ValueError, match=r"1000 environments hold about 5\.9 GiB .* 1\.0 GiB are free"):
         refuse_too_many(1000, space)

@@ -23,7 +23,7 @@ from embodied.distribution import DISTRIBUTION
 from embodied.software import bring_atomic, load_atomic, unpack
 
 LIBRARIES = (
-    DISTRIBUTION, "mujoco-core", "trimesh", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",
+    DISTRIBUTION, "mujoco-core", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",
 )  # fmt: skip
 """What houses, light and pictures need."""
 EXTRAS = {"agents": ("torch", "safetensors"), "viz": ("rerun-sdk", "av", "matplotlib"), "data": ("pyarrow",)}

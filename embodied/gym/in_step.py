@@ -10,13 +10,13 @@ write straight into the batch. For several processes, use Gymnasium's AsyncVecto
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
-import psutil
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -195,10 +195,20 @@ def mask_of(options: dict[str, Any], num_envs: int) -> np.ndarray:
     return mask
 
 
+def free_memory() -> int:
+    """Bytes that can be had without swapping."""
+    if sys.platform == "linux":
+        with open("/proc/meminfo") as lines:
+            return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
+    import psutil  # which is installed there only
+
+    return int(psutil.virtual_memory().available)
+
+
 def refuse_too_many(num_envs: int, space: gym.spaces.Dict) -> None:
     """Raises ValueError where the observations of a batch do not fit into memory."""
     each = sum(int(np.prod(s.shape)) * np.dtype(s.dtype).itemsize for s in space.values() if s.shape is not None)
-    wanted, free = COPIES * num_envs * each, psutil.virtual_memory().available
+    wanted, free = COPIES * num_envs * each, free_memory()
     if wanted > 0.8 * free:
         raise ValueError(
             f"{num_envs} environments hold about {wanted / 2**30:.1f} GiB of observations, {free / 2**30:.1f} GiB "

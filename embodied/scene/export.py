@@ -7,19 +7,19 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import mujoco
 import numpy as np
 import PIL.Image
 import shapely
-import trimesh
 
 from assets.cache import write_bytes
 from assets.records import Finish
 from embodied.house.house import House
 from embodied.house.shapes import footprint
+from embodied.scene.glb import GlbWriter, turned
 from embodied.scene.house_meshes import Part, house_parts
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import UNDERFOOT, build_spec, compile_spec, load_texture
@@ -106,59 +106,56 @@ def export_glb(house: House, catalogue: Catalogue, path: Path, *, ceilings: bool
     parts = house_parts(house, catalogue)
     if not ceilings:
         parts = tuple(p for p in parts if p.kind != "ceiling" and p.owner != "outdoor/roof")
-    scene = glb_scene(parts)
-    write_bytes(Path(path), scene.export(file_type="glb"))
+    write_bytes(Path(path), glb_of(parts))
     return Path(path)
 
 
-def glb_scene(parts: Sequence[Part]) -> trimesh.Scene:
-    """The parts as a trimesh scene, y up; equal mesh keys share one geometry."""
-    scene = trimesh.Scene()
-    upright = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
-    materials: dict[Finish, trimesh.visual.material.PBRMaterial] = {}
+def glb_of(parts: Sequence[Part]) -> bytes:
+    """The parts as binary glTF; equal mesh keys share one mesh, equal finishes one material."""
+    glb = GlbWriter()
     count: dict[str, int] = {}
     for part in parts:
         if not len(part.mesh.faces):
             continue
-        pose = trimesh.transformations.rotation_matrix(part.yaw, [0, 0, 1])
-        pose[:3, 3] = part.position
         k = count[part.owner] = count.get(part.owner, -1) + 1
-        node = part.owner if k == 0 else f"{part.owner}#{k}"
-        if part.mesh_key in scene.geometry:
-            scene.graph.update(frame_to=node, matrix=upright @ pose, geometry=part.mesh_key)
-            continue
-        finish = part.mesh.finish
-        if finish not in materials:
-            materials[finish] = pbr_material(finish)
-        visual = trimesh.visual.TextureVisuals(uv=part.mesh.uv, material=materials[finish])
-        mesh = trimesh.Trimesh(
-            part.mesh.vertices, part.mesh.faces, vertex_normals=part.mesh.normals, visual=visual, process=False
-        )
-        scene.add_geometry(mesh, node_name=node, geom_name=part.mesh_key, transform=upright @ pose)
-    return scene
+        mesh = glb.number("meshes", part.mesh_key)
+        if mesh is None:
+            held, uv = part.mesh, part.mesh.uv
+            down = np.column_stack([uv[:, 0], 1 - uv[:, 1]])
+            material = glb.number("materials", held.finish)
+            if material is None:
+                material = glb.add("materials", held.finish, _material(glb, held.finish))
+            mesh = glb.mesh(part.mesh_key, material, held.vertices, held.faces, NORMAL=held.normals, TEXCOORD_0=down)
+        glb.node(part.owner if k == 0 else f"{part.owner}#{k}", mesh, turned(part.position, part.yaw))
+    return glb.data()
 
 
-def pbr_material(finish: Finish) -> trimesh.visual.material.PBRMaterial:
+def _material(glb: GlbWriter, finish: Finish) -> dict[str, Any]:
     """`finish` in glTF's metallic-roughness model; textures as JPEG unless they have holes."""
-    image = None if finish.texture is None else _picture(finish.texture)
-    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in finish.color[:3]]
-    has_holes = image is not None and image.mode == "RGBA"
-    return trimesh.visual.material.PBRMaterial(
-        baseColorTexture=image,
-        baseColorFactor=[1.0, 1.0, 1.0, finish.color[3]] if image else [*linear, finish.color[3]],
-        roughnessFactor=finish.roughness,
-        metallicFactor=finish.metallic,
-        doubleSided=True,
-        alphaMode="MASK" if has_holes else "BLEND" if finish.color[3] < 1 else "OPAQUE",
-        emissiveFactor=[min(1.0, e) for e in finish.emission] if finish.emission else None,
-    )
+    surface: dict[str, Any] = {"roughnessFactor": finish.roughness, "metallicFactor": finish.metallic}
+    alpha, has_holes = finish.color[3], False
+    if finish.texture is None:
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in finish.color[:3]]
+        surface["baseColorFactor"] = [*linear, alpha]
+    else:
+        image = PIL.Image.fromarray(load_texture(finish.texture))
+        has_holes = image.mode == "RGBA"
+        texture = glb.number("textures", finish.texture)
+        if texture is None:
+            texture = glb.texture(finish.texture, _picture(image))
+        surface |= {"baseColorTexture": {"index": texture}, "baseColorFactor": [1.0, 1.0, 1.0, alpha]}
+    material = {
+        "pbrMetallicRoughness": surface,
+        "doubleSided": True,
+        "alphaMode": "MASK" if has_holes else "BLEND" if alpha < 1 else "OPAQUE",
+    }
+    return material | ({"emissiveFactor": [min(1.0, e) for e in finish.emission]} if finish.emission else {})
 
 
-def _picture(path: str) -> PIL.Image.Image:
-    image = PIL.Image.fromarray(load_texture(path))
+def _picture(image: PIL.Image.Image) -> bytes:
     buffer = io.BytesIO()
     if image.mode == "RGBA":
         image.save(buffer, "PNG")
     else:
         image.save(buffer, "JPEG", quality=90)
-    return PIL.Image.open(buffer)
+    return buffer.getvalue()
