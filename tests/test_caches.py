@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
+import sys
 import time
+
+import pytest
 
 import assets.cache
 from embodied.cli import main
@@ -51,3 +56,50 @@ def test_shared_caches_that_lead_back_or_are_not_there_do_no_harm(tmp_path, monk
         assert assets.cache.default_cache() == mine
         assert [p.relative_to(mine).as_posix() for p in sorted(mine.rglob("*"))] == ["light", "light/a.npz"]
     assert f"EMBODIED_CACHE names {tmp_path / 'nowhere'}, which is left out: " in caplog.text
+
+
+UNPRIVILEGED = ["setpriv", "--bounding-set", "-all", "--inh-caps", "-all"]
+"""Before a command: root obeys the modes of files, and may not change what somebody else owns."""
+
+
+@pytest.fixture
+def filled(tmp_path, shared_cache):
+    """A cache that holds what one house needs; nobody may write there, and root's folders are somebody else's."""
+    folder = tmp_path / "cache"
+    for name in ("assets", "collision", "landscapes", "materials"):
+        (shared_cache / name).mkdir(parents=True, exist_ok=True)
+        assets.cache.link(shared_cache / name, folder / name)
+    assert main([*ORDER, "--out", str(tmp_path / "first"), "--cache", str(folder)]) == 0
+    (tmp_path / "empty").mkdir()
+    folders = [tmp_path / "empty", folder, *(p for p in folder.rglob("*") if p.is_dir())]
+    for path in folders:
+        if os.geteuid() == 0:
+            os.chown(path, 65534, 65534)
+        path.chmod(0o555)
+    yield folder
+    for path in folders:
+        path.chmod(0o755)
+
+
+ORDER = ("house", "--seed", "1", "--area", "38", "46")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.geteuid() == 0 and not shutil.which("setpriv"), reason="root may write everywhere")
+def test_somebody_who_may_only_read_the_cache_reads_it_or_is_told_and_puts_their_own_before_it(filled, tmp_path):
+    def house(out: str, cache: str) -> subprocess.CompletedProcess[str]:
+        words = [sys.executable, "-m", "embodied", *ORDER, "--out", str(tmp_path / out)]
+        env = os.environ | {"EMBODIED_CACHE": cache, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        before = UNPRIVILEGED if os.geteuid() == 0 else []
+        return subprocess.run([*before, *words], capture_output=True, text=True, env=env, cwd=tmp_path)
+
+    held = {p: p.lstat().st_mtime_ns for p in sorted(filled.rglob("*"))}
+    for out, cache in (("alone", str(filled)), ("behind", f"{tmp_path / 'mine'}{os.pathsep}{filled}")):
+        ran = house(out, cache)
+        assert ran.returncode == 0, ran.stderr
+        assert (tmp_path / out / "house.json").read_bytes() == (tmp_path / "first" / "house.json").read_bytes()
+    assert {p: p.lstat().st_mtime_ns for p in sorted(filled.rglob("*"))} == held
+    filled.chmod(0o000)
+    for cache in (filled, tmp_path / "empty"):
+        ran = house("refused", str(cache))
+        assert ran.returncode == 2 and str(cache) in ran.stderr and "Traceback" not in ran.stderr, ran.stderr
