@@ -16,7 +16,8 @@ from dm_control import mjcf as dm_mjcf
 from handmade import HandCatalogue, furnished
 
 from embodied.house.shapes import footprint
-from embodied.scene.export import export_glb, export_mjcf
+from embodied.scene.export import export_mjcf
+from embodied.scene.glb import export_glb
 from embodied.scene.house_meshes import house_parts
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.model import compile_scene, loose

@@ -64,7 +64,7 @@ REMEDIES = {
 EXTRAS = {
     **dict.fromkeys(("torch", "safetensors", "sacrebleu"), "agents"),
     **dict.fromkeys(("rerun", "rerun_cli", "av", "matplotlib"), "viz"),
-    **dict.fromkeys(("pyarrow", "networkx"), "data"),
+    **dict.fromkeys(("pyarrow", "networkx", "trimesh"), "data"),
     **dict.fromkeys(("dm_control", "dm_env"), "drive"),
     "psutil": "serve",
     "shtab": "completion",

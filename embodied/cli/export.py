@@ -292,10 +292,12 @@ def run_walks(what: str, args: WalkOptions) -> int:
 def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> int:
     from embodied.house.validation import load_house
     from embodied.locks import locked
-    from embodied.scene.export import export_glb, export_mjcf
-    from embodied.scene.usd import check_usd, export_usd
-    from embodied.scene.web import export_lit_glb
+    from embodied.scene.export import export_mjcf
 
+    if not isinstance(args, MjcfOptions):  # these need trimesh, which a small installation lacks
+        from embodied.scene.glb import export_glb
+        from embodied.scene.usd import check_usd, export_usd
+        from embodied.scene.web import export_lit_glb
     if what == "usd":
         check_usd(args.out)
         if args.light == "none":

@@ -46,7 +46,10 @@ class Options(Furnished, Printed):
 
 def run(args: Options) -> int:
     from embodied.navigation.graph import build_graph, to_matterport
-    from embodied.scene.export import export_glb, export_mjcf
+    from embodied.scene.export import export_mjcf
+
+    if args.glb:
+        from embodied.scene.glb import export_glb
 
     catalogue, config = catalogue_of(args), args.config
     with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:

@@ -1,104 +1,90 @@
-"""Writing binary glTF 2.0 (Khronos, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html), all in one file."""
+"""Writing a house as binary glTF, for Blender and the web."""
 
 from __future__ import annotations
 
-import json
+import io
 import math
-import struct
-from collections.abc import Hashable
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
+import PIL.Image
+import trimesh
 
-UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
-"""z up to y up, as the format asks."""
-VERTICES, INDICES = 34962, 34963
-"""What a buffer view holds, in OpenGL's numbers."""
-FLOAT, UINT = 5126, 5125
-JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+from assets.cache import write_bytes
+from assets.records import Finish
+from embodied.house.house import House
+from embodied.scene.house_meshes import Part, house_parts
+from embodied.scene.model import load_texture
 
-
-class GlbWriter:
-    """Collects what a file holds. Meshes, materials and pictures are kept by key: what has one is not added again."""
-
-    def __init__(self) -> None:
-        self.tree: dict[str, Any] = {
-            "asset": {"version": "2.0", "generator": "embodied"},
-            "scene": 0,
-            "scenes": [{"nodes": []}],
-            **{name: [] for name in ("nodes", "meshes", "materials", "textures", "images", "accessors", "bufferViews")},
-        }
-        self._body = bytearray()
-        self._numbers: dict[tuple[str, Hashable], int] = {}
-
-    def number(self, kind: str, key: Hashable) -> int | None:
-        """Where in tree[kind] the one of this key is; None if it was not added."""
-        return self._numbers.get((kind, key))
-
-    def add(self, kind: str, key: Hashable, content: dict[str, Any]) -> int:
-        """Append to tree[kind]; returns where it is."""
-        self.tree[kind].append(content)
-        self._numbers[kind, key] = len(self.tree[kind]) - 1
-        return self._numbers[kind, key]
-
-    def texture(self, key: Hashable, picture: bytes) -> int:
-        """A texture that repeats, from a PNG or JPEG file."""
-        kind = "image/png" if picture.startswith(b"\x89PNG") else "image/jpeg"
-        image = self.add("images", key, {"bufferView": self._view(picture), "mimeType": kind})
-        return self.add("textures", key, {"source": image})
-
-    def mesh(self, key: Hashable, material: int, vertices: np.ndarray, faces: np.ndarray, **more: np.ndarray) -> int:
-        """A mesh of one material.
-
-        Args:
-          vertices: (n, 3) metres.
-          faces: (m, 3) indices of vertices.
-          more: further attributes by glTF's names: NORMAL (n, 3), TEXCOORD_0 (n, 2) with v down.
-        """
-        attributes = {"POSITION": self._accessor(vertices, VERTICES, bounded=True)}
-        attributes |= {name: self._accessor(a, VERTICES) for name, a in more.items()}
-        indices = self._accessor(faces.reshape(-1), INDICES)
-        primitive = {"attributes": attributes, "indices": indices, "material": material}
-        return self.add("meshes", key, {"primitives": [primitive]})
-
-    def node(self, name: str, mesh: int, pose: np.ndarray, extras: dict[str, str] | None = None) -> None:
-        """A mesh placed by `pose`, (4, 4), world with z up."""
-        matrix = (UPRIGHT @ pose).T.reshape(-1).tolist()
-        node = {"name": name, "mesh": mesh, "matrix": matrix} | ({"extras": extras} if extras else {})
-        self.tree["scenes"][0]["nodes"].append(self.add("nodes", name, node))
-
-    def data(self) -> bytes:
-        """The file."""
-        body = bytes(self._body) + bytes(-len(self._body) % 4)
-        tree = {name: content for name, content in self.tree.items() if content != []}
-        text = json.dumps(tree | {"buffers": [{"byteLength": len(body)}]}, separators=(",", ":")).encode()
-        text += b" " * (-len(text) % 4)
-        chunks = struct.pack("<II", len(text), JSON_CHUNK) + text + struct.pack("<II", len(body), BINARY_CHUNK) + body
-        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-    def _view(self, data: bytes, **target: int) -> int:
-        self._body += bytes(-len(self._body) % 4)
-        view = {"buffer": 0, "byteOffset": len(self._body), "byteLength": len(data), **target}
-        self._body += data
-        self.tree["bufferViews"].append(view)
-        return len(self.tree["bufferViews"]) - 1
-
-    def _accessor(self, array: np.ndarray, target: int, bounded: bool = False) -> int:
-        held = np.ascontiguousarray(array, "<u4" if target == INDICES else "<f4")
-        accessor = {
-            "bufferView": self._view(held.tobytes(), target=target),
-            "componentType": UINT if target == INDICES else FLOAT,
-            "count": len(held),
-            "type": "SCALAR" if held.ndim == 1 else f"VEC{held.shape[1]}",
-        }
-        if bounded:
-            accessor |= {"min": held.min(0).tolist(), "max": held.max(0).tolist()}
-        self.tree["accessors"].append(accessor)
-        return len(self.tree["accessors"]) - 1
+if TYPE_CHECKING:
+    from assets.catalogue import Catalogue
 
 
-def turned(position: tuple[float, float, float], yaw: float) -> np.ndarray:
-    """(4, 4) the pose of what stands at `position`, turned by `yaw` about z."""
-    c, s = math.cos(yaw), math.sin(yaw)
-    x, y, z = position
-    return np.array([[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
+def export_glb(house: House, catalogue: Catalogue, path: Path, *, ceilings: bool = True) -> Path:
+    """Write the house as one binary glTF file with its textures; y is up there, as the format asks.
+
+    Every node is named after its owner: a placement id, or '<room>/floor' and the like.
+
+    Args:
+      ceilings: False leaves ceilings and roof out, for a look from above.
+    """
+    parts = house_parts(house, catalogue)
+    if not ceilings:
+        parts = tuple(p for p in parts if p.kind != "ceiling" and p.owner != "outdoor/roof")
+    scene = glb_scene(parts)
+    write_bytes(Path(path), scene.export(file_type="glb"))
+    return Path(path)
+
+
+def glb_scene(parts: Sequence[Part]) -> trimesh.Scene:
+    """The parts as a trimesh scene, y up; equal mesh keys share one geometry."""
+    scene = trimesh.Scene()
+    upright = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
+    materials: dict[Finish, trimesh.visual.material.PBRMaterial] = {}
+    count: dict[str, int] = {}
+    for part in parts:
+        if not len(part.mesh.faces):
+            continue
+        pose = trimesh.transformations.rotation_matrix(part.yaw, [0, 0, 1])
+        pose[:3, 3] = part.position
+        k = count[part.owner] = count.get(part.owner, -1) + 1
+        node = part.owner if k == 0 else f"{part.owner}#{k}"
+        if part.mesh_key in scene.geometry:
+            scene.graph.update(frame_to=node, matrix=upright @ pose, geometry=part.mesh_key)
+            continue
+        finish = part.mesh.finish
+        if finish not in materials:
+            materials[finish] = pbr_material(finish)
+        visual = trimesh.visual.TextureVisuals(uv=part.mesh.uv, material=materials[finish])
+        mesh = trimesh.Trimesh(
+            part.mesh.vertices, part.mesh.faces, vertex_normals=part.mesh.normals, visual=visual, process=False
+        )
+        scene.add_geometry(mesh, node_name=node, geom_name=part.mesh_key, transform=upright @ pose)
+    return scene
+
+
+def pbr_material(finish: Finish) -> trimesh.visual.material.PBRMaterial:
+    """`finish` in glTF's metallic-roughness model; textures as JPEG unless they have holes."""
+    image = None if finish.texture is None else _picture(finish.texture)
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in finish.color[:3]]
+    has_holes = image is not None and image.mode == "RGBA"
+    return trimesh.visual.material.PBRMaterial(
+        baseColorTexture=image,
+        baseColorFactor=[1.0, 1.0, 1.0, finish.color[3]] if image else [*linear, finish.color[3]],
+        roughnessFactor=finish.roughness,
+        metallicFactor=finish.metallic,
+        doubleSided=True,
+        alphaMode="MASK" if has_holes else "BLEND" if finish.color[3] < 1 else "OPAQUE",
+        emissiveFactor=[min(1.0, e) for e in finish.emission] if finish.emission else None,
+    )
+
+
+def _picture(path: str) -> PIL.Image.Image:
+    image = PIL.Image.fromarray(load_texture(path))
+    buffer = io.BytesIO()
+    if image.mode == "RGBA":
+        image.save(buffer, "PNG")
+    else:
+        image.save(buffer, "JPEG", quality=90)
+    return PIL.Image.open(buffer)

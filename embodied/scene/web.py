@@ -8,20 +8,24 @@ placement id, or '<room>/floor' and the like) and says in its extras what it is:
 from __future__ import annotations
 
 import io
+import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import PIL.Image
+import trimesh
 
 from assets.cache import write_bytes
 from embodied.house.house import House
-from embodied.scene.glb import GlbWriter
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 UNLIT = "KHR_materials_unlit"
 JPEG_QUALITY = 92
 ROOF, SKY = "outdoor/roof", "outdoor/sky"
+VERTICES, INDICES = 34962, 34963
+"""What a buffer view holds, in OpenGL's numbers."""
+UPRIGHT = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
+"""z up to y up, as the format asks."""
 
 
 def export_lit_glb(house: House, lit: LitPages, path: Path, *, ceilings: bool = True, sky: bool = False) -> Path:
@@ -31,20 +35,43 @@ def export_lit_glb(house: House, lit: LitPages, path: Path, *, ceilings: bool = 
       ceilings: False leaves ceilings and roof out, for a look from above.
       sky: True keeps the dome of far scenery, for a look from inside; viewers frame all there is, and it is 140 m wide.
     """
-    glb = GlbWriter()
+    extras: dict[str, dict[str, str]] = {}
+    scene = trimesh.Scene()
+    materials = {}
     for k, mesh in enumerate(lit.meshes):
         if (not ceilings and (mesh.kind == "ceiling" or mesh.owner == ROOF)) or (not sky and mesh.owner == SKY):
             continue
-        material = glb.number("materials", (mesh.page, mesh.alpha))
-        if material is None:
-            material = glb.add("materials", (mesh.page, mesh.alpha), _material(glb, lit, mesh.page, mesh.alpha))
-        number = glb.mesh(k, material, mesh.vertices, mesh.faces, TEXCOORD_0=mesh.uv)
-        node = mesh.owner if glb.number("nodes", mesh.owner) is None else f"{mesh.owner}#{k}"
-        glb.node(node, number, np.eye(4), about(house, mesh))
-    glb.tree["extensionsUsed"] = [UNLIT]
-    glb.tree["asset"]["extras"] = {"house": house.name, "house_digest": house.digest, "light": lit.digest}
-    write_bytes(Path(path), glb.data())
+        key = (mesh.page, mesh.alpha)
+        if key not in materials:
+            materials[key] = _material(lit, *key)
+        node = mesh.owner if mesh.owner not in extras else f"{mesh.owner}#{k}"
+        extras[node] = about(house, mesh)
+        scene.add_geometry(_geometry(mesh, materials[key]), node_name=node, geom_name=f"mesh_{k}", transform=UPRIGHT)
+
+    def finish(tree: dict) -> None:
+        for material in tree["materials"]:
+            material["extensions"] = {UNLIT: {}}
+        tree["extensionsUsed"] = [UNLIT]
+        _say_what_buffers_hold(tree)
+        tree["asset"]["extras"] = {"house": house.name, "house_digest": house.digest, "light": lit.digest}
+        for node in tree["nodes"]:
+            if node.get("name") in extras:
+                node["extras"] = extras[node["name"]]
+
+    data = trimesh.exchange.gltf.export_glb(scene, include_normals=False, tree_postprocessor=finish)
+    write_bytes(Path(path), data)
     return Path(path)
+
+
+def _say_what_buffers_hold(tree: dict) -> None:
+    """Mark buffer views as vertices or indices, which the format recommends and trimesh leaves out."""
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            for accessor, target in (
+                (primitive["indices"], INDICES),
+                *((a, VERTICES) for a in primitive["attributes"].values()),
+            ):
+                tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
 
 
 def about(house: House, mesh: LitMesh) -> dict[str, str]:
@@ -60,24 +87,25 @@ def about(house: House, mesh: LitMesh) -> dict[str, str]:
     return {name: value for name, value in facts.items() if value}
 
 
-def _material(glb: GlbWriter, lit: LitPages, page: int, alpha: float) -> dict[str, Any]:
-    texture = glb.number("textures", page)
-    if texture is None:
-        texture = glb.texture(page, _jpeg(lit.pages[page]))
-    return {
-        "name": f"page_{page}" if alpha == 1 else f"page_{page}_{alpha:g}",
-        "pbrMetallicRoughness": {
-            "baseColorTexture": {"index": texture},
-            "baseColorFactor": [1.0, 1.0, 1.0, alpha],
-            "metallicFactor": 0.0,
-            "roughnessFactor": 1.0,
-        },
-        "alphaMode": "OPAQUE" if alpha == 1 else "BLEND",
-        "extensions": {UNLIT: {}},
-    }
+def _geometry(mesh: LitMesh, material: trimesh.visual.material.PBRMaterial) -> trimesh.Trimesh:
+    uv = np.column_stack([mesh.uv[:, 0], 1 - mesh.uv[:, 1]])  # trimesh counts v upwards
+    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    return trimesh.Trimesh(mesh.vertices, mesh.faces, visual=visual, process=False)
 
 
-def _jpeg(page: np.ndarray) -> bytes:
+def _material(lit: LitPages, page: int, alpha: float) -> trimesh.visual.material.PBRMaterial:
+    return trimesh.visual.material.PBRMaterial(
+        name=f"page_{page}" if alpha == 1 else f"page_{page}_{alpha:g}",
+        baseColorTexture=_picture(lit.pages[page]),
+        baseColorFactor=[1.0, 1.0, 1.0, alpha],
+        metallicFactor=0.0,
+        roughnessFactor=1.0,
+        alphaMode="OPAQUE" if alpha == 1 else "BLEND",
+    )
+
+
+def _picture(page: np.ndarray) -> PIL.Image.Image:
+    """The page as JPEG, which the file embeds as it is."""
     buffer = io.BytesIO()
     PIL.Image.fromarray(page).save(buffer, "JPEG", quality=JPEG_QUALITY, subsampling=0)
-    return buffer.getvalue()
+    return PIL.Image.open(buffer)
