@@ -83,7 +83,9 @@ SCALES: dict[str, FollowerSettings] = {
     "mini": FollowerSettings(
         hidden_size=128,
         batch=32,
-        iterations=3500,
+        iterations=4000,
+        more_paths=64,
+        least_teacher=0.5,
         learning_rate=1e-3,
         cooldown=0.4,
         environment_dropout=0.3,
@@ -97,4 +99,4 @@ SPEAKER_SCALES: dict[str, SpeakerSettings] = {
     "mini": SpeakerSettings(hidden_size=128, heads=4, iterations=2500, learning_rate=1e-3),
     "paper": SpeakerSettings(),
 }
-"""'mini': ten minutes of one core; 'paper': for one GPU."""
+"""'mini': ten minutes of one core, and twenty more where paths are not worded yet; 'paper': for one GPU."""

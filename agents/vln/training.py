@@ -77,9 +77,9 @@ class VlnLearner:
 
 
 def teacher_share(config: FollowerSettings, update: int) -> float:
-    """Share of the steps in which the teacher acts; of 'dagger' it falls to the least over the second half."""
+    """Share of the steps in which the teacher acts; of 'dagger' it falls to the least over the first half."""
     if config.forcing == "dagger":
-        return min(1.0, max(config.least_teacher, 2.0 - 2.0 * update / config.iterations))
+        return max(config.least_teacher, 1.0 - 2.0 * update / config.iterations)
     return float(config.forcing == "teacher")
 
 
