@@ -46,7 +46,7 @@ from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig
 from embodied.geometry import wrap
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import FeatureEyes, PanoramaStore, PictureEyes, ViewSettings
+from embodied.gym.eyes import CameraSensor, FeatureSensor, PanoramaStore, ViewSettings
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import TURNS, FollowRoute, Pose, Task
 from embodied.language.plain import PlainLanguage
@@ -246,8 +246,8 @@ def find_tasks(world: World, seed: int) -> list[Task]:
 def maker(place: Arena, blind: bool, encoded: bool) -> Callable[[], Seeker]:
     """A maker of environments that share the flats and their decoded panoramas."""
     store = PanoramaStore(place.worlds)
-    pixels = PictureEyes(store, ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
-    eyes = FeatureEyes("features", shipped_features(store)) if encoded else pixels
+    pixels = CameraSensor(store, ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
+    eyes = FeatureSensor("features", shipped_features(store)) if encoded else pixels
     moves = MonocularMoves()
 
     def make() -> Seeker:

@@ -28,7 +28,7 @@ from embodied.evaluation.ask import acted, ask_row, observed, read_seeds, submit
 from embodied.evaluation.metrics import price, success, success_progress, weighted_success
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv, layout_of
-from embodied.gym.eyes import Closed
+from embodied.gym.eyes import NoSensor
 from embodied.interface import Ask, Intention, Move, Pose, Stop
 from embodied.policies.ask import RULES, Asker, Mind, baselines, reached
 from embodied.records import from_json, to_json
@@ -210,7 +210,7 @@ def test_measures_by_hand(world, tasks, make_env):
 def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = HelpGymEnv(make_env, tasks, Closed(), layout=layout_of("ask"), render_mode="rgb_array")
+        env = HelpGymEnv(make_env, tasks, NoSensor(), layout=layout_of("ask"), render_mode="rgb_array")
         check_env(env, skip_render_check=True)
     assert env.render().ndim == 3
     assert gym.spec("embodied/Ask-v0").kwargs == {"kind": "ask"}

@@ -22,7 +22,7 @@ from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_words
 from agents.common.checkpoint import CheckpointError, read_checkpoint
-from agents.common.decoding import drawn_with
+from agents.common.decoding import sampled_choice
 from agents.common.session import Session
 from agents.studies.engine import run_study
 from embodied.cli import main
@@ -272,7 +272,7 @@ def test_what_is_sampled_does_not_depend_on_the_batch():
 
     def drawn(batch: int) -> list[list[int]]:
         parts = [slice(k, k + batch) for k in range(0, 33, batch)]
-        return [s for p in parts for s in decode(translator, padded(source[p]), drawn_with(uniforms[p]), 20)]
+        return [s for p in parts for s in decode(translator, padded(source[p]), sampled_choice(uniforms[p]), 20)]
 
     together = drawn(32)
     assert together == drawn(5) == drawn(1)
@@ -282,7 +282,9 @@ def test_what_is_sampled_does_not_depend_on_the_batch():
 def test_samples_follow_the_distribution():
     translator, _ = networks()
     n = 4000
-    first = [s[0] for s in decode(translator, padded([SOURCE[0]] * n), drawn_with(stream(1, "u").random((n, 1))), 1)]
+    first = [
+        s[0] for s in decode(translator, padded([SOURCE[0]] * n), sampled_choice(stream(1, "u").random((n, 1))), 1)
+    ]
     logits = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[3]]))[0])[0]
     logits[PAD_NUMBER] = -torch.inf
     wanted = logits.softmax(-1).detach().numpy()

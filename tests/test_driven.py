@@ -28,12 +28,12 @@ def catalogue(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_every_edge_is_driven_without_a_bump(place, catalogue):
+def test_every_edge_is_driven_without_a_collision(place, catalogue):
     driver = Driver(place.house, catalogue)
     for a, b in place.graph.edges:
         driver.place(place.graph.positions[a], 1.0)
         drive = driver.drive(place.graph.positions[b])
-        assert drive.arrived and not drive.bumps, (a, b, drive)
+        assert drive.arrived and not drive.collisions, (a, b, drive)
         length = place.graph.distance[a, b]
         assert length - 0.1 <= drive.metres <= 1.2 * length + 0.2
         assert np.linalg.norm(driver.position - place.graph.positions[b, :2]) < 0.1
@@ -52,7 +52,7 @@ def test_a_wall_in_the_way_is_bumped_into_and_not_passed(place, catalogue):
     driver.place(np.array([4.0, 3.0, 1.5]), 0.0)
     drive = driver.drive(np.array([6.0, 3.0]))
     assert not drive.arrived and driver.position[0] < 5.0
-    assert any("wall" in owner for owner in drive.bumps)
+    assert any("wall" in owner for owner in drive.collisions)
 
 
 @pytest.mark.slow
@@ -72,7 +72,7 @@ def test_hanna_on_wheels_visits_the_same_nodes(place, catalogue):
         env.step(Stop())
     walked, drove = (e.episode() for e in envs)
     assert walked == drove
-    assert len(envs[1].drives) == len(path) - 1 and envs[1].facts() == {"bumps": 0}
+    assert len(envs[1].drives) == len(path) - 1 and envs[1].facts() == {"collisions": 0}
 
 
 @pytest.mark.slow
@@ -81,7 +81,7 @@ def test_gymnasium_plays_on_wheels_too(place, tmp_path):
     env = embodied.gym.env.make("vln", cache=tmp_path, worlds={place.name: place}, wheels=True, **blank)
     o, _ = env.reset(seed=0)
     _, _, _, _, info = env.step(int(np.flatnonzero(o["action_mask"])[0]))
-    assert info["bumps"] == 0
+    assert info["collisions"] == 0
     with pytest.raises(ValueError, match="wheels"):
         embodied.gym.env.make("hari", cache=tmp_path, worlds={place.name: place}, wheels=True, **blank)
 

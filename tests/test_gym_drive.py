@@ -64,7 +64,7 @@ def test_depth_straight_ahead_is_how_far_the_wall_is(world):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["reach", "find"])
-def test_whoever_knows_the_way_arrives_without_a_bump(world, task):
+def test_whoever_knows_the_way_arrives_without_a_collision(world, task):
     env = env_of(world, task=task, sees=())
     for seed in range(6):
         env.reset(seed=seed)
@@ -72,7 +72,7 @@ def test_whoever_knows_the_way_arrives_without_a_bump(world, task):
         while not ended:
             _, _, terminated, truncated, info = env.step(guided(env.driving))
             ended = terminated or truncated
-        assert info["success"] == 1.0 and info["bumps"] == 0 and info["spl"] > 0.75, (seed, info)
+        assert info["success"] == 1.0 and info["collisions"] == 0 and info["spl"] > 0.75, (seed, info)
 
 
 def test_a_wall_stops_the_body_and_is_counted_once(world):
@@ -80,7 +80,7 @@ def test_a_wall_stops_the_body_and_is_counted_once(world):
     env.reset(seed=1)
     env.driving.driver.place(np.array([4.0, 3.0, 1.5]), 0.0)
     steps = [env.step(np.array([1.0, 0.0])) for _ in range(30)]
-    assert 1 <= steps[-1][-1]["bumps"] <= 3 and env.driving.driver.position[0] < 5.0
+    assert 1 <= steps[-1][-1]["collisions"] <= 3 and env.driving.driver.position[0] < 5.0
     assert steps[0][0]["touched"][0] == 0.0 and any(o["touched"][0] for o, *_ in steps[-10:])
 
 

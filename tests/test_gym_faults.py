@@ -24,7 +24,7 @@ import embodied.gym.env
 from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import Closed, PanoramaStore, PictureEyes, ViewSettings
+from embodied.gym.eyes import CameraSensor, NoSensor, PanoramaStore, ViewSettings
 from embodied.gym.in_step import SharedSyncVectorEnv
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.navigation.graph import graph_of
@@ -177,7 +177,7 @@ def test_a_data_set_that_is_dropped_keeps_none_of_its_houses(tmp_path):
     built(tmp_path / "data", "vnla")
     for _ in range(3):
         split = Dataset(tmp_path / "data").split("val_seen")
-        env = HelpGymEnv(split.make_env, split.tasks, Closed())
+        env = HelpGymEnv(split.make_env, split.tasks, NoSensor())
         env.reset(seed=0)
         places = [weakref.ref(place) for place in split.worlds.values()]
         assert all(place() is not None for place in places)
@@ -190,8 +190,8 @@ def pixels(cache: Path) -> HelpGymEnv:
     """An environment that sees the panoramas of a small house, which `drawn` has drawn."""
     graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ROOMS)
     world = open_world(furnished(two_rooms()), HandCatalogue(), cache, graph=graph, size=48)
-    eyes = PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth"), ViewSettings(height=16, width=16))
-    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), eyes, opened=[world])
+    sensor = CameraSensor(PanoramaStore({world.name: world}), ("rgb", "depth"), ViewSettings(height=16, width=16))
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), sensor, opened=[world])
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,16 @@ from agents.vision.live import LiveFeatures
 from embodied.envs.base import HelpEnv
 from embodied.gym import eyes as module
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import FAR, AllEyes, Closed, FeatureEyes, PanoramaStore, PictureEyes, ViewSettings, checked_sees
+from embodied.gym.eyes import (
+    FAR,
+    CameraSensor,
+    FeatureSensor,
+    NoSensor,
+    PanoramaStore,
+    SensorSuite,
+    ViewSettings,
+    checked_sees,
+)
 from embodied.gym.in_step import SharedSyncVectorEnv, free_memory, refuse_too_many
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import FindObject, Move, Pose, Sight, Stop, Task
@@ -50,15 +59,15 @@ def tasks_in(world) -> list[Task]:
     ]
 
 
-def env_of(world, eyes) -> HelpGymEnv:
-    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), eyes, layout=SpaceLayout())
+def env_of(world, sensor) -> HelpGymEnv:
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), sensor, layout=SpaceLayout())
 
 
 @pytest.mark.parametrize(
     "view", [ViewSettings(height=40, width=56), ViewSettings("views36", 24), ViewSettings("equirect", 20)]
 )
 def test_pixels_belong_to_the_space_and_are_those_of_the_panorama(world, view):
-    env = env_of(world, PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), view))
+    env = env_of(world, CameraSensor(PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), view))
     for task in range(4):
         o, _ = env.reset(seed=task, options={"task": task})
         assert env.observation_space.contains(o)
@@ -78,7 +87,7 @@ def test_pixels_belong_to_the_space_and_are_those_of_the_panorama(world, view):
 def test_the_view_turns_with_the_agent(world):
     """A move looks along the edge that was walked, so the picture is the one of that direction and place."""
     view = ViewSettings(height=32, width=32)
-    env = env_of(world, PictureEyes(PanoramaStore({world.name: world}), ("rgb",), view))
+    env = env_of(world, CameraSensor(PanoramaStore({world.name: world}), ("rgb",), view))
     env.reset(seed=0, options={"task": 0})
     column = [p.node for p in env._env._reach[1]].index(1)
     o, *_ = env.step(number(Move(column), SpaceLayout()))
@@ -91,10 +100,10 @@ def test_the_view_turns_with_the_agent(world):
 
 def test_features_come_from_the_very_panoramas_that_are_shown(world):
     store, encoder = PanoramaStore({world.name: world}), random_encoder(seed=0)
-    eyes = AllEyes(
-        [PictureEyes(store, ("rgb",), ViewSettings()), FeatureEyes("features", LiveFeatures(encoder, store))]
+    sensor = SensorSuite(
+        [CameraSensor(store, ("rgb",), ViewSettings()), FeatureSensor("features", LiveFeatures(encoder, store))]
     )
-    env = env_of(world, eyes)
+    env = env_of(world, sensor)
     o, _ = env.reset(seed=1, options={"task": 1})
     assert set(o) > {"rgb", "target_rgb", "features", "target_features"}
     expected = encode_panoramas(encoder, [world.panorama(1)])[0].astype(np.float32)
@@ -107,23 +116,25 @@ def test_features_come_from_the_very_panoramas_that_are_shown(world):
 @pytest.mark.parametrize("threads", [1, 3])
 def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world, threads):
     store = PanoramaStore({world.name: world})
-    eyes = PictureEyes(store, ("rgb",), ViewSettings(height=16, width=16))
-    envs = SharedSyncVectorEnv(lambda: env_of(world, Closed()), 12, eyes, threads=threads)
+    sensor = CameraSensor(store, ("rgb",), ViewSettings(height=16, width=16))
+    envs = SharedSyncVectorEnv(lambda: env_of(world, NoSensor()), 12, sensor, threads=threads)
     o, _ = envs.reset(seed=5)
     for _ in range(6):
         o, *_ = envs.step(np.zeros(12, dtype=np.int64))
     assert len(store._kept) == 3
     assert len({bytes(row) for row in o["instruction"]}) > 1
     for i, env in enumerate(envs.envs):
-        assert (o["rgb"][i] == eyes.look(env.observed)()["rgb"]).all()
+        assert (o["rgb"][i] == sensor.look(env.observed)()["rgb"]).all()
         assert bytes(o["instruction"][i]).rstrip(b"\0").decode() == env._env.instruction
     envs.close()
 
 
 def test_a_batch_gives_what_gymnasium_would_batch(world):
-    eyes = PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), ViewSettings(height=16, width=16))
-    ours = SharedSyncVectorEnv(lambda: env_of(world, Closed()), 5, eyes, threads=2)
-    theirs = gym.vector.SyncVectorEnv([lambda: env_of(world, eyes)] * 5)
+    sensor = CameraSensor(
+        PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), ViewSettings(height=16, width=16)
+    )
+    ours = SharedSyncVectorEnv(lambda: env_of(world, NoSensor()), 5, sensor, threads=2)
+    theirs = gym.vector.SyncVectorEnv([lambda: env_of(world, sensor)] * 5)
     assert ours.observation_space == theirs.observation_space
     assert ours.single_observation_space == theirs.single_observation_space
     a, b = ours.reset(seed=3), theirs.reset(seed=3)
@@ -137,7 +148,7 @@ def test_a_batch_gives_what_gymnasium_would_batch(world):
         assert (earlier == kept).all(), "what was handed out stays"
     assert ours.get_attr("render_mode") == (None,) * 5
     with pytest.raises(ValueError, match="threads should be at least 1"):
-        SharedSyncVectorEnv(lambda: env_of(world, Closed()), 2, eyes, threads=0)
+        SharedSyncVectorEnv(lambda: env_of(world, NoSensor()), 2, sensor, threads=0)
     ours.close(), theirs.close()
 
 
@@ -192,7 +203,7 @@ def test_without_an_installed_encoder_the_error_names_the_remedies():
 
 def test_a_robots_camera_is_seen_through_and_sees_the_same_again(world):
     views = [ViewSettings(height=40, width=56, camera=c, device=1) for c in ("robot", "robot", "ideal")]
-    envs = [env_of(world, PictureEyes(PanoramaStore({world.name: world}), ("rgb", "ids"), v)) for v in views]
+    envs = [env_of(world, CameraSensor(PanoramaStore({world.name: world}), ("rgb", "ids"), v)) for v in views]
     one, again, ideal = (e.reset(seed=0, options={"task": 1})[0] for e in envs)
     assert envs[0].observation_space.contains(one)
     assert np.array_equal(one["rgb"], again["rgb"]) and not np.array_equal(one["rgb"], ideal["rgb"])
@@ -200,8 +211,8 @@ def test_a_robots_camera_is_seen_through_and_sees_the_same_again(world):
     assert set(np.unique(one["ids"])) <= set(np.unique(ideal["ids"]))
     for frame in ("views36", "equirect"):
         whole = ViewSettings(frame, 24, camera="phone")
-        eyes = PictureEyes(PanoramaStore({world.name: world}), ("rgb", "depth"), whole)
-        o, _ = env_of(world, eyes).reset(seed=0, options={"task": 0})
+        sensor = CameraSensor(PanoramaStore({world.name: world}), ("rgb", "depth"), whole)
+        o, _ = env_of(world, sensor).reset(seed=0, options={"task": 0})
         assert o["rgb"].shape == (*whole.shape, 3) and o["depth"].shape == whole.shape
     with pytest.raises(ValueError, match="camera 'webcam' is unknown"):
         ViewSettings(camera="webcam")

@@ -21,18 +21,26 @@ import torch
 import torch.distributed as dist
 from hand_worlds import grid_world
 
-from agents.common import spine
+from agents.common import imitation
 from agents.common.checkpoint import CheckpointError, restore
-from agents.common.choosing import choose_at, choose_likeliest, choose_sampled
-from agents.common.session import Clock, DivergedError, Session, as_good, falling_rate, metrics_of, tasks_of_update
-from agents.common.spine import ADDED, NUMBERS
+from agents.common.choosing import choose_at, choose_greedily, choose_sampled
+from agents.common.imitation import REPORTED, SUMMED
+from agents.common.session import (
+    Clock,
+    DivergedError,
+    Session,
+    metrics_of,
+    scheduled_rate,
+    tasks_of_update,
+    within_standard_error,
+)
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
 from agents.hanna.asking import RULES, ask_above
 from agents.hanna.collect import collect, imitation_loss
 from agents.hanna.losses import IGNORE, curiosity, help_loss, navigation_loss, negative_log_likelihood, reason_loss
 from agents.hanna.policy import for_training
-from agents.hanna.training import HannaLearner, learn_once
+from agents.hanna.training import HannaLearner, train_step
 from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Split
@@ -107,7 +115,7 @@ def run(folder, config=TINY, split=None, **options):
     split = split or setting()
     agent = agent_for(split, config)
     learner = HannaLearner(agent, split, HannaTeacher())
-    progress = spine.train(learner, split, folder, identity(agent), note=lambda line: None, **options)
+    progress = imitation.train(learner, split, folder, identity(agent), note=lambda line: None, **options)
     return agent, progress
 
 
@@ -174,7 +182,7 @@ def test_sampled_choices_have_their_frequencies_and_never_take_the_impossible():
     counts = np.bincount([choose_sampled(p, rng) for _ in range(4000)], minlength=5) / 4000
     assert counts[1] == counts[4] == 0
     assert np.allclose(counts, p, atol=0.03)
-    assert choose_likeliest(p, rng) == 2
+    assert choose_greedily(p, rng) == 2
 
 
 def test_a_low_temperature_sharpens_and_zero_takes_the_likeliest():
@@ -342,7 +350,7 @@ def test_it_overfits_one_batch(model):
     split = setting()
     agent = agent_for(split, dataclasses.replace(TINY, model=model, dropout=0.0))
     optimizer = torch.optim.Adam(agent.network.parameters(), 5e-3)
-    learner = dataclasses.replace(for_training(agent.policy(split.bank)), choose=choose_likeliest)
+    learner = dataclasses.replace(for_training(agent.policy(split.bank)), choose=choose_greedily)
     tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:8]]
     losses, rights = [], []
     for _ in range(40):
@@ -380,7 +388,9 @@ def test_training_writes_what_a_researcher_looks_at(tmp_path):
     assert seen == [(2, 6), (4, 6)]
     found = {update: value for update, name, value in metrics_of(tmp_path) if name == "validation/success"}
     assert list(found) == [2, 4] and progress.best == max(found.values())
-    assert progress.best_update in [update for update, success in found.items() if as_good(success, progress.best, 6)]
+    assert progress.best_update in [
+        update for update, success in found.items() if within_standard_error(success, progress.best, 6)
+    ]
     assert list(tmp_path.glob("events.out.tfevents.*"))
     assert json.loads((tmp_path / "settings.json").read_text())["settings"]["batch"] == 6
 
@@ -399,9 +409,11 @@ def test_a_run_may_begin_with_a_trained_agent_of_the_same_sizes(tmp_path):
 
 
 def test_of_agents_as_good_as_each_other_the_later_is_kept():
-    assert as_good(0.68, 0.71, 100) and not as_good(0.66, 0.71, 100)  # one standard error is 4.5 points
-    assert not as_good(0.68, 0.71, 1000)
-    assert as_good(0.0, 0.0, 60) and not as_good(0.9, 1.0, 60)
+    assert within_standard_error(0.68, 0.71, 100) and not within_standard_error(
+        0.66, 0.71, 100
+    )  # one standard error is 4.5 points
+    assert not within_standard_error(0.68, 0.71, 1000)
+    assert within_standard_error(0.0, 0.0, 60) and not within_standard_error(0.9, 1.0, 60)
 
 
 @pytest.mark.slow
@@ -487,7 +499,7 @@ def test_an_agent_learns_in_every_lighting_and_is_validated_in_each_houses_own(t
     config = dataclasses.replace(TINY, iterations=3, validate_every=1)
     with pytest.raises(DivergedError, match="loss") if shown else contextlib.nullcontext():
         agent, shown_in = agent_for(split, config), dataclasses.replace(split, bank=bank)
-        spine.train(HannaLearner(agent, shown_in, HannaTeacher()), split, tmp_path, identity(agent), note=str)
+        imitation.train(HannaLearner(agent, shown_in, HannaTeacher()), split, tmp_path, identity(agent), note=str)
 
 
 def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
@@ -525,12 +537,12 @@ def test_impossible_settings_are_refused(change, message):
 
 def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
     config = dataclasses.replace(TINY, iterations=100, cooldown=0.4, learning_rate=1e-3)
-    rates = [falling_rate(1e-3, u, 100, 0.4) for u in range(100)]
+    rates = [scheduled_rate(1e-3, u, 100, 0.4) for u in range(100)]
     assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
-    assert falling_rate(1e-3, 99, 100, 0.0) == 1e-3
+    assert scheduled_rate(1e-3, 99, 100, 0.0) == 1e-3
     agent, split = agent_for(setting(), config), setting()
     optimizer = torch.optim.Adam(agent.network.parameters(), 1.0)
-    learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 99, Clock())
+    train_step(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 99, Clock())
     assert optimizer.param_groups[0]["lr"] == rates[-1]
 
 
@@ -594,7 +606,7 @@ def save_gradients(path: Path) -> None:
     split = setting()
     agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0))
     optimizer = torch.optim.SGD(agent.network.parameters(), 0.0)
-    numbers = learn_once(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 0, Clock())
+    numbers = train_step(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 0, Clock())
     torch.save([p.grad for p in agent.network.parameters()], path)
     path.with_suffix(".json").write_text(json.dumps(numbers))
 
@@ -610,6 +622,6 @@ def test_two_processes_learn_what_one_would(tmp_path):
             assert torch.equal(b, c)
             assert torch.allclose(a, b, atol=1e-4, rtol=1e-3)
     alone, *both = (json.loads((tmp_path / f"{n}.json").read_text()) for n in ("alone", "0", "1"))
-    assert set(alone) <= set(NUMBERS) and both[0] == both[1]
-    for name in (*ADDED, "gradient", "success", "requests"):
+    assert set(alone) <= set(REPORTED) and both[0] == both[1]
+    for name in (*SUMMED, "gradient", "success", "requests"):
         assert both[0][name] == pytest.approx(alone[name], rel=1e-3), name

@@ -13,11 +13,11 @@ from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.checkpoint import CheckpointError
-from agents.common.playing import Ground
+from agents.common.playing import TaskSet
 from agents.hari import pretraining
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import IntentionRun, counts_of, learn_once, train, values
+from agents.hari.intention import IntentionRun, counts_of, train, train_step, values
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from agents.hari.policy import DO, DONE, Belief, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from agents.hari.pretraining import (
@@ -29,7 +29,7 @@ from agents.hari.pretraining import (
     pretrain,
     pretraining_success,
 )
-from agents.hari.pretraining import learn_once as lesson
+from agents.hari.pretraining import train_step as lesson
 from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
 from agents.hari.study import HariStudy
 from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
@@ -455,9 +455,9 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
     agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
     run = IntentionRun(agent, new_heads(config, SMALL.hidden_size)[1])
     world = fork_world()
-    ground = Ground({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
+    ground = TaskSet({"fork": world}, [fork_task(1), fork_task(2)], fork_env)
     for update in range(config.updates):
-        learn_once(run, ground, update)
+        train_step(run, ground, update)
     episodes = play(fork_env, policy_of(agent, sample=False), [fork_task(1), fork_task(2)], seed=0)
     assert all(e.ended == "stop" and e.nodes[-1] in e.task.goal_nodes for e in episodes)
     assert all(e.requests == 1 for e in episodes), "one question, and not the useless one"
@@ -504,7 +504,7 @@ def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
         pretrain(other, lessons, tmp_path / "parts", identity(other.config), note=silent)
 
     say = lessons.describer
-    ground = Ground(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
+    ground = TaskSet(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
     runs = {}
     for name, stops in (("one", (3,)), ("two", (1, 3))):
         for updates in stops:

@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from agents.hari.transformer import Packing, Transformer, silenced
+from agents.hari.transformer import Packing, Transformer, fast_dropout
 
 
 @pytest.fixture
@@ -33,14 +33,14 @@ def test_it_computes_what_torchs_does(rows):
     mine = Transformer(8, 2, 2, 0.0)
     expected = torchs(mine)(padded, src_key_padding_mask=~packing.present)
     torch.testing.assert_close(mine(packing.pack(padded), packing), packing.pack(expected))
-    torch.testing.assert_close(mine(packing.pack(padded), packing, firsts_only=True), expected[:, 0])
+    torch.testing.assert_close(mine(packing.pack(padded), packing, first_rows_only=True), expected[:, 0])
 
 
 def test_it_learns_from_the_first_rows_what_torchs_would(rows):
     padded, packing = rows
     mine = Transformer(8, 2, 2, 0.0)
     theirs = torchs(mine)
-    mine(packing.pack(padded), packing, firsts_only=True).square().sum().backward()
+    mine(packing.pack(padded), packing, first_rows_only=True).square().sum().backward()
     theirs(padded, src_key_padding_mask=~packing.present)[:, 0].square().sum().backward()
     torch.testing.assert_close(mine.layers[0].widen.weight.grad, theirs.layers[0].linear1.weight.grad)
     torch.testing.assert_close(mine.layers[1].narrow.weight.grad, theirs.layers[1].linear2.weight.grad)
@@ -48,14 +48,14 @@ def test_it_learns_from_the_first_rows_what_torchs_would(rows):
 
 def test_padding_and_packing_are_each_others_inverse(rows):
     padded, packing = rows
-    assert packing.firsts.tolist() == [0, 5, 7]
+    assert packing.first_rows.tolist() == [0, 5, 7]
     torch.testing.assert_close(packing.pad(packing.pack(padded))[packing.present], padded[packing.present])
     assert not packing.pad(packing.pack(padded))[~packing.present].any()
 
 
 def test_dropout_silences_its_share_and_keeps_the_mean():
     torch.manual_seed(0)
-    dropped = silenced(torch.ones(1001, 100), 0.1)
+    dropped = fast_dropout(torch.ones(1001, 100), 0.1)
     assert float((dropped == 0).float().mean()) == pytest.approx(26 / 256, abs=0.003)
     assert float(dropped.mean()) == pytest.approx(1.0, abs=0.005)
     assert float(dropped.max()) == pytest.approx(256 / 230)

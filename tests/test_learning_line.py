@@ -302,7 +302,7 @@ def test_a_data_set_of_another_kind_of_task_is_refused_with_the_command_that_mak
 
 def test_the_shipped_encoder_and_agent_are_small_and_fit_each_other():
     encoder, agent = load_encoder(), load_agent()
-    assert agent.encoder_digest == encoder.speaks
+    assert agent.encoder_digest == encoder.feature_space
     assert agent.feature_size == encoder.size
     assert sum(p.stat().st_size for p in WEIGHTS.iterdir()) < 15e6
     look = encoder.encode_strips(np.zeros((1, 192, 576, 3), np.uint8))

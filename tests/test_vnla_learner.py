@@ -12,9 +12,9 @@ import pytest
 import torch
 from hand_vnla import TINY, lesson, split_under
 
-from agents.common import spine
+from agents.common import imitation
 from agents.common.checkpoint import CheckpointError
-from agents.common.playing import play_remembering
+from agents.common.playing import play_with_memory
 from agents.common.session import Clock, DivergedError
 from agents.vision.bank import FeatureBank
 from agents.vnla.agent import load_agent, new_agent, rules_of, save_agent
@@ -149,7 +149,7 @@ def moments(config=TINY):
     agent, training, _ = lesson(config)
     teacher = teacher_of(TRAINED_UNDER[config.rules], rules_of(config))
     player = for_training(agent.policy(training.bank), teacher)
-    return training, *play_remembering(training.make_env, player, training.tasks[:8], seed=3)[:2]
+    return training, *play_with_memory(training.make_env, player, training.tasks[:8], seed=3)[:2]
 
 
 @pytest.mark.slow
@@ -257,7 +257,7 @@ def test_it_learns_one_batch_by_heart():
 @pytest.mark.parametrize("rules", RULES)
 def test_a_run_under_every_rule_writes_an_agent_that_plays(rules, tmp_path):
     agent, training, validation = lesson(dataclasses.replace(TINY, rules=rules, iterations=2, validate_every=2))
-    progress = spine.train(VnlaLearner(agent, training), validation, tmp_path, identity(agent), note=quiet)
+    progress = imitation.train(VnlaLearner(agent, training), validation, tmp_path, identity(agent), note=quiet)
     assert progress.update == 2
     found = load_agent(tmp_path / "best.safetensors")
     assert (found.pictures, found.config.rules) == ("unlit_192", rules)
@@ -281,18 +281,18 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
     def run(folder, *iterations):
         for n in iterations:
             agent, training, validation = lesson(dataclasses.replace(TINY, iterations=n, validate_every=10))
-            spine.train(VnlaLearner(agent, training), validation, folder, identity(agent), note=quiet)
+            imitation.train(VnlaLearner(agent, training), validation, folder, identity(agent), note=quiet)
         return agent.network.state_dict()
 
     whole, parts = run(tmp_path / "whole", 4), run(tmp_path / "parts", 2, 4)
     assert all(torch.equal(whole[k], parts[k]) for k in whole)
     with pytest.raises(CheckpointError, match="hidden_size 24 -> 32|settings changed"):
         agent, training, validation = lesson(dataclasses.replace(TINY, batch=5))
-        spine.train(VnlaLearner(agent, training), validation, tmp_path / "parts", identity(agent), note=quiet)
+        imitation.train(VnlaLearner(agent, training), validation, tmp_path / "parts", identity(agent), note=quiet)
     with pytest.raises(CheckpointError, match="pictures 'unlit_192' -> 'fast_256'"):
         agent, training, validation = lesson(dataclasses.replace(TINY, iterations=5))
         other = identity(dataclasses.replace(agent, pictures="fast_256"))
-        spine.train(VnlaLearner(agent, training), validation, tmp_path / "parts", other, note=quiet)
+        imitation.train(VnlaLearner(agent, training), validation, tmp_path / "parts", other, note=quiet)
 
 
 def test_an_agent_comes_back_from_its_file(tmp_path):

@@ -21,7 +21,7 @@ from torch import Tensor, nn
 from agents.bandit.rating_config import RatingConfig
 from agents.bandit.ratings import Rater
 from agents.common.actor_critic import Decisions, actor_loss, critic_loss
-from agents.common.session import Note, Session, descend, seed_of, tasks_of_update
+from agents.common.session import Note, Session, descend, episode_seed, tasks_of_update
 from agents.common.tensor_file import checksum_of
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
@@ -199,7 +199,7 @@ def _learn_once(
     tasks = tasks_of_update(split.tasks, update, config.batch, config.seed)
     tasks = [dataclasses.replace(t, horizon=min(t.horizon, config.steps)) for t in tasks]
     watching = Watching(policy)
-    episodes = play(split.make_env, watching, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
+    episodes = play(split.make_env, watching, tasks, seed=episode_seed(config.seed, update), batch=len(tasks))
     scores = [score_of(e, split.worlds[e.task.world].graph, config.score) for e in episodes]
     rngs = [stream(config.seed, "stars", update, i) for i in range(len(episodes))]
     ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs, strict=True)]

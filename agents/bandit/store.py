@@ -11,7 +11,7 @@ from torch import nn
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
 from agents.bandit.words import Words
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import load_weights, save_weights
 from embodied.identity import Identity
@@ -44,7 +44,7 @@ def load_network(network: nn.Module, path: Path) -> None:
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    put(network, load_weights(path, "bandit", BanditAbout, REMEDY)[0], path)
+    load_into(network, load_weights(path, "bandit", BanditAbout, REMEDY)[0], path)
 
 
 def load_translator(path: Path) -> tuple[Translator, tuple[Words, Words], BanditConfig]:
@@ -56,5 +56,5 @@ def load_translator(path: Path) -> tuple[Translator, tuple[Words, Words], Bandit
     tensors, told = load_weights(path, "bandit", BanditAbout, REMEDY)
     source, target = (Words(Vocabulary(words)) for words in (told.source, told.target))
     translator = Translator(len(source), len(target), told.config.hidden_size)
-    put(translator, tensors, path)
+    load_into(translator, tensors, path)
     return translator, (source, target), told.config

@@ -30,7 +30,7 @@ from agents.bandit.translate import Numbered, batches, decode, greedy, numbered,
 from agents.bandit.words import Words, build_words
 from agents.common.actor_critic import Decisions, actor_loss, critic_loss
 from agents.common.checkpoint import Stateful
-from agents.common.decoding import drawn_with
+from agents.common.decoding import sampled_choice
 from agents.common.session import Note, Session, descend
 from agents.common.weights import weights_digest
 from embodied.identity import Identity, identity_of
@@ -263,7 +263,7 @@ def sampled(
     """One sampled translation of each chosen sentence (line 3 of Algorithm 2); learners draw alike."""
     longest = m.config.longest
     uniforms = np.stack([stream(m.config.seed, purpose, "sample", turn, int(i)).random(longest) for i in chosen])
-    return decode(translator, rows(data.source, chosen), drawn_with(uniforms), longest)
+    return decode(translator, rows(data.source, chosen), sampled_choice(uniforms), longest)
 
 
 def scores_of(said: Sequence[Sequence[int]], m: NumberedCorpus, data: Numbered, chosen: np.ndarray) -> list[float]:

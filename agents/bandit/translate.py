@@ -11,7 +11,7 @@ from torch import Tensor
 
 from agents.bandit.network import Translator
 from agents.bandit.words import END_NUMBER, PAD_NUMBER, Words
-from agents.common.decoding import Choice, likeliest
+from agents.common.decoding import Choice, greedy_choice
 
 POOL = 20
 """Batches that are sorted by length together."""
@@ -92,7 +92,7 @@ def greedy(
     found: list[tuple[str, ...]] = [()] * len(data)
     for chosen in in_order([len(s) for s in data.source], batch):
         for i, numbers in zip(
-            chosen, decode(translator, padded([data.source[i] for i in chosen]), likeliest, longest), strict=True
+            chosen, decode(translator, padded([data.source[i] for i in chosen]), greedy_choice, longest), strict=True
         ):
             found[i] = lexicon.decode(numbers)
     return found

@@ -9,7 +9,7 @@ import numpy as np
 Chooser = Callable[[np.ndarray, np.random.Generator], int]
 
 
-def choose_likeliest(probabilities: np.ndarray, rng: np.random.Generator) -> int:
+def choose_greedily(probabilities: np.ndarray, rng: np.random.Generator) -> int:
     """Index of the largest probability, the first of equals: for evaluation."""
     return int(probabilities.argmax())
 
@@ -25,7 +25,7 @@ def choose_sampled(probabilities: np.ndarray, rng: np.random.Generator) -> int:
 def choose_at(temperature: float) -> Chooser:
     """Draw from the distribution sharpened (below 1) or flattened (above 1) by `temperature`; 0 is the likeliest."""
     if temperature == 0:
-        return choose_likeliest
+        return choose_greedily
     if temperature == 1:
         return choose_sampled
     return lambda probabilities, rng: choose_sampled((probabilities / probabilities.max()) ** (1 / temperature), rng)

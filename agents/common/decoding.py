@@ -1,4 +1,4 @@
-"""How the next word, character or action is chosen from logits: the likeliest, or drawn with numbers of one's own."""
+"""How the next word, character or action is chosen from logits: greedily, or sampled with given random numbers."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ Choice = Callable[[Tensor, Tensor, int], Tensor]
 """(logits (k, V), rows (k,) of the batch, step) to chosen numbers (k,)."""
 
 
-def likeliest(logits: Tensor, rows: Tensor, step: int) -> Tensor:
+def greedy_choice(logits: Tensor, rows: Tensor, step: int) -> Tensor:
     """The number of the largest logit."""
     return logits.argmax(-1)
 
 
-def drawn_with(uniforms: np.ndarray) -> Choice:
+def sampled_choice(uniforms: np.ndarray) -> Choice:
     """Sample each number with one of `uniforms` (B, steps) in [0, 1), by inverting the distribution.
 
     Each row brings its own uniforms, so what is drawn for it does not depend on its batch.

@@ -23,7 +23,7 @@ def rank() -> int:
     return dist.get_rank() if dist.is_initialized() else 0
 
 
-def processes() -> int:
+def world_size() -> int:
     return dist.get_world_size() if dist.is_initialized() else 1
 
 
@@ -42,12 +42,12 @@ def join_launcher(device: str) -> str:
 
 def share(items: Sequence[T]) -> Sequence[T]:
     """What this process works on: every n-th item."""
-    return items[rank() :: processes()]
+    return items[rank() :: world_size()]
 
 
 def add_gradients(parameters: Iterable[torch.nn.Parameter]) -> None:
     """Every process gets the sum of all gradients."""
-    if processes() == 1:
+    if world_size() == 1:
         return
     gradients = [p.grad for p in parameters if p.grad is not None]
     flat = torch.cat([g.flatten() for g in gradients])
@@ -63,7 +63,7 @@ def reduce_metrics(
 ) -> dict[str, float]:
     """`numbers` of all processes, each named in `names`: those in `added` summed up, of the others the mean over
     the processes that have them."""
-    if processes() == 1:
+    if world_size() == 1:
         return dict(numbers)
     table = torch.tensor([[numbers.get(n, 0.0), float(n in numbers)] for n in names], device=device)
     dist.all_reduce(table)
@@ -81,7 +81,7 @@ def rank_zero(note: Callable[[str], None]) -> Callable[[str], None]:
 
 def any_rank(flag: bool, device: torch.device) -> bool:
     """Whether `flag` is true in any process, so that all stop together."""
-    if processes() == 1:
+    if world_size() == 1:
         return flag
     tensor = torch.tensor(float(flag), device=device)
     dist.all_reduce(tensor, dist.ReduceOp.MAX)

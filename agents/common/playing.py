@@ -1,4 +1,4 @@
-"""Playing training episodes with a policy whose memory holds, in the end, all that it said."""
+"""Playing training episodes with a policy whose last memory is wanted: it holds all outputs of the episodes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from embodied.evaluation.rollout import rollout
 from embodied.interface import Actions, Agent, Episode, Observations, Place, Situations, Task, act
 
 
-class _Remembering:
+class _MemoryKeeper:
     """An agent that keeps the memory of its last call, because `rollout` does not hand it out, and its time."""
 
     def __init__(self, agent: Agent) -> None:
@@ -32,7 +32,7 @@ class _Remembering:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class TaskSet:
     """Tasks of some houses and the environment they are played in."""
 
     worlds: Mapping[str, Place]
@@ -40,11 +40,11 @@ class Ground:
     make_env: Callable[[], HelpEnv]
 
 
-def play_remembering(
+def play_with_memory(
     make_env: Callable[[], HelpEnv], agent: Agent, tasks: Sequence[Task], *, seed: int
 ) -> tuple[tuple[Episode, ...], Any, float]:
     """Play `tasks` side by side; their episodes, the agent's last memory and the seconds that it took."""
-    remembering = _Remembering(agent)
+    remembering = _MemoryKeeper(agent)
     frames = rollout(make_env, remembering, tasks, seed=seed, batch=len(tasks))
     done = {f.index: f.episode for f in frames if f.episode is not None}
     return tuple(done[i] for i in range(len(tasks))), remembering.memory, remembering.seconds

@@ -191,7 +191,7 @@ class Session:
         Of agents that a few hundred tasks cannot tell apart, the one that learned longest is kept, not the luckiest.
         """
         best = max(self.progress.best, score)
-        kept = score >= best if episodes is None else as_good(score, best, episodes)
+        kept = score >= best if episodes is None else within_standard_error(score, best, episodes)
         if kept:
             self.progress = dataclasses.replace(self.progress, best=best, best_update=self.done)
         return kept
@@ -357,13 +357,13 @@ def tasks_of_update(tasks: Sequence[T], update: int, batch: int, seed: int) -> l
     return [tasks[int(orders[turn][place])] for turn, place in chosen]
 
 
-def seed_of(seed: int, update: int) -> int:
+def episode_seed(seed: int, update: int) -> int:
     """The seed of the episodes of one update."""
     return int(stream(seed, "update", update).integers(2**31))
 
 
 @contextmanager
-def dropout_of(seed: int, update: int) -> Iterator[None]:
+def seeded_dropout(seed: int, update: int) -> Iterator[None]:
     """PyTorch's own draws (dropout) follow from (seed, update) inside, and are as before outside."""
     devices = list(range(torch.cuda.device_count()))
     with torch.random.fork_rng(devices=devices):
@@ -371,12 +371,12 @@ def dropout_of(seed: int, update: int) -> Iterator[None]:
         yield
 
 
-def as_good(success: float, best: float, episodes: int) -> bool:
+def within_standard_error(success: float, best: float, episodes: int) -> bool:
     """Whether a success rate on `episodes` tasks is within one standard error of the best one (Breiman's rule)."""
     return success >= best - math.sqrt(best * (1 - best) / episodes)
 
 
-def falling_rate(rate: float, update: int, updates: int, cooldown: float) -> float:
+def scheduled_rate(rate: float, update: int, updates: int, cooldown: float) -> float:
     """A learning rate that falls linearly over the last share `cooldown` of the updates; never zero."""
     falling = round(cooldown * updates)
     return rate * min(1.0, (updates - update) / (falling + 1))
@@ -409,6 +409,6 @@ def descend(loss: torch.Tensor, optimizer: torch.optim.Optimizer, what: str, cli
     return float(norm)
 
 
-def set_rate(optimizer: torch.optim.Optimizer, rate: float) -> None:
+def set_learning_rate(optimizer: torch.optim.Optimizer, rate: float) -> None:
     for group in optimizer.param_groups:
         group["lr"] = rate

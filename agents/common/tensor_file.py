@@ -98,7 +98,7 @@ def checksum_of(tensors: Mapping[str, Tensor], about: Mapping[str, str]) -> str:
     return h.hexdigest()
 
 
-def put(network: nn.Module, tensors: Mapping[str, Tensor], path: Path) -> None:
+def load_into(network: nn.Module, tensors: Mapping[str, Tensor], path: Path) -> None:
     """Give `network` the weights `tensors`, which were read from `path`.
 
     Raises:

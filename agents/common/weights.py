@@ -67,13 +67,13 @@ def weights_digest(path: Path) -> str:
     return checksum_of(tensors, {k: v for k, v in found.items() if k != "identity"})
 
 
-def halved(network: nn.Module) -> dict[str, Tensor]:
+def half_precision(network: nn.Module) -> dict[str, Tensor]:
     """The weights of a network in half precision."""
     return {k: v.detach().half() for k, v in network.state_dict().items()}
 
 
-def refuse_features(found: str, learned_from: str) -> None:
-    """Raises ValueError where features come from another encoder than the one that an agent learned from."""
+def check_features(found: str, learned_from: str) -> None:
+    """Raises ValueError where features come from another encoder than the one that an agent was trained on."""
     if found != learned_from:
         raise ValueError(
             f"the features come from encoder {found[:12]}, the agent learned from {learned_from[:12]}; "

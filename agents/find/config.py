@@ -22,15 +22,16 @@ class FinderConfig(ImitationSettings):
     agent: str = "network"
     """'network' learns where to look; 'detector' explores the nearest frontier and goes to what it recognises."""
     sees: str = "all"
-    """'all'; 'map': black for the network, while its map recognises places; 'nothing': black for both."""
+    """Ablations of vision: 'all': none; 'map': the network sees black pictures, its map still recognises places;
+    'nothing': both see black pictures."""
     hidden_size: int = 128
     """Width of the network."""
     dropout: float = 0.3
-    """Share of features and of hidden units that are dropped in training."""
+    """Dropout rate of features and hidden units."""
     iterations: int = 800
     """Updates of the weights."""
     glimpses: int = 600
-    """In the first so many updates only the readers of views learn, then from whole episodes, too (DAgger)."""
+    """Updates at the start that train only the heads that read single views; later ones also use episodes (DAgger)."""
     learning_rate: float = 3e-3
     """Learning rate of Adam."""
     cooldown: float = 0.5

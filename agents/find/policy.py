@@ -15,7 +15,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common.choosing import Chooser, choose_likeliest
+from agents.common.choosing import Chooser, choose_greedily
 from agents.common.vocabulary import Vocabulary
 from agents.find.network import Scorer
 from agents.find.way_map import WayMap, directions
@@ -94,7 +94,7 @@ class FindPolicy:
     """What the network sees."""
     looks: FeatureBank
     """What places are known again by."""
-    choose: Chooser = choose_likeliest
+    choose: Chooser = choose_greedily
 
     def act(
         self, observations: Sequence[Observation | None], memory: Any, *, rngs: Sequence[np.random.Generator]

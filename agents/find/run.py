@@ -11,14 +11,23 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
-from agents.common import spine
+from agents.common import imitation
 from agents.common.choosing import choose_sampled
-from agents.common.playing import play_remembering
-from agents.common.session import Clock, Note, descend, dropout_of, falling_rate, seed_of, set_rate, tasks_of_update
+from agents.common.playing import play_with_memory
+from agents.common.session import (
+    Clock,
+    Note,
+    descend,
+    episode_seed,
+    scheduled_rate,
+    seeded_dropout,
+    set_learning_rate,
+    tasks_of_update,
+)
 from agents.common.settings import EvaluationSettings
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.weights import load_weights, refuse_features, save_weights
+from agents.common.weights import check_features, load_weights, save_weights
 from agents.find.config import THINGS, FinderConfig
 from agents.find.network import READ, Explorer, SeekNetwork
 from agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
@@ -87,7 +96,7 @@ class Finder:
         Raises:
           ValueError: features of another encoder.
         """
-        refuse_features(bank.digest, self.about.encoder)
+        check_features(bank.digest, self.about.encoder)
         sees, scorer = self.about.config.sees, self.scorer
         looks = bank.blind() if sees == "nothing" else bank
         seen = bank if sees == "all" else bank.blind()
@@ -114,13 +123,13 @@ def load_finder(path: Path) -> Finder:
     """
     tensors, about = load_weights(path, "find", FinderAbout, "train the agent again with `embodied study find`")
     finder = new_finder(about, tensors["requests"])
-    put(finder.scorer, tensors, path)
+    load_into(finder.scorer, tensors, path)
     finder.scorer.eval()
     return finder
 
 
 class FindLearner:
-    """An agent in training; a Learner of agents.common.spine."""
+    """An agent in training; a Learner of agents.common.imitation."""
 
     evaluation = EvaluationSettings()
 
@@ -138,8 +147,8 @@ class FindLearner:
             with clock.on("environment"):
                 searches, numbers = self._search(update)
         self.network.train()
-        with clock.on("backward"), dropout_of(c.seed, update):
-            set_rate(self.optimizer, falling_rate(c.learning_rate, update, c.iterations, c.cooldown))
+        with clock.on("backward"), seeded_dropout(c.seed, update):
+            set_learning_rate(self.optimizer, scheduled_rate(c.learning_rate, update, c.iterations, c.cooldown))
             loss = self._labels.loss(self.network, looks_of(self._labels, c.seed, update))
             numbers["reading"] = float(loss.detach())
             if searches:
@@ -153,17 +162,17 @@ class FindLearner:
         c, split = self.config, self._training
         policy = Watched(dataclasses.replace(self.finder.policy(split.bank), choose=choose_sampled))
         tasks = tasks_of_update(split.tasks, update, c.batch, c.seed)
-        episodes, searches, _ = play_remembering(split.make_env, policy, tasks, seed=seed_of(c.seed, update))
+        episodes, searches, _ = play_with_memory(split.make_env, policy, tasks, seed=episode_seed(c.seed, update))
         success = sum(metrics.success(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
         return list(searches.values()), {"success": success, "steps": float(sum(len(e.steps) for e in episodes))}
 
-    def judged(self, split: Split) -> FindPolicy:
+    def evaluated_agent(self, split: Split) -> FindPolicy:
         return self.finder.policy(split.bank)
 
-    def task(self, task: Task) -> Task:
+    def evaluation_task(self, task: Task) -> Task:
         return task
 
-    def keep(self, path: Path, identity: Identity) -> None:
+    def save(self, path: Path, identity: Identity) -> None:
         self.finder.save(path, identity)
 
 
@@ -172,7 +181,7 @@ def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Pa
     training = find_split(lessons, "train", config.house_tasks, config.training_houses or None)
     validation = find_split(lessons, "val_unseen", -(-config.validation_tasks // len(lessons.data.names("val_unseen"))))
     words = build_vocabulary(t.request for t in training.tasks).words
-    about = FinderAbout(config, lessons.encoder.speaks, lessons.encoder.size, words)
+    about = FinderAbout(config, lessons.encoder.feature_space, lessons.encoder.size, words)
     classes = sorted({t.goal.object_class for t in training.tasks if isinstance(t.goal, FindObject)})
     say = lambda c: PlainLanguage().request(FindObject(c), rng=stream(config.seed, "unused"))
     requests = torch.stack([torch.from_numpy(Vocabulary(words).encode(say(c), WORDS)) for c in classes])
@@ -183,7 +192,7 @@ def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Pa
     if config.agent == "detector":
         explorer_of(finder, labels, validation, note=note).save(folder / "best.safetensors", identity)
         return
-    spine.train(FindLearner(finder, training, labels), validation, folder, identity, note=note)
+    imitation.train(FindLearner(finder, training, labels), validation, folder, identity, note=note)
 
 
 def finder_identity(lessons: Lessons, config: FinderConfig) -> Identity:
@@ -252,8 +261,8 @@ def explorer_of(finder: Finder, labels: Labels, validation: Split, *, note: Note
     assert isinstance(explorer, Explorer)
     optimizer = torch.optim.AdamW(explorer.parameters(), c.learning_rate, weight_decay=c.weight_decay)
     for update in range(c.iterations):
-        with dropout_of(c.seed, update):
-            set_rate(optimizer, falling_rate(c.learning_rate, update, c.iterations, c.cooldown))
+        with seeded_dropout(c.seed, update):
+            set_learning_rate(optimizer, scheduled_rate(c.learning_rate, update, c.iterations, c.cooldown))
             descend(labels.loss(explorer, looks_of(labels, c.seed, update)), optimizer, f"update {update}", CLIP)
     explorer.eval()
     scores = {}

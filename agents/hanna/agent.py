@@ -10,9 +10,9 @@ import torch
 
 from agents.common.choosing import choose_at
 from agents.common.shipped import SHIPPED_AGENT
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
-from agents.common.weights import halved, load_weights, refuse_features, save_weights
+from agents.common.weights import check_features, half_precision, load_weights, save_weights
 from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
@@ -56,7 +56,7 @@ class HannaAgent:
         Raises:
           ValueError: features of another encoder.
         """
-        refuse_features(bank.digest, self.encoder_digest)
+        check_features(bank.digest, self.encoder_digest)
         config, judged = self.config, self.evaluation
         learned = ask_patiently(
             judged.ask_threshold,
@@ -98,7 +98,7 @@ def save_agent(agent: HannaAgent, path: Path, identity: Identity | None = None) 
     """Write weights in half precision, with settings, vocabulary and what it was trained with, atomically."""
     words = agent.vocabulary.words
     about = HannaAbout(agent.config, agent.evaluation, agent.encoder_digest, agent.feature_size, words)
-    save_weights(path, "hanna", halved(agent.network), about, identity)
+    save_weights(path, "hanna", half_precision(agent.network), about, identity)
 
 
 def load_agent(path: Path = SHIPPED) -> HannaAgent:
@@ -110,7 +110,7 @@ def load_agent(path: Path = SHIPPED) -> HannaAgent:
     """
     tensors, told = load_weights(path, "hanna", HannaAbout, "train the agent again with `embodied train hanna`")
     agent = new_agent(told.config, Vocabulary(told.words), told.encoder, told.feature_size, told.evaluation)
-    put(agent.network, tensors, path)
+    load_into(agent.network, tensors, path)
     agent.network.eval()
     return agent
 

@@ -16,7 +16,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.losses import IGNORE
-from agents.common.playing import play_remembering
+from agents.common.playing import play_with_memory
 from agents.hanna.losses import help_loss, navigation_loss
 from agents.hanna.policy import HannaPolicy, Moment
 from embodied.envs.base import HelpEnv
@@ -70,7 +70,7 @@ def collect(
     seed: int,
 ) -> Experience:
     """Play `tasks` side by side with a policy that keeps its moments, and have them labelled."""
-    episodes, memory, thinking = play_remembering(make_env, policy, tasks, seed=seed)
+    episodes, memory, thinking = play_with_memory(make_env, policy, tasks, seed=seed)
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
     moments = memory.moments
     return Experience(episodes, join(moments), targets(moments, labels), thinking)

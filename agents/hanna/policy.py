@@ -12,7 +12,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common.choosing import Chooser, choose_likeliest, choose_sampled
+from agents.common.choosing import Chooser, choose_greedily, choose_sampled
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
@@ -77,7 +77,7 @@ class HannaPolicy:
     network: HannaNetwork | LstmNetwork
     vocabulary: Vocabulary
     bank: FeatureBank
-    choose: Chooser = choose_likeliest
+    choose: Chooser = choose_greedily
     ask_rule: HannaAskRule = ask_greedily
     instruction_length: int = 50
     turn_to_agent: bool = True

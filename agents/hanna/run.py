@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from agents.common import spine
+from agents.common import imitation
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
@@ -35,9 +35,9 @@ def train_agent(
     minutes: float | None = None,
     begin: Path | None = None,
     note: Note = print,
-    on_validation: spine.OnValidation | None = None,
+    on_validation: imitation.OnValidation | None = None,
 ) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.spine.train.
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train.
 
     Args:
       begin: a trained agent whose weights and words a new run begins with.
@@ -51,7 +51,7 @@ def train_agent(
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else load_agent(begin)
     words = other.vocabulary if other else vocabulary_of(data, houses)
-    agent = new_agent(config, words, encoder.speaks, encoder.size, evaluation)
+    agent = new_agent(config, words, encoder.feature_space, encoder.size, evaluation)
     if other is not None and begin is not None:
         take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
         note(f"new runs begin with the weights of {begin}")
@@ -61,7 +61,7 @@ def train_agent(
     note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
     identity = training_identity(lessons, config, begin)
     learner, watch = HannaLearner(agent, training, HannaTeacher()), on_validation
-    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+    return imitation.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
 
 
 def training_identity(lessons: Lessons, config: TrainingConfig, begin: Path | None = None) -> dict[str, Any]:

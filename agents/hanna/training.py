@@ -1,4 +1,4 @@
-"""The training of HANNA: retrospective DAgger with the losses of 4.2.3, in the loop of agents.common.spine.
+"""The training of HANNA: retrospective DAgger with the losses of 4.2.3, in the loop of agents.common.imitation.
 
 episodes = play tasks with the sampling policies          (collect)
 labels = teacher.relabel(episodes)                        (collect)
@@ -13,9 +13,9 @@ from pathlib import Path
 
 import torch
 
-from agents.common import parallel, spine
+from agents.common import imitation, parallel
 from agents.common.losses import IGNORE
-from agents.common.session import Clock, seed_of, tasks_of_update
+from agents.common.session import Clock, episode_seed, tasks_of_update
 from agents.hanna.agent import HannaAgent, save_agent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import Experience, collect, imitation_loss
@@ -46,19 +46,19 @@ class HannaLearner:
     def learn(self, update: int, clock: Clock) -> dict[str, float]:
         bank = self._training.bank.relit(stream(self.config.seed, "lightings", update))
         player = dataclasses.replace(self._player, bank=bank)
-        return learn_once(self.agent, self.optimizer, player, self._training, self._teacher, update, clock)
+        return train_step(self.agent, self.optimizer, player, self._training, self._teacher, update, clock)
 
-    def judged(self, split: Split) -> Agent:
+    def evaluated_agent(self, split: Split) -> Agent:
         return self.agent.policy(split.bank)
 
-    def task(self, task: Task) -> Task:
+    def evaluation_task(self, task: Task) -> Task:
         return dataclasses.replace(task, horizon=self.evaluation.evaluation_steps)
 
-    def keep(self, path: Path, identity: Identity) -> None:
+    def save(self, path: Path, identity: Identity) -> None:
         save_agent(self.agent, path, identity)
 
 
-def learn_once(
+def train_step(
     agent: HannaAgent,
     optimizer: torch.optim.Optimizer,
     learner: HannaPolicy,
@@ -78,18 +78,18 @@ def learn_once(
     tasks = [dataclasses.replace(t, horizon=config.training_steps) for t in tasks]
 
     def played() -> tuple[Experience, float]:
-        seed = seed_of(config.seed, update)
+        seed = episode_seed(config.seed, update)
         experience = collect(training.make_env, learner, tasks, teacher, training.worlds, seed=seed)
         return experience, experience.thinking
 
-    def lesson_of(experience: Experience) -> spine.Lesson:
+    def loss_of(experience: Experience) -> imitation.BatchLoss:
         losses = imitation_loss(
             experience.said, experience.targets, config.alpha, config.batch, config.curiosity_floor, config.ask_price
         )
-        learned = losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]
-        return spine.Lesson(losses, learned, numbers_of(experience, training.worlds))
+        loss = losses[0] + losses[1] if config.ask_rule == "learned" else losses[0]
+        return imitation.BatchLoss(losses, loss, numbers_of(experience, training.worlds))
 
-    return spine.learn_once(agent.network, optimizer, config, update, clock, played, lesson_of)
+    return imitation.train_step(agent.network, optimizer, config, update, clock, played, loss_of)
 
 
 def numbers_of(experience: Experience, worlds: Mapping[str, Place]) -> dict[str, float]:

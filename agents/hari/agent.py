@@ -9,7 +9,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.weights import load_weights, save_weights
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
@@ -100,7 +100,7 @@ def load_executor(path: Path) -> Executor:
     """
     tensors, told = load_weights(path, "hari", HariAbout, REMEDY)
     executor = new_executor(told.execution, FeatureWords(told.names))
-    put(executor.network, _of("execution", tensors), path)
+    load_into(executor.network, _of("execution", tensors), path)
     executor.network.eval()
     return executor
 
@@ -120,7 +120,7 @@ def load_agent(path: Path) -> HariAgent:
         )
     executor = load_executor(path)
     actor, _ = new_heads(config, executor.config.hidden_size)
-    put(actor, _of("actor", tensors), path)
+    load_into(actor, _of("actor", tensors), path)
     actor.eval()
     return HariAgent(executor, actor, config)
 

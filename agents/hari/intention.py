@@ -19,8 +19,8 @@ from torch import Tensor
 
 from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.checkpoint import Stateful
-from agents.common.playing import Ground
-from agents.common.session import Note, Progress, Session, descend, seed_of, tasks_of_update
+from agents.common.playing import TaskSet
+from agents.common.session import Note, Progress, Session, descend, episode_seed, tasks_of_update
 from agents.hari.agent import HariAgent, save_agent
 from agents.hari.networks import INTENTIONS, RecurrentHead
 from agents.hari.policy import Choice, policy_of
@@ -36,8 +36,8 @@ MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_
 def train(
     agent: HariAgent,
     critic: RecurrentHead,
-    training: Ground,
-    validation: Ground,
+    training: TaskSet,
+    validation: TaskSet,
     folder: Path,
     identity: Identity,
     *,
@@ -74,7 +74,7 @@ def train(
         note=note,
     ) as session:
         for update in session:
-            session.add(learn_once(run, training, update))
+            session.add(train_step(run, training, update))
             if session.due(config.validate_every):
                 episodes = _validation_of(agent, validation)
                 cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
@@ -103,14 +103,14 @@ class IntentionRun:
         return {**heads, "actor optimizer": self.actor_optimizer, "critic optimizer": self.critic_optimizer}
 
 
-def learn_once(run: IntentionRun, ground: Ground, update: int) -> dict[str, float]:
+def train_step(run: IntentionRun, ground: TaskSet, update: int) -> dict[str, float]:
     """One update: of the critic alone among the first `critic_iterations`, else of both; returns numbers to report."""
     config = run.agent.config
     tasks = tasks_of_update(ground.tasks, update, config.batch, config.seed)
     tasks = [dataclasses.replace(t, id=f"{t.id}#{k}") for k, t in enumerate(tasks)]
     choices: list[Choice] = []
     run.policy.choices = choices
-    episodes = play(ground.make_env, run.policy, tasks, seed=seed_of(config.seed, update), batch=len(tasks))
+    episodes = play(ground.make_env, run.policy, tasks, seed=episode_seed(config.seed, update), batch=len(tasks))
     costs, mask = padded([shaped_costs(e, ground.worlds[e.task.world].graph.hops) for e in episodes])
     log_p, entropy = chosen(choices, len(tasks))
     decisions = Decisions(log_p, -values(run.critic, choices, len(tasks)), -costs_to_go(costs, mask), mask)
@@ -179,7 +179,7 @@ def numbers_of(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict
     return {"success": success, **counts_of(episodes)}
 
 
-def _validation_of(agent: HariAgent, ground: Ground) -> Sequence[Episode]:
+def _validation_of(agent: HariAgent, ground: TaskSet) -> Sequence[Episode]:
     config, tasks = agent.config, ground.tasks[: agent.config.validation_tasks]
     with torch.inference_mode():
         return play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)

@@ -112,7 +112,7 @@ class ExecutionNetwork(nn.Module):
         rows = torch.cat([(before + self.roles[0])[:, None], state_rows, goal_rows], 1)  # (B, 1 + S + G, h)
         there = torch.ones_like(state.present[:, :1])
         packing = Packing.of(torch.cat([there, state.present, goal.present], 1))
-        belief = self.norm(self.decoder(packing.pack(rows), packing, firsts_only=True))  # (B, h)
+        belief = self.norm(self.decoder(packing.pack(rows), packing, first_rows_only=True))  # (B, h)
         moves, angles, allowed = (torch.from_numpy(x).to(device) for x in (inputs.moves, inputs.angles, inputs.allowed))
         keys = self.key(self.embed(moves) + self.angles(angles))  # (B, C + 1, h)
         scores = torch.einsum("bh,bch->bc", self.query(belief), keys) / math.sqrt(keys.shape[-1])

@@ -19,7 +19,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.common.session import Note, Progress, Session, descend, dropout_of, falling_rate, set_rate, tasks_of_update
+from agents.common.session import (
+    Note,
+    Progress,
+    Session,
+    descend,
+    scheduled_rate,
+    seeded_dropout,
+    set_learning_rate,
+    tasks_of_update,
+)
 from agents.hari.agent import Executor, save_executor
 from agents.hari.config import ExecutionConfig
 from agents.hari.words import Inputs, collate, padded, percept
@@ -94,7 +103,7 @@ def pretrain(
         note=note,
     ) as session:
         for update in session:
-            session.add(learn_once(executor, optimizer, lessons, update))
+            session.add(train_step(executor, optimizer, lessons, update))
             if session.due(config.validate_every):
                 tasks = lessons.validation[: config.validation_tasks]
                 success = pretraining_success(executor, lessons, tasks)
@@ -105,7 +114,7 @@ def pretrain(
     return session.progress
 
 
-def learn_once(
+def train_step(
     executor: Executor, optimizer: torch.optim.Optimizer, lessons: PretrainingData, update: int
 ) -> dict[str, float]:
     """One update; returns its loss per step and the share of steps at which the likeliest move was right.
@@ -121,10 +130,10 @@ def learn_once(
             if walk.rng.random() < config.subgoals:
                 give_subgoal(walk, lessons.describer, longest=int(walk.rng.integers(1, LONGEST + 1)))
     executor.network.train()
-    with dropout_of(config.seed, update):
+    with seeded_dropout(config.seed, update):
         losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
     loss = torch.cat(losses).mean()
-    set_rate(optimizer, falling_rate(config.learning_rate, update, config.iterations, config.cooldown))
+    set_learning_rate(optimizer, scheduled_rate(config.learning_rate, update, config.iterations, config.cooldown))
     descend(loss, optimizer, f"update {update}", config.clip)
     steps = torch.cat(right)
     return {"loss": float(loss.detach()), "right moves": float(steps.float().mean()), "steps": float(len(steps))}

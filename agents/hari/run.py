@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.common.playing import Ground
+from agents.common.playing import TaskSet
 from agents.common.session import Note, Progress
 from agents.common.tensor_file import checksum_of
 from agents.common.weights import weights_digest
@@ -39,13 +39,13 @@ def rules_of(config: IntentionConfig) -> HariRules:
     return HariRules(costs, config.stack, config.longest, config.cooperative, horizon=config.horizon, kept=config.kept)
 
 
-def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> Ground:
+def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> TaskSet:
     """Some splits as one place to learn or to be validated in; at most `limit` tasks, from all splits alike."""
     parts = [data.split(s, hari=rules_of(config)) for s in splits]
     each = None if limit is None else -(-limit // len(splits))
     tasks = [t for part in parts for t in spread(part.tasks, each)]
     places: Mapping[str, Place] = {name: place for part in parts for name, place in part.worlds.items()}
-    return Ground(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
+    return TaskSet(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
 
 
 def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[[], HelpEnv]:

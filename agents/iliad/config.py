@@ -40,7 +40,7 @@ class LearnerConfig:
     cooldown: float = 0.0
     """Share of the updates at the end over which the learning rate falls linearly to zero."""
     threshold: float = 0.85
-    """Validation success at which training episodes are counted (c of Table 3.4)."""
+    """Sample complexity is the number of training episodes until validation reaches this success (c of Table 3.4)."""
     validate_every: int = 500
     """Updates between validations."""
     checkpoint_minutes: float = 2.0

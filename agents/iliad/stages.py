@@ -15,8 +15,8 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.checkpoint import Stateful
-from agents.common.session import Note, Session, descend, falling_rate, set_rate
-from agents.common.tensor_file import put, read_weights
+from agents.common.session import Note, Session, descend, scheduled_rate, set_learning_rate
+from agents.common.tensor_file import load_into, read_weights
 from agents.common.weights import origin_of, save_weights
 from embodied.identity import Identity, differences
 from embodied.seeds import stream
@@ -56,7 +56,7 @@ class TeachingStage:
         """Train `network` or go on, unless NAME.safetensors in the folder is what would come of it."""
         path = self.folder / f"{self.name}.safetensors"
         if path.exists() and not differences(origin_of(path) or {}, self.identity):
-            put(network, read_weights(path), path)
+            load_into(network, read_weights(path), path)
             return network.eval()
         optimizer = torch.optim.Adam(network.parameters(), self.rate, fused=True)
         network.train()
@@ -65,7 +65,7 @@ class TeachingStage:
             self.folder / self.name, self.identity, parts, self.updates, checkpoint_minutes=2.0, every=REPORT, note=note
         ) as session:
             for update in session:
-                set_rate(optimizer, falling_rate(self.rate, update, self.updates, COOLDOWN))
+                set_learning_rate(optimizer, scheduled_rate(self.rate, update, self.updates, COOLDOWN))
                 loss = loss_of(stream(self.seed, self.world, self.name, update))
                 descend(loss, optimizer, f"{self.name}, update {update}", CLIP)
                 session.add({"loss": float(loss.detach()), "updates": 1.0})

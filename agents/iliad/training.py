@@ -10,7 +10,7 @@ from typing import Generic
 import numpy as np
 import torch
 
-from agents.common.session import Note, Session, descend, falling_rate, set_rate, tasks_of_update
+from agents.common.session import Note, Session, descend, scheduled_rate, set_learning_rate, tasks_of_update
 from agents.iliad.config import LearnerConfig, as_dict, mixing_at
 from agents.iliad.learners import Asked, IliadLesson, RewardsOf, RunningMean, adel, dagger, mixture, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
@@ -123,7 +123,7 @@ class _Learner(Generic[Q, E]):
     def update(self, update: int) -> dict[str, float]:
         """One update; returns numbers to add up."""
         c, world = self.config, self.problem.world
-        set_rate(self.optimizer, falling_rate(c.rate, update, c.iterations, c.cooldown))
+        set_learning_rate(self.optimizer, scheduled_rate(c.rate, update, c.iterations, c.cooldown))
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
         asked = Asked(tasks, [world.request(q, rng=rng) for q in tasks], rng)

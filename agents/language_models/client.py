@@ -48,12 +48,12 @@ class ServerSettings:
     model: str
     """Name of the model, as its server knows it."""
     base_url: str = "https://api.openai.com/v1"
-    """Address of the server, which speaks OpenAI's chat completions; answers are kept without regard to it."""
+    """Address of the server, which implements OpenAI's chat completions; stored answers do not depend on it."""
     key_variable: str = "OPENAI_API_KEY"
     """Environment variable with the key; a server of your own needs none."""
     form: str = "schema"
-    """How JSON is asked for: by structured output as OpenAI has it (schema) or as llama-cpp-python has it (object), by
-    a tool, or in words alone (text)."""
+    """How JSON is requested: structured output of OpenAI (schema) or of llama-cpp-python (object), a tool call (tools),
+    or the prompt alone (text)."""
     temperature: float = 0.0
     """Sampling temperature."""
     most_tokens: int = 300

@@ -74,7 +74,7 @@ class VisionConfig:
     begin: str = "random"
     """Initial weights: 'random', or 'imagenet' for 'lite0' and 'lite0_means'."""
     frozen: bool = False
-    """Freeze the body; the neck and the heads are trained."""
+    """Freeze the backbone; train only the neck and the heads."""
     training_houses: int = 0
     """Train on this many of the data set's training houses; 0: on all."""
     epochs: int = 6
@@ -82,7 +82,7 @@ class VisionConfig:
     batch: int = 8
     """Strips per update."""
     shade: float = 0.0
-    """Standard deviation of the logarithm of a random uneven light laid over strips; 0.3 suits unlit pictures."""
+    """Augmentation by random uneven brightness: standard deviation of its logarithm; 0.3 suits unlit pictures."""
     learning_rate: float = 2e-3
     """Highest learning rate of a one-cycle schedule."""
     weight_decay: float = 1e-2
@@ -92,9 +92,10 @@ class VisionConfig:
     seed: int = 0
     """Random seed."""
     cameras: tuple[str, ...] = ("ideal",)
-    """Cameras that take the strips, 'ideal', 'phone' or 'robot', one of them at random for each strip."""
+    """Simulated cameras for augmentation, 'ideal', 'phone' or 'robot'; each strip is taken by a random one."""
     like: str = ""
-    """Digest of an encoder to begin with, whose sight of the same places without light is learned; '' for none."""
+    """Digest of an encoder to distil from, which encodes the same places without light; '' for none. The name is that
+    of stored settings."""
 
     def __post_init__(self) -> None:
         if not self.cameras:

@@ -23,7 +23,7 @@ class Design:
     neck: int = 0
     """Channels that a 1x1 convolution makes of the body's; 0: the map is the body's."""
     peaks: int = 0
-    """So many of them are the largest of what a view shows: small things drown in a mean."""
+    """This many of them are max-pooled over a view, the others mean-pooled: small things vanish in a mean."""
 
 
 DESIGNS: Mapping[str, Design] = {
@@ -35,7 +35,7 @@ DESIGNS: Mapping[str, Design] = {
 }
 
 
-class Necked(Network):
+class NetworkWithNeck(Network):
     """A body whose map a 1x1 convolution mixes."""
 
     def __init__(self, body: Network, size: int, peaks: int) -> None:
@@ -54,16 +54,16 @@ def build(name: str) -> Network:
     """The network `name` with random weights."""
     design = DESIGNS[name]
     body = LiteBody() if design.body == "lite0" else ResNet(ARCHITECTURES[design.body])
-    return Necked(body, design.neck, design.peaks) if design.neck else body
+    return NetworkWithNeck(body, design.neck, design.peaks) if design.neck else body
 
 
 def body_of(network: Network) -> Network:
     """The network without its neck."""
-    return network.body if isinstance(network, Necked) else network
+    return network.body if isinstance(network, NetworkWithNeck) else network
 
 
-def begin_as_imagenet(network: Network) -> None:
-    """Put what ImageNet taught into the body of 'lite0' or 'lite0_means'.
+def load_imagenet(network: Network) -> None:
+    """Load ImageNet weights into the body of 'lite0' or 'lite0_means'.
 
     Raises:
       ValueError: no other network's weights come in a package.

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from agents.common.shipped import SHIPPED_ENCODER
-from agents.common.tensor_file import put, read_weights
+from agents.common.tensor_file import load_into, read_weights
 from agents.common.weights import load_weights, save_weights
 from agents.vision.designs import DESIGNS, build
 from agents.vision.network import Network
@@ -39,6 +39,7 @@ class EncoderAbout:
     sharing: str
     digest: str
     like: str = ""
+    """Encoder.distilled_from; the name is that of stored files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,13 +56,14 @@ class Encoder:
     """(D,) subtracted from features; None leaves them as the network gives them."""
     mix: Tensor | None = None
     """(D, D) that whitens features after the mean is gone: x -> (x - mean) @ mix."""
-    like: str = ""
-    """Digest of the encoder that it was taught to see alike (agents.vision.training.Example); '' for none."""
+    distilled_from: str = ""
+    """Digest of the encoder whose features it was trained to give (agents.vision.training.DistillationTarget); '' for
+    none."""
 
     @property
-    def speaks(self) -> str:
-        """Digest of the encoder whose features its own stand for: agents that know those may be shown these."""
-        return self.like or self.digest
+    def feature_space(self) -> str:
+        """Digest of the encoder whose features its own can replace: agents trained on those can use these."""
+        return self.distilled_from or self.digest
 
     @property
     def size(self) -> int:
@@ -160,7 +162,7 @@ def imagenet_encoder(name: str, weights: Path) -> Encoder:
 
 def save_encoder(encoder: Encoder, path: Path, identity: Identity | None = None) -> None:
     """Write half-precision weights, settings and what they were trained with, atomically."""
-    about = EncoderAbout(encoder.name, encoder.sharing, encoder.digest, encoder.like)
+    about = EncoderAbout(encoder.name, encoder.sharing, encoder.digest, encoder.distilled_from)
     save_weights(path, "encoder", {k: v.detach().half() for k, v in _tensors(encoder).items()}, about, identity)
 
 
@@ -178,7 +180,7 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
     network = build(told.name)
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
-    put(network, {**counters, **tensors}, path)
+    load_into(network, {**counters, **tensors}, path)
     encoder = Encoder(network.eval(), told.name, told.sharing, mean, mix, told.like)
     if encoder.digest != told.digest:
         raise ValueError(f"{path}: contents do not fit the digest {told.digest[:12]}; it was changed")

@@ -80,8 +80,8 @@ def save_features(
 ) -> None:
     """Write (n, 36, D) features; `source` is the digest of what they were computed from (the house)."""
     about = {"format": FORMAT, "encoder": encoder.digest, "source": source, "drawing": drawing(pictures)}
-    if encoder.like:
-        about["speaks"] = encoder.speaks
+    if encoder.distilled_from:
+        about["speaks"] = encoder.feature_space
     tensor = torch.from_numpy(np.ascontiguousarray(features, dtype=np.float16))
     save_tensors(Path(path), {"features": tensor}, about)
 
@@ -94,7 +94,7 @@ def load_features(
     pictures: PictureSettings | None = None,
     lights: int = 1,
 ) -> tuple[np.ndarray, str]:
-    """(n, 36, D) float16 features and the digest that their encoder speaks.
+    """(n, 36, D) float16 features and the feature space of their encoder (Encoder.feature_space).
 
     Args:
       encoder, source, pictures: what is expected, if anything.

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from agents.common.playing import Ground
+from agents.common.playing import TaskSet
 from agents.vision.bank import FeatureBank
 from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
@@ -20,7 +20,7 @@ from embodied.evaluation.evaluate import spread
 
 
 @dataclass(frozen=True, eq=False)
-class Split(Ground):
+class Split(TaskSet):
     """Tasks of some houses, the environment they are played in, and what is seen there."""
 
     bank: FeatureBank

@@ -15,7 +15,7 @@ from torch import Tensor
 
 
 @dataclass(frozen=True, eq=False)
-class Labelled:
+class LabelledFeatures:
     """Features of n nodes and what is to be read from them."""
 
     features: np.ndarray
@@ -33,7 +33,7 @@ class Labelled:
 
 
 @dataclass(frozen=True)
-class ReadingScores:
+class ProbeScores:
     """What linear readers achieve on unseen houses."""
 
     mean_ap: float
@@ -68,7 +68,7 @@ def average_precision(scores: np.ndarray, positive: np.ndarray) -> float:
     return float((precision * hits).sum() / hits.sum())
 
 
-def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> ReadingScores:
+def read(train: LabelledFeatures, test: LabelledFeatures, *, seed: int, steps: int = 400) -> ProbeScores:
     """Fit linear readers on `train` and judge them on `test`."""
     d = train.features.shape[-1]
     x, y = (torch.from_numpy(s.features.reshape(-1, d)) for s in (train, test))
@@ -92,7 +92,7 @@ def read(train: Labelled, test: Labelled, *, seed: int, steps: int = 400) -> Rea
     depth = _fit(x, goal, F.mse_loss, seed, steps)(y).numpy()[:, 0]
     true_depth = test.log_depth.reshape(-1)
     common = np.bincount(train.room).argmax()
-    return ReadingScores(
+    return ProbeScores(
         mean_ap=float(np.nanmean(ap)),
         chance_ap=float(truth[:, [c for c in known if truth[:, c].any()]].mean()),
         classes=int(np.isfinite(ap).sum()),
@@ -123,8 +123,8 @@ def _fit(
     return lambda rows: reader(rows).detach()
 
 
-def place_auc(nodes: Labelled, near: float = 2.5) -> float:
-    """See ReadingScores.place_auc; pairs of one house only, a node is not compared with itself."""
+def place_auc(nodes: LabelledFeatures, near: float = 2.5) -> float:
+    """See ProbeScores.place_auc; pairs of one house only, a node is not compared with itself."""
     close, far = [], []
     for house in sorted(set(nodes.house.tolist())):
         rows = np.flatnonzero(nodes.house == house)

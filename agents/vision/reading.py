@@ -11,7 +11,7 @@ import numpy as np
 
 from agents.vision.encoder import Encoder
 from agents.vision.labels import HouseStrips, mean_log_depth_of_views, visible_in_views
-from agents.vision.probe import Labelled, ReadingScores
+from agents.vision.probe import LabelledFeatures, ProbeScores
 from agents.vision.strip import view_of_strip
 from embodied.datasets.store import Dataset
 from embodied.interface import VIEWS
@@ -19,7 +19,7 @@ from embodied.interface import VIEWS
 
 def labelled(
     data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str], *, alone: bool = False
-) -> Labelled:
+) -> LabelledFeatures:
     """Features of houses and what a linear reader should read from them.
 
     Args:
@@ -33,7 +33,7 @@ def labelled(
             np.stack([[view_of_strip(s, k) for k in range(VIEWS)] for s in strips])
         )
     features = [np.concatenate([encode(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
-    return Labelled(
+    return LabelledFeatures(
         np.concatenate(features),
         np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
         np.concatenate([h.room for h in houses]).astype(np.int64),
@@ -43,7 +43,7 @@ def labelled(
     )
 
 
-def as_numbers(reading: ReadingScores, classes: Sequence[str]) -> dict[str, Any]:
+def as_numbers(reading: ProbeScores, classes: Sequence[str]) -> dict[str, Any]:
     """A reading for JSON; None for a class that no judged house shows."""
     numbers = {k: v for k, v in dataclasses.asdict(reading).items() if k != "ap"}
     ap = [None if math.isnan(x) else x for x in reading.ap]

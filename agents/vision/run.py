@@ -20,7 +20,7 @@ from agents.vision.labels import HouseStrips
 from agents.vision.occasions import Occasion, make_shown
 from agents.vision.probe import read
 from agents.vision.reading import as_numbers, labelled
-from agents.vision.training import Example, matched, save_training, train_encoder, trained_classes, whitened
+from agents.vision.training import DistillationTarget, aligned, save_training, train_encoder, trained_classes, whitened
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
@@ -35,35 +35,35 @@ def train_vision(
     config: VisionConfig,
     out: Path,
     *,
-    like: Path | None = None,
+    distil_from: Path | None = None,
     device: str = "cpu",
     workers: int = 1,
     note: Note = print,
 ) -> None:
-    """Cut strips from the pictures of all houses, train on the training houses, judge on validation houses, save.
+    """Cut strips from the pictures of all houses, train on the training houses, evaluate on validation houses, save.
 
     What is there already, strips or an encoder of the same settings, is not made again; training goes on from the
     last epoch that was finished.
 
     Args:
-      like: an encoder to begin with and to see alike.
+      distil_from: an encoder to start from and to distil.
 
     Raises:
       LockedError: another process writes to `out`.
     """
     check_device(device)
     data = Dataset(source.data)
-    other = None if like is None else load_encoder(like)
+    other = None if distil_from is None else load_encoder(distil_from)
     if other is not None:
         config = dataclasses.replace(config, like=other.digest)
     with locked(out):
         seen = source.strips(training_houses(data, config), workers=workers, note=note)
-        example = None
+        target = None
         if other is not None:
-            example = example_of(other, source, training_houses(data, config), workers=workers, note=note)
+            target = distillation_target(other, source, training_houses(data, config), workers=workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
-        shown = seen if example is None else [*seen, *example.strips.values()]  # plain ones as one more lighting
-        encoder, classes = taught(shown, config, out, note, example=example, device=device)
+        shown = seen if target is None else [*seen, *target.strips.values()]  # plain ones as one more lighting
+        encoder, classes = trained_encoder(shown, config, out, note, target=target, device=device)
         untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
         numbers = {}
         for name, who, alone in (
@@ -77,29 +77,29 @@ def train_vision(
         write_json(out / "readings.json", numbers, indent=1)
 
 
-def example_of(
+def distillation_target(
     encoder: Encoder, source: StripSource, names: Sequence[str], *, workers: int = 1, note: Note = print
-) -> Example:
-    """What an encoder sees in houses when they are drawn without light."""
+) -> DistillationTarget:
+    """An encoder to distil from, with houses drawn without light."""
     plain = dataclasses.replace(source, picture_kind="unlit", lights=1)
-    return Example(encoder, {h.name: h for h in plain.strips(names, workers=workers, note=note)})
+    return DistillationTarget(encoder, {h.name: h for h in plain.strips(names, workers=workers, note=note)})
 
 
-def taught(
+def trained_encoder(
     seen: Sequence[HouseStrips],
     config: VisionConfig,
     folder: Path,
     note: Note = print,
     *,
-    example: Example | None = None,
+    target: DistillationTarget | None = None,
     device: str = "cpu",
 ) -> tuple[Encoder, list[str]]:
-    """The encoder that `config` makes of strips, from `folder` if it is there, and the classes it was taught."""
+    """The encoder that `config` makes of strips, from `folder` if it is there, and the classes of its heads."""
     classes = trained_classes(folder, config)
     if classes is None:
         home = folder / "training"
-        encoder, heads, classes = train_encoder(seen, config, home, example=example, device=device, note=note)
-        encoder = matched(encoder, seen, example) if example else whitened(encoder, seen)
+        encoder, heads, classes = train_encoder(seen, config, home, target=target, device=device, note=note)
+        encoder = aligned(encoder, seen, target) if target else whitened(encoder, seen)
         save_training(encoder, heads, classes, config, folder)
         (home / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes

@@ -66,7 +66,7 @@ def _perspective(yaw: float, pitch: float, size: tuple[int, int]) -> tuple[np.nd
     return (x % WIDTH).astype(np.float32), y.astype(np.float32)
 
 
-def seen_by_view(view: int) -> np.ndarray:
+def view_coverage(view: int) -> np.ndarray:
     """(192, 576) float64: how much picture area of view `view` each pixel of the strip covers; 0 outside.
 
     A pixel's solid angle is proportional to cos(pitch); a solid angle at angle theta from the
@@ -88,7 +88,7 @@ def seen_by_view(view: int) -> np.ndarray:
 @functools.cache
 def windows() -> np.ndarray:
     """(36, 12, 36) float32: weight of each cell of the feature map in each view; each view sums to 1."""
-    weights = np.stack([seen_by_view(k).reshape(ROWS, CELL, COLUMNS, CELL).sum((1, 3)) for k in range(VIEWS)])
+    weights = np.stack([view_coverage(k).reshape(ROWS, CELL, COLUMNS, CELL).sum((1, 3)) for k in range(VIEWS)])
     return (weights / weights.sum((1, 2), keepdims=True)).astype(np.float32)
 
 

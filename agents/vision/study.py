@@ -28,7 +28,7 @@ from agents.vision.encoder import load_encoder
 from agents.vision.labels import HouseStrips
 from agents.vision.probe import read
 from agents.vision.reading import labelled
-from agents.vision.run import taught, training_houses
+from agents.vision.run import trained_encoder, training_houses
 from agents.vision.training import frequent_classes
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
@@ -106,7 +106,7 @@ class EncoderStudy:
         if READY in train:
             return self.ready[train[READY]][seed]
         config = dataclasses.replace(self.config, seed=seed, **train)
-        taught(self._seen(), config, home, note, device=self.device)
+        trained_encoder(self._seen(), config, home, note, device=self.device)
         return home / "encoder.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
@@ -120,7 +120,7 @@ class EncoderStudy:
         known, other = (labelled(data, houses, encoder, classes) for houses in (seen, unseen))
         found = read(known, other, seed=self.config.seed)
         numbers = (found.mean_ap, found.chance_ap, 100 * found.room_accuracy, found.depth_r2, found.place_auc)
-        cost = (price(encoder.encode_strips, unseen), weights.stat().st_size / 1e6)
+        cost = (encoding_ms(encoder.encode_strips, unseen), weights.stat().st_size / 1e6)
         return {name: Samples((float(v),)) for name, v in zip(COLUMNS, (*numbers, *cost), strict=True)}
 
     def about(self) -> str:
@@ -144,7 +144,7 @@ class EncoderStudy:
         return self.source.strips(training_houses(Dataset(self.source.data), self.config), note=lambda line: None)
 
 
-def price(encode: Any, houses: Sequence[HouseStrips], rounds: int = 5) -> float:
+def encoding_ms(encode: Any, houses: Sequence[HouseStrips], rounds: int = 5) -> float:
     """Milliseconds of processor time per viewpoint, the median of some looks at several strips."""
     strips, times = houses[0].rgb[:STRIPS], []
     for _ in range(rounds + 1):

@@ -1,4 +1,4 @@
-"""Teaching the encoder to see, on our own renders: which objects, which room, how far.
+"""Training of the encoder on our own renders: which objects, which room, how far.
 
 Every cell of the feature map learns which classes it shows, which kind of room it looks into and
 how far away things are; every one of the 36 views learns which classes are visible in it and in
@@ -25,7 +25,7 @@ from agents.common.checkpoint import Stateful
 from agents.common.session import Session, descend
 from agents.common.tensor_file import save_tensors
 from agents.vision.config import VisionConfig
-from agents.vision.designs import begin_as_imagenet, body_of, build
+from agents.vision.designs import body_of, build, load_imagenet
 from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
 from agents.vision.network import Network
@@ -75,7 +75,7 @@ class StripBatch:
     room: Tensor
     """(n,) int64."""
     plain: Tensor | None = None
-    """(n, 192, 576, 3) uint8, the same places as an example sees them."""
+    """(n, 192, 576, 3) uint8, the same places without light, for distillation."""
 
     def to(self, device: str) -> StripBatch:
         held = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
@@ -83,12 +83,13 @@ class StripBatch:
 
 
 @dataclass(frozen=True, eq=False)
-class Example:
-    """What an encoder is taught to see alike: another one's features of the same places, drawn without light.
+class DistillationTarget:
+    """What an encoder is distilled from: another encoder, and the same places drawn without light, which it encodes.
 
-    Houses without light are cheap, so an agent can learn in many of them; an encoder that sees a lit house as the
-    agent's own sees the unlit one opens lit houses to it. It begins with that encoder's weights, and the labels teach
-    the heads alone. Where the plain strips are also among those it is shown, it goes on seeing them as before.
+    Houses without light are cheap, so an agent can learn in many of them. An encoder that gives for a lit house the
+    features that the agent's own encoder gives for the unlit one lets the agent act in lit houses. It starts from that
+    encoder's weights, and the labels train the heads alone. Where the unlit strips are also among the inputs, their
+    features stay as they were.
     """
 
     encoder: Encoder
@@ -118,18 +119,20 @@ def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) ->
     }
 
 
-def alike_loss(network: Network, heads: Heads, batch: StripBatch, example: Encoder) -> tuple[Tensor, dict[str, float]]:
-    """Mean square between the finished features of `network` and those of `example` in plain strips, and the losses
-    of the heads, which leave the network alone."""
+def distillation_loss(
+    network: Network, heads: Heads, batch: StripBatch, target: Encoder
+) -> tuple[Tensor, dict[str, float]]:
+    """Mean square between the finished features of `network` and those of `target` in unlit strips, and the losses
+    of the heads, whose gradients do not reach the network."""
     if batch.plain is None:
-        raise ValueError("the batch holds no strips for the example")
+        raise ValueError("the batch holds no unlit strips to distil from; give `batches` `plain`")
     maps = strip_map(network, batch.rgb)
-    views = example.finish(pool_views(maps, network.peaks))
+    views = target.finish(pool_views(maps, network.peaks))
     with torch.no_grad():
-        aim = example.finish(pool_views(strip_map(example.network, batch.plain), example.network.peaks))
-    alike = F.mse_loss(views, aim)
+        aim = target.finish(pool_views(strip_map(target.network, batch.plain), target.network.peaks))
+    distillation = F.mse_loss(views, aim)
     told, parts = head_losses(heads, maps.detach(), pool_views(maps.detach(), network.peaks), batch)
-    return alike + told, {"alike": float(alike.detach()), **parts}
+    return distillation + told, {"distillation": float(distillation.detach()), **parts}
 
 
 def batches(
@@ -155,14 +158,14 @@ def batches(
             several = lightings[name]
             house = several[int(rng.integers(len(several)))] if len(several) > 1 else several[0]
             turn, mirror = int(rng.integers(COLUMNS)), bool(rng.random() < 0.5)
-            seen = recolour(turned(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
-            rgb.append(taken(seen, cameras, rng=rng) if set(cameras) != {"ideal"} else seen)
-            share.append(turned(house.share[i], turn, mirror)[..., columns])
-            rooms.append(turned(house.rooms[i], turn, mirror))
-            depth.append(turned(house.log_depth[i], turn, mirror))
+            seen = recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
+            rgb.append(photograph_strip(seen, cameras, rng=rng) if set(cameras) != {"ideal"} else seen)
+            share.append(turn_strip(house.share[i], turn, mirror)[..., columns])
+            rooms.append(turn_strip(house.rooms[i], turn, mirror))
+            depth.append(turn_strip(house.log_depth[i], turn, mirror))
             room.append(house.room[i])
             if plain is not None:
-                bare.append(turned(plain[name].rgb[i], turn * CELL, mirror))
+                bare.append(turn_strip(plain[name].rgb[i], turn * CELL, mirror))
         shares = np.stack(share)
         yield StripBatch(
             torch.from_numpy(np.stack(rgb)),
@@ -183,12 +186,12 @@ def _by_name(houses: Sequence[HouseStrips]) -> dict[str, list[HouseStrips]]:
     return out
 
 
-def strips_of(houses: Sequence[HouseStrips]) -> int:
+def strip_count(houses: Sequence[HouseStrips]) -> int:
     """How many strips an epoch has: one per viewpoint, however many lightings a house has."""
     return sum(len(several[0].rgb) for several in _by_name(houses).values())
 
 
-def turned(strip: np.ndarray, columns: int, mirror: bool) -> np.ndarray:
+def turn_strip(strip: np.ndarray, columns: int, mirror: bool) -> np.ndarray:
     """A strip or its labels (rows, columns, ...) as seen after turning, and in a mirror."""
     rolled = np.roll(strip, columns, 1)
     return rolled[:, ::-1] if mirror else rolled
@@ -209,9 +212,9 @@ def recolour(image: np.ndarray, uneven: float = 0.0, *, rng: np.random.Generator
     return np.clip(recoloured * shade[..., None], 0, 255).astype(np.uint8)
 
 
-def taken(strip: np.ndarray, cameras: Sequence[str], *, rng: np.random.Generator) -> np.ndarray:
-    """A strip as another device of one of `cameras` takes it: exposure, balance, bloom, noise and JPEG, but no lens,
-    since a strip is stitched of views and labels stand in its cells."""
+def photograph_strip(strip: np.ndarray, cameras: Sequence[str], *, rng: np.random.Generator) -> np.ndarray:
+    """A strip as a random device of one of `cameras` takes it: exposure, white balance, bloom, noise and JPEG, but no
+    lens distortion, which would move the picture against its labels."""
     traits = camera_traits(cameras[int(rng.integers(len(cameras)))], rng=rng)
     return strip if traits is None else photograph(np.ascontiguousarray(strip), traits, None, rng=rng)
 
@@ -227,14 +230,14 @@ def train_encoder(
     config: VisionConfig,
     folder: Path | None = None,
     *,
-    example: Example | None = None,
+    target: DistillationTarget | None = None,
     device: str = "cpu",
     note: Callable[[str], None] = print,
 ) -> tuple[Encoder, Heads, list[str]]:
-    """The encoder, its heads, and the names of the classes the heads speak of; both on the CPU in the end.
+    """The encoder, its heads, and the names of the classes that the heads predict; both on the CPU in the end.
 
     Args:
-      example: what it is to see alike; `config.like` names it.
+      target: what to distil from; `config.like` names its encoder.
       device: where PyTorch computes.
       folder: of the run, whose state is kept after each epoch; training goes on from it. None keeps nothing.
 
@@ -242,14 +245,14 @@ def train_encoder(
       ValueError: no strips, or strips with different classes.
       DivergedError: the loss is no longer a number.
       CheckpointError: damaged, or of other settings.
-      UnableError: it should begin as ImageNet taught, and the package of weights is not installed.
+      UnableError: it should start from ImageNet weights, and their package is not installed.
     """
     if not houses or len({h.classes for h in houses}) != 1:
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
-    _refuse_example(houses, config, example)
+    _check_target(houses, config, target)
     classes = frequent_classes(houses, config.least_views)
-    strips = strips_of(houses)
-    training = _Training(config, len(classes), strips // config.batch, device, example)
+    strips = strip_count(houses)
+    training = _Training(config, len(classes), strips // config.batch, device, target)
     note(f"{strips} strips an epoch, of {len(_by_name(houses))} houses, {len(classes)} classes")
     if folder is None:
         for epoch in range(config.epochs):
@@ -261,9 +264,13 @@ def train_encoder(
                 session.add(training.pass_over(houses, classes, epoch, note))
     network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
     names = [houses[0].classes[i] for i in classes]
-    if example is None:
+    if target is None:
         return Encoder(network, config.network), heads, names
-    return dataclasses.replace(example.encoder, network=network, like=example.encoder.speaks), heads, names
+    return (
+        dataclasses.replace(target.encoder, network=network, distilled_from=target.encoder.feature_space),
+        heads,
+        names,
+    )
 
 
 def _digest_of(houses: Sequence[HouseStrips]) -> str:
@@ -271,39 +278,43 @@ def _digest_of(houses: Sequence[HouseStrips]) -> str:
     return digest(*(digest(h.name, h.classes, h.rgb.tobytes(), h.share.tobytes()) for h in houses))
 
 
-def _refuse_example(houses: Sequence[HouseStrips], config: VisionConfig, example: Example | None) -> None:
-    if (example.encoder.digest if example else "") != config.like:
-        raise ValueError(f"the settings name the example {config.like[:12]!r}; pass that encoder, or none")
-    if example is None:
-        return
-    if (example.encoder.name, example.encoder.sharing) != (config.network, "strip"):
+def _check_target(houses: Sequence[HouseStrips], config: VisionConfig, target: DistillationTarget | None) -> None:
+    if (target.encoder.digest if target else "") != config.like:
         raise ValueError(
-            f"the example is a {example.encoder.name!r} that looks at {example.encoder.sharing}, training one of "
-            f"{config.network!r} on strips; say --network {example.encoder.name}"
+            f"the settings name the encoder {config.like[:12]!r} to distil from; pass that encoder as target, or none"
+        )
+    if target is None:
+        return
+    if (target.encoder.name, target.encoder.sharing) != (config.network, "strip"):
+        raise ValueError(
+            f"the encoder to distil from is a {target.encoder.name!r} on {target.encoder.sharing}, training one of "
+            f"{config.network!r} on strips; say --network {target.encoder.name}"
         )
     for house in houses:
-        if house.name not in example.strips or len(example.strips[house.name].rgb) != len(house.rgb):
-            raise ValueError(f"house {house.name!r} has {len(house.rgb)} strips, and not as many for the example")
+        if house.name not in target.strips or len(target.strips[house.name].rgb) != len(house.rgb):
+            raise ValueError(
+                f"house {house.name!r} has {len(house.rgb)} strips, and not as many unlit ones to distil from"
+            )
 
 
 class _Training:
     """Owns what changes while an encoder learns."""
 
     def __init__(
-        self, config: VisionConfig, classes: int, updates: int, device: str, example: Example | None = None
+        self, config: VisionConfig, classes: int, updates: int, device: str, target: DistillationTarget | None = None
     ) -> None:
         """Args:
         updates: per epoch.
         """
-        self.config, self._device, self._example = config, device, example
+        self.config, self._device, self._target = config, device, target
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(config.seed)
             self.network = build(config.network)
             self.heads = Heads(self.network.size, classes)
         if config.begin == "imagenet":
-            begin_as_imagenet(self.network)
-        if example is not None:
-            self.network.load_state_dict(example.encoder.network.state_dict())
+            load_imagenet(self.network)
+        if target is not None:
+            self.network.load_state_dict(target.encoder.network.state_dict())
         if config.frozen:
             body_of(self.network).requires_grad_(False)
         self.network.to(device)
@@ -331,17 +342,17 @@ class _Training:
             body_of(self.network).eval()
         began, smooth = time.monotonic(), dict[str, float]()
         rng = stream(self.config.seed, "vision", "epoch", epoch)
-        example = None if self._example is None else self._example.encoder.to(self._device)
-        plain = None if self._example is None else self._example.strips
+        target = None if self._target is None else self._target.encoder.to(self._device)
+        plain = None if self._target is None else self._target.strips
         drawn = batches(
             houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng, plain=plain
         )
         for done, batch in enumerate(drawn, 1):
             batch = batch.to(self._device)
-            if example is None:
+            if target is None:
                 loss, parts = vision_loss(self.network, self.heads, batch)
             else:
-                loss, parts = alike_loss(self.network, self.heads, batch, example)
+                loss, parts = distillation_loss(self.network, self.heads, batch, target)
             descend(loss, self._optimizer, f"epoch {epoch + 1}, update {done}")
             self._schedule.step()
             smooth = {k: 0.95 * smooth.get(k, v) + 0.05 * v for k, v in parts.items()}
@@ -362,7 +373,7 @@ def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
     return Encoder(encoder.network, encoder.name, encoder.sharing, mean, mix)
 
 
-def matched(encoder: Encoder, houses: Sequence[HouseStrips], example: Example) -> Encoder:
+def aligned(encoder: Encoder, houses: Sequence[HouseStrips], target: DistillationTarget) -> Encoder:
     """The encoder with features that are mapped linearly onto those it was taught to see, and spread as widely.
 
     What is taught by least squares lies nearer to the mean than what it stands for, and the nearer the less of it can
@@ -371,13 +382,13 @@ def matched(encoder: Encoder, houses: Sequence[HouseStrips], example: Example) -
     Args:
       houses: strips to fit the map on, in any light.
     """
-    teacher = example.encoder.to("cpu")  # training left its network where it computed
-    aims = {name: _seen_by(teacher, [strips]) for name, strips in example.strips.items()}
-    turned, offset = _spread_map(_seen_by(encoder, houses).double(), torch.cat([aims[h.name] for h in houses]).double())
+    teacher = target.encoder.to("cpu")  # training left its network where it computed
+    aims = {name: _seen_by(teacher, [strips]) for name, strips in target.strips.items()}
+    linear, offset = _spread_map(_seen_by(encoder, houses).double(), torch.cat([aims[h.name] for h in houses]).double())
     mean, mix = encoder.mean, encoder.mix
     mean = torch.zeros(encoder.size) if mean is None else mean
     mix = torch.eye(encoder.size) if mix is None else mix
-    both = mix.double() @ turned  # (x - mean) @ mix @ turned + offset, as (x - other) @ both
+    both = mix.double() @ linear  # (x - mean) @ mix @ linear + offset, as (x - other) @ both
     other = mean.double() - offset @ torch.linalg.pinv(both, rtol=1e-4)
     return dataclasses.replace(encoder, mean=other.float(), mix=both.float())
 

@@ -9,9 +9,9 @@ import torch
 
 from agents.common.choosing import choose_at
 from agents.common.settings import EvaluationSettings
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
-from agents.common.weights import halved, load_weights, refuse_features, save_weights
+from agents.common.weights import check_features, half_precision, load_weights, save_weights
 from agents.vision.bank import FeatureBank
 from agents.vln.config import FollowerSettings
 from agents.vln.network import FollowerNetwork
@@ -45,7 +45,7 @@ class VlnAgent:
         Raises:
           ValueError: features of another encoder.
         """
-        refuse_features(bank.digest, self.about.encoder)
+        check_features(bank.digest, self.about.encoder)
         config = self.about.config
         return VlnPolicy(
             self.network,
@@ -67,7 +67,7 @@ def new_agent(about: VlnAbout) -> VlnAgent:
 
 def save_agent(agent: VlnAgent, path: Path, identity: Identity | None = None) -> None:
     """Write weights in half precision, with settings, words and what it was trained with, atomically."""
-    save_weights(path, "vln", halved(agent.network), agent.about, identity)
+    save_weights(path, "vln", half_precision(agent.network), agent.about, identity)
 
 
 def load_agent(path: Path) -> VlnAgent:
@@ -79,6 +79,6 @@ def load_agent(path: Path) -> VlnAgent:
     """
     tensors, about = load_weights(path, "vln", VlnAbout, "train the agent again with `embodied train vln follower`")
     agent = new_agent(about)
-    put(agent.network, tensors, path)
+    load_into(agent.network, tensors, path)
     agent.network.eval()
     return agent

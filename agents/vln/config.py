@@ -29,27 +29,27 @@ class FollowerSettings(ImitationSettings):
     dropout: float = 0.2
     """Dropout rate in training."""
     forcing: str = "dagger"
-    """Whose actions are taken in training: 'teacher', 'student' or 'dagger'."""
+    """Whose actions are executed in training: 'teacher', 'student' or 'dagger'."""
     blind: bool = False
-    """Whether it sees nothing: all features are zero."""
+    """Ablation without vision: all features are zero."""
     wordless: bool = False
-    """Whether it is told nothing: the instruction is empty."""
+    """Ablation without language: the instruction is empty."""
     progress_weight: float = 0.5
-    """Weight of the loss of guessing which share of the way is left (Ma et al. 2019)."""
+    """Weight of the progress monitor's loss: it predicts which share of the path is left (Ma et al. 2019)."""
     room_weight: float = 0.5
-    """Weight of the loss of naming the kinds of the rooms that it is in and can go to."""
+    """Weight of an auxiliary loss: predict the kinds of the current room and of the candidates' rooms."""
     spoken_share: float = 0.0
-    """Share of the episodes in which it follows a speaker's words along random paths (back-translation)."""
+    """Share of training episodes on random paths with a speaker's instructions (back-translation)."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
     least_teacher: float = 0.0
-    """Share of the steps in which the teacher acts at the end of 'dagger'."""
+    """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
     iterations: int = 20_000
     """Updates of the weights."""
     batch: int = 64
     """Episodes per update."""
     instruction_length: int = 80
-    """Words of an instruction that are read."""
+    """Longest instruction, words; the rest is cut."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -68,7 +68,7 @@ class SpeakerSettings(RunSettings):
     hidden_size: int = 256
     """Width of the networks."""
     heads: int = 8
-    """Of attention."""
+    """Attention heads."""
     iterations: int = 20_000
     """Updates of the weights."""
     learning_rate: float = 1e-4

@@ -11,7 +11,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common.choosing import Chooser, choose_likeliest
+from agents.common.choosing import Chooser, choose_greedily
 from agents.common.losses import IGNORE
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.percept import orientation
@@ -81,7 +81,7 @@ class VlnPolicy:
     network: FollowerNetwork
     vocabulary: Vocabulary
     bank: FeatureBank
-    choose: Chooser = choose_likeliest
+    choose: Chooser = choose_greedily
     instruction_length: int = 80
     wordless: bool = False
     """Whether the instruction is empty to it."""

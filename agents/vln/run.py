@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from agents.common import spine
+from agents.common import imitation
 from agents.common.more_paths import more_routes
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
@@ -31,9 +31,9 @@ def train_follower(
     speaker: Path | None = None,
     minutes: float | None = None,
     note: Note = print,
-    on_validation: spine.OnValidation | None = None,
+    on_validation: imitation.OnValidation | None = None,
 ) -> Progress:
-    """Train, or go on training, the follower of a run folder; other arguments as in agents.common.spine.train.
+    """Train, or go on training, the follower of a run folder; other arguments as in agents.common.imitation.train.
 
     Args:
       speaker: whose words it learns from besides, in spoken_share of the episodes.
@@ -48,7 +48,7 @@ def train_follower(
         training = dataclasses.replace(training, tasks=mixed(training, config, speaker))
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     words, encoder = build_vocabulary(t.request for t in training.tasks), lessons.encoder
-    about = VlnAbout(config, evaluation, encoder.speaks, encoder.size, words.words, lessons.pictures("train"))
+    about = VlnAbout(config, evaluation, encoder.feature_space, encoder.size, words.words, lessons.pictures("train"))
     agent = new_agent(about)
     agent.network.to(lessons.device)
     rank_zero(note)(
@@ -57,7 +57,7 @@ def train_follower(
     )
     identity, watch = training_identity(lessons, config, speaker), on_validation
     learner = VlnLearner(agent, training)
-    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+    return imitation.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
 
 
 def more_tasks(lessons: Lessons, training: Split, config: FollowerSettings) -> list[Task]:

@@ -16,11 +16,11 @@ import torch
 from torch import Tensor
 
 from agents.common.choosing import choose_sampled
-from agents.common.decoding import drawn_with
+from agents.common.decoding import sampled_choice
 from agents.common.session import Note
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.weights import load_weights, refuse_features
+from agents.common.weights import check_features, load_weights
 from agents.iliad.nav.network import WalkDescriber
 from agents.iliad.nav.student import COPIES, NavEyes
 from agents.iliad.nav.teacher import said, walked
@@ -70,7 +70,7 @@ class Speaker:
         Raises:
           ValueError: features of another encoder.
         """
-        refuse_features(bank.digest, self.about.encoder)
+        check_features(bank.digest, self.about.encoder)
         return NavEyes(places, bank, Vocabulary(self.about.words))
 
 
@@ -92,7 +92,7 @@ def load_speaker(path: Path) -> Speaker:
     """
     tensors, about = load_weights(path, "vln-speaker", SpeakerAbout, "train it again with `embodied train vln speaker`")
     speaker = new_speaker(about)
-    put(speaker.network, tensors, path)
+    load_into(speaker.network, tensors, path)
     speaker.network.eval()
     return speaker
 
@@ -101,7 +101,7 @@ def train_speaker(lessons: Lessons, config: SpeakerSettings, folder: Path, *, no
     """Train, or go on training, the speaker of a folder by maximum likelihood; returns its file."""
     training, judged = lessons.split("train"), lessons.split("val_unseen", limit=JUDGED)
     words = build_vocabulary(t.request for t in training.tasks).words
-    speaker = new_speaker(SpeakerAbout(config, lessons.encoder.speaks, lessons.encoder.size, words))
+    speaker = new_speaker(SpeakerAbout(config, lessons.encoder.feature_space, lessons.encoder.size, words))
     eyes = speaker.eyes(dict(training.worlds), training.bank)
 
     def loss_of(rng: np.random.Generator) -> Tensor:
@@ -194,7 +194,7 @@ def spoken_tasks(speaker: Speaker, training: Split, dropout: float, *, seed: int
         )
         seen = torch.stack([channels_of(t.id, training.bank.size, dropout) for t in unworded])[:, None]
         actions = torch.cat([actions[..., : training.bank.size] * seen, actions[..., training.bank.size :]], -1)
-        choose = drawn_with(rng.random((len(paths), LONGEST)))
+        choose = sampled_choice(rng.random((len(paths), LONGEST)))
         numbers = speaker.network.write(views * seen[:, :, None], actions, mask, choose, LONGEST)
         texts = said(eyes.vocabulary, numbers)
         tasks += [dataclasses.replace(t, request=text) for t, text in zip(unworded, texts, strict=True)]

@@ -1,4 +1,4 @@
-"""The training of a follower: imitation of the shortest path, in the loop of agents.common.spine.
+"""The training of a follower: imitation of the shortest path, in the loop of agents.common.imitation.
 
 episodes = play tasks, actions of teacher or follower (FORCING)                                  (policy)
 loss = - log pi(a*) + progress_weight (left - left*)^2 - room_weight log p(room*)                (`losses_of`)
@@ -15,11 +15,11 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common import parallel, spine
+from agents.common import imitation, parallel
 from agents.common.choosing import choose_sampled
 from agents.common.losses import IGNORE, negative_log_likelihood
-from agents.common.playing import play_remembering
-from agents.common.session import Clock, seed_of, tasks_of_update
+from agents.common.playing import play_with_memory
+from agents.common.session import Clock, episode_seed, tasks_of_update
 from agents.vision.lessons import Split
 from agents.vln.agent import VlnAgent, save_agent
 from agents.vln.config import FollowerSettings
@@ -55,24 +55,24 @@ class VlnLearner:
         player = SupervisedVln(policy, lambda _, rng: bool(rng.random() < share))
 
         def played() -> tuple[VlnExperience, float]:
-            seed = seed_of(config.seed, update)
-            episodes, memory, seconds = play_remembering(training.make_env, player, tasks, seed=seed)
+            seed = episode_seed(config.seed, update)
+            episodes, memory, seconds = play_with_memory(training.make_env, player, tasks, seed=seed)
             return VlnExperience(episodes, memory.moments), seconds
 
-        def lesson_of(experience: VlnExperience) -> spine.Lesson:
+        def loss_of(experience: VlnExperience) -> imitation.BatchLoss:
             moves, left, rooms = losses_of(experience.moments, config.batch)
-            learned = moves + config.progress_weight * left + config.room_weight * rooms
-            return spine.Lesson((moves, torch.zeros(())), learned, numbers_of(experience, training.worlds))
+            loss = moves + config.progress_weight * left + config.room_weight * rooms
+            return imitation.BatchLoss((moves, torch.zeros(())), loss, numbers_of(experience, training.worlds))
 
-        return spine.learn_once(self.network, self.optimizer, config, update, clock, played, lesson_of)
+        return imitation.train_step(self.network, self.optimizer, config, update, clock, played, loss_of)
 
-    def judged(self, split: Split) -> Agent:
+    def evaluated_agent(self, split: Split) -> Agent:
         return self.agent.policy(split.bank)
 
-    def task(self, task: Task) -> Task:
+    def evaluation_task(self, task: Task) -> Task:
         return task
 
-    def keep(self, path: Path, identity: Identity) -> None:
+    def save(self, path: Path, identity: Identity) -> None:
         save_agent(self.agent, path, identity)
 
 

@@ -9,9 +9,9 @@ import torch
 
 from agents.common.choosing import choose_at
 from agents.common.settings import EvaluationSettings
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
-from agents.common.weights import halved, load_weights, refuse_features, save_weights
+from agents.common.weights import check_features, half_precision, load_weights, save_weights
 from agents.vision.bank import FeatureBank
 from agents.vnla.config import ASK_RULES, VnlaSettings
 from agents.vnla.network import VnlaNetwork
@@ -58,7 +58,7 @@ class VnlaAgent:
         Raises:
           ValueError: features of another encoder.
         """
-        refuse_features(bank.digest, self.encoder_digest)
+        check_features(bank.digest, self.encoder_digest)
         config = self.config
         return VnlaPolicy(
             self.network,
@@ -100,7 +100,7 @@ def save_agent(agent: VnlaAgent, path: Path, identity: Identity | None = None) -
     """Write weights in half precision, with settings, words and what it was trained with, atomically."""
     words = agent.vocabulary.words
     about = VnlaAbout(agent.config, agent.evaluation, agent.encoder_digest, agent.feature_size, words, agent.pictures)
-    save_weights(path, "vnla", halved(agent.network), about, identity)
+    save_weights(path, "vnla", half_precision(agent.network), about, identity)
 
 
 def load_agent(path: Path) -> VnlaAgent:
@@ -113,6 +113,6 @@ def load_agent(path: Path) -> VnlaAgent:
     tensors, told = load_weights(path, "vnla", VnlaAbout, "train the agent again with `embodied train vnla`")
     words = Vocabulary(told.words)
     agent = new_agent(told.config, words, told.encoder, told.feature_size, told.pictures, told.evaluation)
-    put(agent.network, tensors, path)
+    load_into(agent.network, tensors, path)
     agent.network.eval()
     return agent

@@ -15,7 +15,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common.choosing import Chooser, choose_likeliest, choose_sampled
+from agents.common.choosing import Chooser, choose_greedily, choose_sampled
 from agents.common.vocabulary import Vocabulary, tokenize
 from agents.vision.bank import FeatureBank
 from agents.vnla.network import (
@@ -116,7 +116,7 @@ class VnlaPolicy:
     asker: str = "learned"
     """'learned', 'none' or 'first'; 'random' and 'teacher' need SupervisedVnla."""
     ask_threshold: float = 0.5
-    choose: Chooser = choose_likeliest
+    choose: Chooser = choose_greedily
     instruction_length: int = 50
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all. For training."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from agents.common import spine
+from agents.common import imitation
 from agents.common.parallel import rank_zero
 from agents.common.session import Note, Progress
 from agents.common.settings import EvaluationSettings
@@ -37,14 +37,14 @@ def train_agent(
     *,
     minutes: float | None = None,
     note: Note = print,
-    on_validation: spine.OnValidation | None = None,
+    on_validation: imitation.OnValidation | None = None,
 ) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.spine.train."""
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
     houses, note = config.training_houses or None, rank_zero(note)
     training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
     words, encoder = vocabulary_of(lessons.data, houses), lessons.encoder
-    agent = new_agent(config, words, encoder.speaks, encoder.size, lessons.pictures("train"), evaluation)
+    agent = new_agent(config, words, encoder.feature_space, encoder.size, lessons.pictures("train"), evaluation)
     agent.network.to(lessons.device)
     size = sum(p.numel() for p in agent.network.parameters())
     count = len({t.world for t in training.tasks})
@@ -54,7 +54,7 @@ def train_agent(
     )
     identity, watch = training_identity(lessons, config), on_validation
     learner = VnlaLearner(agent, training)
-    return spine.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+    return imitation.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
 
 
 def training_identity(lessons: Lessons, config: VnlaSettings) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The training of VNLA: imitation by two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.common.spine.
+"""The training of VNLA: imitation by two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.common.imitation.
 
 episodes = play tasks: moves are sampled, questions are the asking teacher's, and where an advisor acts in the
            learner's place it learns from what is done all the same                              (policy)
@@ -15,10 +15,10 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from agents.common import parallel, spine
+from agents.common import imitation, parallel
 from agents.common.losses import negative_log_likelihood
-from agents.common.playing import play_remembering
-from agents.common.session import Clock, seed_of, tasks_of_update
+from agents.common.playing import play_with_memory
+from agents.common.session import Clock, episode_seed, tasks_of_update
 from agents.vision.lessons import Split
 from agents.vnla.agent import VnlaAgent, rules_of, save_agent
 from agents.vnla.config import TRAINED_UNDER
@@ -51,24 +51,24 @@ class VnlaLearner:
         player = dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=bank))
 
         def played() -> tuple[VnlaExperience, float]:
-            seed = seed_of(config.seed, update)
-            episodes, memory, seconds = play_remembering(training.make_env, player, tasks, seed=seed)
+            seed = episode_seed(config.seed, update)
+            episodes, memory, seconds = play_with_memory(training.make_env, player, tasks, seed=seed)
             return VnlaExperience(episodes, memory.moments), seconds
 
-        def lesson_of(experience: VnlaExperience) -> spine.Lesson:
+        def loss_of(experience: VnlaExperience) -> imitation.BatchLoss:
             losses = losses_of(experience.moments, config.batch)
-            learned = losses[0] + losses[1] if config.asker == "learned" else losses[0]
-            return spine.Lesson(losses, learned, numbers_of(experience, training.worlds))
+            loss = losses[0] + losses[1] if config.asker == "learned" else losses[0]
+            return imitation.BatchLoss(losses, loss, numbers_of(experience, training.worlds))
 
-        return spine.learn_once(self.network, self.optimizer, config, update, clock, played, lesson_of)
+        return imitation.train_step(self.network, self.optimizer, config, update, clock, played, loss_of)
 
-    def judged(self, split: Split) -> Agent:
+    def evaluated_agent(self, split: Split) -> Agent:
         return self.agent.player(split.bank)
 
-    def task(self, task: Task) -> Task:
+    def evaluation_task(self, task: Task) -> Task:
         return task  # its own time limit belongs to it
 
-    def keep(self, path: Path, identity: Identity) -> None:
+    def save(self, path: Path, identity: Identity) -> None:
         save_agent(self.agent, path, identity)
 
 

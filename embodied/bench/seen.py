@@ -14,7 +14,7 @@ from embodied.bench.timing import Measure, measure, one_core, ratio
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.gym.env import HelpGymEnv, make, make_vec
-from embodied.gym.eyes import Eyes, PanoramaStore, PictureEyes, ViewSettings
+from embodied.gym.eyes import CameraSensor, PanoramaStore, Sensor, ViewSettings
 from embodied.gym.playground import flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
@@ -60,11 +60,11 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
     store, pool = PanoramaStore({world.name: world}), find_pool(world, seed=seed)
     tasks = [find_task(pool, i, seed=seed, language=PlainLanguage()) for i in range(50)]
     for name, channels, view, aim in LINES:
-        env = _env(world, tasks, PictureEyes(store, channels, view))
+        env = _env(world, tasks, CameraSensor(store, channels, view))
         steps = 40 if view.frame == "views36" else STEPS
         walk = functools.partial(_walk, env, steps, seed)
         yield measure(f"steps, {name}", walk, "1/s", per=steps, aim=aim)
-    plain = _env(world, tasks, PictureEyes(store, ("rgb",), ViewSettings()))
+    plain = _env(world, tasks, CameraSensor(store, ("rgb",), ViewSettings()))
     resampled = measure("steps, rgb, 128 x 128, again", lambda: _walk(plain, STEPS, seed), "1/s", per=STEPS)
     naive = measure("the naive way: a picture drawn per step", lambda: _draw(plain, world, 40, seed), "1/s", per=40)
     yield naive
@@ -115,8 +115,8 @@ class _Together:
             self._seen, *_ = self._envs.step(self._seen["action_mask"].argmax(1))
 
 
-def _env(world: World, tasks: list[Task], eyes: Eyes) -> HelpGymEnv:
-    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks, eyes, layout=SpaceLayout())
+def _env(world: World, tasks: list[Task], sensor: Sensor) -> HelpGymEnv:
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks, sensor, layout=SpaceLayout())
 
 
 def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:

@@ -53,14 +53,14 @@ class Options(Furnished, Printed):
     routes: Annotated[str, Option(words=("sampled", "spanning"))] = "sampled"
     """Routes that assistants know: random ones, or those of a spanning tree."""
     language: Annotated[str, Option(words=("people", "plain"))] = "people"
-    """Who words the routes: people with habits and landmarks, or plain turns and rooms."""
+    """Wording of the routes: varied, with habits and landmarks (people), or plain turns and rooms (plain)."""
     no_rooms: bool = False
     """Requests name no room: any such object in the house will do (VNLA)."""
     ood: Annotated[int, Option(whole(0, HOUSES), "N")] = 0
     """N further houses out of distribution (split 'test_ood'), with furniture, looks, speakers and words that all other
     houses then lack."""
     no_people: bool = False
-    """Assistants are heard but not seen (HANNA)."""
+    """Leave the assistants' bodies out of the houses (HANNA)."""
     people: InputFolder | None = None
     """from-people: the folder of a study."""
     data: InputFolder | None = None
@@ -68,7 +68,7 @@ class Options(Furnished, Printed):
     people_only: bool = False
     """from-people: leave out all routes but people's."""
     pictures: Annotated[str | None, drawn_as(PICTURE_KINDS)] = None
-    """How the panorama of every viewpoint is drawn (default: as the pictures that are there already, else fast; hari:
+    """How the panorama of every viewpoint is drawn (default: as existing panoramas are, else fast; hari:
     none)."""
     size: CubeFace | None = None
     """Side of a panorama's cube face (default: as are there, else 256)."""

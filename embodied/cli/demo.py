@@ -183,7 +183,7 @@ def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: 
     agent, encoder = load_agent(), load_encoder()
     nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
     features = encode_panoramas(encoder, (world.panorama(n) for n in nodes))
-    bank = FeatureBank({world.name: features}, encoder.speaks)
+    bank = FeatureBank({world.name: features}, encoder.feature_space)
     pool = hanna_pool(world, seed=args.seed)
     task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
     make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})

@@ -133,9 +133,9 @@ class OfTrained:
     """Rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' where
     other agents are named)."""
     shown: Annotated[str, Option(words=SHOWN)] = "same"
-    """How goal images differ from what the agent sees: not at all (same), by a robot's camera, taken at another hour,
-    on another day with people elsewhere and small things moved, later (hour and day); by that camera, and one view of
-    60 degrees of that."""
+    """How goal images differ from what the agent sees there; same: not at all; camera: taken by a robot's camera; hour:
+    at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
+    another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -69,17 +69,17 @@ class OfData(Printed):
 
 @dataclass(frozen=True, kw_only=True)
 class ProgramOptions(OfData, Encoded):
-    """Folders that published programs read."""
+    """A folder to copy into the published program."""
 
     features: bool = False
     """Also write the features of `embodied features`."""
     pad: Count = WIDTH
-    """Fill features with zeros up to N numbers, which the programs count on."""
+    """Pad features with zeros to N numbers, the length that the programs expect."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParquetOptions(OfData):
-    """Parquet tables with a card."""
+    """Parquet tables of houses, tasks, routes and episodes, with a data-set card."""
 
     episodes: tuple[InputPath, ...] = ()
     """Episodes (.jsonl) to write as tables, too."""
@@ -110,7 +110,7 @@ class WalkOptions(OfData, Cached):
     tasks: Count | None = None
     """Walk the first N tasks (default: all)."""
     wander: Annotated[float, Option(not_negative, "SHARE")] = 0.0
-    """Replace this share of the steps and turns by random ones, and write what the expert does there."""
+    """Share of the actions that are random; the stored action is always the expert's, as in DAgger."""
     width: Annotated[int | None, Option(video_side, "PIXELS")] = None
     """Width of the pictures (default: that of the program)."""
     depth: bool = False
@@ -119,29 +119,29 @@ class WalkOptions(OfData, Cached):
 
 @dataclass(frozen=True, kw_only=True)
 class HouseOptions(Furnished, Printed):
-    """A house, for MuJoCo's viewer or for USD programs."""
+    """The house."""
 
     house: HouseFolder
     """Folder that `embodied house` wrote."""
     light: Annotated[str, Option(words=("none", "fast", "normal", "high"))] = "normal"
-    """Bake light of this quality into it, or leave its materials as they are."""
+    """Quality of the baked light; none: export the unlit house."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GlbOptions(HouseOptions):
-    """A house, for web viewers and Blender."""
+    """A house as GLB, for web viewers and Blender."""
 
     out: Annotated[Path, Option(file_ending_in(".glb"), "FILE")]
     """File to write."""
     no_ceilings: bool = False
-    """Leave ceilings and roof out, for a look from above."""
+    """Leave ceilings and roof out, to look in from above."""
     sky: bool = False
-    """Keep the dome of far scenery, for a look from inside."""
+    """Keep the backdrop of distant scenery, to look out of the windows."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MjcfOptions(HouseOptions):
-    """A house, for MuJoCo's viewer."""
+    """A house as MJCF, for MuJoCo's viewer."""
 
     out: OutputFolder
     """Folder to write."""
@@ -149,7 +149,7 @@ class MjcfOptions(HouseOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class UsdOptions(HouseOptions):
-    """A house, for USD programs."""
+    """A house as USDZ, for USD programs."""
 
     out: Annotated[Path, Option(file_to_write, "FILE")]
     """File to write."""

@@ -24,9 +24,9 @@ class Options(WithData, Encoded, Lit, WithDevice):
     houses: Count | None = None
     """Use the first N houses of each split (default: all)."""
     shown: tuple[Annotated[str, Option(words=SHOWN)], ...] = ()
-    """Make features of pictures that were taken at another time, by which goal images differ from what the agent sees:
-    the same, by a robot's camera, at another hour, on another day with people elsewhere and small things moved, later
-    (hour and day); by that camera, and one view of 60 degrees of that."""
+    """Also make features of goal images that differ from what the agent sees there: camera: taken by a robot's camera;
+    hour: at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
+    another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees; same: identical."""
     ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
     """Use a Ray cluster instead: its address, or 'local'."""
 

@@ -22,8 +22,8 @@ SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "la
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
     pictures: Annotated[str | None, PRESET] = None
-    """How the pictures are drawn that features come from, traced and reference at 96 pixels with few rays (default: as
-    the panoramas that the data set holds, else unlit)."""
+    """How the encoded pictures are drawn; traced and reference at 96 pixels with few rays (default: as the panoramas of
+    the data set, else unlit)."""
 
 
 @dataclass(frozen=True, kw_only=True)

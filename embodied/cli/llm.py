@@ -28,7 +28,7 @@ class ServeOptions(Threaded):
 
 @dataclass(frozen=True, kw_only=True)
 class ParaphraseOptions(WithModel, Cached):
-    """Word every route of a split anew, and keep what leads a scripted listener to the same place."""
+    """Paraphrase every route of a split; keep the paraphrases that lead a scripted listener to the same place."""
 
     data: InputFolder
     """A data set with routes (HANNA or VLN)."""

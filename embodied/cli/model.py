@@ -21,7 +21,7 @@ class WithModel:
     answers: InputPath = Path("answers.sqlite")
     """File that keeps every answer: the same question is not asked twice."""
     offline: bool = False
-    """Use only answers that are kept."""
+    """Use only stored answers; send nothing to a server."""
     prompts: InputFolder | None = None
     """Folder with prompts of your own (agent.md, ...)."""
 

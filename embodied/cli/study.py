@@ -29,6 +29,7 @@ import functools
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from agents.ask.config import AskerConfig, AskEvaluation
@@ -66,13 +67,13 @@ from embodied.cli.learning import (
 from embodied.cli.model import WithModel, client_of
 from embodied.cli.options import (
     REPEATS,
-    AnyFolder,
     Count,
     InputFolder,
     InputPath,
     Option,
     OutputFolder,
     Settings,
+    any_folder,
     whole,
 )
 from embodied.cli.train import EVALUATION, TRAINING, RegexFiles, Strips
@@ -89,7 +90,7 @@ Seeds = Annotated[int, Option(whole(1, REPEATS), "N")]
 
 @dataclass(frozen=True, kw_only=True)
 class Study(Threaded):
-    """What every study has."""
+    """Options of every study."""
 
     out: OutputFolder
     """Folder of the study: runs, episodes and tables; rerun the command to resume."""
@@ -247,8 +248,8 @@ class StarsOptions(Study, Trained, Judged, WithData, Encoded, LikePeople):
     rated: Annotated[str, Option(metavar="SPLIT")] = "train"
     """Collect ratings in the houses of this split."""
     decisions: Annotated[str, Option(words=DECISIONS)] = "drawn"
-    """Evaluate with moves and questions sampled, as they are while they are rated (drawn), or as `embodied evaluate`
-    chooses them (usual)."""
+    """Decoding in evaluation: moves and questions are sampled, as in training (drawn), or chosen as in `embodied
+    evaluate` (usual)."""
     judgings: Count = 3
     """Evaluate every task N times with different seeds."""
     config: Annotated[RatingConfig, Settings(TRAINING, RatingConfig())]
@@ -297,7 +298,8 @@ class AskOptions(Study, Trained, WithModel, Cached):
 class CheckOptions:
     """Say which stored tables no longer belong to this code."""
 
-    folder: Annotated[AnyFolder, Option(name="STUDY")]
+    folder: Annotated[Path, Option(any_folder, "STUDY", name="folder")]
+    """Folder of a study, or of stored tables such as docs/results/data."""
 
 
 def run_table(args: Any, learner: StudyLearner, **names: Any) -> int:

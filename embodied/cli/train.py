@@ -185,8 +185,9 @@ def train_vision(args: TrainVision) -> int:
 
     use_threads(args.threads)
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
-    like, device, workers = args.distil_from, args.device, args.workers
-    train_vision(source, args.config, args.out, like=like, device=device, workers=workers, note=note)
+    train_vision(
+        source, args.config, args.out, distil_from=args.distil_from, device=args.device, workers=args.workers, note=note
+    )
     return 0
 
 

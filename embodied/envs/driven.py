@@ -1,7 +1,7 @@
 """A body with wheels that drives the edges of the graph physically (dm_control's composer).
 
 The house is its arena (the collision boxes of embodied.scene.model), and the same tasks are played: a
-Move is driven by a simple controller, bumps are counted, and a way that turns out to be blocked
+Move is driven by a simple controller, collisions are counted, and a way that turns out to be blocked
 leaves the agent where it came from.
 """
 
@@ -46,7 +46,7 @@ NEAR = 0.06
 AHEAD = 0.4
 """The body steers for a point of its line this many metres ahead, so that it stays on the line."""
 APART = 0.5
-"""Seconds without touch after which touching the same thing is another bump (Driver.roll): bodies rebound."""
+"""Seconds without touch after which touching the same thing is another collision (Driver.roll): bodies rebound."""
 PATIENCE = 4.0
 """Seconds allowed beyond four times what the way takes at full speed."""
 
@@ -109,7 +109,7 @@ class Drive:
     seconds: float
     metres: float
     """Way of the body's centre."""
-    bumps: tuple[str, ...]
+    collisions: tuple[str, ...]
     """What it touched besides floors, in order, once per contact."""
 
 
@@ -119,7 +119,7 @@ class Roll:
 
     metres: float
     """Way of the body's centre."""
-    bumps: tuple[str, ...]
+    collisions: tuple[str, ...]
     """What it began to touch, besides floors, in order."""
     touched: bool
     """Whether it touched anything meanwhile."""
@@ -191,9 +191,9 @@ class Driver:
     def noted(self, rolled: Roll, before: np.ndarray, now: frozenset[str]) -> Roll:
         """`rolled` after one more period that began at `before` (2,), at whose end the body touches `now`."""
         metres, time = float(np.linalg.norm(self.position - before)), self.data.time
-        bumps = sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
+        collisions = sorted(t for t in now if time - self._last_touch.get(t, -math.inf) > APART)
         self._last_touch |= dict.fromkeys(now, time)
-        return Roll(rolled.metres + metres, (*rolled.bumps, *bumps), rolled.touched or bool(now))
+        return Roll(rolled.metres + metres, (*rolled.collisions, *collisions), rolled.touched or bool(now))
 
     def take_over(self, qpos: np.ndarray, qvel: np.ndarray, seconds: float) -> None:
         """Be in a state that was computed elsewhere, so many seconds after the last; `eye` follows `update_poses`."""
@@ -229,14 +229,14 @@ class Driver:
         along = (goal - origin) / max(way, 1e-9)
         limit = 4.0 * (way / FASTEST + math.pi / TURNING) + PATIENCE
         metres = 0.0
-        bumps: list[str] = []
+        collisions: list[str] = []
         touching: frozenset[str] = frozenset()
         while self.data.time - start < limit:
             before = self.position
             distance = float(np.linalg.norm(goal - before))
             if distance < NEAR:
                 self._command(0.0, 0.0)
-                return Drive(True, self.data.time - start, metres, tuple(bumps))
+                return Drive(True, self.data.time - start, metres, tuple(collisions))
             ahead = origin + along * min(way, float((before - origin) @ along) + AHEAD)
             offset = ahead - before
             error = float(wrap(math.atan2(offset[1], offset[0]) - self.yaw))
@@ -246,10 +246,10 @@ class Driver:
             mujoco.mj_step(self.model, self.data, self.substeps)
             metres += float(np.linalg.norm(self.position - before))
             now = self._touched()
-            bumps += sorted(now - touching)
+            collisions += sorted(now - touching)
             touching = now
         self._command(0.0, 0.0)
-        return Drive(False, self.data.time - start, metres, tuple(bumps))
+        return Drive(False, self.data.time - start, metres, tuple(collisions))
 
     def _command(self, speed: float, turn: float) -> None:
         for motor, side in zip(self._motors, (-1.0, 1.0), strict=True):
@@ -322,7 +322,7 @@ class _Driven(HelpEnv):
 
     def facts(self) -> dict[str, float]:
         """Collisions of the current episode."""
-        return {"bumps": sum(len(d.bumps) for d in self.drives)}
+        return {"collisions": sum(len(d.collisions) for d in self.drives)}
 
     def _begin(self) -> None:
         super()._begin()

@@ -36,9 +36,9 @@ VIEW = (480, 640)
 class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
     """Driving as a Gymnasium environment.
 
-    Reward: 1 on success, minus 0.01 a command and 0.05 for everything that is bumped into, plus a tenth for every
+    Reward: 1 on success, minus 0.01 a command and 0.05 for every collision, plus a tenth for every
     metre nearer to the goal along the floor. An episode ends when the point is reached, when the object is said to be
-    here, and is cut short after `seconds`. info: success, spl, bumps, metres, seconds, left (metres to the goal).
+    here, and is cut short after `seconds`. info: success, spl, collisions, metres, seconds, distance_to_goal (metres).
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}

@@ -30,8 +30,8 @@ TASKS = ("reach", "find")
 """To reach a point, or to find an object of a class and say so."""
 TEXT = 80
 """Most characters of a request."""
-STEP_COST, BUMP_COST, PER_METRE = 0.01, 0.05, 0.1
-"""Of every command, of everything that is bumped into; and what a metre nearer to the goal is worth."""
+STEP_COST, COLLISION_COST, PER_METRE = 0.01, 0.05, 0.1
+"""Of every command, of every collision; and what a metre nearer to the goal is worth."""
 KEPT = 4
 """Houses whose physics and pictures are held ready, the last used."""
 AHEAD = 3
@@ -97,7 +97,7 @@ class Outcome:
     ended: str | None
     """'reached', 'said' or 'limit'; None while it goes on."""
     facts: Mapping[str, float]
-    """success, spl, bumps, metres, seconds and the distance that is left, all since the episode began."""
+    """success, spl, collisions, metres, seconds and distance_to_goal, since the episode began."""
 
 
 class Driving:
@@ -150,7 +150,7 @@ class Driving:
         """Metres that the best driver needs."""
         self._left = self.left
         self.metres = self.seconds = 0.0
-        self.bumps: list[str] = []
+        self.collisions: list[str] = []
         self.touched = False
         self.ended: str | None = None
         self._wide: DrivingWays | None = None
@@ -184,7 +184,7 @@ class Driving:
         s = self.settings
         self.metres += rolled.metres
         self.seconds += self.periods * CONTROL
-        self.bumps += rolled.bumps
+        self.collisions += rolled.collisions
         self.touched = rolled.touched
         before, self._left = self._left, self.left
         near = self.is_there
@@ -195,7 +195,7 @@ class Driving:
         elif self.seconds >= s.seconds - 1e-9:
             self.ended = "limit"
         success = float(near and self.ended in ("reached", "said"))
-        reward = success - STEP_COST - BUMP_COST * len(rolled.bumps) + PER_METRE * (before - self._left)
+        reward = success - STEP_COST - COLLISION_COST * len(rolled.collisions) + PER_METRE * (before - self._left)
         return Outcome(reward, self.ended, self._facts(success))
 
     @property
@@ -275,10 +275,10 @@ class Driving:
         return {
             "success": success,
             "spl": success * (self.shortest / longer if longer > 0 else 1.0),
-            "bumps": float(len(self.bumps)),
+            "collisions": float(len(self.collisions)),
             "metres": self.metres,
             "seconds": self.seconds,
-            "left": self._left,
+            "distance_to_goal": self._left,
         }
 
     def _draw(self, rng: np.random.Generator) -> int:

@@ -33,12 +33,12 @@ from embodied.envs.make import AS_PUBLISHED, assistant_of
 from embodied.evaluation.metrics import PER_EPISODE
 from embodied.gym.eyes import (
     PIXELS,
-    AllEyes,
-    Closed,
-    Eyes,
-    FeatureEyes,
+    CameraSensor,
+    FeatureSensor,
+    NoSensor,
     PanoramaStore,
-    PictureEyes,
+    Sensor,
+    SensorSuite,
     ViewSettings,
     checked_sees,
     encoder_entry,
@@ -93,7 +93,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         self,
         make_env: Callable[[], HelpEnv],
         tasks: Sequence[Task],
-        eyes: Eyes,
+        sensor: Sensor,
         *,
         layout: SpaceLayout = LAYOUT,
         shaping: bool = False,
@@ -106,7 +106,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         """
         Args:
           tasks: what `reset` draws from; reset(options={"task": ID}) chooses one.
-          eyes: what is seen of every place, of the target image too.
+          sensor: what is seen of every place, of the target image too.
           needs_stop: an episode that runs out of steps near its goal is no success.
           opened: worlds that `close` closes.
 
@@ -116,12 +116,12 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         check_options(render_mode, patience=patience)
         if not tasks:
             raise ValueError("there are no tasks to play; choose another split or a larger scale")
-        self._env, self._tasks, self._eyes, self._layout = make_env(), tuple(tasks), eyes, layout
+        self._env, self._tasks, self._sensor, self._layout = make_env(), tuple(tasks), sensor, layout
         self._shaping, self._strict, self._patience = shaping, strict, patience
         self._needs_stop, self._opened = needs_stop, tuple(opened)
         self.render_mode = render_mode
         self.action_space: gym.Space[Any] = action_space(layout)
-        self.observation_space = observation_space(layout, eyes)
+        self.observation_space = observation_space(layout, sensor)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -260,7 +260,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         }
 
     def _encoded(self, o: Observation) -> dict[str, Any]:
-        return encode(o, self._eyes, self._layout)
+        return encode(o, self._sensor, self._layout)
 
     def _potential(self) -> float:
         e = self._env
@@ -304,7 +304,7 @@ def _direction(degrees: int) -> str:
 
 
 def picture(env: HelpEnv, o: Observation) -> np.ndarray:
-    """The view along the agent's eyes, the plan beside it, the words below."""
+    """The view along the agent's heading, the plan beside it, the words below."""
     nodes = [env.task.start.node, *(s.next_pose.node for s in env._steps)]
     view = _view(env.world, env.pose)
     plan = paint_plan(
@@ -344,22 +344,22 @@ def _wrapped(text: str, width: int) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class SharedResources:
     """Everything that environments of one batch share: houses, tasks, assistants, decoded panoramas."""
 
     make_env: Callable[[], HelpEnv]
     tasks: Sequence[Task]
-    eyes: Eyes
+    sensor: Sensor
     layout: SpaceLayout
     opened: Sequence[World]
-    """Whoever plays on it closes them."""
+    """Whoever uses them closes them."""
 
 
 def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGymEnv:
     """The environment of a kind of task over a data set, or over one generated and lit flat without `data`.
 
     Args:
-      options: fields of StageSettings (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
+      options: fields of EnvironmentSettings (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
         (shaping, strict, patience, needs_stop).
 
     Examples:
@@ -370,20 +370,20 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     """
     own = {name: options.pop(name) for name in OWN if name in options}
     check_options(render_mode, **own)
-    stage = set_stage(kind, **options)
+    shared = open_resources(kind, **options)
     return HelpGymEnv(
-        stage.make_env,
-        stage.tasks,
-        stage.eyes,
-        layout=stage.layout,
+        shared.make_env,
+        shared.tasks,
+        shared.sensor,
+        layout=shared.layout,
         render_mode=render_mode,
-        opened=stage.opened,
+        opened=shared.opened,
         **own,
     )
 
 
 def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> SharedSyncVectorEnv:
-    """So many environments that share one stage: houses, pages and decoded panoramas are held once.
+    """`num_envs` environments that share resources: houses, pages and decoded panoramas are held once.
 
     Each has its own task, target, instruction and generator.
 
@@ -398,17 +398,19 @@ def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **
     own = {name: options.pop(name) for name in OWN if name in options}
     check_options(render_mode, **own)
     threads = options.pop("threads", None)
-    stage = set_stage(kind, **options)
+    shared = open_resources(kind, **options)
 
     def one() -> HelpGymEnv:
-        return HelpGymEnv(stage.make_env, stage.tasks, Closed(), layout=stage.layout, render_mode=render_mode, **own)
+        return HelpGymEnv(
+            shared.make_env, shared.tasks, NoSensor(), layout=shared.layout, render_mode=render_mode, **own
+        )
 
-    refuse_too_many(num_envs, observation_space(stage.layout, stage.eyes))
-    return SharedSyncVectorEnv(one, int(num_envs), stage.eyes, threads=threads, opened=stage.opened)
+    refuse_too_many(num_envs, observation_space(shared.layout, shared.sensor))
+    return SharedSyncVectorEnv(one, int(num_envs), shared.sensor, threads=threads, opened=shared.opened)
 
 
 @dataclass(frozen=True, eq=False)
-class StageSettings:
+class EnvironmentSettings:
     """What environments of a kind of task play in and see."""
 
     data: str | Path | None = None
@@ -438,16 +440,16 @@ class StageSettings:
     assistant: Assistant | str | None = None
     """Who answers requests instead of the kind's own assistant: an Assistant, or 'module:Class' to import one."""
     wheels: bool = False
-    """Edges are driven physically (find, VLN and HANNA); bumps are in info["bumps"]."""
+    """A body drives along every edge (find, VLN and HANNA); info["collisions"] counts what it runs into."""
 
 
-def set_stage(kind: str, **settings: Any) -> Stage:
-    """Everything that environments of a kind of task share; `settings` are fields of StageSettings.
+def open_resources(kind: str, **settings: Any) -> SharedResources:
+    """Everything that environments of a kind of task share; `settings` are fields of EnvironmentSettings.
 
     Raises:
       ValueError: unknown `sees`, pixels where there are none, or wheels for a kind that cannot have them.
     """
-    wanted = StageSettings(**settings)
+    wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
     seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
     asked: dict[str, Any] = {
@@ -465,7 +467,7 @@ def set_stage(kind: str, **settings: Any) -> Stage:
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
     layout = wanted.layout or layout_of(kind, max(SpaceLayout.stack, wanted.hari.stack))
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
-    return Stage(make_env, play.tasks, _eyes_of(play, seen, wanted), layout, opened)
+    return SharedResources(make_env, play.tasks, _sensor_of(play, seen, wanted), layout, opened)
 
 
 def layout_of(kind: str, stack: int = SpaceLayout.stack) -> SpaceLayout:
@@ -475,22 +477,22 @@ def layout_of(kind: str, stack: int = SpaceLayout.stack) -> SpaceLayout:
     return SpaceLayout(descriptions=kind == "hari", stack=stack)
 
 
-def _eyes_of(play: Playground, seen: Sequence[str], wanted: StageSettings) -> Eyes:
+def _sensor_of(play: Playground, seen: Sequence[str], wanted: EnvironmentSettings) -> Sensor:
     """Everything that is seen, over one store of decoded panoramas."""
-    eyes: list[Eyes] = []
+    sensors: list[Sensor] = []
     drawn = {name: w for name, w in play.worlds.items() if isinstance(w, World)}
     store = PanoramaStore(drawn)
     if pixels := [name for name in PIXELS if name in seen]:
         require_rendered(play.worlds, drawn)
-        eyes.append(PictureEyes(store, pixels, wanted.view))
+        sensors.append(CameraSensor(store, pixels, wanted.view))
     if "features" in seen:
         if wanted.source is None:
             require_rendered(play.worlds, drawn)
         source = wanted.source if wanted.source is not None else encoder_entry().load()(store)
-        eyes.append(FeatureEyes("features", source))
+        sensors.append(FeatureSensor("features", source))
     if "oracle" in seen:
-        eyes.append(FeatureEyes("oracle", FeatureTable(play.features)))
-    return AllEyes(eyes)
+        sensors.append(FeatureSensor("oracle", FeatureTable(play.features)))
+    return SensorSuite(sensors)
 
 
 def require_rendered(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]) -> None:

@@ -1,8 +1,8 @@
-"""Eyes: what an environment shows of a place, beside words, moves and clock.
+"""Sensors: what an environment shows of a place, beside words, moves and clock.
 
-Pixels (`PictureEyes`) are resampled from the panoramas of the viewpoints, which are drawn once and
-kept; features (`FeatureEyes`) are an encoder's of the same panoramas, or, by its honest name, an
-oracle's list of the visible objects.
+Pixels (`CameraSensor`) are resampled from the panoramas of the viewpoints, which are drawn once and
+kept; features (`FeatureSensor`) are an encoder's of the same panoramas, or an oracle's list of the
+visible objects.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SEES = ("rgb", "depth", "ids", "features", "oracle")
 """What can be seen: three kinds of pixels, an encoder's features, an oracle's list of visible objects."""
 PIXELS = SEES[:3]
 FRAMES = ("view", "views36", "equirect")
-"""The picture along the agent's eyes, the 36 views of the VLN literature, or all directions in one picture."""
+"""A perspective view straight ahead, the 36 views of the VLN literature, or all directions in one picture."""
 LARGE = 1e6
 """Bound of features; Gymnasium wants one."""
 FAR = 65.535
@@ -42,7 +42,7 @@ ENCODERS = "embodied.encoders"
 Arrays = dict[str, np.ndarray]
 
 
-class Eyes(Protocol):
+class Sensor(Protocol):
     """Turns the sights of an observation into arrays."""
 
     def spaces(self) -> dict[str, spaces.Space]:
@@ -55,8 +55,8 @@ class Eyes(Protocol):
         ...
 
 
-class Closed:
-    """Eyes that see nothing."""
+class NoSensor:
+    """Sees nothing."""
 
     def spaces(self) -> dict[str, spaces.Space]:
         return {}
@@ -173,7 +173,7 @@ def _bytes(panorama: Panorama) -> int:
     return 2 * (panorama.rgb.nbytes + panorama.depth.nbytes + panorama.ids.nbytes)
 
 
-class PictureEyes:
+class CameraSensor:
     """Pixels. The target image, where a task has one, is an equirect: where it was taken from is not told."""
 
     TARGET = 64
@@ -220,7 +220,7 @@ class PictureEyes:
         return camera.photographed(panorama.equirect(self.TARGET), None, at.world, at.node)
 
 
-class FeatureEyes:
+class FeatureSensor:
     """(36, D) features of the place, and of the target image (zeros without one); row k is view k."""
 
     def __init__(self, name: str, source: FeatureSource) -> None:
@@ -244,17 +244,17 @@ class FeatureEyes:
         return np.array(self._source.features(sight), dtype=np.float32)  # a copy: the source keeps its own
 
 
-class AllEyes:
-    """Several eyes as one."""
+class SensorSuite:
+    """Several sensors as one."""
 
-    def __init__(self, eyes: Sequence[Eyes]) -> None:
-        self._eyes = tuple(eyes)
+    def __init__(self, sensors: Sequence[Sensor]) -> None:
+        self._sensors = tuple(sensors)
 
     def spaces(self) -> dict[str, spaces.Space]:
-        return {name: space for eyes in self._eyes for name, space in eyes.spaces().items()}
+        return {name: space for sensor in self._sensors for name, space in sensor.spaces().items()}
 
     def look(self, o: Observation) -> Callable[[], Arrays]:
-        looks = [eyes.look(o) for eyes in self._eyes]
+        looks = [sensor.look(o) for sensor in self._sensors]
         return lambda: {name: array for look in looks for name, array in look().items()}
 
 

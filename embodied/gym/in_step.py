@@ -20,7 +20,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from embodied.gym.eyes import Arrays, Eyes
+from embodied.gym.eyes import Arrays, Sensor
 from embodied.seeds import checked_seed
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ COPIES = 2
 
 
 class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
-    """A batch of environments whose slots have closed eyes: the batch looks for them.
+    """A batch of environments whose slots have no sensor: the batch observes for them.
 
     Observations are new arrays each time. A slot that has ended is reset by the next step.
     """
@@ -41,14 +41,14 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         self,
         make_one: Callable[[], HelpGymEnv],
         num_envs: int,
-        eyes: Eyes,
+        sensor: Sensor,
         *,
         threads: int | None = None,
         opened: Sequence[World] = (),
     ) -> None:
         """Args:
-        make_one: makes the environment of a slot, with `embodied.gym.eyes.Closed`.
-        eyes: what the slots see; shared.
+        make_one: makes the environment of a slot, with `embodied.gym.eyes.NoSensor`.
+        sensor: what the slots see; shared.
         threads: that look; one per core by default.
         opened: worlds that `close` closes.
 
@@ -63,7 +63,7 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         self.num_envs, self.render_mode = num_envs, first.render_mode
         self.metadata = {**first.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
         self.single_action_space, self.action_space = first.action_space, batch_space(first.action_space, num_envs)
-        self._eyes, self._seen, told = eyes, eyes.spaces(), first.observation_space
+        self._sensor, self._seen, told = sensor, sensor.spaces(), first.observation_space
         assert isinstance(told, gym.spaces.Dict), "an environment shows several things"
         self.single_observation_space = gym.spaces.Dict({**self._seen, **told.spaces})
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -153,7 +153,7 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
 
     def _look(self, into: Arrays) -> None:
         """What all slots see: places by this thread, since only it may draw; pictures of them by all."""
-        looks = [self._eyes.look(env.observed) for env in self.envs]
+        looks = [self._sensor.look(env.observed) for env in self.envs]
 
         def fill(first: int) -> None:
             for k in range(first, self.num_envs, self._threads):

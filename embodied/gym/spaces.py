@@ -15,7 +15,7 @@ from gymnasium import spaces
 from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
 from embodied.envs.base import ActionError
-from embodied.gym.eyes import Eyes
+from embodied.gym.eyes import Sensor
 from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Feature, Intention, Mode, Move, Observation, Stop
 
 INTENTIONS = (Intention.HELP, Intention.CUR, Intention.GOAL, Intention.SUB)
@@ -60,10 +60,10 @@ def action_space(layout: SpaceLayout) -> spaces.Discrete:
     return spaces.Discrete(layout.actions)
 
 
-def observation_space(layout: SpaceLayout, eyes: Eyes) -> spaces.Dict:
-    """Everything an Observation holds, padded with zeros, and what the eyes see."""
+def observation_space(layout: SpaceLayout, sensor: Sensor) -> spaces.Dict:
+    """Everything an Observation holds, padded with zeros, and what the sensor sees."""
     whole: dict[str, Any] = {
-        **eyes.spaces(),
+        **sensor.spaces(),
         "has_target": spaces.Discrete(2),
         "instruction": spaces.Box(0, 255, (layout.text,), np.uint8),
         "candidates": spaces.Box(-1.0, 1.0, (layout.candidates, 4), np.float32),
@@ -82,7 +82,7 @@ def observation_space(layout: SpaceLayout, eyes: Eyes) -> spaces.Dict:
     return spaces.Dict(whole)
 
 
-def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
+def encode(o: Observation, sensor: Sensor, layout: SpaceLayout) -> dict[str, Any]:
     """An Observation as a member of `observation_space`.
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
@@ -106,7 +106,7 @@ def encode(o: Observation, eyes: Eyes, layout: SpaceLayout) -> dict[str, Any]:
     views[:n] = c.view + 1
     left = -1.0 if o.requests_left is None else o.requests_left / MANY
     whole: dict[str, Any] = {
-        **eyes.look(o)(),
+        **sensor.look(o)(),
         "has_target": np.int64(o.target is not None),
         "instruction": codes_of(o.instruction, layout.text).copy(),
         "candidates": candidates,

@@ -22,7 +22,7 @@ class NavConfig:
     """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
     that word the routes of data sets."""
     pragmatics: str = "program"
-    """Which candidate description is taken: by Eq 3.15 and 3.16 ('text'), or the first that leads the executor to the
+    """How a candidate description is chosen: by Eq 3.15 and 3.16 ('text'), or the first that leads the executor to the
     end of the walk ('program'; docs/sources.md, S93, S141)."""
     candidates: int = 5
     """Number of candidate descriptions: the likeliest and sampled ones (Table C.2)."""

@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.common.decoding import likeliest
+from agents.common.decoding import greedy_choice
 from agents.common.session import Note
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import load_weights, save_weights
 from agents.iliad.nav.config import NavConfig
@@ -91,7 +91,7 @@ def teach_describer(
 def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, trips: Sequence[Trip]) -> float:
     """Share of paths whose likeliest description leads the executor to their end."""
     walks = [walk_along(t.path) for t in trips]
-    numbers = describer.write(*walked(executor.eyes, trips, walks), likeliest, LONGEST)
+    numbers = describer.write(*walked(executor.eyes, trips, walks), greedy_choice, LONGEST)
     done = executor.greedy(trips, said(executor.eyes.vocabulary, numbers))
     return float(np.mean([arrival(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
 
@@ -118,7 +118,7 @@ def load_follower(path: Path, eyes: NavEyes) -> tuple[NavStudent, NavConfig]:
         )
     own = NavEyes(eyes.places, eyes.bank, Vocabulary(about.words))
     follower = new_walker(Follower, about.config, own, 0, "loaded")
-    put(follower, tensors, path)
+    load_into(follower, tensors, path)
     return NavStudent(follower.eval(), own), about.config
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.common.decoding import Choice, drawn_with, likeliest
+from agents.common.decoding import Choice, greedy_choice, sampled_choice
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.percept import orientation
 from agents.iliad.nav.network import Follower, StepSeen
@@ -103,10 +103,10 @@ class NavStudent:
         return self.follower
 
     def sample(self, tasks: Sequence[Trip], requests: Sequence[str], *, rng: np.random.Generator) -> list[NavWalk]:
-        return self._walk(tasks, requests, drawn_with(rng.random((len(tasks), MOVES))))
+        return self._walk(tasks, requests, sampled_choice(rng.random((len(tasks), MOVES))))
 
     def greedy(self, tasks: Sequence[Trip], requests: Sequence[str]) -> list[NavWalk]:
-        return self._walk(tasks, requests, likeliest)
+        return self._walk(tasks, requests, greedy_choice)
 
     def scores(
         self,

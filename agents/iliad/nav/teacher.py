@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.common.decoding import drawn_with, likeliest
+from agents.common.decoding import greedy_choice, sampled_choice
 from agents.common.vocabulary import PAD, Vocabulary
 from agents.iliad.describing import DescribingNetworks
 from agents.iliad.nav.network import WORD_END, WalkDescriber
@@ -83,7 +83,7 @@ class LearnedNavTeacher(DescribingNetworks[Trip, NavWalk]):
         self, tasks: Sequence[Trip], executions: Sequence[NavWalk], uniforms: np.ndarray | None = None
     ) -> list[list[str]]:
         copies = 1 if uniforms is None else uniforms.shape[1]
-        choose = likeliest if uniforms is None else drawn_with(uniforms.reshape(-1, LONGEST))
+        choose = greedy_choice if uniforms is None else sampled_choice(uniforms.reshape(-1, LONGEST))
         numbers = self.describer.write(*walked(self.eyes, tasks, executions), choose, LONGEST, copies)
         drawn = said(self.eyes.vocabulary, numbers)
         return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(tasks))]

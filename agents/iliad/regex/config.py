@@ -33,7 +33,7 @@ class RegexConfig:
     """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
     that word the requests."""
     pragmatics: str = "program"
-    """Which candidate description is taken: by Eq 3.15 and 3.16 ('text'), or the best one ('program'; docs/sources.md,
+    """How a candidate description is chosen: by Eq 3.15 and 3.16 ('text'), or the best one ('program'; docs/sources.md,
     S93)."""
     candidates: int = 10
     """Number of candidate descriptions: the likeliest and sampled ones (Table C.2)."""

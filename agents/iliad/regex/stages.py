@@ -13,9 +13,9 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.common.decoding import likeliest
+from agents.common.decoding import greedy_choice
 from agents.common.session import Note
-from agents.common.tensor_file import put
+from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import load_weights, save_weights
 from agents.iliad.protocol import NOTHING
@@ -117,7 +117,7 @@ def executor_success(executor: Speller, requests: Requests, items: Sequence[Word
     """Share of words that the executor changes as their request says."""
     words = characters([q.words[0] for q in items])
     longest = max(len(q.outputs[0]) for q in items) + 2
-    written = texts(executor.write(words, requests([q.requests[0] for q in items]), likeliest, longest))
+    written = texts(executor.write(words, requests([q.requests[0] for q in items]), greedy_choice, longest))
     return {"success": float(np.mean([w == q.outputs[0] for w, q in zip(written, items, strict=True)]))}
 
 
@@ -135,7 +135,7 @@ def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Req
     tensors, about = load_weights(path, "regex", RegexAbout, REMEDY)
     requests = Requests(Vocabulary(about.words))
     network = new_network(kind, about.config, requests, 0, "loaded")
-    put(network, tensors, path)
+    load_into(network, tensors, path)
     return network.eval(), requests, about.config
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agents.common.decoding import drawn_with, likeliest
+from agents.common.decoding import greedy_choice, sampled_choice
 from agents.iliad.describing import DescribingNetworks
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
@@ -57,7 +57,7 @@ class LearnedTeacher(DescribingNetworks[WordTask, Written]):
     ) -> list[list[str]]:
         changed = changes([list(zip(q.words, e.outputs or (), strict=True)) for q, e in zip(tasks, executions)])
         copies = 1 if uniforms is None else uniforms.shape[1]
-        choose = likeliest if uniforms is None else drawn_with(uniforms.reshape(-1, uniforms.shape[2]))
+        choose = greedy_choice if uniforms is None else sampled_choice(uniforms.reshape(-1, uniforms.shape[2]))
         said = self.requests.say(self.describer.write(changed, choose, LONGEST_REQUEST, copies))
         several = [said[k * copies : (k + 1) * copies] for k in range(len(tasks))]
         return [[d for d in dict.fromkeys(many) if d != NOTHING] or [NOTHING] for many in several]
@@ -88,7 +88,7 @@ class LearnedTeacher(DescribingNetworks[WordTask, Written]):
             return []
         longest = max(len(expected) for _, expected, _ in cases) + 2
         words, requests = characters([w for w, _, _ in cases]), self.requests([d for _, _, d in cases])
-        written = texts(self.executor.write(words, requests, likeliest, longest))
+        written = texts(self.executor.write(words, requests, greedy_choice, longest))
         return [a == expected for a, (_, expected, _) in zip(written, cases)]
 
 

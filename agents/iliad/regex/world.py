@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.common.decoding import Choice, drawn_with, likeliest
+from agents.common.decoding import Choice, greedy_choice, sampled_choice
 from agents.iliad.protocol import ExecutionScores
 from agents.iliad.regex.coding import PAD, Requests, characters, texts
 from agents.iliad.regex.data import WordTask
@@ -80,10 +80,10 @@ class RegexStudent:
         return self.speller
 
     def sample(self, tasks: Sequence[WordTask], requests: Sequence[str], *, rng: np.random.Generator) -> list[Written]:
-        return self._write(tasks, requests, drawn_with(rng.random((len(tasks), LONGEST))))
+        return self._write(tasks, requests, sampled_choice(rng.random((len(tasks), LONGEST))))
 
     def greedy(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> list[Written]:
-        return self._write(tasks, requests, likeliest)
+        return self._write(tasks, requests, greedy_choice)
 
     def scores(
         self,

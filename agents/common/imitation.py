@@ -1,8 +1,8 @@
-"""What learners by imitation share: play, be corrected, learn; validate; keep the best (agents.common.session).
+"""The training loop of imitation learners: play, label, update; validate; keep the best (agents.common.session).
 
 for update in session:
-    learner.learn(update)           # play tasks, have them labelled, descend (see `learn_once`)
-    every so often: validate        # as the agent is judged; keep it if it is as good as the best
+    learner.learn(update)           # play tasks, have them labelled, take a gradient step (see `train_step`)
+    every so often: validate        # as in evaluation; keep the agent if it is as good as the best
 """
 
 from __future__ import annotations
@@ -16,8 +16,17 @@ import torch
 from torch import Tensor, nn
 
 from agents.common import parallel
-from agents.common.playing import Ground
-from agents.common.session import Clock, Note, Progress, Session, descend, dropout_of, falling_rate, set_rate
+from agents.common.playing import TaskSet
+from agents.common.session import (
+    Clock,
+    Note,
+    Progress,
+    Session,
+    descend,
+    scheduled_rate,
+    seeded_dropout,
+    set_learning_rate,
+)
 from agents.common.settings import MAY_CHANGE, EvaluationSettings, ImitationSettings
 from embodied.errors import UnableError
 from embodied.evaluation import metrics
@@ -45,22 +54,22 @@ class Learner(Protocol):
         """One update; the numbers to report: NUMBERS and, where help could be asked for, ASKING."""
         ...
 
-    def judged(self, split: Any) -> Agent:
-        """The agent as it is judged, with the features of `split`."""
+    def evaluated_agent(self, split: Any) -> Agent:
+        """The agent as it is evaluated, with the features of `split`."""
         ...
 
-    def task(self, task: Task) -> Task:
-        """A validation task as it is judged."""
+    def evaluation_task(self, task: Task) -> Task:
+        """A task as it is in evaluation, with its horizon."""
         ...
 
-    def keep(self, path: Path, identity: Identity) -> None:
+    def save(self, path: Path, identity: Identity) -> None:
         """Write the agent, atomically."""
         ...
 
 
 def train(
     learner: Learner,
-    validation: Ground,
+    validation: TaskSet,
     folder: Path,
     identity: Identity,
     *,
@@ -108,53 +117,55 @@ def train(
 
 @dataclass(frozen=True, eq=False)
 class Lesson:
-    """What came of playing one batch."""
+    """The losses of one batch of episodes, and what else is reported."""
 
     losses: tuple[Tensor, Tensor]
     """Of navigation and of asking, summed over steps and averaged over episodes; for the backward pass."""
-    learned: Tensor
-    """What is descended: their sum, or navigation's alone where asking is not learned."""
+    loss: Tensor
+    """What the gradient is taken of: their sum, or navigation's alone where asking is not learned."""
     numbers: Mapping[str, float]
     """What is reported besides the losses and the gradient."""
 
 
-def learn_once(
+def train_step(
     network: nn.Module,
     optimizer: torch.optim.Optimizer,
     config: ImitationSettings,
     update: int,
     clock: Clock,
     played: Callable[[], tuple[X, float]],
-    lesson_of: Callable[[X], Lesson],
+    loss_of: Callable[[X], Lesson],
 ) -> dict[str, float]:
-    """One update: play a batch, be corrected, descend; returns the numbers to report.
+    """One update: play a batch, compute its loss, take a gradient step; returns the numbers to report.
 
     Args:
       played: plays the batch; what came of it, and the seconds of it that the policy took.
-      lesson_of: what is to be learned from it.
+      loss_of: its losses.
 
     Raises:
       DivergedError: the loss or a gradient is not finite (weights are as before).
       UnableError: memory ran out.
     """
     try:
-        with dropout_of(config.seed + parallel.rank(), update):
+        with seeded_dropout(config.seed + parallel.rank(), update):
             network.train()
             with clock.on("environment"):
                 experience, thinking = played()
             clock.move(thinking, "environment", "network")
             with clock.on("backward"):
-                lesson = lesson_of(experience)
-                set_rate(optimizer, falling_rate(config.learning_rate, update, config.iterations, config.cooldown))
-                norm = descend(lesson.learned, optimizer, f"update {update}")
+                batch_loss = loss_of(experience)
+                set_learning_rate(
+                    optimizer, scheduled_rate(config.learning_rate, update, config.iterations, config.cooldown)
+                )
+                norm = descend(batch_loss.loss, optimizer, f"update {update}")
     except torch.OutOfMemoryError as e:
         raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
-    losses = [float(x.detach()) for x in lesson.losses]
-    numbers = {"loss navigation": losses[0], "loss asking": losses[1], "gradient": norm, **lesson.numbers}
-    return parallel.reduce_metrics(numbers, NUMBERS, ADDED, lesson.learned.device)
+    losses = [float(x.detach()) for x in batch_loss.losses]
+    numbers = {"loss navigation": losses[0], "loss asking": losses[1], "gradient": norm, **batch_loss.numbers}
+    return parallel.reduce_metrics(numbers, REPORTED, SUMMED, batch_loss.loss.device)
 
 
-NUMBERS = (
+REPORTED = (
     "loss navigation",
     "loss asking",
     "gradient",
@@ -166,18 +177,18 @@ NUMBERS = (
     "right asks",
 )
 """What is reported of an update; the last two only where help could be asked for."""
-ADDED: Collection[str] = ("loss navigation", "loss asking", "steps")
+SUMMED: Collection[str] = ("loss navigation", "loss asking", "steps")
 """Those that are sums over the batch, of which every process has a share."""
 
 
-def validate(learner: Learner, split: Ground, session: Session) -> Sequence[Episode]:
+def validate(learner: Learner, split: TaskSet, session: Session) -> Sequence[Episode]:
     """Play validation tasks as in evaluation; keep the agent if it is as good as the best so far."""
     config = learner.config
-    tasks = [learner.task(t) for t in split.tasks[: config.validation_tasks]]
+    tasks = [learner.evaluation_task(t) for t in split.tasks[: config.validation_tasks]]
     learner.network.eval()
     with torch.inference_mode():
         batch = learner.evaluation.evaluation_batch
-        episodes = play(split.make_env, learner.judged(split), tasks, seed=config.seed, batch=batch)
+        episodes = play(split.make_env, learner.evaluated_agent(split), tasks, seed=config.seed, batch=batch)
     values = {
         name: sum(f(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
         for name, f in metrics.PER_EPISODE.items()
@@ -187,5 +198,5 @@ def validate(learner: Learner, split: Ground, session: Session) -> Sequence[Epis
     )
     session.record({"episodes": len(episodes), **values})
     if session.improved(values["success"], episodes=len(episodes)):
-        learner.keep(session.folder / "best.safetensors", session.identity)
+        learner.save(session.folder / "best.safetensors", session.identity)
     return episodes
