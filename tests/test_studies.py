@@ -22,6 +22,7 @@ from hand_data import build, small_house
 
 from agents.common.weights import load_weights, save_weights
 from agents.studies.engine import Figure, StudyRow, StudyTable, check, run_study
+from embodied.cli import main
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.locks import LockedError, locked
@@ -176,6 +177,11 @@ def test_what_other_code_judged_is_judged_again_and_the_check_tells_it(tmp_path)
     ]
     assert table(archer, out, report=True)["rows"] == [] and table(archer, out)["rows"] == body["rows"]
     assert did(archer) == {"train": 0, "judge": 14}
+
+
+def test_the_command_that_checks_takes_its_folder_by_position(tmp_path, capsys):
+    assert main(["study", "check", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f"no stored tables in {tmp_path}\n"
 
 
 def test_some_rows_are_had_alone_and_missing_ones_are_named(tmp_path):

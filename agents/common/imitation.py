@@ -51,7 +51,7 @@ class Learner(Protocol):
     def optimizer(self) -> torch.optim.Optimizer: ...
 
     def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
-        """One update; the numbers to report: NUMBERS and, where help could be asked for, ASKING."""
+        """One update; the numbers to report, those of REPORTED."""
         ...
 
     def evaluated_agent(self, split: Any) -> Agent:
@@ -116,7 +116,7 @@ def train(
 
 
 @dataclass(frozen=True, eq=False)
-class Lesson:
+class BatchLoss:
     """The losses of one batch of episodes, and what else is reported."""
 
     losses: tuple[Tensor, Tensor]
@@ -134,7 +134,7 @@ def train_step(
     update: int,
     clock: Clock,
     played: Callable[[], tuple[X, float]],
-    loss_of: Callable[[X], Lesson],
+    loss_of: Callable[[X], BatchLoss],
 ) -> dict[str, float]:
     """One update: play a batch, compute its loss, take a gradient step; returns the numbers to report.
 
