@@ -564,7 +564,7 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
         "split = t.setting(); agent = t.agent_for(split, config)\n"
         "note = lambda line: print(line, flush=True)\n"
         "learner = t.HannaLearner(agent, split, t.HannaTeacher())\n"
-        "t.spine.train(learner, split, Path(sys.argv[1]), t.identity(agent), note=note)\n"
+        "t.imitation.train(learner, split, Path(sys.argv[1]), t.identity(agent), note=note)\n"
     )
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}
     process = subprocess.Popen(
