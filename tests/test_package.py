@@ -78,11 +78,12 @@ def test_another_embodied_that_would_win_elsewhere_is_noticed(tmp_path):
 
 
 def test_a_distribution_that_installs_into_our_folders_is_noticed(tmp_path):
-    info = tmp_path / "other" / "openai_agents-0.1.dist-info"
-    info.mkdir(parents=True)
+    other = foreign(tmp_path / "other", "agents")  # Python 3.12 leaves recorded files out that are not there
+    info = other / "openai_agents-0.1.dist-info"
+    info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: openai-agents\nVersion: 0.1\n")
     (info / "RECORD").write_text("agents/__init__.py,,\nopenai_agents-0.1.dist-info/METADATA,,\n")
-    said = doctor(tmp_path, ROOT, tmp_path / "other")
+    said = doctor(tmp_path, ROOT, other)
     assert "the distribution openai-agents 0.1 installs agents, too" in said.stdout, said.stdout + said.stderr
 
 
