@@ -13,7 +13,7 @@ from hand_data import build, paint
 
 from embodied.cli import main
 from embodied.datasets.checks import DatasetError
-from embodied.datasets.lerobot import ACTION, CAMERA, FPS, STATE, RecordedCamera, export_lerobot, seen
+from embodied.datasets.lerobot import ACTION, CAMERA, FPS, MOST, STATE, RecordedCamera, export_lerobot, seen
 from embodied.evaluation.metrics import success
 from embodied.evaluation.rollout import play
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
@@ -78,6 +78,15 @@ def test_every_step_is_a_row_with_its_pose_its_action_and_the_words_of_the_momen
     acts, asked = np.array(table["action"]), [ACTION.index("ask"), ACTION.index("stop")]
     kinds = [type(s.action).__name__ for s in steps]
     assert [("Ask", "Stop")[int(a[1])] if a.any() else "Move" for a in acts[:, asked]] == kinds
+    where = np.array(table["candidates"]).reshape(len(steps), MOST, 3)
+    for k, step in enumerate(steps):
+        there = graph.positions[list(step.candidate_nodes)] - graph.positions[step.pose.node]
+        n, chosen = len(there), table["candidate"][k]
+        assert np.allclose(np.linalg.norm(where[k, :n], axis=1), np.linalg.norm(there, axis=1)), "metres"
+        assert not where[k, n:].any() and (chosen == -1) == (kinds[k] != "Move")
+        if chosen >= 0:
+            assert step.candidate_nodes[chosen] == step.next_pose.node
+            assert np.allclose(where[k, chosen], acts[k, :3], atol=1e-5), "in the agent's own frame"
     ends = np.cumsum([len(e.steps) for e in episodes]) - 1
     assert np.flatnonzero(table["next.done"]).tolist() == ends.tolist()
     assert [table["next.success"][k] for k in ends] == [won(data, e) for e in episodes]

@@ -32,7 +32,7 @@ import pyarrow.parquet as pq
 from assets.cache import drafts, sweep, write_bytes, write_json
 from embodied.datasets.checks import DatasetError
 from embodied.geometry import wrap
-from embodied.interface import Ask, Episode, Place, Pose, Step, Stop
+from embodied.interface import Ask, Episode, Move, Place, Pose, Step, Stop
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile
 
@@ -81,6 +81,18 @@ COLUMNS: Columns = {
     "task_index": (pa.int64(), None),
 }
 """Of one step: type, and names where it is a vector."""
+MOST = 24
+"""Candidates that a row has room for; graphs of houses have at most a dozen neighbours at a node."""
+GRAPH_COLUMNS: Columns = {
+    **COLUMNS,
+    "candidates": (
+        pa.list_(pa.float32(), 3 * MOST),
+        tuple(f"{axis}_{k}" for k in range(MOST) for axis in ("forward", "left", "up")),
+    ),
+    "candidate": (pa.int64(), None),
+}
+"""Besides, of walks on a graph: where the agent can go, in its own frame (metres, zero behind the last), and which it
+chose, -1 for none. By their names LeRobot takes them for neither observations nor actions of a policy."""
 DTYPES = {pa.float32(): "float32", pa.int64(): "int64", pa.bool_(): "bool"}
 
 
@@ -120,7 +132,7 @@ def export_lerobot(
       DatasetError: an episode of another data set's house, or a house without pictures.
     """
     with whole_folder(folder) as draft:
-        writer = Writer(draft, camera, depth=depth)
+        writer = Writer(draft, camera, GRAPH_COLUMNS, depth=depth)
         for episode in episodes:
             place = data.place_of(episode)
             _add(writer, episode, place, _pictures(data, episode.task.world), succeeded)
@@ -164,12 +176,32 @@ def state(pose: Pose, place: Place) -> np.ndarray:
 
 def action(step: Step, place: Place) -> np.ndarray:
     """(7,) float32, ACTION: the next pose seen from this one."""
-    before, after = (place.graph.positions[p.node] for p in (step.pose, step.next_pose))
-    (dx, dy, dz), yaw = after - before, step.pose.yaw
-    forward, left = dx * math.cos(yaw) + dy * math.sin(yaw), dy * math.cos(yaw) - dx * math.sin(yaw)
-    turn, tilt = float(wrap(step.next_pose.yaw - yaw)), step.next_pose.pitch - step.pose.pitch
+    yaw, pitch = step.next_pose.yaw - step.pose.yaw, step.next_pose.pitch - step.pose.pitch
+    moved = offsets(step.pose, (step.next_pose.node,), place)[0]
     asked, stopped = isinstance(step.action, Ask), isinstance(step.action, Stop)
-    return np.array([forward, left, dz, turn, tilt, asked, stopped], np.float32)
+    return np.array([*moved, float(wrap(yaw)), pitch, asked, stopped], np.float32)
+
+
+def offsets(pose: Pose, nodes: Sequence[int], place: Place) -> np.ndarray:
+    """(n, 3) metres ahead, to the left and up, from a pose to nodes."""
+    positions = place.graph.positions
+    dx, dy, dz = (positions[list(nodes)] - positions[pose.node]).T
+    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+    return np.stack([dx * cos + dy * sin, dy * cos - dx * sin, dz], 1)
+
+
+def candidates(step: Step, place: Place) -> np.ndarray:
+    """(3 MOST,) float32, as GRAPH_COLUMNS.
+
+    Raises:
+      ValueError: more than MOST candidates.
+    """
+    found, nodes = np.zeros((MOST, 3), np.float32), step.candidate_nodes
+    if len(nodes) > MOST:
+        raise ValueError(f"a step has {len(nodes)} candidates; a LeRobot data set has room for {MOST}")
+    if nodes:
+        found[: len(nodes)] = offsets(step.pose, nodes, place)
+    return found.ravel()
 
 
 def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeeded: Callable[[Episode], bool]) -> None:
@@ -179,6 +211,8 @@ def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeed
     rows = {
         "observation.state": np.stack([state(s.pose, place) for s in episode.steps]),
         "action": np.stack([action(s, place) for s in episode.steps]),
+        "candidates": np.stack([candidates(s, place) for s in episode.steps]),
+        "candidate": np.array([s.action.candidate if isinstance(s.action, Move) else -1 for s in episode.steps]),
     }
     with PanoramaFile(pictures) as file:
         frames = [seen(file, s.pose, writer.camera) for s in episode.steps]
@@ -518,6 +552,7 @@ def _card(data: Dataset) -> str:
 LeRobotDataset {VERSION}, {FPS} frames a "second": a frame is what the agent sees before a step
 (`{CAMERA}`), `observation.state` its pose ({", ".join(STATE)}; metres and
 radians, z up), `action` how the pose changes in its own frame
-({", ".join(ACTION)}), the task of a frame the instruction that
+({", ".join(ACTION)}), `candidates` where it can go in that frame
+(metres, zero behind the last), `candidate` which of them it chose, the task of a frame the instruction that
 it hears at that moment, `{EVENTS}` what an assistant answers then. `meta/episodes` says which task, house and agent.
 """
