@@ -11,12 +11,10 @@ import contextlib
 import ctypes
 import ctypes.util
 import functools
-import importlib.util
 import os
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from embodied import software
@@ -125,7 +123,7 @@ def _egl_works() -> bool:
     name = ctypes.util.find_library("EGL")
     if name is None or not any(map(ctypes.util.find_library, ("OpenGL", "GLESv2", "GLESv1_CM"))):  # PyOpenGL needs one
         return False
-    _load_triton_first()
+    software.load_triton_first()
     try:
         egl = ctypes.CDLL(name)
     except OSError:  # it is there, and broken
@@ -145,18 +143,6 @@ def _egl_works() -> bool:
     egl.eglInitialize.argtypes = [pointer, pointer, pointer]
     displays = (get_display(platform_device, devices[i], None) for i in range(count.value))
     return any(d and egl.eglInitialize(d, None, None) for d in displays)
-
-
-def _load_triton_first() -> None:
-    """Load the library of triton, which comes with PyTorch's CUDA build, before Mesa's drivers.
-
-    Both contain LLVM, and Mesa before 24.1 makes its own visible to all that is loaded later:
-    importing triton afterwards, as PyTorch's optimisers do, ends in a segmentation fault.
-    """
-    spec = importlib.util.find_spec("triton")
-    for folder in (spec.submodule_search_locations or ()) if spec else ():
-        with contextlib.suppress(OSError):  # a triton that cannot be loaded at all
-            ctypes.CDLL(str(Path(folder) / "_C" / "libtriton.so"))
 
 
 class _Owner:
@@ -230,7 +216,7 @@ def _let_go(owner: _Owner) -> None:
 
 
 def _create(backend: str) -> Any:
-    _load_triton_first()
+    software.load_triton_first()
     try:
         if backend == "egl":
             from mujoco.egl import GLContext

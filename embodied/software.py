@@ -35,6 +35,7 @@ def bundled(stem: str) -> Path | None:
     if spec is None or spec.origin is None:
         return None
     folder = Path(spec.origin).parent.parent / FOLDER
+    load_triton_first()
     found = sorted(folder.glob(f"lib{stem}-*.so*"))
     return found[0] if found and _loaded(folder, found[0]) else None
 
@@ -58,6 +59,18 @@ def _try(path: Path) -> bool:
     except OSError:
         return False
     return True
+
+
+@functools.cache
+def load_triton_first() -> None:
+    """Load the library of triton, which comes with PyTorch's CUDA build, before Mesa's drivers or the wheel's LLVM.
+
+    All contain LLVM, and Mesa before 24.1 makes its own visible to all that is loaded later: loading triton
+    afterwards, as PyTorch's optimisers do, ends in a segmentation fault.
+    """
+    spec = importlib.util.find_spec("triton")
+    for folder in (spec.submodule_search_locations or ()) if spec else ():
+        _try(Path(folder) / "_C" / "libtriton.so")  # or it cannot be loaded at all
 
 
 def bind_osmesa() -> None:

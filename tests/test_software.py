@@ -19,12 +19,16 @@ from embodied.cli import doctor
 def wheel(tmp_path, monkeypatch):
     """The folder of an installed wheel's libraries; nothing is in it."""
     package = SimpleNamespace(origin=str(tmp_path / "lavavu" / "__init__.py"))
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: package if name == software.WHEEL else None)
+    triton = SimpleNamespace(submodule_search_locations=[str(tmp_path / "triton")])
+    specs = {software.WHEEL: package, "triton": triton}
+    monkeypatch.setattr(importlib.util, "find_spec", specs.get)
     software.bundled.cache_clear()
+    software.load_triton_first.cache_clear()
     folder = tmp_path / software.FOLDER
     folder.mkdir()
     yield folder
     software.bundled.cache_clear()
+    software.load_triton_first.cache_clear()
 
 
 def test_a_wheel_with_a_library_that_does_not_load_is_not_used(wheel):
@@ -32,20 +36,20 @@ def test_a_wheel_with_a_library_that_does_not_load_is_not_used(wheel):
     assert software.bundled("OSMesa") is None and software.bundled("LLVM") is None
 
 
-def test_libraries_are_loaded_in_the_order_that_they_need(wheel, monkeypatch):
+def test_libraries_are_loaded_in_the_order_that_they_need_and_after_pytorchs_own_llvm(wheel, monkeypatch):
     for name in ("libLLVM-17.so", "libffi-1.so", "libzstd-1.so"):
         (wheel / name).write_bytes(b"")
     loaded: list[str] = []
 
     def load(path: str) -> None:
         name = path.rpartition("/")[2]
-        if name.startswith("libLLVM") and len(loaded) < 2:
+        if name.startswith("libLLVM") and len(loaded) < 3:
             raise OSError("libffi-1.so: cannot open shared object file")
         loaded.append(name)
 
     monkeypatch.setattr(ctypes, "CDLL", load)
     assert software.bundled("LLVM") == wheel / "libLLVM-17.so"
-    assert loaded == ["libffi-1.so", "libzstd-1.so", "libLLVM-17.so"]
+    assert loaded == ["libtriton.so", "libffi-1.so", "libzstd-1.so", "libLLVM-17.so"]
 
 
 def test_the_systems_osmesa_goes_before_the_wheels(monkeypatch):
