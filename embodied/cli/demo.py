@@ -8,6 +8,8 @@ asking the people. Both episodes are recorded for Rerun; --video also films the 
 from __future__ import annotations
 
 import contextlib
+import shutil
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -94,11 +96,18 @@ def demonstrate(args: Options, viewers: tuple[str, ...]) -> int:
                 told(walk),
                 told(help_facts),
                 f"floor plan  {facts['plan']}",
-                f"look at a recording with: .venv/bin/embodied view {help_facts['recording']}",
+                f"look at a recording with: {as_typed(Path(sys.argv[0]))} view {help_facts['recording']}",
             ]
         ),
     )
     return 0
+
+
+def as_typed(program: Path) -> str:
+    """How the user started `program`, as the beginning of a line to copy."""
+    if program.name != "embodied":
+        return f"{sys.executable} -m embodied"
+    return program.name if shutil.which(program.name) == str(program) else str(program)
 
 
 SMALL = (32.0, 36.0)
