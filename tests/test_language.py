@@ -15,6 +15,7 @@ from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import cost, count_cost, follow
 from embodied.language.plain import with_article
+from embodied.language.prose import prose
 from embodied.language.route_clauses import legs_of, shortened
 from embodied.language.seen import Lookout, doorway
 from embodied.language.speakers import SPEAKERS, draw_speaker
@@ -251,3 +252,13 @@ def test_nobody_says_next_twice(spoken):
     for text, _, _ in spoken:
         for link in ("after that", "next,", "once there", "at that point", "afterwards"):
             assert text.lower().count(f"{link} ") <= 1, text
+
+
+def test_people_read_no_blanks_before_full_stops():
+    assert (
+        prose("turn right and go into the hall . turn slightly left .")
+        == "turn right and go into the hall. turn slightly left."
+    )
+    assert prose("turn 60 degrees left , go forward") == "turn 60 degrees left, go forward"
+    for written in ("Is it here? Yes, 2.5 m ahead.", "go on :) then stop", "a .5 litre bottle", ""):
+        assert prose(written) == written

@@ -25,6 +25,7 @@ from embodied.errors import UnableError
 from embodied.geometry import wrap
 from embodied.interface import Ask, Episode, Thought
 from embodied.language.plain import PlainLanguage
+from embodied.language.prose import prose
 from embodied.language.said import PeoplesWords
 from embodied.policies.baselines import RandomWalk
 from embodied.records import load_lines, parse, to_json
@@ -281,7 +282,10 @@ def test_a_person_is_helped_by_the_data_sets_own_assistant_under_its_own_rule(da
     kind, body = game.think()
     play.do(kind, None, game=game.id, **body)
     route = game.env.last_step.reply.subtask
-    assert game.situation.pose == route.start and play.screen("ann")["subtask"]
+    screen, told = play.screen("ann"), game.observation.instruction
+    assert game.situation.pose == route.start and screen["subtask"]
+    assert screen["instruction"] == screen["said"][-1]["text"] == prose(told), "people read what the learner reads,"
+    assert " ." in told and " ." not in screen["instruction"], "without its blanks"
 
 
 class Helpful:

@@ -40,7 +40,7 @@ def told(story, *steps):
 
 
 def test_the_route_is_spoken_of_until_it_is_left_and_then_the_goal_image_is_looked_for():
-    reply = Reply("Go on.", Viewpoint("line", 1), subtask=Subtask("r1", 1, Pose(0), 2, (0, 1, 2)))
+    reply = Reply("Go on .", Viewpoint("line", 1), subtask=Subtask("r1", 1, Pose(0), 2, (0, 1, 2)))
     asked = told(Story(task_of("hanna")), step_of(Ask(), reply=reply))
     assert asked.route == (0, 1, 2) and asked.image == Viewpoint("line", 1)
     assert asked.dialogue[1:] == ["**Agent** (step 0): Can you help me?", "**Assistant:** Go on."]

@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from embodied.geometry import rotation
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Step, Stop, Task
+from embodied.language.prose import prose
 from embodied.navigation.free_space import EYE
 from embodied.render.panorama import Panorama
 from embodied.render.photograph import PhotoCamera
@@ -149,7 +150,7 @@ def record_episode(
     about = {name: str(value) for name, value in world.fingerprint.items()}
     seen = None if eyes is None else eyes.pictures
     layout = blueprint_of(world.house, episode, seen, shown=views_of(world, eyes).shown is not None)
-    with open_recording(sinks, layout, name=episode.task.request, properties=about) as recording:
+    with open_recording(sinks, layout, name=prose(episode.task.request), properties=about) as recording:
         steps = watch(episode.steps)
         for _ in record(recording, world, episode.task, steps, eyes=eyes, pictures=pictures, budget=episode.budget):
             pass
@@ -195,7 +196,9 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
     )
     heading = "## " if len(task.request) <= SHORT else ""
     recording.log(
-        "text/request", rr.TextDocument(f"{heading}“{task.request}”", media_type=rr.MediaType.MARKDOWN), static=True
+        "text/request",
+        rr.TextDocument(f"{heading}“{prose(task.request)}”", media_type=rr.MediaType.MARKDOWN),
+        static=True,
     )
     for name in ("goal", "target"):
         recording.log(
@@ -354,11 +357,11 @@ def instruction_text(step: Step, left: int | None = None) -> str:
     """What the agent is trying to carry out right now, as Markdown; `left` requests remain where they are counted."""
     mode = "Sub-task, from an assistant" if step.mode is Mode.SUB else "Main task"
     if isinstance(step.action, Ask):
-        return f"**{mode}**\n\n> {step.instruction}\n\n**The agent asks for help.**"
+        return f"**{mode}**\n\n> {prose(step.instruction)}\n\n**The agent asks for help.**"
     helpers = "\n\n*Somebody is near who can be asked.*" if step.can_ask else ""
     if left is not None:
         helpers = f"\n\n*{left} request{'s' * (left != 1)} left.*"
-    return f"**{mode}**\n\n> {step.instruction}{helpers}"
+    return f"**{mode}**\n\n> {prose(step.instruction)}{helpers}"
 
 
 WANTED = {

@@ -18,6 +18,7 @@ from embodied.interface import (
     Task,
     Viewpoint,
 )
+from embodied.language.prose import prose
 
 QUESTIONS = {
     Intention.HELP: "Can you help me?",
@@ -57,7 +58,7 @@ class Story:
     def __init__(self, task: Task, budget: int | None = None) -> None:
         """`budget`: requests that the episode allows; None where they are not counted."""
         self.task, self.budget = task, budget
-        self.dialogue = [f"**Requester:** {task.request}"]
+        self.dialogue = [f"**Requester:** {prose(task.request)}"]
         self.nodes = [task.start.node]
         self.goals = [task.goal_nodes[0]]
         """HARI's stack of goals, the top last."""
@@ -97,7 +98,7 @@ class Story:
             if step.reply is not None:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)
-            self.dialogue.append(f"**Teacher:** {step.reply.text}")
+            self.dialogue.append(f"**Teacher:** {prose(step.reply.text or '')}")
         if step.next_pose.node != self.nodes[-1]:
             self.nodes.append(step.next_pose.node)
         self.last = step
@@ -106,7 +107,7 @@ class Story:
 
     def _heard(self, reply: Reply, pose: Pose) -> None:
         said = reply.text or described(reply.description or (), pose if reply.intention is Intention.CUR else None)
-        self.dialogue.append(f"**Assistant:** {said}")
+        self.dialogue.append(f"**Assistant:** {prose(said)}")
         self.image = reply.image or self.image
         if reply.subtask is not None:
             self.route = reply.subtask.path
@@ -136,7 +137,7 @@ class Story:
         here, lines = step.pose.node, []
         for depth, goal in reversed(list(enumerate(self.goals))):
             room = world.graph.room_of_node[goal].replace("_", " ")
-            name = f"the task: “{self.task.request}”" if depth == 0 else "sub-goal from the assistant"
+            name = f"the task: “{prose(self.task.request)}”" if depth == 0 else "sub-goal from the assistant"
             text = f"{depth + 1}. {name}, in the {room}, {world.graph.distance[here, goal]:.1f} m from here"
             lines.append(f"**{text}**  ← now" if depth == len(self.goals) - 1 else text)
         return "\n\n".join(lines)

@@ -14,6 +14,7 @@ from assets.cache import atomic_path
 from embodied.geometry import wrap
 from embodied.house.floor_plan import font
 from embodied.interface import Episode, Pose
+from embodied.language.prose import prose
 from embodied.navigation.graph import NavGraph
 
 FPS = 24
@@ -112,7 +113,7 @@ def _captions(episode: Episode) -> list[str]:
             told.append(f"Task: {episode.task.request}" if after == episode.task.request else f"Assistant: {after}")
     if episode.ended == "stop":
         told[-1] = f"Agent stops. {told[-1]}"
-    return told
+    return [prose(words) for words in told]
 
 
 def captioned(rgb: np.ndarray, caption: str) -> np.ndarray:

@@ -50,6 +50,7 @@ from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, obser
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
 from embodied.interface import Assistant, FeatureSource, Observation, Place, Pose, SeenPlace, Task
+from embodied.language.prose import prose
 from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import instance_classes
 from embodied.seeds import checked_seed
@@ -321,7 +322,8 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     sheet.paste(plan, (view.width, 0))
     pen = ImageDraw.Draw(sheet)
     who = "assistant" if o.mode.value == "sub" else "task"
-    pen.text((10, VIEW[0] + 8), _wrapped(f"{who}: {o.instruction}", sheet.width // 9), font=font(16), fill="black")
+    words = _wrapped(f"{who}: {prose(o.instruction)}", sheet.width // 9)
+    pen.text((10, VIEW[0] + 8), words, font=font(16), fill="black")
     return np.asarray(sheet)
 
 

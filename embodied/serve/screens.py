@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Sight, Situation, Step, viewpoint
+from embodied.language.prose import prose
 from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
@@ -65,14 +66,14 @@ def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     """What both roles see."""
     world = game.task.world
     shown = lambda node: None if node is None else pictures.name(world, node)
-    said = [{"who": s["who"], "text": s["text"], "pano": shown(s["picture"])} for s in game.said]
+    said = [{"who": s["who"], "text": prose(s["text"]), "pano": shown(s["picture"])} for s in game.said]
     return {
         "screen": role,
         "game": game.id,
         "turn": game.turn,
         "practice": game.practice,
         "advice": game.table.part.advice,
-        "request": game.task.request,
+        "request": prose(game.task.request),
         "said": said,
         "question": game.question,
         "yours": game.mover == role,
@@ -98,7 +99,7 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
     return {
         **(moves if game.drive is None else drives),
         "words": list(seen.candidates.words if game.drive is None else ACTIONS),
-        "instruction": seen.instruction,
+        "instruction": prose(seen.instruction),
         "subtask": seen.mode is Mode.SUB,
         "target": target,
         "canAsk": bool(seen.can_ask) and game.question is None,
@@ -156,7 +157,7 @@ def judge_of(sessions: Sessions, person: Person, pictures: Pictures) -> Screen:
         "ask": part.ask or DEFAULT_QUESTIONS[part.kind],
         "stars": STARS if part.kind == "rate" else 0,
         "unit": f"{part.name}/{person.viewing[1]}",
-        "request": episode.task.request if part.kind == "rate" else None,
+        "request": prose(episode.task.request) if part.kind == "rate" else None,
         "frames": frames(episode.task.world, episode.task.start, episode.steps, part, pictures),
     }
 
@@ -174,7 +175,9 @@ def frames(world: str, start: Pose, steps: tuple[Step, ...], part: Part, picture
         text = ""
         if part.kind == "rate" and isinstance(step.action, Ask):
             asked = step.action.question or "Can you help me?"
-            text = f"Question: {asked}" + (f"\nAnswer: {step.reply.text}" if step.reply and step.reply.text else "")
+            text = f"Question: {asked}"
+            if step.reply and step.reply.text:
+                text += f"\nAnswer: {prose(step.reply.text)}"
         if isinstance(step.action, Move) or text:
             pose = step.next_pose if isinstance(step.action, Move) else step.pose
             found.append({"pano": pictures.name(world, step.pose.node), "yaw": pose.yaw, "pitch": 0, "text": text})

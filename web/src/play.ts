@@ -54,9 +54,6 @@ class Words {
   }
 }
 
-/** Words of simulated assistants have blanks before their full stops. */
-const plain = (text: string): string => text.replace(/ ([.,;:?!])(?=\s|$)/g, "$1");
-
 /** What was said so far. */
 function conversation(said: Said[], you: string, names: Record<string, string>, look?: (pano: string) => void): HTMLElement[] {
   return said.map((x) =>
@@ -64,7 +61,7 @@ function conversation(said: Said[], you: string, names: Record<string, string>, 
       "li",
       { class: x.who === you ? "mine" : "theirs" },
       h("span", { class: "who" }, x.who === you ? "You" : names[x.who]),
-      h("p", {}, plain(x.text)),
+      h("p", {}, x.text),
       x.pano && thumbnail(x.pano, look),
     ),
   );
@@ -138,7 +135,7 @@ export class AgentView implements View<AgentScreen> {
     this.request.textContent = screen.request;
     const sub = screen.subtask || (screen.instruction !== screen.request && screen.said.length > 0);
     this.told.replaceChildren(
-      ...(sub ? [h("p", { class: "told" }, h("span", { class: "who" }, "You were told"), plain(screen.instruction))] : []),
+      ...(sub ? [h("p", { class: "told" }, h("span", { class: "who" }, "You were told"), screen.instruction)] : []),
       ...(screen.target ? [h("p", { class: "told" }, h("span", { class: "who" }, "Look for this view"), thumbnail(screen.target, (p) => this.visit(p)))] : []),
     );
     this.talk.replaceChildren(...conversation(screen.said, "agent", { assistant: "Assistant" }, (p) => this.visit(p)));
