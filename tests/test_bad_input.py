@@ -33,7 +33,9 @@ from embodied.cli.options import field_docs
 from embodied.datasets.build import for_each_unit
 from embodied.errors import UnableError
 from embodied.generate import HouseConfig
+from embodied.gl import GLError
 from embodied.house.house import House, HouseError
+from embodied.light.backend import LightError
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.scene.model import load_texture
@@ -316,6 +318,52 @@ def test_viewers_that_are_not_there_are_named_before_any_work(capsys, tmp_path, 
     assert "URL of a running viewer" in said(capsys, "demo", "--connect", "http://127.0.0.1:1")
     assert "use --serve and a browser" in said(capsys, "rollout", "--spawn")
     assert not list(tmp_path.iterdir())
+
+
+DRAWING = [
+    ("demo",),
+    ("demo", "--small"),
+    ("rollout",),
+    ("rollout", "--pictures", "unlit"),
+    ("render", "house"),
+    ("dataset", "find"),
+    ("dataset", "find", "--pictures", "unlit"),
+]
+
+
+@pytest.mark.parametrize("words", DRAWING)
+def test_a_machine_without_a_renderer_is_told_before_any_work(words, capsys, tmp_path, monkeypatch):
+    unable(monkeypatch, "embodied.gl.info", GLError("neither EGL nor OSMesa works here"))
+    refused_at_once(words, "neither EGL nor OSMesa works", capsys, tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("words", [*(w for w in DRAWING if "unlit" not in w and "render" not in w), ("light", "house")])
+def test_a_machine_that_cannot_light_is_told_before_any_work(words, capsys, tmp_path, monkeypatch):
+    unable(monkeypatch, "embodied.light.backend._module", LightError("light needs CUDA or LLVM"))
+    refused_at_once(words, "light needs CUDA or LLVM", capsys, tmp_path, monkeypatch)
+
+
+def unable(monkeypatch, function, error):
+    """Calls of `function` raise `error`."""
+
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(function, fail)
+
+
+def refused_at_once(words, message, capsys, tmp_path, monkeypatch):
+    """`embodied words` says `message` before it opens or makes a house, and writes nothing."""
+    late = AssertionError("work was done first")
+    for function in ("generate.generate_house", "datasets.build.build_dataset", "world.open_folder"):
+        unable(monkeypatch, f"embodied.{function}", late)
+    (tmp_path / "house").mkdir()
+    (tmp_path / "house/house.json").write_text("{}")
+    places = [str(tmp_path / w) if w == "house" else w for w in words]
+    if words[0] in ("demo", "dataset"):
+        places += ["--out", str(tmp_path / "out")]
+    assert message in said(capsys, *places, "--cache", str(tmp_path / "cache"))
+    assert [p.name for p in tmp_path.iterdir()] == ["house"]
 
 
 def test_a_full_disk_leaves_no_file(tmp_path):

@@ -53,6 +53,23 @@ def catalogue_of(args: Furnished) -> Catalogue:
     return load_catalogue(args.cache, args.pack, args.own)
 
 
+def check_machine(pictures: str) -> None:
+    """See that this machine can light and draw such pictures, before work that would be lost.
+
+    Raises:
+      GLError: no off-screen renderer works.
+      LightError: the pictures are lit, and light cannot be computed.
+    """
+    from embodied import gl
+    from embodied.light.backend import device
+    from embodied.render.pictures import PictureSettings
+
+    if pictures != "none":
+        gl.info()
+    if PictureSettings.of(pictures).lit:
+        device()
+
+
 def pause() -> float:
     """Seconds between two states of a progress bar."""
     return 0.1 if sys.stderr.isatty() else SELDOM

@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from embodied.cli.common import Furnished, Printed, note, pause, show
+from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
 from embodied.cli.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
 from embodied.render.pictures import KINDS as PICTURE_KINDS
@@ -132,6 +132,9 @@ def run(args: Options) -> int:
 
     def watch(jobs: Iterable[str], total: int) -> Iterable[str]:
         return tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
+
+    if args.ray in (None, "local") and not (args.out / "dataset.json").exists():
+        check_machine(chosen_pictures(args.kind, args.pictures, args.size, None).kind)
 
     how: dict[str, Any] = {"workers": args.workers, "watch": watch, "packs": args.pack, "ray_address": args.ray}
     build_dataset(config, args.out, args.cache, own=args.own, **how)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import Furnished, Printed, bar, catalogue_of, fetch, note, show
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, note, show
 from embodied.cli.options import CubeFace, Option, OutputFolder, OutputRrd, drawn_as, whole
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.render.pictures import DRAWN
@@ -51,6 +51,7 @@ class Options(Filmed, Viewers, Furnished, Printed):
 
 
 def run(args: Options) -> int:
+    check_machine("fast" if args.small else args.pictures)
     if args.small:
         return show_a_room(args)
     with viewers_of(args) as viewers:

@@ -63,10 +63,12 @@ class Options(Furnished, Printed):
 
 
 def run(args: Options) -> int:
+    from embodied.light.backend import device
     from embodied.locks import locked
 
     if not (args.folder / "house.json").exists():
         raise FileNotFoundError(f"{args.folder} holds no house.json; name a folder that `embodied house` wrote")
+    device()  # says what is missing
     changes = [getattr(args, n) for n in ("time", "weather", "lamps", "landscape", "season")]
     writes = args.lights > 1 or any(c is not None for c in changes)
     with locked(args.folder) if writes else contextlib.nullcontext():

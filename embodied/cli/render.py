@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import Furnished, Printed, catalogue_of, fetch, note, show
+from embodied.cli.common import Furnished, Printed, catalogue_of, check_machine, fetch, note, show
 from embodied.cli.options import CubeFace, Option, OutputPng, drawn_as, house_folder, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
@@ -53,6 +53,7 @@ def run(args: Options) -> int:
             "--camera takes pictures of one viewpoint: --node 3 --view node3.png --camera phone; panorama files stay "
             "ideal, and environments and training photograph what they show of them"
         )
+    check_machine("unlit")  # the house may be lit already
     catalogue = catalogue_of(args)
     drawn = PictureSettings(args.size, args.pictures)
     with open_folder(args.folder, catalogue, args.cache, drawn) as world:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from embodied.cli.common import Furnished, Printed, bar, catalogue_of, fetch, show
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, show
 from embodied.cli.options import Count, CubeFace, HouseFolder, Option, drawn_as
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.render.photograph import CAMERAS
@@ -42,6 +42,7 @@ class Options(Filmed, Viewers, Furnished, Printed):
 
 
 def run(args: Options) -> int:
+    check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
     with viewers_of(args) as viewers:
         return roll_out(args, viewers)
 
