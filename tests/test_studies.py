@@ -129,7 +129,7 @@ def test_each_run_is_trained_and_judged_once_and_its_numbers_are_right(tmp_path)
     assert gain["mean"] == pytest.approx(((2.5 - 0.5) + (1.5 - 0.5) + (0.5 - 1.5)) / 3), "seed by seed, task by task"
     assert rows["far"]["tries"] == {"mean": 0.5, "half_width": 0.0, "n": 48}, "counted over both splits"
     assert rows["nobody"]["error_easy"]["n"] == 4, "who does not learn is judged once"
-    assert any(note.startswith("far less near, error, easy: +0.67 ±") for note in body["notes"])
+    assert any(note.startswith("far minus near, error, easy: +0.67 ±") for note in body["notes"])
     assert [c["unit"] for c in body["columns"]][:2] == ["%", ""] and body["settings"] == "Rate 0.5, 2 houses."
     assert (out / "archer-1.png").read_bytes().startswith(b"\x89PNG") and "| far |" in (out / "archer-1.md").read_text()
 

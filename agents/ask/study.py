@@ -100,7 +100,7 @@ class AskStudy:
     def tables(self) -> Mapping[str, StudyTable]:
         model, columns = (_rule(MODEL),) if self.model else (), (*COLUMNS, *KINDS, *metrics.USAGE)
         differences = (
-            StudyRow(f"learned asker less {other}", {}, minus=_rule(other))
+            StudyRow(f"learned asker minus {other}", {}, minus=_rule(other))
             for other in ("confirm on sight", "always route")
         )
         rows = (*map(_rule, baselines()), StudyRow("learned asker", {}), _rule(FORESIGHT), *model, *differences)

@@ -431,7 +431,8 @@ def _comparisons(learner: StudyLearner, table: StudyTable, out: Path, rows: Sequ
         for (split, metric), samples in _found(learner, table, pair, out).items():
             scale, e = 100.0 if metric in PERCENT else 1.0, interval(samples)
             told.append(
-                f"{first.label} less {second.label}, {metric}, {split}: {scale * e.mean:+.2f} ± {scale * e.half:.2f}"
+                f"{first.label} minus {second.label}, {metric}, {split.replace('_', ' ')}: "
+                f"{scale * e.mean:+.2f} ± {scale * e.half:.2f}{' points' * (metric in PERCENT)}"
             )
     return told
 
