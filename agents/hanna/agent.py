@@ -13,6 +13,7 @@ from agents.common.shipped import SHIPPED_AGENT
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import check_features, half_precision, load_weights, save_weights
+from agents.common.word_vectors import found_on, vocabulary_with
 from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
@@ -91,6 +92,8 @@ def new_agent(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         network = NETWORKS[config.model](config.network_config(len(vocabulary), feature_size))
+        vocabulary = vocabulary_with(vocabulary.words, config.word_vectors)
+        found_on(network, vocabulary)
     return HannaAgent(network, vocabulary, config, encoder_digest, feature_size, evaluation)
 
 
@@ -122,10 +125,14 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
       ValueError: their networks differ, or the features that they know.
     """
     sizes = [a.config.network_config(len(a.vocabulary), a.feature_size) for a in (agent, other)]
-    if (agent.encoder_digest, agent.config.model, sizes[0]) != (other.encoder_digest, other.config.model, sizes[1]):
+    if [_kind(agent), sizes[0]] != [_kind(other), sizes[1]]:
         raise ValueError(
             f"{source} cannot be begun with: it is a {other.config.model!r} of {sizes[1]} on encoder "
             f"{other.encoder_digest[:12]}, this run a {agent.config.model!r} of {sizes[0]} on encoder "
             f"{agent.encoder_digest[:12]}; give this run its settings"
         )
     agent.network.load_state_dict(other.network.state_dict())
+
+
+def _kind(agent: HannaAgent) -> tuple[str, str, str]:
+    return agent.encoder_digest, agent.config.model, agent.config.word_vectors

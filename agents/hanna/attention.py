@@ -13,6 +13,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.common.word_vectors import WordEmbedding
+
 SIMILARITY_THRESHOLD = 0.9
 """A past situation counts as nearly identical above this cosine (Eq D.3)."""
 
@@ -171,7 +173,7 @@ class TextEncoder(nn.Module):
     def __init__(self, words: int, hidden: int, heads: int, dropout: float) -> None:
         super().__init__()
         self.hidden = hidden
-        self.embedding = nn.Embedding(words, hidden, padding_idx=0)
+        self.embedding = WordEmbedding(words, hidden)
         nn.init.normal_(self.embedding.weight, std=hidden**-0.5)
         self.attend = MultiAttend(hidden, heads, dropout)
         self.feed = FeedForward(hidden, dropout)

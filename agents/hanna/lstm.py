@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from agents.common.word_vectors import WordEmbedding
 from agents.hanna.attention import DotAttend
 from agents.hanna.config import HannaSizes
 from agents.hanna.network import Scores
@@ -41,7 +42,7 @@ class LstmStateNetwork(nn.Module):
         super().__init__()
         h, d = config.hidden_size, config.feature_size
         self.hidden_size = h
-        self.embedding = nn.Embedding(config.words, h, padding_idx=0)
+        self.embedding = WordEmbedding(config.words, h)
         self.text_lstm = nn.LSTM(h, h, batch_first=True)
         self.scene_attend = DotAttend(h, d, h)
         self.decoder = nn.LSTMCell(previous_size + d + VIEWS + extra_size, h)

@@ -12,6 +12,7 @@ from agents.common.settings import EvaluationSettings
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import check_features, half_precision, load_weights, save_weights
+from agents.common.word_vectors import found_on, vocabulary_with
 from agents.vision.bank import FeatureBank
 from agents.vln.config import FollowerSettings
 from agents.vln.network import FollowerNetwork
@@ -62,7 +63,9 @@ def new_agent(about: VlnAbout) -> VlnAgent:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(about.config.seed)
         network = FollowerNetwork(about.config, len(about.words), about.feature_size)
-    return VlnAgent(network, Vocabulary(about.words), about)
+        vocabulary = vocabulary_with(about.words, about.config.word_vectors)
+        found_on(network, vocabulary)
+    return VlnAgent(network, vocabulary, about)
 
 
 def save_agent(agent: VlnAgent, path: Path, identity: Identity | None = None) -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from agents.common.word_vectors import WordEmbedding
 from agents.hanna.attention import DotAttend
 from agents.vln.config import FollowerSettings
 from assets.records import ROOM_KINDS
@@ -75,7 +76,7 @@ class FollowerNetwork(nn.Module):
     def __init__(self, config: FollowerSettings, words: int, features: int) -> None:
         super().__init__()
         h, size = config.hidden_size, features + 4 * COPIES
-        self.embed, self.dropout = nn.Embedding(words, h, padding_idx=0), nn.Dropout(config.dropout)
+        self.embed, self.dropout = WordEmbedding(words, h), nn.Dropout(config.dropout)
         self.read = nn.LSTM(h, h // 2, batch_first=True, bidirectional=True)
         self.begins = nn.Linear(h, 2 * h)
         self.look, self.stand = DotAttend(h, size, h), DotAttend(h, size, h)

@@ -12,6 +12,7 @@ from agents.common.settings import EvaluationSettings
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import check_features, half_precision, load_weights, save_weights
+from agents.common.word_vectors import found_on, vocabulary_with
 from agents.vision.bank import FeatureBank
 from agents.vnla.config import ASK_RULES, VnlaSettings
 from agents.vnla.network import VnlaNetwork
@@ -93,6 +94,8 @@ def new_agent(
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
         network = VnlaNetwork(config, len(vocabulary), feature_size)
+        vocabulary = vocabulary_with(vocabulary.words, config.word_vectors)
+        found_on(network, vocabulary)
     return VnlaAgent(network, vocabulary, config, encoder_digest, feature_size, pictures, evaluation)
 
 

@@ -15,6 +15,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.common.word_vectors import WordEmbedding
 from agents.vnla.config import VnlaSettings
 from embodied.action_spaces import WORDS
 
@@ -156,7 +157,7 @@ class VnlaNetwork(nn.Module):
         super().__init__()
         h = config.hidden_size
         self.hidden_size, self.coverage = h, config.coverage
-        self.embedding = nn.Embedding(words, config.word_embedding, padding_idx=0)
+        self.embedding = WordEmbedding(words, config.word_embedding)
         self.reader = nn.LSTM(config.word_embedding, h, batch_first=True)
         self.moves = nn.Embedding(ACTIONS + 1, config.navigation_embedding)
         self.asks = nn.Embedding(3, config.ask_embedding)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from agents.common.settings import LEARNED_WORDS, WORD_VECTORS, require_word
 from agents.iliad.config import LearnerConfig
 
 TEACHERS = ("learned", "grammar")
@@ -38,12 +39,15 @@ class NavConfig:
     """Share of the paths of training houses held out for validation."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
+    word_vectors: str = LEARNED_WORDS
+    """What followers know of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
     data_seed: int = 0
     """Random seed of the held-out paths and of the teacher, which all students share."""
 
     def __post_init__(self) -> None:
         if self.teacher not in TEACHERS:
             raise ValueError(f"teacher must be one of {TEACHERS}, got {self.teacher!r}")
+        require_word(self, "word_vectors", WORD_VECTORS)
         if self.pragmatics not in PRAGMATICS:
             raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
         for name in ("hidden_size", "heads", "executor_iterations", "describer_iterations", "teacher_batch"):

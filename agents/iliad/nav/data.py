@@ -8,6 +8,7 @@ from pathlib import Path
 
 from agents.common.more_paths import more_routes
 from agents.common.vocabulary import build_vocabulary
+from agents.common.word_vectors import vocabulary_with
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.student import NavEyes
 from agents.iliad.nav.world import Trip, trips_of
@@ -74,7 +75,8 @@ def nav_data(
     pictures = {name: pictures_of(source, name, picture_kind) for name in names}
     paths: dict[str, Path] = {n: feature_path(source.folder / "features", encoder, n, pictures[n]) for n in names}
     vocabulary = build_vocabulary(request for trip in splits["train"] for request in trip.requests)
-    eyes = NavEyes(places, load_bank(paths, encoder, places, pictures), vocabulary)
+    words = vocabulary_with(vocabulary.words, config.word_vectors)
+    eyes = NavEyes(places, load_bank(paths, encoder, places, pictures), words)
     drawn = ", ".join(sorted({drawing(p) for p in pictures.values()}))
     return NavData(source, eyes, splits, drawn)
 

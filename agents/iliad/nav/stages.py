@@ -13,8 +13,8 @@ from torch import Tensor, nn
 from agents.common.decoding import greedy_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
-from agents.common.vocabulary import Vocabulary
 from agents.common.weights import load_weights, save_weights
+from agents.common.word_vectors import found_on, vocabulary_with
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
 from agents.iliad.nav.network import Follower, WalkDescriber
@@ -48,7 +48,9 @@ def new_walker(kind: Callable[..., Network], config: NavConfig, eyes: NavEyes, s
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(stream(seed, "nav", "begin", name).integers(2**31)))
         words, features = len(eyes.vocabulary), eyes.bank.size
-        return kind(words, config.hidden_size, config.heads, features, eyes.action_size, HORIZON)
+        walker = kind(words, config.hidden_size, config.heads, features, eyes.action_size, HORIZON)
+        found_on(walker, eyes.vocabulary)
+        return walker
 
 
 def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note) -> NavStudent:
@@ -116,7 +118,7 @@ def load_follower(path: Path, eyes: NavEyes) -> tuple[NavStudent, NavConfig]:
             f"{path} was taught with features of encoder {about.encoder[:12]}, these are of {eyes.bank.digest[:12]}; "
             "name it by --encoder"
         )
-    own = NavEyes(eyes.places, eyes.bank, Vocabulary(about.words))
+    own = NavEyes(eyes.places, eyes.bank, vocabulary_with(about.words, about.config.word_vectors))
     follower = new_walker(Follower, about.config, own, 0, "loaded")
     load_into(follower, tensors, path)
     return NavStudent(follower.eval(), own), about.config
