@@ -16,7 +16,9 @@ from agents.common.word_vectors import Lexicon, WordEmbedding, found_on, vocabul
 from agents.hanna.attention import TextEncoder
 from agents.vln.agent import VlnAbout, load_agent, new_agent, save_agent
 from agents.vln.config import FollowerSettings
+from agents.vln.unheard import UNHEARD, unheard
 from embodied.errors import UnableError
+from embodied.interface import FollowRoute, Pose, Task
 
 WORDS = build_vocabulary(["walk to the hall, turn left", "stop near the bed"]).words
 ALIKE = {"stroll": "walk", "corridor": "hall"}
@@ -85,7 +87,9 @@ def test_a_trained_agent_is_stored_with_its_vectors_and_hears_new_words_again(tm
     agent.network.half().float().eval()
     save_agent(agent, tmp_path / "a.safetensors")
     again = load_agent(tmp_path / "a.safetensors")
-    heard = [a.network.begin(torch.from_numpy(a.vocabulary.encode("tread left", 5))[None]).hidden for a in (agent, again)]
+    heard = [
+        a.network.begin(torch.from_numpy(a.vocabulary.encode("tread left", 5))[None]).hidden for a in (agent, again)
+    ]
     plain = new_agent(dataclasses.replace(agent.about, config=FollowerSettings(hidden_size=16)))
     assert torch.equal(*heard) and len(plain.network.state_dict()) == len(agent.network.state_dict()) - 1
 
@@ -103,6 +107,12 @@ def test_settings_name_the_vectors_there_are_and_a_missing_package_is_named(monk
     monkeypatch.setattr(word_vectors, "PACKAGE", "no_such_package")
     with pytest.raises(UnableError, match="sentences"):
         word_vectors.minilm.__wrapped__()
+
+
+def test_common_words_of_an_instruction_are_replaced_by_ones_that_are_not_known():
+    task = Task("t", "vln", "grid", Pose(0), FollowRoute("r", (0, 1)), (1,), "Walk to the Sofa, then left.", 3.0, 20)
+    assert unheard(task, {"walk", "tramp"}).request == "tread to the loveseat, thereafter leftward."
+    assert unheard(task, {*UNHEARD, *(w for many in UNHEARD.values() for w in many)}).request == task.request.lower()
 
 
 def test_minilms_vectors_know_that_words_are_alike():

@@ -20,7 +20,8 @@ from agents.vln.agent import VlnAgent, load_agent
 from agents.vln.config import FollowerSettings, SpeakerSettings
 from agents.vln.run import train_follower
 from agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
-from embodied.datasets.store import Dataset, dataset_of
+from agents.vln.unheard import unheard
+from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.evaluate import spread
 from embodied.interface import Agent
@@ -43,6 +44,11 @@ def _without(name: str) -> StudyRow:
 
 FOLLOWER, BLIND = _row("DAgger"), _row("DAgger, blind", blind=True)
 CHOSEN, SPOKEN = _row("DAgger, reranked", RERANKED), _row("DAgger, back-translation", spoken_share=0.5)
+READER = _row("pre-trained word vectors", word_vectors="minilm")
+UNHEARD_BY_FOLLOWER, UNHEARD_BY_READER = (
+    dataclasses.replace(row, label=f"{row.label}, unheard words", judge={**row.judge, "unheard": True})
+    for row in (FOLLOWER, READER)
+)
 TABLES: Mapping[str, StudyTable] = {
     "followers": StudyTable(
         "Followers of route instructions",
@@ -65,6 +71,13 @@ TABLES: Mapping[str, StudyTable] = {
         COLUMNS,
         SPLITS,
         ((CHOSEN, FOLLOWER), (SPOKEN, FOLLOWER)),
+    ),
+    "words": StudyTable(
+        "Instructions in words that were never heard",
+        (FOLLOWER, UNHEARD_BY_FOLLOWER, READER, UNHEARD_BY_READER),
+        COLUMNS,
+        SPLITS[1:],
+        ((FOLLOWER, UNHEARD_BY_FOLLOWER), (READER, UNHEARD_BY_READER), (UNHEARD_BY_READER, UNHEARD_BY_FOLLOWER)),
     ),
 }
 
@@ -90,8 +103,8 @@ class VlnStudy(EpisodeStudy):
     judges = (*JUDGES, "agents.vln.speaker")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        splits = (*SPLITS, *self.lessons().data.ood)
-        return {name: dataclasses.replace(table, splits=splits) for name, table in TABLES.items()}
+        other = self.lessons().data.ood
+        return {name: dataclasses.replace(t, splits=(*t.splits, *other)) for name, t in TABLES.items()}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         return self.repeats if row.train == {} else self.repeats[: 1 if row.train is None else self.others]
@@ -113,6 +126,13 @@ class VlnStudy(EpisodeStudy):
         config = self.settings(train, seed)
         train_follower(self.lessons(), config, self.evaluation, home, speaker=speaker, note=note)
         return home / "best.safetensors"
+
+    def where(self, agent: VlnAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
+        whole = super().where(agent, judge, split)
+        if not judge.get("unheard"):
+            return whole
+        assert agent is not None, "rows with unheard words learn"
+        return dataclasses.replace(whole, tasks=[unheard(t, agent.about.words) for t in whole.tasks])
 
     def load(self, weights: Path) -> VlnAgent:
         return load_agent(weights)

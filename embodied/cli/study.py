@@ -15,10 +15,10 @@
 
 HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `sight` and `places`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b'
 and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and
-`algorithm-6`. VLN's are `followers` and `speaker`. Ask-v0's are `houses`, `classes` and `curves`. `bandit` has Table
-3.2, Figures 3.4 and 3.5, `rates`, `held-out` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure
-3.7' and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share are
-trained once. Each table is written as JSON, Markdown and, for some, as a figure. Rerun an interrupted command to
+`algorithm-6`. VLN's are `followers`, `speaker` and `words`. Ask-v0's are `houses`, `classes` and `curves`. `bandit`
+has Table 3.2, Figures 3.4 and 3.5, `rates`, `held-out` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1,
+'figure 3.7' and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share
+are trained once. Each table is written as JSON, Markdown and, for some, as a figure. Rerun an interrupted command to
 resume.
 """
 
@@ -213,7 +213,7 @@ class VlnOptions(Study, Trained, Judged, WithData, Encoded):
     """Agents that follow route instructions, and a speaker."""
 
     tables: Tables
-    """Make these tables: followers or speaker."""
+    """Make these tables: followers, speaker or words."""
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
     others: Count = 1
