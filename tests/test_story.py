@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hand_worlds import line_world
 
+from embodied.assistants.words import described
 from embodied.interface import (
     Ask,
     Feature,
@@ -19,7 +20,7 @@ from embodied.interface import (
     Task,
     Viewpoint,
 )
-from viz.story import Story, described
+from viz.story import Story
 
 GOAL = FindObject("mug", "hall", ("mug_1",))
 

@@ -2,22 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from embodied.interface import (
-    TURNS,
-    Ask,
-    Description,
-    Feature,
-    Intention,
-    Mode,
-    Place,
-    Pose,
-    Reply,
-    Step,
-    Task,
-    Viewpoint,
-)
+from embodied.assistants.words import described
+from embodied.interface import Ask, Intention, Mode, Place, Pose, Reply, Step, Task, Viewpoint
 from embodied.language.prose import prose
 
 QUESTIONS = {
@@ -32,21 +18,6 @@ QUESTIONS = {
     Intention.DISAMBIGUATE: "Which of these do you mean?",
     Intention.FREE: "May I ask something?",
 }
-SIDES = (
-    "ahead",
-    "ahead on the left",
-    "left",
-    "left",
-    "left",
-    "behind on the left",
-    "behind",
-    "behind on the right",
-    "right",
-    "right",
-    "right",
-    "ahead on the right",
-)
-"""Where something is, by its direction in steps of 30 degrees counter-clockwise from the gaze."""
 
 
 class Story:
@@ -141,30 +112,3 @@ class Story:
             text = f"{depth + 1}. {name}, in the {room}, {world.graph.distance[here, goal]:.1f} m from here"
             lines.append(f"**{text}**  ← now" if depth == len(self.goals) - 1 else text)
         return "\n\n".join(lines)
-
-
-def described(description: Description, pose: Pose | None = None, most: int = 6) -> str:
-    """HARI's bag of features as a sentence.
-
-    Args:
-      pose: whose surroundings it describes; sides are named then. Directions of other places are left out.
-      most: objects to name.
-    """
-    actions = [f for f in description if f.kind == "action"]
-    if actions:
-        return "You are there." if actions[0].name == "stop" else "It is the next step from where you are."
-    rooms = [f.name.replace("_", " ") for f in description if f.kind == "room"]
-    things = [_thing(f, pose) for f in description if f.kind == "object"][:most]
-    place = f"{'You are in' if pose else 'Go to a place in'} the {rooms[0]}" if rooms else "There is no room to name"
-    return f"{place}, with {_listed(things)}." if things else f"{place}."
-
-
-def _thing(feature: Feature, pose: Pose | None) -> str:
-    name = feature.name.replace("_", " ")
-    if pose is None:
-        return f"{name} ({feature.distance} m)"
-    return f"{name} ({feature.distance} m, {SIDES[(feature.horizontal - pose.turn) % TURNS]})"
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]

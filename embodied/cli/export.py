@@ -90,11 +90,14 @@ class LeRobotOptions(OfData):
     """Episodes as a LeRobot data set (v3.0)."""
 
     episodes: tuple[InputPath, ...] = ()
-    """Episodes (.jsonl) of `embodied evaluate` (default: an expert plays --split)."""
+    """Episodes (.jsonl) of `embodied evaluate` (default: --agent plays --split)."""
+    agent: Annotated[str | None, Option(metavar="NAME")] = None
+    """Who plays: an agent of `embodied evaluate` that needs no training and no pictures (default: an expert, which asks
+    where the kind of task has help)."""
     split: str = "train"
-    """The split whose tasks the expert plays."""
+    """The split whose tasks are played."""
     tasks: Count | None = None
-    """The expert plays the first N tasks (default: all)."""
+    """Play the first N tasks (default: all)."""
     size: Annotated[int, Option(video_side, "PIXELS")] = 224
     """Side of the pictures."""
     depth: bool = False
@@ -218,21 +221,29 @@ def run_parquet(args: ParquetOptions) -> int:
 def run_lerobot(args: LeRobotOptions) -> int:
     from embodied.datasets.lerobot import RecordedCamera, export_lerobot
     from embodied.datasets.store import Dataset
-    from embodied.evaluation.evaluate import agent
+    from embodied.evaluation.evaluate import AGENTS, EXPERTS, agent
     from embodied.evaluation.metrics import success
     from embodied.evaluation.rollout import play
     from embodied.interface import Episode
     from embodied.records import load_lines
 
     data = Dataset(args.data)
+    name = args.agent or EXPERTS.get(data.kind, "shortest")
+    if args.agent and args.episodes:
+        raise ValueError("--episodes says who played; leave --agent out")
+    if name not in AGENTS[data.kind]:
+        raise ValueError(
+            f"--agent is {name!r}; of {data.kind!r} use one of {[*AGENTS[data.kind]]}, or export the --episodes that "
+            "`embodied evaluate --out` wrote of any other"
+        )
     if args.episodes:
         episodes = [e for path in args.episodes for e in load_lines(path, Episode)]
         for episode in episodes:
             data.place_of(episode)
     else:
         whole_split = data.split(args.split)
-        expert = agent(data.kind, "shortest")
-        episodes = play(whole_split.make_env, expert, whole_split.tasks[: args.tasks], seed=data.config.seed)
+        tasks = whole_split.tasks[: args.tasks]
+        episodes = play(whole_split.make_env, agent(data.kind, name), tasks, seed=data.config.seed, agent=name)
 
     def succeeded(episode: Episode) -> bool:
         return success(episode, data.place(episode.task.world).graph) > 0

@@ -9,8 +9,9 @@
 
 A frame is what the agent sees before it acts, cut from the panorama that the data set holds. The task of a step is
 the instruction that it hears then, so that an assistant's words appear where they were said; they are events of the
-frame, too (`language_events`). Depth is a video of 12 bits, as LeRobot 0.6 quantises it. Written from the
-published description of the format (huggingface.co/docs/lerobot, LeRobotDataset v3.0).
+frame, too (`language_events`). HARI's descriptions of places are put into words. Depth is a video of 12 bits, as
+LeRobot 0.6 quantises it. Written from the published description of the format (huggingface.co/docs/lerobot,
+LeRobotDataset v3.0).
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from assets.cache import drafts, sweep, write_bytes, write_json
+from embodied.assistants.words import described
 from embodied.datasets.checks import DatasetError
 from embodied.geometry import wrap
-from embodied.interface import Ask, Episode, Move, Place, Pose, Step, Stop
+from embodied.interface import Ask, Episode, Intention, Mode, Move, Place, Pose, Step, Stop
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile
 
@@ -217,10 +219,22 @@ def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeed
     with PanoramaFile(pictures) as file:
         frames = [seen(file, s.pose, writer.camera) for s in episode.steps]
         depths = [seen_depth(file, s.pose, writer.camera) for s in episode.steps] if writer.depth else []
-    words = [s.instruction for s in episode.steps]
-    said = [(s.reply and s.reply.text) or "" for s in episode.steps]
+    words, said = spoken(episode.steps)
     facts = {"embodied/task": episode.task.id, "embodied/house": episode.task.world, "embodied/agent": episode.agent}
     writer.add(rows, frames, depths, words, said, succeeded(episode), facts)
+
+
+def spoken(steps: Sequence[Step]) -> tuple[list[str], list[str]]:
+    """What the agent is to do at each step, and what an assistant says there, '' for nothing."""
+    words, said, nearer = [], [], ""
+    for s in steps:
+        nearer = nearer if s.mode is Mode.SUB else ""
+        words.append(nearer or s.instruction)
+        said.append((s.reply and s.reply.text) or "")
+        if s.reply and s.reply.description:
+            said[-1] = described(s.reply.description, s.pose if s.reply.intention is Intention.CUR else None)
+            nearer = said[-1] if s.reply.intention is Intention.SUB else nearer
+    return words, said
 
 
 class Writer:

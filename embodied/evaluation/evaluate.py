@@ -42,6 +42,7 @@ AGENTS: Mapping[str, Mapping[str, Callable[[], Agent]]] = {
     "vnla": {
         "random walk": RandomWalk,
         "shortest": lambda: Shortest(teacher_of(AS_PUBLISHED)),
+        "shortest, random": lambda: VnlaAsking(Shortest(teacher_of(AS_PUBLISHED)), "random"),
         "listener, none": lambda: VnlaAsking(SubgoalListener(), "none"),
         "listener, first": lambda: VnlaAsking(SubgoalListener(), "first"),
         "listener, random": lambda: VnlaAsking(SubgoalListener(), "random"),
@@ -52,6 +53,8 @@ AGENTS: Mapping[str, Mapping[str, Callable[[], Agent]]] = {
 """Agents without learning, by kind of task. In HANNA's 'no ask', 'random ask' and 'ask every 5' the
 teacher navigates, so they show what asking by that rule costs; who learns to navigate brings an own
 policy to the same rules (embodied.policies.baselines.Asking)."""
+EXPERTS = {"hanna": "perfect interpretation", "vnla": "shortest, random", "hari": "half-way sub-goals"}
+"""Who shows how a task is done, by its kind: they ask where help can be had; 'shortest' is that of the others."""
 LOOKING: Mapping[str, Mapping[str, Callable[[Mapping[str, SeenPlace]], Agent]]] = {
     "vln": {"scripted listener": ScriptedListener},
     "hanna": {"scripted listener": ListeningInterpreter},
