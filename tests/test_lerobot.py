@@ -13,7 +13,18 @@ from hand_data import build, paint
 
 from embodied.cli import main
 from embodied.datasets.checks import DatasetError
-from embodied.datasets.lerobot import ACTION, CAMERA, FPS, MOST, STATE, RecordedCamera, export_lerobot, seen
+from embodied.datasets.lerobot import (
+    ACTION,
+    CAMERA,
+    DEPTH,
+    FPS,
+    MOST,
+    STATE,
+    RecordedCamera,
+    export_lerobot,
+    seen,
+    seen_depth,
+)
 from embodied.evaluation.metrics import success
 from embodied.evaluation.rollout import play
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
@@ -44,7 +55,7 @@ def episodes(data):
 @pytest.fixture(scope="module")
 def folder(data, episodes, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out") / "walks"
-    steps = export_lerobot(data, folder, episodes, succeeded=lambda e: won(data, e), camera=SMALL)
+    steps = export_lerobot(data, folder, episodes, succeeded=lambda e: won(data, e), camera=SMALL, depth=True)
     assert steps == sum(len(e.steps) for e in episodes)
     return folder
 
@@ -161,17 +172,28 @@ def test_what_cannot_be_exported_is_said_and_leaves_nothing(data, episodes, tmp_
 
 
 def test_lerobots_own_reader_reads_it(folder, data, episodes):
-    """Where it is installed; LeRobot 0.4.4 and 0.6.1 did in November 2026, frames decoded by its PyAV backend."""
+    """Where it is installed: LeRobot 0.6.1, frames decoded by its PyAV backend, batches by a loader of PyTorch."""
     reader = pytest.importorskip("lerobot.datasets.lerobot_dataset")
+    from lerobot.utils.collate import lerobot_collate_fn
+    from torch.utils.data import DataLoader
+
     read = reader.LeRobotDataset("embodied/walks", root=folder, video_backend="pyav")
-    steps = [s for e in episodes for s in e.steps]
+    steps, table = [s for e in episodes for s in e.steps], rows(folder)
     assert (len(read), read.num_episodes, read.fps) == (len(steps), 3, FPS)
     shown = frames(folder)
-    for k in (0, len(steps) // 2, len(steps) - 1):
-        item = read[k]
-        assert item["task"] == steps[k].instruction
-        assert item["observation.state"].shape == (5,) and item["action"].shape == (7,)
-        spoken = [event["content"] for event in item.get("language_events", ())]
-        assert spoken == ([steps[k].reply.text] if steps[k].reply and steps[k].reply.text else [])
-        picture = item[CAMERA].permute(1, 2, 0).numpy() * 255
-        assert np.abs(picture - shown[k]).mean() < 3
+    with PanoramaFile(data.folder / "houses" / "train_0000" / "panoramas.pano") as file:
+        for k in (0, len(steps) // 2, len(steps) - 1):
+            item = read[k]
+            assert item["task"] == steps[k].instruction
+            spoken = [event["content"] for event in item.get("language_events", ())]
+            assert spoken == ([steps[k].reply.text] if steps[k].reply and steps[k].reply.text else [])
+            picture = item[CAMERA].permute(1, 2, 0).numpy() * 255
+            assert np.abs(picture - shown[k]).mean() < 3
+            millimetres = 1000 * np.clip(seen_depth(file, steps[k].pose, SMALL), 0.01, 10)
+            assert np.allclose(item[DEPTH].numpy().squeeze(), millimetres, rtol=2e-3, atol=2)
+    loader = DataLoader(read, batch_size=4, collate_fn=lerobot_collate_fn)
+    batches = list(loader)
+    for name in ("observation.state", "action", "candidates", "candidate", "next.done", "next.success"):
+        loaded = np.concatenate([b[name].numpy().reshape(len(b["index"]), -1) for b in batches])
+        assert np.allclose(loaded, np.array(table[name], float).reshape(len(steps), -1)), name
+    assert [text for b in batches for text in b["task"]] == [s.instruction for s in steps]

@@ -392,7 +392,8 @@ class _Video:
 
     def add(self, frames: Sequence[np.ndarray]) -> dict[str, Any]:
         """Append frames, (h, w, 3) uint8 or metres; returns where they lie, as the table of episodes says it."""
-        if self._container is None or self._path().stat().st_size > FILE_MB * 2**20:
+        path = self._path()  # not there until the encoder lets go of the first frames
+        if self._container is None or (path.exists() and path.stat().st_size > FILE_MB * 2**20):
             self._begin()
         start = self._frames
         for picture in frames:
