@@ -8,7 +8,7 @@ from hand_worlds import grid_world
 from agents.common.vocabulary import build_vocabulary
 from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Split
-from agents.vnla.agent import new_agent
+from agents.vnla.agent import VnlaAbout, VnlaAgent
 from agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from embodied.envs.make import environment_maker, tasks_under
 from embodied.language.plain import PlainLanguage
@@ -53,4 +53,5 @@ def lesson(config: VnlaSettings = TINY):
     words = build_vocabulary(
         [*(t.request for t in training.tasks), "turn left , go forward 2 3 4 steps . look up down"]
     )
-    return new_agent(config, words, "hand", 16, "unlit_192"), training, validation
+    about = VnlaAbout(config=config, encoder="hand", feature_size=16, words=words.words, pictures="unlit_192")
+    return VnlaAgent.new(about), training, validation

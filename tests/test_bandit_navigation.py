@@ -29,7 +29,7 @@ from agents.bandit.stars_study import StarsStudy, raters, rise
 from agents.common.actor_critic import advantages
 from agents.common.checkpoint import CheckpointError, read_checkpoint
 from agents.common.vocabulary import build_vocabulary
-from agents.hanna.agent import HannaAgent, new_agent, save_agent
+from agents.hanna.agent import HannaAbout, HannaAgent
 from agents.hanna.training_config import SCALES
 from agents.studies.engine import run_study
 from agents.vision.bank import FeatureBank
@@ -74,7 +74,9 @@ def split() -> Split:
 
 def agent_for(split: Split) -> HannaAgent:
     words = build_vocabulary([t.request for t in split.tasks])
-    return new_agent(TINY, words, split.bank.digest, split.bank.size)
+    return HannaAgent.new(
+        HannaAbout(config=TINY, encoder=split.bank.digest, feature_size=split.bank.size, words=words.words)
+    )
 
 
 class Seen:
@@ -183,7 +185,7 @@ def test_settings_are_checked():
 
 @pytest.mark.slow
 def test_a_study_learns_judges_and_writes_once(split, tmp_path, monkeypatch):
-    save_agent(agent_for(split), tmp_path / "agent.safetensors")
+    agent_for(split).save(tmp_path / "agent.safetensors")
     data = SimpleNamespace(digest="d", names=lambda name: [name], split=lambda name: SimpleNamespace(**vars(split)))
     monkeypatch.setattr("agents.bandit.stars_study.dataset_of", lambda *_: data)
     monkeypatch.setattr(StarsStudy, "_split", lambda self, name: split)

@@ -14,7 +14,7 @@ from agents.common.vocabulary import build_vocabulary
 from agents.find.config import FinderConfig
 from agents.find.network import AROUND, READ, Explorer, SeekNetwork
 from agents.find.policy import STOP, WORDS, Search, Watched, costs_of
-from agents.find.run import Finder, FinderAbout, FindLearner, Labels, load_finder, new_finder, tasks_in
+from agents.find.run import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
 from agents.find.way_map import WayMap
 from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Split
@@ -45,7 +45,8 @@ def finder_for(split: Split, **settings) -> Finder:
     )
     words = build_vocabulary(t.request for t in split.tasks)
     requests = np.stack([words.encode(r, WORDS) for r in sorted({t.request for t in split.tasks})])
-    return new_finder(FinderAbout(config, "hand", SIZE, words.words), torch.from_numpy(requests))
+    about = FinderAbout(config=config, encoder="hand", feature_size=SIZE, words=words.words)
+    return new_finder(about, torch.from_numpy(requests))
 
 
 def labels_for(split: Split, finder: Finder) -> Labels:
@@ -60,7 +61,7 @@ def labels_for(split: Split, finder: Finder) -> Labels:
 
 
 def success(finder: Finder, split: Split) -> float:
-    finder.scorer.eval()
+    finder.network.eval()
     episodes = play(split.make_env, finder.policy(split.bank), split.tasks, seed=1, batch=20)
     return sum(metrics.success(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
 
@@ -107,7 +108,7 @@ def test_who_sees_learns_to_find_things_and_who_is_blind_does_not(tmp_path):
         assert numbers[-1]["reading"] < numbers[0]["reading"]
     assert success(finder, split) > success(blind, split) + 0.3
     finder.save(tmp_path / "agent.safetensors")
-    assert success(load_finder(tmp_path / "agent.safetensors"), split) == success(finder, split)
+    assert success(Finder.load(tmp_path / "agent.safetensors"), split) == success(finder, split)
 
 
 def test_a_lesson_never_stops_at_a_wrong_place():

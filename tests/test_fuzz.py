@@ -35,7 +35,7 @@ from agents.common.session import Session
 from agents.common.tensor_file import save_tensors
 from agents.common.vocabulary import build_vocabulary
 from agents.common.weights import FORMAT
-from agents.hanna.agent import load_agent, new_agent, save_agent
+from agents.hanna.agent import HannaAbout, HannaAgent
 from agents.hanna.training_config import SCALES
 from agents.hari import agent as hari
 from agents.hari.config import ExecutionConfig, IntentionConfig
@@ -116,7 +116,7 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
         "houses/routes.jsonl": Kind(home / "routes.jsonl", whole, True),
         "houses/tasks.jsonl": Kind(home / "tasks_test_unseen.jsonl", whole, True),
         "episodes": Kind(folder / "episodes.jsonl", lambda p: [to_json(e) for e in load_lines(p, Episode)], False),
-        "agent": Kind(folder / "agent.safetensors", lambda p: _weights(load_agent(p).network), True),
+        "agent": Kind(folder / "agent.safetensors", lambda p: _weights(HannaAgent.load(p).network), True),
         "hari agent": Kind(folder / "hari.safetensors", lambda p: _weights(hari.load_agent(p).actor), True),
         "translator": Kind(folder / "translator.safetensors", lambda p: _weights(load_translator(p)[0]), True),
         "features": Kind(folder / "features.safetensors", lambda p: load_features(p)[0].tolist(), True),
@@ -160,12 +160,13 @@ def _write_episodes(data: Dataset, path: Path) -> None:
 
 
 def _agent():
-    return new_agent(TINY, build_vocabulary(["go to the red door"]), "e" * 64, 4)
+    words = build_vocabulary(["go to the red door"]).words
+    return HannaAgent.new(HannaAbout(config=TINY, encoder="e" * 64, feature_size=4, words=words))
 
 
 def _write_learned(folder: Path) -> None:
     agent = _agent()
-    save_agent(agent, folder / "agent.safetensors")
+    agent.save(folder / "agent.safetensors")
     parts = {"network": agent.network, "adam": torch.optim.Adam(agent.network.parameters())}
     with Session(folder, {"settings": {"batch": 2}}, parts, 5, note=str) as session:
         session.save()
@@ -385,7 +386,7 @@ def test_weights_beside_settings_that_cannot_be_are_refused(read, kind, about, m
         read(tmp_path / "a.safetensors")
 
 
-@pytest.mark.parametrize("read", [hari.load_agent, load_agent, load_translator])
+@pytest.mark.parametrize("read", [hari.load_agent, HannaAgent.load, load_translator])
 def test_weights_that_are_not_there_say_how_they_are_made(read, tmp_path):
     with pytest.raises(FileNotFoundError, match=r"none\.safetensors does not exist; name another file, or .*train"):
         read(tmp_path / "none.safetensors")

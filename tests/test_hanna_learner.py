@@ -35,7 +35,7 @@ from agents.common.session import (
     within_standard_error,
 )
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
-from agents.hanna.agent import load_agent, new_agent, save_agent, take_weights
+from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
 from agents.hanna.asking import RULES, ask_above
 from agents.hanna.collect import collect, imitation_loss
 from agents.hanna.losses import IGNORE, curiosity, help_loss, navigation_loss, negative_log_likelihood, reason_loss
@@ -104,11 +104,14 @@ def setting(side: int = 6, houses: int = 1) -> Split:
 def agent_for(split: Split, config: TrainingConfig = TINY, evaluation=JUDGED):
     routes = ground(6, 1)[1]["grid0"]
     words = build_vocabulary([t.request for t in split.tasks] + [r.instruction for r in routes])
-    return new_agent(config, words, split.bank.digest, split.bank.size, evaluation)
+    bank, words = split.bank, words.words
+    return HannaAgent.new(
+        HannaAbout(config=config, evaluation=evaluation, encoder=bank.digest, feature_size=bank.size, words=words)
+    )
 
 
 def identity(agent):
-    return identity_of(settings=agent.config, encoder=agent.encoder_digest)
+    return identity_of(settings=agent.config, encoder=agent.about.encoder)
 
 
 def run(folder, config=TINY, split=None, **options):
@@ -439,7 +442,7 @@ def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
 @pytest.mark.slow
 def test_a_changed_byte_of_a_checkpoint_or_of_weights_is_noticed(tmp_path):
     agent, _ = run(tmp_path, dataclasses.replace(TINY, iterations=1))
-    for name, read in (("checkpoint.pt", lambda _: run(tmp_path)), ("best.safetensors", load_agent)):
+    for name, read in (("checkpoint.pt", lambda _: run(tmp_path)), ("best.safetensors", HannaAgent.load)):
         body = bytearray((tmp_path / name).read_bytes())
         body[len(body) // 2] ^= 1
         (tmp_path / name).write_bytes(body)
@@ -505,10 +508,10 @@ def test_an_agent_learns_in_every_lighting_and_is_validated_in_each_houses_own(t
 def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
     split = setting()
     agent, path = agent_for(split), tmp_path / "agent.safetensors"
-    save_agent(agent, path)
-    again = load_agent(path)
-    assert (again.config, again.evaluation, again.vocabulary) == (agent.config, JUDGED, agent.vocabulary)
-    save_agent(again, tmp_path / "again.safetensors")
+    agent.save(path)
+    again = HannaAgent.load(path)
+    assert (again.config, again.about.evaluation, again.vocabulary) == (agent.config, JUDGED, agent.vocabulary)
+    again.save(tmp_path / "again.safetensors")
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes(), "equal agents are equal files"
     for name, value in agent.network.state_dict().items():
         assert torch.allclose(value, again.network.state_dict()[name], atol=2e-3), name
@@ -517,7 +520,7 @@ def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
         again.policy(other)
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(ValueError, match="cannot be read"):
-        load_agent(path)
+        HannaAgent.load(path)
 
 
 @pytest.mark.parametrize(
@@ -574,6 +577,7 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
         text=True,
         env=environment,
     )
+    process.stdout.readline()  # what it learns from
     assert process.stdout.readline().startswith("20/")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)

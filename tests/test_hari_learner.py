@@ -556,7 +556,7 @@ def test_the_tables_are_made_from_a_data_set(tmp_path):
     data = built(tmp_path / "data", "hari")
     walking = dataclasses.replace(SMALL, hidden_size=16, iterations=1, validate_every=1, validation_tasks=2)
     asking = dataclasses.replace(QUICK, hidden_size=8, iterations=1, batch=4, validation_tasks=3, horizon=6)
-    study = HariStudy(data.folder, (0,), 2, (0,), execution=walking, intention=asking)
+    study = HariStudy(data.folder, (0,), 2, (0,), execution=walking, config=asking)
     tables = ["4.7", "figure 4.5b"]
     run_study(study, tables, tmp_path / "out", rows=["learned", "random + rules"], note=silent)
     body, times = (read_json(tmp_path / "out" / f"hari-{n.replace(' ', '-')}.json") for n in tables)

@@ -12,9 +12,9 @@ import torch
 from hand_data import build
 
 from agents.common.session import metrics_of
-from agents.common.shipped import WEIGHTS
+from agents.common.shipped import SHIPPED_AGENT, WEIGHTS
 from agents.common.weights import origin_of, weights_digest
-from agents.hanna.agent import load_agent, new_agent
+from agents.hanna.agent import HannaAbout, HannaAgent
 from agents.hanna.evaluation import behaviour, hanna_policies
 from agents.hanna.run import train_agent, vocabulary_of
 from agents.hanna.study import HannaStudy
@@ -126,7 +126,8 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
     config = parsed(TrainHanna, "--data", ".", "--out", ".", *SMALL).config
     bank = Lessons(data, random_encoder(seed=0)).split("test_unseen").bank
-    agent = new_agent(config, vocabulary_of(data), bank.digest, bank.size)
+    words = vocabulary_of(data).words
+    agent = HannaAgent.new(HannaAbout(config=config, encoder=bank.digest, feature_size=bank.size, words=words))
     agent.network.eval()
     agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
     policies = hanna_policies(agent, bank)
@@ -301,9 +302,9 @@ def test_a_data_set_of_another_kind_of_task_is_refused_with_the_command_that_mak
 
 
 def test_the_shipped_encoder_and_agent_are_small_and_fit_each_other():
-    encoder, agent = load_encoder(), load_agent()
-    assert agent.encoder_digest == encoder.feature_space
-    assert agent.feature_size == encoder.size
+    encoder, agent = load_encoder(), HannaAgent.load(SHIPPED_AGENT)
+    assert agent.about.encoder == encoder.feature_space
+    assert agent.about.feature_size == encoder.size
     assert sum(p.stat().st_size for p in WEIGHTS.iterdir()) < 15e6
     look = encoder.encode_strips(np.zeros((1, 192, 576, 3), np.uint8))
     assert look.shape == (1, 36, encoder.size) and np.isfinite(look).all()

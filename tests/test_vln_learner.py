@@ -13,13 +13,12 @@ from hand_worlds import grid_world
 
 from agents.common.losses import IGNORE
 from agents.common.session import Clock
-from agents.common.settings import EvaluationSettings
 from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
 from agents.common.vocabulary import build_vocabulary
 from agents.vision.bank import FeatureBank
 from agents.vision.encoder import load_encoder
 from agents.vision.lessons import Split
-from agents.vln.agent import VlnAbout, load_agent, new_agent, save_agent
+from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings, SpeakerSettings
 from agents.vln.network import Said
 from agents.vln.policy import VlnMoment, channels_of
@@ -50,7 +49,7 @@ def split() -> Split:
 def new(split: Split, **changes):
     words = build_vocabulary(t.request for t in split.tasks).words
     config = dataclasses.replace(TINY, **changes)
-    return new_agent(VlnAbout(config, EvaluationSettings(), "hand", 16, words, "unlit_192"))
+    return VlnAgent.new(VlnAbout(config=config, encoder="hand", feature_size=16, words=words, pictures="unlit_192"))
 
 
 def walks(episodes):
@@ -87,8 +86,8 @@ def test_the_blind_see_nothing_and_the_wordless_read_nothing(split, tmp_path):
     other = FeatureBank({"grid": np.ones((36, 36, 16), np.float16)}, "hand")
     for change, bank, tasks in (("blind", other, split.tasks), ("wordless", split.bank, reworded)):
         path = tmp_path / f"{change}.safetensors"
-        save_agent(new(split, **{change: True}), path)
-        agent = load_agent(path)
+        new(split, **{change: True}).save(path)
+        agent = VlnAgent.load(path)
         one = play(split.make_env, agent.policy(split.bank), split.tasks, seed=0, batch=12)
         two = play(split.make_env, agent.policy(bank), tasks, seed=0, batch=12)
         assert walks(one) == walks(two)
@@ -146,7 +145,7 @@ def test_routes_of_a_hanna_data_set_are_tasks_of_vln(tmp_path):
 
 
 def test_the_shipped_follower_learned_from_the_shipped_encoder():
-    agent = load_agent(SHIPPED_VLN)
+    agent = VlnAgent.load(SHIPPED_VLN)
     assert SHIPPED_VLN.stat().st_size < 4e6
     assert agent.about.encoder == load_encoder(SHIPPED_ENCODER).feature_space
     assert len(agent.vocabulary) > 900 and not agent.about.config.blind

@@ -17,7 +17,7 @@ from agents.common.checkpoint import CheckpointError
 from agents.common.playing import play_with_memory
 from agents.common.session import Clock, DivergedError
 from agents.vision.bank import FeatureBank
-from agents.vnla.agent import load_agent, new_agent, rules_of, save_agent
+from agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
 from agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER
 from agents.vnla.network import (
     ASK,
@@ -41,7 +41,7 @@ from embodied.interface import Ask
 from embodied.teachers.vnla import AskRules, ask_reason
 
 quiet = lambda line: None
-identity = lambda agent: identity_of(settings=agent.config, pictures=agent.pictures)
+identity = lambda agent: identity_of(settings=agent.config, pictures=agent.about.pictures)
 
 
 # The networks ------------------------------------------------------------------------------------
@@ -129,7 +129,9 @@ def test_actions_that_are_not_possible_are_never_likely():
 
 @pytest.mark.slow
 def test_the_paper_sizes_have_about_as_many_parameters_as_the_reference_says():
-    agent = new_agent(SCALES["paper"], lesson()[0].vocabulary, "x", 192)
+    agent = VnlaAgent.new(
+        VnlaAbout(config=SCALES["paper"], encoder="x", feature_size=192, words=lesson()[0].about.words)
+    )
     assert 4.3e6 < sum(p.numel() for p in agent.network.parameters()) < 4.9e6
 
 
@@ -236,7 +238,7 @@ def test_a_random_asker_needs_the_situation_and_says_so():
 def test_features_of_another_encoder_are_refused():
     agent, _, split = lesson()
     with pytest.raises(ValueError, match="the agent learned from other"):
-        dataclasses.replace(agent, encoder_digest="other").policy(split.bank)
+        dataclasses.replace(agent, about=dataclasses.replace(agent.about, encoder="other")).policy(split.bank)
 
 
 # Training ----------------------------------------------------------------------------------------
@@ -259,8 +261,8 @@ def test_a_run_under_every_rule_writes_an_agent_that_plays(rules, tmp_path):
     agent, training, validation = lesson(dataclasses.replace(TINY, rules=rules, iterations=2, validate_every=2))
     progress = imitation.train(VnlaLearner(agent, training), validation, tmp_path, identity(agent), note=quiet)
     assert progress.update == 2
-    found = load_agent(tmp_path / "best.safetensors")
-    assert (found.pictures, found.config.rules) == ("unlit_192", rules)
+    found = VnlaAgent.load(tmp_path / "best.safetensors")
+    assert (found.about.pictures, found.config.rules) == ("unlit_192", rules)
     played = play(validation.make_env, found.player(validation.bank), validation.tasks[:3], seed=0)
     assert len(played) == 3
 
@@ -291,18 +293,18 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
         imitation.train(VnlaLearner(agent, training), validation, tmp_path / "parts", identity(agent), note=quiet)
     with pytest.raises(CheckpointError, match="pictures 'unlit_192' -> 'fast_256'"):
         agent, training, validation = lesson(dataclasses.replace(TINY, iterations=5))
-        other = identity(dataclasses.replace(agent, pictures="fast_256"))
+        other = identity(dataclasses.replace(agent, about=dataclasses.replace(agent.about, pictures="fast_256")))
         imitation.train(VnlaLearner(agent, training), validation, tmp_path / "parts", other, note=quiet)
 
 
 def test_an_agent_comes_back_from_its_file(tmp_path):
     agent, _, split = lesson()
-    save_agent(agent, tmp_path / "agent.safetensors")
-    found = load_agent(tmp_path / "agent.safetensors")
-    assert (found.config, found.vocabulary, found.pictures) == (agent.config, agent.vocabulary, "unlit_192")
+    agent.save(tmp_path / "agent.safetensors")
+    found = VnlaAgent.load(tmp_path / "agent.safetensors")
+    assert (found.config, found.vocabulary, found.about.pictures) == (agent.config, agent.vocabulary, "unlit_192")
     (tmp_path / "agent.safetensors").write_bytes((tmp_path / "agent.safetensors").read_bytes()[:-9])
     with pytest.raises(ValueError, match="cannot be read|checksum"):
-        load_agent(tmp_path / "agent.safetensors")
+        VnlaAgent.load(tmp_path / "agent.safetensors")
 
 
 def test_settings_refuse_what_they_cannot_be():

@@ -12,7 +12,7 @@ from agents.common.session import metrics_of
 from agents.vision.config import drawing
 from agents.vision.encoder import random_encoder
 from agents.vision.features import feature_path, save_features
-from agents.vnla.agent import load_agent
+from agents.vnla.agent import VnlaAgent
 from embodied.cli import main
 from embodied.cli.view import looked_at
 from embodied.identity import read_finished
@@ -62,7 +62,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert "continuing after update 1" in said.out + said.err and "pictures: unlit_192" in said.out + said.err
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2]
     best = tmp_path / "best.safetensors"
-    assert load_agent(best).pictures == "unlit_192"
+    assert VnlaAgent.load(best).about.pictures == "unlit_192"
     judge = ("evaluate", "vnla", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 3, "--json")
     assert run(*judge, "--out", tmp_path / "judged") == 0
     said_by_judge = capsys.readouterr()

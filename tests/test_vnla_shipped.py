@@ -11,7 +11,7 @@ from hand_worlds import grid_world
 from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
 from agents.vision.bank import FeatureBank
 from agents.vision.encoder import load_encoder
-from agents.vnla.agent import VnlaAgent, load_agent
+from agents.vnla.agent import VnlaAgent
 from embodied.envs.make import environment_maker
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
@@ -19,20 +19,20 @@ from embodied.interface import Episode
 
 @pytest.fixture(scope="module")
 def agent() -> VnlaAgent:
-    return load_agent(SHIPPED_VNLA)
+    return VnlaAgent.load(SHIPPED_VNLA)
 
 
 def test_it_is_small_and_says_what_it_was_trained_as(agent):
     assert SHIPPED_VNLA.stat().st_size < 6e6
-    assert (agent.config.asker, agent.config.rules) == ("learned", "indirect") and agent.pictures
-    assert agent.encoder_digest == load_encoder(SHIPPED_ENCODER).feature_space
+    assert (agent.config.asker, agent.config.rules) == ("learned", "indirect") and agent.about.pictures
+    assert agent.about.encoder == load_encoder(SHIPPED_ENCODER).feature_space
     assert {"find", "forward", "steps", "left"} <= set(agent.vocabulary.words)
 
 
 def played(agent: VnlaAgent, asker: str | None = None) -> list[Episode]:
     """Sixteen tasks of a house by hand, whose pictures tell nothing: all it knows it was told."""
     world = grid_world()
-    blank = FeatureBank({"grid": np.zeros((len(world.graph.ids), 36, agent.feature_size))}, agent.encoder_digest)
+    blank = FeatureBank({"grid": np.zeros((len(world.graph.ids), 36, agent.about.feature_size))}, agent.about.encoder)
     make = environment_maker("vnla", {"grid": world})
     with torch.inference_mode():
         return play(make, agent.player(blank, asker), tasks_of(world, 16), seed=0, batch=8)

@@ -10,11 +10,10 @@ import torch
 from torch import nn
 
 from agents.common import word_vectors
-from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import build_vocabulary
 from agents.common.word_vectors import Lexicon, WordEmbedding, found_on, vocabulary_with
 from agents.hanna.attention import TextEncoder
-from agents.vln.agent import VlnAbout, load_agent, new_agent, save_agent
+from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
 from agents.vln.unheard import UNHEARD, unheard
 from embodied.errors import UnableError
@@ -83,14 +82,14 @@ def test_in_training_a_word_is_at_times_known_by_its_vector_alone():
 
 def test_a_trained_agent_is_stored_with_its_vectors_and_hears_new_words_again(tmp_path):
     config = FollowerSettings(hidden_size=16, word_vectors="minilm")
-    agent = new_agent(VlnAbout(config, EvaluationSettings(), "hand", 8, WORDS, "unlit_192"))
+    agent = VlnAgent.new(VlnAbout(config=config, encoder="hand", feature_size=8, words=WORDS))
     agent.network.half().float().eval()
-    save_agent(agent, tmp_path / "a.safetensors")
-    again = load_agent(tmp_path / "a.safetensors")
+    agent.save(tmp_path / "a.safetensors")
+    again = VlnAgent.load(tmp_path / "a.safetensors")
     heard = [
         a.network.begin(torch.from_numpy(a.vocabulary.encode("tread left", 5))[None]).hidden for a in (agent, again)
     ]
-    plain = new_agent(dataclasses.replace(agent.about, config=FollowerSettings(hidden_size=16)))
+    plain = VlnAgent.new(dataclasses.replace(agent.about, config=FollowerSettings(hidden_size=16)))
     assert torch.equal(*heard) and len(plain.network.state_dict()) == len(agent.network.state_dict()) - 1
 
 

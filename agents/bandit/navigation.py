@@ -23,7 +23,7 @@ from agents.bandit.ratings import Rater
 from agents.common.actor_critic import Decisions, actor_loss, critic_loss
 from agents.common.session import Note, Session, descend, episode_seed, tasks_of_update
 from agents.common.tensor_file import checksum_of
-from agents.hanna.agent import HannaAgent, save_agent
+from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import action_index
 from agents.hanna.percept import DO_NOTHING, REQUEST
@@ -176,7 +176,7 @@ def learn_from_stars(
             numbers = _learn_once(agent, policy, critic, optimizers, split, rater, config, update)
             session.add(numbers)
             session.history.append({"update": update + 1, **numbers})
-    save_agent(agent, Path(folder) / "best.safetensors", identity)
+    agent.save(Path(folder) / "best.safetensors", identity)
     return session.history[: config.updates]
 
 

@@ -17,7 +17,7 @@ from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.common.checkpoint import read_checkpoint
 from agents.common.session import Note
 from agents.common.weights import weights_digest
-from agents.hanna.agent import HannaAgent, load_agent
+from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES
 from agents.hanna.policy import for_training
 from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
@@ -110,11 +110,11 @@ class StarsStudy(EpisodeStudy):
         rated, begun = self._split(self.rated), weights_digest(self.agent)
         who, config = train["rater"], self.settings(train, seed)
         rater = Rater(**who) if isinstance(who, dict) else raters()[who]
-        learn_from_stars(load_agent(self.agent), rated, rater, config, home, begun_with=begun, note=note)
+        learn_from_stars(HannaAgent.load(self.agent), rated, rater, config, home, begun_with=begun, note=note)
         return home / "best.safetensors"
 
     def load(self, weights: Path) -> HannaAgent:
-        return load_agent(weights)
+        return HannaAgent.load(weights)
 
     def policies(self, agent: HannaAgent, judge: Mapping[str, Any], split: str) -> Agent:
         policy = agent.policy(self._split(split).bank)

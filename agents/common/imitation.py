@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar, TypedDict, TypeVar, Unpack
 
 import torch
 from torch import Tensor, nn
@@ -27,7 +27,7 @@ from agents.common.session import (
     seeded_dropout,
     set_learning_rate,
 )
-from agents.common.settings import MAY_CHANGE, EvaluationSettings, ImitationSettings
+from agents.common.settings import MAY_CHANGE, ImitationSettings
 from embodied.errors import UnableError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -38,44 +38,48 @@ X = TypeVar("X")
 OnValidation = Callable[[int, Sequence[Episode]], None]
 
 
-class Learner(Protocol):
-    """An agent in training."""
+class Learner:
+    """An agent in training; who derives from it says `learn`."""
 
-    @property
-    def config(self) -> ImitationSettings: ...
-    @property
-    def evaluation(self) -> EvaluationSettings: ...
-    @property
-    def network(self) -> nn.Module: ...
-    @property
-    def optimizer(self) -> torch.optim.Optimizer: ...
+    optimizer_kind: ClassVar[type[torch.optim.Adam]] = torch.optim.Adam
+
+    def __init__(self, agent: Any, training: Any) -> None:
+        """
+        Args:
+          agent: a SightedAgent.
+          training: a TaskSet with features.
+        """
+        self.agent, self.training, self.network = agent, training, agent.network
+        self.config, self.evaluation = agent.about.config, agent.about.evaluation
+        self.optimizer = self.optimizer_kind(
+            agent.network.parameters(), self.config.learning_rate, weight_decay=self.config.weight_decay
+        )
 
     def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
         """One update; the numbers to report, those of REPORTED."""
-        ...
+        raise NotImplementedError
 
     def evaluated_agent(self, split: Any) -> Agent:
         """The agent as it is evaluated, with the features of `split`."""
-        ...
+        return self.agent.policy(split.bank)
 
     def evaluation_task(self, task: Task) -> Task:
         """A task as it is in evaluation, with its horizon."""
-        ...
+        return task
 
-    def save(self, path: Path, identity: Identity) -> None:
-        """Write the agent, atomically."""
-        ...
+
+class Options(TypedDict, total=False):
+    """Of a session of training."""
+
+    minutes: float | None
+    """Stop after this long, as if interrupted."""
+    note: Note
+    on_validation: OnValidation | None
+    """Called with the update and the validation episodes, e.g. to record them."""
 
 
 def train(
-    learner: Learner,
-    validation: TaskSet,
-    folder: Path,
-    identity: Identity,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: OnValidation | None = None,
+    learner: Learner, validation: TaskSet, folder: Path, identity: Identity, **options: Unpack[Options]
 ) -> Progress:
     """Train in place, from `folder`'s checkpoint if there is one; one process at a time.
 
@@ -83,8 +87,6 @@ def train(
 
     Args:
       identity: all that the run depends on.
-      minutes: stop after this long in this session, as if interrupted.
-      on_validation: called with the update and the validation episodes, e.g. to record them.
 
     Raises:
       DivergedError: a loss or gradient is not a number any more.
@@ -93,14 +95,21 @@ def train(
       LockedError: another process trains in `folder`.
       CheckpointError, OSError.
     """
-    config = learner.config
+    config, on_validation = learner.config, options.get("on_validation")
+    note = parallel.rank_zero(options.get("note", print))
+    tasks, about = learner.training.tasks, learner.agent.about
+    size = sum(p.numel() for p in learner.network.parameters())
+    note(
+        f"{len(tasks)} tasks in {len({t.world for t in tasks})} houses, {len(about.words)} words, {size:,} parameters, "
+        f"pictures: {about.pictures}"
+    )
     with Session(
         folder,
         identity,
         {"network": learner.network, "optimizer": learner.optimizer},
         config.iterations,
         may_change=MAY_CHANGE,
-        minutes=minutes,
+        minutes=options.get("minutes"),
         checkpoint_minutes=config.checkpoint_minutes,
         note=note,
     ) as session:
@@ -198,5 +207,5 @@ def validate(learner: Learner, split: TaskSet, session: Session) -> Sequence[Epi
     )
     session.record({"episodes": len(episodes), **values})
     if session.improved(values["success"], episodes=len(episodes)):
-        learner.save(session.folder / "best.safetensors", session.identity)
+        learner.agent.save(session.folder / "best.safetensors", session.identity)
     return episodes

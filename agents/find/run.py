@@ -25,6 +25,7 @@ from agents.common.session import (
     tasks_of_update,
 )
 from agents.common.settings import EvaluationSettings
+from agents.common.sighted import About, SightedAgent
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.weights import check_features, load_weights, save_weights
@@ -72,39 +73,36 @@ def find_split(lessons: Lessons, name: str, per_house: int, houses: int | None =
     return dataclasses.replace(split, tasks=tasks, make_env=environment_maker("find", split.worlds))
 
 
-@dataclass(frozen=True)
-class FinderAbout:
-    """What stands beside the weights in an agent's file."""
-
+@dataclass(frozen=True, kw_only=True)
+class FinderAbout(About):
     config: FinderConfig
-    encoder: str
-    """Digest of the encoder whose features it learned from."""
-    feature_size: int
-    words: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Finder:
+class Finder(SightedAgent):
     """An agent that finds things."""
 
     about: FinderAbout
-    scorer: SeekNetwork
+    network: SeekNetwork
+    kind, about_kind = "find", FinderAbout
 
     def policy(self, bank: FeatureBank) -> FindPolicy:
-        """The agent as it is judged.
-
-        Raises:
-          ValueError: features of another encoder.
-        """
         check_features(bank.digest, self.about.encoder)
-        sees, scorer = self.about.config.sees, self.scorer
+        sees = self.about.config.sees
         looks = bank.blind() if sees == "nothing" else bank
-        seen = bank if sees == "all" else bank.blind()
-        return FindPolicy(scorer, Vocabulary(self.about.words), seen, looks)
+        return FindPolicy(self.network, self.vocabulary, bank if sees == "all" else bank.blind(), looks)
 
     def save(self, path: Path, identity: Identity | None = None) -> None:
         """Write the agent, atomically."""
-        save_weights(path, "find", self.scorer.state_dict(), self.about, identity)
+        save_weights(path, "find", self.network.state_dict(), self.about, identity)
+
+    @classmethod
+    def load(cls, path: Path) -> Finder:
+        tensors, about = load_weights(path, "find", FinderAbout, "train the agent again with `embodied study find`")
+        finder = new_finder(about, tensors["requests"])
+        load_into(finder.network, tensors, path)
+        finder.network.eval()
+        return finder
 
 
 def new_finder(about: FinderAbout, requests: torch.Tensor) -> Finder:
@@ -112,33 +110,18 @@ def new_finder(about: FinderAbout, requests: torch.Tensor) -> Finder:
     c, kind = about.config, {"network": SeekNetwork, "detector": Explorer}[about.config.agent]
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(c.seed)
-        return Finder(about, kind(about.feature_size, requests, c.hidden_size, c.dropout))
+        network = kind(about.feature_size, requests, c.hidden_size, c.dropout)
+        return Finder(about, network, Vocabulary(about.words))
 
 
-def load_finder(path: Path) -> Finder:
-    """Read what Finder.save wrote.
+class FindLearner(imitation.Learner):
+    """An agent in training."""
 
-    Raises:
-      FileNotFoundError, OSError, ValueError.
-    """
-    tensors, about = load_weights(path, "find", FinderAbout, "train the agent again with `embodied study find`")
-    finder = new_finder(about, tensors["requests"])
-    load_into(finder.scorer, tensors, path)
-    finder.scorer.eval()
-    return finder
-
-
-class FindLearner:
-    """An agent in training; a Learner of agents.common.imitation."""
-
-    evaluation = EvaluationSettings()
+    optimizer_kind = torch.optim.AdamW
 
     def __init__(self, finder: Finder, training: Split, labels: Labels) -> None:
-        self.finder, self.config, self.network, self._labels = finder, finder.about.config, finder.scorer, labels
-        self.optimizer: torch.optim.Optimizer = torch.optim.AdamW(
-            self.network.parameters(), self.config.learning_rate, weight_decay=self.config.weight_decay
-        )
-        self._training = training
+        super().__init__(finder, training)
+        self._labels = labels
 
     def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
         c, numbers, searches = self.config, dict[str, float](), list[Search]()
@@ -159,45 +142,31 @@ class FindLearner:
 
     def _search(self, update: int) -> tuple[list[Search], dict[str, float]]:
         """Whole episodes, watched by a teacher."""
-        c, split = self.config, self._training
-        policy = Watched(dataclasses.replace(self.finder.policy(split.bank), choose=choose_sampled))
+        c, split = self.config, self.training
+        policy = Watched(dataclasses.replace(self.agent.policy(split.bank), choose=choose_sampled))
         tasks = tasks_of_update(split.tasks, update, c.batch, c.seed)
         episodes, searches, _ = play_with_memory(split.make_env, policy, tasks, seed=episode_seed(c.seed, update))
         success = sum(metrics.success(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
         return list(searches.values()), {"success": success, "steps": float(sum(len(e.steps) for e in episodes))}
-
-    def evaluated_agent(self, split: Split) -> FindPolicy:
-        return self.finder.policy(split.bank)
-
-    def evaluation_task(self, task: Task) -> Task:
-        return task
-
-    def save(self, path: Path, identity: Identity) -> None:
-        self.finder.save(path, identity)
 
 
 def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:
     """Train, or go on training, an agent; writes best.safetensors and what agents.common.session writes."""
     training = find_split(lessons, "train", config.house_tasks, config.training_houses or None)
     validation = find_split(lessons, "val_unseen", -(-config.validation_tasks // len(lessons.data.names("val_unseen"))))
-    words = build_vocabulary(t.request for t in training.tasks).words
-    about = FinderAbout(config, lessons.encoder.feature_space, lessons.encoder.size, words)
+    vocabulary = build_vocabulary(t.request for t in training.tasks)
+    about = lessons.about(FinderAbout, config, EvaluationSettings(), vocabulary)
     classes = sorted({t.goal.object_class for t in training.tasks if isinstance(t.goal, FindObject)})
     say = lambda c: PlainLanguage().request(FindObject(c), rng=stream(config.seed, "unused"))
-    requests = torch.stack([torch.from_numpy(Vocabulary(words).encode(say(c), WORDS)) for c in classes])
-    finder, identity = new_finder(about, requests), finder_identity(lessons, config)
+    requests = torch.stack([torch.from_numpy(vocabulary.encode(say(c), WORDS)) for c in classes])
+    finder = new_finder(about, requests)
+    identity = identity_of("agents.find.run", settings=config, **lessons.identity())
     looks = dataclasses.replace(training, bank=finder.policy(training.bank).bank)
     labels = labels_of(lessons.data, looks, classes, cache)
-    note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {len(classes)} classes")
     if config.agent == "detector":
         explorer_of(finder, labels, validation, note=note).save(folder / "best.safetensors", identity)
         return
     imitation.train(FindLearner(finder, training, labels), validation, folder, identity, note=note)
-
-
-def finder_identity(lessons: Lessons, config: FinderConfig) -> Identity:
-    """All that a trained agent depends on."""
-    return identity_of("agents.find.run", settings=config, **lessons.identity())
 
 
 # What there is to be read -------------------------------------------------------------------------
@@ -257,7 +226,7 @@ def labels_of(data: Dataset, split: Split, classes: Sequence[str], cache: Path) 
 
 def explorer_of(finder: Finder, labels: Labels, validation: Split, *, note: Note) -> Finder:
     """The finder that explores, with patience and bar chosen in validation houses, once its readers have learned."""
-    c, explorer = finder.about.config, finder.scorer
+    c, explorer = finder.about.config, finder.network
     assert isinstance(explorer, Explorer)
     optimizer = torch.optim.AdamW(explorer.parameters(), c.learning_rate, weight_decay=c.weight_decay)
     for update in range(c.iterations):

@@ -1,4 +1,4 @@
-"""HannaAgent: trained networks with all that is needed to act again, and their file."""
+"""HannaAgent: trained networks with all that is needed to act again."""
 
 from __future__ import annotations
 
@@ -6,59 +6,44 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import torch
-
 from agents.common.choosing import choose_at
-from agents.common.shipped import SHIPPED_AGENT
-from agents.common.tensor_file import load_into
-from agents.common.vocabulary import Vocabulary
-from agents.common.weights import check_features, half_precision, load_weights, save_weights
-from agents.common.word_vectors import found_on, vocabulary_with
+from agents.common.sighted import About, SightedAgent
+from agents.common.weights import check_features
 from agents.hanna.asking import RULES, ask_patiently
+from agents.hanna.config import HannaSizes
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.vision.bank import FeatureBank
-from embodied.identity import Identity
 
 NETWORKS: Mapping[str, type[HannaNetwork] | type[LstmNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
-AS_PUBLISHED = HannaEvaluation()
-SHIPPED = SHIPPED_AGENT
-"""The agent of this repository; see agents/weights/README.md."""
 
 
-@dataclass(frozen=True)
-class HannaAbout:
-    """What stands beside the weights in an agent's file."""
-
+@dataclass(frozen=True, kw_only=True)
+class HannaAbout(About):
     config: TrainingConfig
-    evaluation: HannaEvaluation
-    encoder: str
-    """Digest of the encoder whose features it learned from."""
-    feature_size: int
-    words: tuple[str, ...]
+    evaluation: HannaEvaluation = HannaEvaluation()
+
+    @property
+    def sizes(self) -> HannaSizes:
+        """Of its networks."""
+        return self.config.network_config(len(self.words), self.feature_size)
 
 
 @dataclass(frozen=True, eq=False)
-class HannaAgent:
+class HannaAgent(SightedAgent):
+    about: HannaAbout
     network: HannaNetwork | LstmNetwork
-    vocabulary: Vocabulary
-    config: TrainingConfig
-    encoder_digest: str
-    """Of the encoder whose features it learned from; others mean nothing to it."""
-    feature_size: int
-    evaluation: HannaEvaluation = AS_PUBLISHED
-    """How it is judged, if nobody says otherwise."""
+    kind, about_kind = "hanna", HannaAbout
+
+    @staticmethod
+    def network_of(about: HannaAbout) -> HannaNetwork | LstmNetwork:
+        return NETWORKS[about.config.model](about.sizes)
 
     def policy(self, bank: FeatureBank) -> HannaPolicy:
-        """The agent acting as it is judged: see HannaEvaluation.
-
-        Raises:
-          ValueError: features of another encoder.
-        """
-        check_features(bank.digest, self.encoder_digest)
-        config, judged = self.config, self.evaluation
+        check_features(bank.digest, self.about.encoder)
+        config, judged = self.about.config, self.about.evaluation
         learned = ask_patiently(
             judged.ask_threshold,
             first=judged.first_ask_threshold,
@@ -81,58 +66,21 @@ class HannaAgent:
         )
 
 
-def new_agent(
-    config: TrainingConfig,
-    vocabulary: Vocabulary,
-    encoder_digest: str,
-    feature_size: int,
-    evaluation: HannaEvaluation = AS_PUBLISHED,
-) -> HannaAgent:
-    """An untrained agent; its weights follow from config.seed."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
-        network = NETWORKS[config.model](config.network_config(len(vocabulary), feature_size))
-        vocabulary = vocabulary_with(vocabulary.words, config.word_vectors)
-        found_on(network, vocabulary)
-    return HannaAgent(network, vocabulary, config, encoder_digest, feature_size, evaluation)
-
-
-def save_agent(agent: HannaAgent, path: Path, identity: Identity | None = None) -> None:
-    """Write weights in half precision, with settings, vocabulary and what it was trained with, atomically."""
-    words = agent.vocabulary.words
-    about = HannaAbout(agent.config, agent.evaluation, agent.encoder_digest, agent.feature_size, words)
-    save_weights(path, "hanna", half_precision(agent.network), about, identity)
-
-
-def load_agent(path: Path = SHIPPED) -> HannaAgent:
-    """Read what `save_agent` wrote, ready to act.
-
-    Raises:
-      FileNotFoundError, OSError.
-      ValueError: truncated, changed, or of another format.
-    """
-    tensors, told = load_weights(path, "hanna", HannaAbout, "train the agent again with `embodied train hanna`")
-    agent = new_agent(told.config, Vocabulary(told.words), told.encoder, told.feature_size, told.evaluation)
-    load_into(agent.network, tensors, path)
-    agent.network.eval()
-    return agent
-
-
 def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
     """Copy the weights of `other`, read from `source`, into `agent`.
 
     Raises:
       ValueError: their networks differ, or the features that they know.
     """
-    sizes = [a.config.network_config(len(a.vocabulary), a.feature_size) for a in (agent, other)]
-    if [_kind(agent), sizes[0]] != [_kind(other), sizes[1]]:
+    mine, its = agent.about, other.about
+    if _kind(mine) != _kind(its):
         raise ValueError(
-            f"{source} cannot be begun with: it is a {other.config.model!r} of {sizes[1]} on encoder "
-            f"{other.encoder_digest[:12]}, this run a {agent.config.model!r} of {sizes[0]} on encoder "
-            f"{agent.encoder_digest[:12]}; give this run its settings"
+            f"{source} cannot be begun with: it is a {its.config.model!r} of {its.sizes} on encoder "
+            f"{its.encoder[:12]}, this run a {mine.config.model!r} of {mine.sizes} on encoder "
+            f"{mine.encoder[:12]}; give this run its settings"
         )
     agent.network.load_state_dict(other.network.state_dict())
 
 
-def _kind(agent: HannaAgent) -> tuple[str, str, str]:
-    return agent.encoder_digest, agent.config.model, agent.config.word_vectors
+def _kind(about: HannaAbout) -> tuple[str, str, str, HannaSizes]:
+    return about.encoder, about.config.model, about.config.word_vectors, about.sizes

@@ -59,12 +59,7 @@ Judged = Callable[[HannaAgent, FeatureBank], HannaPolicy]
 """How an agent acts when it is judged."""
 
 
-def as_shipped(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
-    """By its HannaEvaluation."""
-    return agent.policy(bank)
-
-
-def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
+def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent.policy) -> dict[str, Agent]:
     """Variants of a learned agent by the names of Tables 4.3 to 4.5.
 
     'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
@@ -88,7 +83,7 @@ def by_the_text(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
     return dataclasses.replace(agent.policy(bank), **plain, ask_rule=RULES[agent.config.ask_rule][1])
 
 
-def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = as_shipped) -> dict[str, Agent]:
+def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent.policy) -> dict[str, Agent]:
     """Those of `hanna_policies` and `sight_policies`, and the agent in each way of EVAL_ABLATIONS."""
     learned = of(agent, bank)
     plainer = {name: dataclasses.replace(learned, **changed) for name, changed in EVAL_ABLATIONS.items()}

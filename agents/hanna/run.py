@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 from agents.common import imitation
-from agents.common.parallel import rank_zero
-from agents.common.session import Note, Progress
+from agents.common.session import Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.weights import weights_digest
-from agents.hanna.agent import load_agent, new_agent, take_weights
+from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
 from agents.hanna.training import HannaLearner
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.vision.lessons import Lessons
@@ -32,10 +31,8 @@ def train_agent(
     evaluation: HannaEvaluation,
     folder: Path,
     *,
-    minutes: float | None = None,
     begin: Path | None = None,
-    note: Note = print,
-    on_validation: imitation.OnValidation | None = None,
+    **options: Unpack[imitation.Options],
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train.
 
@@ -45,26 +42,15 @@ def train_agent(
     Raises:
       ValueError: `begin` has networks of other sizes, or learned from another encoder.
     """
-    houses, note = config.training_houses or None, rank_zero(note)
-    data, encoder = lessons.data, lessons.encoder
+    houses = config.training_houses or None
     training = lessons.split("train", houses=houses, lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
-    other = None if begin is None else load_agent(begin)
-    words = other.vocabulary if other else vocabulary_of(data, houses)
-    agent = new_agent(config, words, encoder.feature_space, encoder.size, evaluation)
+    other = None if begin is None else HannaAgent.load(begin)
+    words = other.vocabulary if other else vocabulary_of(lessons.data, houses)
+    agent, begun = HannaAgent.new(lessons.about(HannaAbout, config, evaluation, words)), dict[str, str]()
     if other is not None and begin is not None:
         take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
-        note(f"new runs begin with the weights of {begin}")
+        begun["begin"] = weights_digest(begin)
     agent.network.to(lessons.device)
-    parameters = sum(p.numel() for p in agent.network.parameters())
-    count = len({t.world for t in training.tasks})
-    note(f"{len(training.tasks)} tasks in {count} houses, {len(agent.vocabulary)} words, {parameters:,} parameters")
-    identity = training_identity(lessons, config, begin)
-    learner, watch = HannaLearner(agent, training, HannaTeacher()), on_validation
-    return imitation.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
-
-
-def training_identity(lessons: Lessons, config: TrainingConfig, begin: Path | None = None) -> dict[str, Any]:
-    """All that a trained agent depends on; `begin` as of train_agent."""
-    begun = {} if begin is None else {"begin": weights_digest(begin)}
-    return identity_of("agents.hanna.run", settings=config, **lessons.identity(), **begun)
+    identity = identity_of("agents.hanna.run", settings=config, **lessons.identity(), **begun)
+    return imitation.train(HannaLearner(agent, training, HannaTeacher()), validation, folder, identity, **options)

@@ -4,29 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from agents.common.session import Note
 from agents.common.weights import weights_digest
-from agents.hanna.agent import HannaAgent, load_agent
-from agents.hanna.evaluation import all_policies, as_shipped, by_the_text, counted
+from agents.hanna.agent import HannaAgent
+from agents.hanna.evaluation import all_policies, by_the_text, counted
 from agents.hanna.places import AGAIN, COLUMNS, recognised
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Measured, StudyRow, StudyTable
-from agents.studies.episodes import JUDGES, EpisodeStudy
-from agents.vision.encoder import load_encoder
+from agents.studies.episodes import JUDGES
 from agents.vision.lessons import Lessons
 from agents.vision.occasions import OCCASIONS
-from assets.cache import default_cache
-from embodied.datasets.store import Dataset, SplitData, dataset_of
-from embodied.evaluation.evaluate import agent as agent_without_learning
+from agents.vision.sighted_study import SPLITS as TEST
+from agents.vision.sighted_study import SightedStudy
+from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 
-FINAL = StudyRow("final")
-TEST, VALIDATION = ("test_seen", "test_unseen"), ("val_seen", "val_unseen")
+VALIDATION = ("val_seen", "val_unseen")
 FULL = ("success", "spl", "navigation error", "requests")
 
 
@@ -149,25 +147,20 @@ def in_both_ways(table: StudyTable) -> StudyTable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaStudy(EpisodeStudy):
+class HannaStudy(SightedStudy):
     """Tables 4.3 to 4.6, D.1 and D.2, what sight is worth, and how well places are recognised."""
 
-    encoder: Path
     config: TrainingConfig
-    """Where the rows start from."""
     evaluation: HannaEvaluation
     device: str = "cpu"
-    picture_kind: str | None = None
-    """Of the pictures that features come from; as the data set holds them where not given."""
     begin: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
     elsewhere: Path | None = None
     """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
     shown: str = "same"
     """When the pictures that helpers show were taken (agents.vision.occasions.OCCASIONS), in training and judging."""
-    cache: Path = field(default_factory=default_cache)
 
-    name = "hanna"
+    name, agent_kind = "hanna", HannaAgent
     makers = ("agents.hanna.run",)
     judges = (*JUDGES, "agents.hanna.evaluation", "agents.hanna.places")
 
@@ -183,66 +176,54 @@ class HannaStudy(EpisodeStudy):
                 found[name] = in_both_ways(found[name])
         return found
 
-    def settings(self, train: Mapping[str, Any], seed: int) -> TrainingConfig:
-        return dataclasses.replace(self.config, seed=seed, **train)
-
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
-        return {**self._lessons().identity(), "encoder": weights_digest(self.encoder), **begun}
+        return {**super().depends(train), "encoder": weights_digest(self.encoder), **begun}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
-            self._lessons(self.elsewhere).split(split)
+            self.judged_lessons({}).split(split)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(self._lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
+        train_agent(self.lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
         return home / "best.safetensors"
 
-    def load(self, weights: Path) -> HannaAgent:
-        return dataclasses.replace(load_agent(weights), evaluation=self.evaluation)
-
     def policies(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
-        played = judge["played"]
         if agent is None:
-            return agent_without_learning("hanna", played)
-        bank = self._lessons(self.elsewhere).split(split.removesuffix(SHIPPED)).bank
+            return super().policies(agent, judge, split)
+        bank = self.judged_lessons(judge).split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
-        return all_policies(agent, bank, by_the_text if by_text else as_shipped)[played]
+        return all_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
 
     def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         return super().where(agent, judge, split.removesuffix(SHIPPED))
 
-    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
-        return dataset_of(self.elsewhere or self.data, "hanna")
-
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         if PICTURE not in row.judge:
             return super().judge(weights, row, split, seed, folder, keep)
-        encoder = load_encoder(self.encoder).digest
-        return recognised(self.judged_in({}), split, row.judge[PICTURE], encoder, self.picture_kind)
+        lessons = self.judged_lessons({})
+        return recognised(lessons.data, split, row.judge[PICTURE], lessons.encoder.digest, self.pictures)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        drawn = self._lessons(self.elsewhere).pictures(split.removesuffix(SHIPPED))
-        return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn, "shown": self.shown}
+        return {**super().judged(row, split.removesuffix(SHIPPED)), "shown": self.shown}
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         return counted(episodes, split.worlds)
 
     def about(self) -> str:
-        c, told = self.config, super().about()
         begun = f", begun with {self.begin.name}" if self.begin else ""
-        judged = (
-            f" Judged in the data set {self.judged_in({}).digest[:16]}, not that of training." if self.elsewhere else ""
-        )
+        other = self.judged_in({}).digest[:16]
+        judged = f" Judged in the data set {other}, not that of training." if self.elsewhere else ""
         return (
-            f"{told}{judged} Pictures: {self.depends({})['pictures']}; goal images: {self.shown}. "
-            f"{c.iterations} updates of {c.batch} episodes{begun}; judged at temperature "
+            f"{super().about().removesuffix('.')}{begun}; goal images: {self.shown}.{judged} Judged at temperature "
             f"{self.evaluation.evaluation_temperature:g} and by the rules of docs/sources.md, S36, S161, S162; in "
             f"{', '.join(PRINTED)} so in the columns 'as shipped' alone, in the others, beside the printed numbers, "
             "the likeliest action is taken."
         )
 
-    def _lessons(self, elsewhere: Path | None = None) -> Lessons:
-        data, encoder = dataset_of(elsewhere or self.data, "hanna"), load_encoder(self.encoder)
-        return Lessons(data, encoder, self.picture_kind, self.device, self.shown, self.cache)
+    def judged_lessons(self, judge: Mapping[str, Any]) -> Lessons:
+        return self.lessons_in(self.elsewhere or self.data)
+
+    def lessons_in(self, folder: Path) -> Lessons:
+        return dataclasses.replace(super().lessons_in(folder), device=self.device, shown=self.shown)

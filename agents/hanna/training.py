@@ -9,53 +9,40 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
 
 import torch
 
 from agents.common import imitation, parallel
 from agents.common.losses import IGNORE
 from agents.common.session import Clock, episode_seed, tasks_of_update
-from agents.hanna.agent import HannaAgent, save_agent
+from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES
 from agents.hanna.collect import Experience, collect, imitation_loss
 from agents.hanna.policy import HannaPolicy, for_training
-from agents.hanna.training_config import TrainingConfig
 from agents.vision.lessons import Split
 from embodied.evaluation import metrics
-from embodied.identity import Identity
-from embodied.interface import Agent, Place, Task, Teacher
+from embodied.interface import Place, Task, Teacher
 from embodied.seeds import stream
 
 
-class HannaLearner:
-    """A HANNA agent in training: its optimizer, and how it plays."""
+class HannaLearner(imitation.Learner):
+    """A HANNA agent in training."""
 
     def __init__(self, agent: HannaAgent, training: Split, teacher: Teacher) -> None:
-        self.agent, self.config, self.evaluation, self.network = agent, agent.config, agent.evaluation, agent.network
-        config: TrainingConfig = agent.config
-        self.optimizer = torch.optim.Adam(
-            agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay
-        )
+        super().__init__(agent, training)
+        config, self._teacher = agent.about.config, teacher
         guided = config.guided_asking if config.ask_rule == "learned" else 0.0
-        self._training, self._teacher = training, teacher
         self._player = for_training(
             agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout, guided
         )
 
     def learn(self, update: int, clock: Clock) -> dict[str, float]:
-        bank = self._training.bank.relit(stream(self.config.seed, "lightings", update))
+        bank = self.training.bank.relit(stream(self.config.seed, "lightings", update))
         player = dataclasses.replace(self._player, bank=bank)
-        return train_step(self.agent, self.optimizer, player, self._training, self._teacher, update, clock)
-
-    def evaluated_agent(self, split: Split) -> Agent:
-        return self.agent.policy(split.bank)
+        return train_step(self.agent, self.optimizer, player, self.training, self._teacher, update, clock)
 
     def evaluation_task(self, task: Task) -> Task:
         return dataclasses.replace(task, horizon=self.evaluation.evaluation_steps)
-
-    def save(self, path: Path, identity: Identity) -> None:
-        save_agent(self.agent, path, identity)
 
 
 def train_step(

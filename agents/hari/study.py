@@ -85,7 +85,7 @@ class HariStudy(EpisodeStudy):
     """Tables 4.7 and 4.8, Figures 4.5 and 4.6."""
 
     execution: ExecutionConfig
-    intention: IntentionConfig
+    config: IntentionConfig
     """Where the rows start from."""
     executor: Path | None = None
     """A trained execution policy; None trains one in the study's folder."""
@@ -101,7 +101,7 @@ class HariStudy(EpisodeStudy):
         return {name: extended(table) for name, table in TABLES.items()}
 
     def settings(self, train: Mapping[str, Any], seed: int) -> IntentionConfig:
-        return dataclasses.replace(self.intention, seed=seed, **train)
+        return dataclasses.replace(self.config, seed=seed, **train)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         walking = self._walking(folder)
@@ -133,7 +133,7 @@ class HariStudy(EpisodeStudy):
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         if judge.get(TIMES):
-            return intentions_by_time(episodes, self.intention.horizon)
+            return intentions_by_time(episodes, self.config.horizon)
         return super().count(episodes, split, judge)
 
     def _walking(self, folder: Path) -> Path:

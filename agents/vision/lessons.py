@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from agents.common.playing import TaskSet
+from agents.common.settings import EvaluationSettings, ImitationSettings
+from agents.common.sighted import About
+from agents.common.vocabulary import Vocabulary
 from agents.vision.bank import FeatureBank
 from agents.vision.config import drawing
 from agents.vision.drawn import pictures_of
@@ -17,6 +21,8 @@ from assets.cache import default_cache
 from embodied.datasets.store import Dataset
 from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.evaluate import spread
+
+A = TypeVar("A", bound=About)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +79,18 @@ class Lessons:
         """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""
         shown = {} if self.shown == "same" else {"shown": self.shown}
         return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train"), **shown}
+
+    def about(self, kind: type[A], config: ImitationSettings, evaluation: EvaluationSettings, words: Vocabulary) -> A:
+        """What stands beside the weights of an agent that learns here."""
+        encoder, pictures = self.encoder, self.pictures("train")
+        return kind(
+            config=config,
+            evaluation=evaluation,
+            encoder=encoder.feature_space,
+            feature_size=encoder.size,
+            words=words.words,
+            pictures=pictures,
+        )
 
     def pictures(self, name: str) -> str:
         """How the pictures of a split's houses were drawn, as in `drawings`."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Unpack
 
 from agents.common import imitation
 from agents.common.more_paths import more_routes
-from agents.common.parallel import rank_zero
-from agents.common.session import Note, Progress
+from agents.common.session import Progress
 from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import build_vocabulary
 from agents.common.weights import weights_digest
 from agents.vision.lessons import Lessons, Split
-from agents.vln.agent import VlnAbout, new_agent
+from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
 from agents.vln.speaker import load_speaker, spoken_tasks
 from agents.vln.training import VlnLearner
@@ -29,9 +29,7 @@ def train_follower(
     folder: Path,
     *,
     speaker: Path | None = None,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: imitation.OnValidation | None = None,
+    **options: Unpack[imitation.Options],
 ) -> Progress:
     """Train, or go on training, the follower of a run folder; other arguments as in agents.common.imitation.train.
 
@@ -47,17 +45,11 @@ def train_follower(
     if config.spoken_share:
         training = dataclasses.replace(training, tasks=mixed(training, config, speaker))
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
-    words, encoder = build_vocabulary(t.request for t in training.tasks), lessons.encoder
-    about = VlnAbout(config, evaluation, encoder.feature_space, encoder.size, words.words, lessons.pictures("train"))
-    agent = new_agent(about)
+    words = build_vocabulary(t.request for t in training.tasks)
+    agent = VlnAgent.new(lessons.about(VlnAbout, config, evaluation, words))
     agent.network.to(lessons.device)
-    rank_zero(note)(
-        f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {len(words)} words, "
-        f"{sum(p.numel() for p in agent.network.parameters()):,} parameters, pictures: {about.pictures}"
-    )
-    identity, watch = training_identity(lessons, config, speaker), on_validation
-    learner = VlnLearner(agent, training)
-    return imitation.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+    identity = training_identity(lessons, config, speaker)
+    return imitation.train(VlnLearner(agent, training), validation, folder, identity, **options)
 
 
 def more_tasks(lessons: Lessons, training: Split, config: FollowerSettings) -> list[Task]:

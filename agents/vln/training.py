@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import torch
 import torch.nn.functional as F
@@ -20,33 +19,23 @@ from agents.common.choosing import choose_sampled
 from agents.common.losses import IGNORE, negative_log_likelihood
 from agents.common.playing import play_with_memory
 from agents.common.session import Clock, episode_seed, tasks_of_update
-from agents.vision.lessons import Split
-from agents.vln.agent import VlnAgent, save_agent
 from agents.vln.config import FollowerSettings
 from agents.vln.policy import SupervisedVln, VlnMoment
 from embodied.evaluation import metrics
-from embodied.identity import Identity
-from embodied.interface import Agent, Episode, Place, Task
+from embodied.interface import Episode, Place
 from embodied.seeds import stream
 
 LONGEST = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
 
 
-class VlnLearner:
-    """A follower in training: its optimizer, and how it plays."""
+class VlnLearner(imitation.Learner):
+    """A follower in training."""
 
-    def __init__(self, agent: VlnAgent, training: Split) -> None:
-        self.agent, self.network = agent, agent.network
-        self.config, self.evaluation = agent.about.config, agent.about.evaluation
-        self.optimizer = torch.optim.AdamW(
-            agent.network.parameters(), self.config.learning_rate, weight_decay=self.config.weight_decay
-        )
-        self._training = training
+    optimizer_kind = torch.optim.AdamW
 
     def learn(self, update: int, clock: Clock) -> dict[str, float]:
-        """One update; the numbers to report."""
-        config, training = self.config, self._training
+        config, training = self.config, self.training
         chosen = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
         tasks = [dataclasses.replace(t, horizon=min(t.horizon, LONGEST)) for t in chosen]
         policy = self.agent.policy(training.bank.relit(stream(config.seed, "lightings", update)))
@@ -65,15 +54,6 @@ class VlnLearner:
             return imitation.BatchLoss((moves, torch.zeros(())), loss, numbers_of(experience, training.worlds))
 
         return imitation.train_step(self.network, self.optimizer, config, update, clock, played, loss_of)
-
-    def evaluated_agent(self, split: Split) -> Agent:
-        return self.agent.policy(split.bank)
-
-    def evaluation_task(self, task: Task) -> Task:
-        return task
-
-    def save(self, path: Path, identity: Identity) -> None:
-        save_agent(self.agent, path, identity)
 
 
 def teacher_share(config: FollowerSettings, update: int) -> float:

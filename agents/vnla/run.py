@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 from agents.common import imitation
-from agents.common.parallel import rank_zero
-from agents.common.session import Note, Progress
+from agents.common.session import Progress
 from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.vision.lessons import Lessons
-from agents.vnla.agent import new_agent
+from agents.vnla.agent import VnlaAbout, VnlaAgent
 from agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from agents.vnla.training import VnlaLearner
 from embodied.action_spaces import WORDS
@@ -34,29 +33,13 @@ def train_agent(
     config: VnlaSettings,
     evaluation: EvaluationSettings,
     folder: Path,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: imitation.OnValidation | None = None,
+    **options: Unpack[imitation.Options],
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
-    houses, note = config.training_houses or None, rank_zero(note)
+    houses = config.training_houses or None
     training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
-    words, encoder = vocabulary_of(lessons.data, houses), lessons.encoder
-    agent = new_agent(config, words, encoder.feature_space, encoder.size, lessons.pictures("train"), evaluation)
+    agent = VnlaAgent.new(lessons.about(VnlaAbout, config, evaluation, vocabulary_of(lessons.data, houses)))
     agent.network.to(lessons.device)
-    size = sum(p.numel() for p in agent.network.parameters())
-    count = len({t.world for t in training.tasks})
-    note(
-        f"{len(training.tasks)} tasks in {count} houses, {len(words)} words, {size:,} parameters, "
-        f"pictures: {agent.pictures}"
-    )
-    identity, watch = training_identity(lessons, config), on_validation
-    learner = VnlaLearner(agent, training)
-    return imitation.train(learner, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
-
-
-def training_identity(lessons: Lessons, config: VnlaSettings) -> dict[str, Any]:
-    """All that a trained agent depends on."""
-    return identity_of("agents.vnla.run", settings=config, **lessons.identity())
+    identity = identity_of("agents.vnla.run", settings=config, **lessons.identity())
+    return imitation.train(VnlaLearner(agent, training), validation, folder, identity, **options)

@@ -6,28 +6,25 @@ learned asker's agent: they are trained alike (docs/sources.md, S160).
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from agents.common.session import Note
-from agents.common.settings import EvaluationSettings
 from agents.studies.engine import StudyRow, StudyTable
-from agents.studies.episodes import JUDGES, EpisodeStudy
+from agents.studies.episodes import JUDGES
 from agents.vision.lessons import Lessons
-from agents.vision.run import encoder_of
-from agents.vnla.agent import VnlaAgent, load_agent
+from agents.vision.sighted_study import NOTHING, SPLITS, SightedStudy
+from agents.vnla.agent import VnlaAgent
 from agents.vnla.config import VnlaSettings
 from agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
 from agents.vnla.run import train_agent
-from embodied.datasets.store import Dataset, SplitData, dataset_of
+from embodied.datasets.store import SplitData
 from embodied.interface import Agent
 
 EVALUATION_SEEDS = (123, 435, 6757, 867, 983)
 """The program's."""
-SPLITS = ("test_seen", "test_unseen")
 COLUMNS = ("success", "room success", "navigation error", "requests")
 ROOMS = "rooms"
 """In a row: whether the requests name rooms that it learns from (train) or is judged by (judge)."""
@@ -92,87 +89,52 @@ TABLES: Mapping[str, StudyTable] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class VnlaStudy(EpisodeStudy):
+class VnlaStudy(SightedStudy):
     """Tables 2, 3, 4 and 7 of VNLA's first paper."""
 
-    encoder: Path
-    network: str | None = None
-    """Torchvision network of `encoder`, or 'random'; None for one of our own encoders."""
     config: VnlaSettings
-    """Where the rows start from."""
-    evaluation: EvaluationSettings
     without_rooms: Path | None = None
     """A data set whose requests name no room, for the table 'rooms'."""
-    others: int = 3
-    """Agents of every row but that of the learned asker."""
-    picture_kind: str | None = None
-    """Of the pictures that features come from."""
     judging: tuple[int, ...] = EVALUATION_SEEDS
 
-    name = "vnla"
+    name, agent_kind, all_tables = "vnla", VnlaAgent, TABLES
     makers = ("agents.vnla.run",)
     judges = (*JUDGES, "agents.vnla.judging")
 
-    def tables(self) -> Mapping[str, StudyTable]:
-        """The splits out of distribution that there are come beside the others."""
-        splits = (*SPLITS, *dataset_of(self.data, "vnla").ood)
-        return {name: dataclasses.replace(table, splits=splits) for name, table in TABLES.items()}
-
-    def seeds(self, row: StudyRow) -> Sequence[int]:
-        return self.repeats if not row.train else self.repeats[: self.others]
-
     def settings(self, train: Mapping[str, Any], seed: int) -> VnlaSettings:
-        return dataclasses.replace(self.config, seed=seed, **{k: v for k, v in train.items() if k != ROOMS})
-
-    def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
-        lessons = self.lessons(train.get(ROOMS, True))
-        return {"data": lessons.data.digest, "encoder": lessons.encoder.digest, "pictures": lessons.pictures("train")}
+        return super().settings({k: v for k, v in train.items() if k != ROOMS}, seed)
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data sets that are missing are told before anything is trained."""
         for row in rows:
-            for rooms in ((row.train or {}).get(ROOMS, True), row.judge[ROOMS]):
-                self.lessons(rooms)
+            for how in (row.train or {}, row.judge):
+                self.lessons(how)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(self.lessons(train.get(ROOMS, True)), self.settings(train, seed), self.evaluation, home, note=note)
+        train_agent(self.lessons(train), self.settings(train, seed), self.evaluation, home, note=note)
         return home / "best.safetensors"
 
-    def load(self, weights: Path) -> VnlaAgent:
-        return dataclasses.replace(load_agent(weights), evaluation=self.evaluation)
-
     def policies(self, agent: VnlaAgent, judge: Mapping[str, Any], split: str) -> Agent:
-        return player(agent, self.lessons(judge[ROOMS]).split(split).bank, judge["played"])
-
-    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
-        return self.lessons(judge[ROOMS]).data
+        return player(agent, self.lessons(judge).split(split).bank, judge["played"])
 
     def where(self, agent: VnlaAgent, judge: Mapping[str, Any], split: str) -> SplitData:
         return self.judged_in(judge).split(split, vnla=rules_of_row(agent, judge["played"]))
 
-    def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        pictures = self.lessons(row.judge[ROOMS]).pictures(split)
-        return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": pictures}
-
-    def lessons(self, rooms: bool) -> Lessons:
-        """What agents of one of the two kinds of requests learn from.
-
+    def lessons(self, how: Mapping[str, Any] = NOTHING) -> Lessons:
+        """
         Raises:
           ValueError: requests without rooms are wanted and there are none, or the data set names (no) rooms.
         """
+        rooms = how.get(ROOMS, True)
         folder = self.data if rooms else self.without_rooms
         if folder is None:
             raise ValueError(
                 "the table 'rooms' needs requests that name no room: `embodied dataset vnla --no-rooms --out DIR2`, "
                 "features for it, and --without-rooms DIR2"
             )
-        data = dataset_of(folder, "vnla")
-        if data.config.rooms != rooms:
+        lessons = self.lessons_in(folder)
+        if lessons.data.config.rooms != rooms:
             raise ValueError(
                 f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"
             )
-        return Lessons(data, encoder_of(self.encoder, self.network), self.picture_kind)
-
-    def about(self) -> str:
-        c, pictures = self.config, self.lessons(True).pictures("train")
-        return f"{super().about()} Trained {c.iterations} updates of {c.batch} episodes on pictures {pictures}."
+        return lessons

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import torch
 from torch import Tensor
@@ -20,32 +19,26 @@ from agents.common.losses import negative_log_likelihood
 from agents.common.playing import play_with_memory
 from agents.common.session import Clock, episode_seed, tasks_of_update
 from agents.vision.lessons import Split
-from agents.vnla.agent import VnlaAgent, rules_of, save_agent
+from agents.vnla.agent import VnlaAgent, rules_of
 from agents.vnla.config import TRAINED_UNDER
 from agents.vnla.policy import VnlaMoment, for_training
 from embodied.envs.vnla import teacher_of
 from embodied.evaluation import metrics
-from embodied.identity import Identity
-from embodied.interface import Agent, Episode, Place, Task
+from embodied.interface import Agent, Episode, Place
 from embodied.seeds import stream
 
 
-class VnlaLearner:
-    """A VNLA agent in training: its optimizer, and how it plays."""
+class VnlaLearner(imitation.Learner):
+    """A VNLA agent in training."""
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
-        self.agent, self.config, self.evaluation, self.network = agent, agent.config, agent.evaluation, agent.network
-        config = agent.config
-        self.optimizer = torch.optim.Adam(
-            agent.network.parameters(), config.learning_rate, weight_decay=config.weight_decay
-        )
+        super().__init__(agent, training)
+        config = self.config
         teacher = teacher_of(TRAINED_UNDER[config.rules], rules_of(config))
-        self._training = training
         self._player = for_training(agent.policy(training.bank), teacher, config.environment_dropout)
 
     def learn(self, update: int, clock: Clock) -> dict[str, float]:
-        """One update; the numbers to report."""
-        config, training = self.config, self._training
+        config, training = self.config, self.training
         tasks = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
         bank = training.bank.relit(stream(config.seed, "lightings", update))
         player = dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=bank))
@@ -64,12 +57,6 @@ class VnlaLearner:
 
     def evaluated_agent(self, split: Split) -> Agent:
         return self.agent.player(split.bank)
-
-    def evaluation_task(self, task: Task) -> Task:
-        return task  # its own time limit belongs to it
-
-    def save(self, path: Path, identity: Identity) -> None:
-        save_agent(self.agent, path, identity)
 
 
 @dataclass(frozen=True, eq=False)

@@ -180,7 +180,8 @@ def find_something(args: Options, world: World, viewers: tuple[str, ...]) -> dic
 def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
-    from agents.hanna.agent import load_agent
+    from agents.common.shipped import SHIPPED_AGENT
+    from agents.hanna.agent import HannaAgent
     from agents.hanna.evaluation import hanna_policies
     from agents.vision.bank import FeatureBank
     from agents.vision.encoder import load_encoder
@@ -190,7 +191,7 @@ def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: 
     from embodied.language import People
     from embodied.tasks.hanna import hanna_pool, hanna_task
 
-    agent, encoder = load_agent(), load_encoder()
+    agent, encoder = HannaAgent.load(SHIPPED_AGENT), load_encoder()
     nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
     features = encode_panoramas(encoder, (world.panorama(n) for n in nodes))
     bank = FeatureBank({world.name: features}, encoder.feature_space)

@@ -92,10 +92,10 @@ class Known:
 
 def _hanna(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """Tables 4.3 to 4.5."""
-    from agents.hanna.agent import load_agent
+    from agents.hanna.agent import HannaAgent
     from agents.hanna.evaluation import WITHOUT_LEARNING, players
 
-    lessons, agent = _lessons(args, data), load_agent(file)
+    lessons, agent = _lessons(args, data), HannaAgent.load(file)
 
     def known(split: str) -> Known:
         whole, (all_, usual) = data.split(split), players(agent, lessons.split(split).bank)
@@ -106,11 +106,11 @@ def _hanna(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 
 def _vnla(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """The learned asker beside other askers, direct intervention and agents without learning."""
-    from agents.vnla.agent import load_agent
+    from agents.vnla.agent import VnlaAgent
     from agents.vnla.judging import WITHOUT_LEARNING, player, row_names, rules_of_row
 
-    lessons, agent = _lessons(args, data), load_agent(file)
-    note(f"rules of play: {agent.config.rules}; trained on pictures {agent.pictures}")
+    lessons, agent = _lessons(args, data), VnlaAgent.load(file)
+    note(f"rules of play: {agent.config.rules}; trained on pictures {agent.about.pictures}")
 
     def known(split: str) -> Known:
         bank, names = lessons.split(split).bank, row_names(agent)
@@ -123,10 +123,10 @@ def _vnla(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 
 def _vln(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """The follower beside agents without learning."""
-    from agents.vln.agent import load_agent
+    from agents.vln.agent import VlnAgent
     from embodied.evaluation.evaluate import PLAIN
 
-    lessons, agent = _lessons(args, data), load_agent(file)
+    lessons, agent = _lessons(args, data), VlnAgent.load(file)
     note(f"trained on pictures {agent.about.pictures}")
 
     def known(split: str) -> Known:

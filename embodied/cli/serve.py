@@ -148,13 +148,13 @@ def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentM
 
     def shipped(places: Mapping[str, Place]) -> Agent:
         from agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER, SHIPPED_VNLA
-        from agents.hanna.agent import load_agent as hanna
+        from agents.hanna.agent import HannaAgent
         from agents.vision.drawn import pictures_of
         from agents.vision.encoder import load_encoder
         from agents.vision.features import feature_path, load_bank
-        from agents.vnla.agent import load_agent as vnla
+        from agents.vnla.agent import VnlaAgent
 
-        agent = vnla(SHIPPED_VNLA) if data.kind == "vnla" else hanna(SHIPPED_AGENT)
+        agent = VnlaAgent.load(SHIPPED_VNLA) if data.kind == "vnla" else HannaAgent.load(SHIPPED_AGENT)
         pictures = {n: pictures_of(data, n, None) for n in places}
         encoder = load_encoder(SHIPPED_ENCODER).digest
         paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in places}

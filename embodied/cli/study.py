@@ -271,7 +271,7 @@ LEARNED = ("learner", "mixing", "anneal_every")
 class RegexOptions(IliadOptions, RegexFiles):
     """Students that learn to change words from descriptions."""
 
-    learner: Annotated[LearnerConfig, Settings("settings of the student's training", LEARNER_SCALES, skip=LEARNED)]
+    config: Annotated[LearnerConfig, Settings("settings of the student's training", LEARNER_SCALES, skip=LEARNED)]
     world: Annotated[RegexConfig, Settings("settings of data and teacher", REGEX_SCALES)]
 
 
@@ -280,7 +280,7 @@ class NavOptions(IliadOptions, Nav):
     """Students that learn to follow routes from descriptions."""
 
     data: InputFolder
-    learner: Annotated[LearnerConfig, Settings("settings of the student's training", NAV_LEARNER_SCALES, skip=LEARNED)]
+    config: Annotated[LearnerConfig, Settings("settings of the student's training", NAV_LEARNER_SCALES, skip=LEARNED)]
     world: Annotated[NavConfig, Settings("settings of data and teacher", NAV_SCALES)]
 
 
@@ -321,47 +321,23 @@ def run_table(args: Any, learner: StudyLearner, **names: Any) -> int:
     return 0
 
 
-def seeds_of(args: Trained, first: int) -> tuple[int, ...]:
-    """Training seeds: as many as --seeds says, from the first one on."""
-    return tuple(range(first, first + args.seeds))
+def study_of(kind: Any, args: Any, **more: Any) -> Any:
+    """A study: its fields are the options of the same names, but for `more`."""
+    named = {f.name: getattr(args, f.name) for f in dataclasses.fields(kind) if hasattr(args, f.name)}
+    seed = named["config"].seed
+    return kind(**{"repeats": tuple(range(seed, seed + args.seeds)), **named, **more})
 
 
 def hanna(args: HannaOptions) -> int:
     from agents.hanna.study import HannaStudy
 
-    learner = HannaStudy(
-        args.data,
-        seeds_of(args, args.config.seed),
-        args.tasks,
-        (args.judge_seed,),
-        args.threads,
-        encoder=args.encoder,
-        config=args.config,
-        evaluation=args.evaluation,
-        device=args.device,
-        picture_kind=args.pictures,
-        begin=args.begin,
-        elsewhere=args.judged_in,
-        shown=args.shown,
-        cache=args.cache,
-    )
-    return run_table(args, learner)
+    return run_table(args, study_of(HannaStudy, args, judging=(args.judge_seed,), elsewhere=args.judged_in))
 
 
 def find(args: FindOptions) -> int:
     from agents.find.study import FindStudy
 
-    learner = FindStudy(
-        args.data,
-        seeds_of(args, args.config.seed),
-        threads=args.threads,
-        encoder=args.encoder,
-        config=args.config,
-        cache=args.cache,
-        judged_tasks=args.judged_tasks,
-        picture_kind=args.pictures,
-    )
-    return run_table(args, learner)
+    return run_table(args, study_of(FindStudy, args))
 
 
 def vision(args: VisionOptions) -> int:
@@ -371,100 +347,43 @@ def vision(args: VisionOptions) -> int:
 
     check_device(args.device)
     ready = by_name(args.encoders)
-    learner = EncoderStudy(
-        StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights),
-        args.config,
-        seeds_of(args, args.config.seed),
-        args.split,
-        args.test_pictures,
-        args.threads,
-        args.device,
-        args.workers,
-        ready,
-    )
+    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
+    learner = study_of(EncoderStudy, args, source=source, pictures=args.test_pictures, ready=ready)
     return run_table(args, learner, rows=args.rows or tuple(ready))
 
 
 def hari(args: HariOptions) -> int:
     from agents.hari.study import HariStudy
 
-    learner = HariStudy(
-        args.data,
-        seeds_of(args, args.config.seed),
-        args.tasks,
-        (args.config.seed,),
-        args.threads,
-        execution=EXECUTION_SCALES[args.scale],
-        intention=args.config,
-        executor=args.execution,
-    )
+    config, execution = args.config, EXECUTION_SCALES[args.scale]
+    learner = study_of(HariStudy, args, judging=(config.seed,), execution=execution, executor=args.execution)
     return run_table(args, learner)
 
 
 def vnla(args: VnlaOptions) -> int:
     from agents.vnla.study import VnlaStudy
 
-    learner = VnlaStudy(
-        args.data,
-        seeds_of(args, args.config.seed),
-        args.tasks,
-        threads=args.threads,
-        encoder=args.encoder,
-        network=args.network,
-        config=args.config,
-        evaluation=args.evaluation,
-        without_rooms=args.without_rooms,
-        others=args.others or args.seeds,
-        picture_kind=args.pictures,
-    )
-    return run_table(args, learner)
+    return run_table(args, study_of(VnlaStudy, args))
 
 
 def vln(args: VlnOptions) -> int:
     from agents.vln.study import VlnStudy
 
-    learner = VlnStudy(
-        args.data,
-        seeds_of(args, args.config.seed),
-        args.tasks,
-        threads=args.threads,
-        encoder=args.encoder,
-        network=args.network,
-        config=args.config,
-        speaker=SPEAKER_SCALES[args.scale],
-        evaluation=args.evaluation,
-        others=args.others,
-        picture_kind=args.pictures,
-    )
-    return run_table(args, learner)
+    return run_table(args, study_of(VlnStudy, args, speaker=SPEAKER_SCALES[args.scale]))
 
 
 def bandit(args: BanditOptions) -> int:
     from agents.bandit.study import BanditStudy
 
-    seeds = seeds_of(args, args.config.seed)
-    return run_table(args, BanditStudy(args.data, args.config, seeds, args.threads, args.read_rater()))
+    return run_table(args, study_of(BanditStudy, args, rater=args.read_rater()))
 
 
 def stars(args: StarsOptions) -> int:
     from agents.bandit.stars_study import StarsStudy
     from agents.vision.run import encoder_of
 
-    learner = StarsStudy(
-        args.data,
-        seeds_of(args, args.config.seed),
-        args.tasks,
-        tuple(range(args.judgings)),
-        args.threads,
-        agent=args.agent,
-        encoder=encoder_of(args.encoder, args.network),
-        config=args.config,
-        split=args.split,
-        rated=args.rated,
-        decisions=args.decisions,
-        rater=args.read_rater(),
-    )
-    return run_table(args, learner)
+    judging, encoder = tuple(range(args.judgings)), encoder_of(args.encoder, args.network)
+    return run_table(args, study_of(StarsStudy, args, judging=judging, encoder=encoder, rater=args.read_rater()))
 
 
 def iliad(args: RegexOptions | NavOptions) -> int:
@@ -476,7 +395,7 @@ def iliad(args: RegexOptions | NavOptions) -> int:
         world = NavStudyWorld(args.world, NavSource(args.data, args.encoder_digest(), args.pictures, args.cache))
     else:
         world = RegexStudyWorld(args.world, args.words, args.templates)
-    return run_table(args, IliadStudy(world, args.learner, seeds_of(args, args.learner.seed), args.threads))
+    return run_table(args, study_of(IliadStudy, args, world=world))
 
 
 def check(args: CheckOptions) -> int:
@@ -489,7 +408,7 @@ def check(args: CheckOptions) -> int:
 def ask(args: AskOptions) -> int:
     from agents.ask.study import AskStudy
 
-    learner = AskStudy(args.cache, args.config, args.evaluation, seeds_of(args, args.config.seed), args.threads)
+    learner = study_of(AskStudy, args)
     if args.server.model:
         about = {k: getattr(args.server, k) for k in ("model", "form", "temperature", "most_tokens")}
         learner = dataclasses.replace(learner, model=functools.partial(model_agent, args), model_about=about)
