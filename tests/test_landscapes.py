@@ -17,8 +17,8 @@ from assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig
 from embodied.house.house import LANDSCAPES, SEASONS, House, HouseError, Sky
 from embodied.light.tracing.sky import paint
-from embodied.scene import backdrop
-from embodied.scene.landscapes import TABLE, Scenery, near_buildings, scenery_of
+from embodied.scene import backdrop, far_canvas, far_land
+from embodied.scene.landscapes import TABLE, Ridge, Scenery, near_buildings, scenery_of
 from embodied.scene.model import build_spec, compile_scene, owner_of_name
 from embodied.scene.outdoors import PIECES, footprint, outdoor_parts
 
@@ -118,7 +118,7 @@ def test_neighbours_do_not_overlap_the_plot_and_only_three_landscapes_have_them(
 
 
 def test_what_is_left_of_contrast_falls_with_distance_to_a_fiftieth_at_the_visibility():
-    left = backdrop.clearness(np.array([0.0, 10.0, 400.0, 3e3, 12e3]), 12e3)
+    left = far_canvas.clearness(np.array([0.0, 10.0, 400.0, 3e3, 12e3]), 12e3)
     assert np.allclose(left[0], 1) and left[-1, 1] == pytest.approx(0.02, rel=0.01)
     assert all((a > b).all() for a, b in itertools.pairwise(left)) and (left[-1, 2] < left[-1, 0]), "hills turn blue"
 
@@ -126,12 +126,12 @@ def test_what_is_left_of_contrast_falls_with_distance_to_a_fiftieth_at_the_visib
 def test_farther_hills_are_nearer_to_the_colour_of_the_sky(two_room_house):
     place = Scenery("fields", "summer", 0.15, 0.0)
     grey = np.full((128, 512, 3), 0.9, np.float32)
-    light = backdrop.FarLight(grey[0], np.full(3, 0.3), np.zeros(3), np.array([0, 0, 1.0]), 12e3, 0.0)
+    light = far_canvas.FarLight(grey[0], np.full(3, 0.3), np.zeros(3), np.array([0, 0, 1.0]), 12e3, 0.0)
     apart = []
     for distance in (500.0, 2000.0, 8000.0, 30000.0):
-        canvas = backdrop.Canvas(grey.copy(), 1.75)
-        ridge = backdrop.Ridge(distance, 0.06 * distance, 0.0, "wood")
-        for _, draw in backdrop._ridge(canvas, ridge, place, light, rng=np.random.default_rng(0)):
+        canvas = far_canvas.Canvas(grey.copy(), 1.75)
+        hill = Ridge(distance, 0.06 * distance, 0.0, "wood")
+        for _, draw in far_land.ridge(canvas, hill, place, light, rng=np.random.default_rng(0)):
             draw()
         row = int(canvas.rows(np.array(0.03)))
         apart.append(float(np.abs(canvas.picture[row] - 0.9).mean()))
@@ -148,5 +148,5 @@ def test_windows_are_lit_at_night_and_not_by_day(landscape):
 
 
 def test_rows_of_the_picture_and_elevations_agree():
-    rows = backdrop.elevations(1024)
-    assert np.allclose(backdrop.share_down(rows) * 1024 - 0.5, np.arange(1024)) and (np.diff(rows) < 0).all()
+    rows = far_canvas.elevations(1024)
+    assert np.allclose(far_canvas.share_down(rows) * 1024 - 0.5, np.arange(1024)) and (np.diff(rows) < 0).all()

@@ -23,7 +23,8 @@ from embodied.light.pages.unwrap import SPARSEST
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.radiosity import ENV_ROWS, LIFT, Together, points_of, sky_alone
 from embodied.light.tracing.sky import Outdoors
-from embodied.scene.backdrop import DOME, GLOW, dome
+from embodied.scene.backdrop import DOME, dome
+from embodied.scene.far_towns import GLOW
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 

@@ -18,7 +18,7 @@ from embodied.light.tracing.emitters import portals_of, read_lamps
 from embodied.light.tracing.paths import Lights, Surfaces, lights_of
 from embodied.light.tracing.radiosity import Space
 from embodied.light.tracing.sky import Outdoors, outdoors
-from embodied.scene.backdrop import KNOTS
+from embodied.scene.far_canvas import KNOTS
 from embodied.scene.lit_pages import LitPages, glass_surfaces
 
 
@@ -336,7 +336,7 @@ def picture_at(table: Array, rows: int, d: Array, active: Array = True) -> Array
 
 
 def backdrop_at(table: Array, rows: int, d: Array) -> Array:
-    """As `picture_at` for a picture as it is shown (flat, rows x 4 rows; `embodied.scene.backdrop.share_down`)."""
+    """As `picture_at` for a picture as it is shown (flat, rows x 4 rows; `embodied.scene.far_canvas.share_down`)."""
     mi, dr = mitsuba(), drjit()
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * (4 * rows)
     up, y = dr.asin(dr.clip(d.z, -1, 1)), mi.Float(0.0)

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 
 from embodied.house.house import House, Sky
-from embodied.scene.backdrop import EYE, Canvas, FarLight, elevations, land_rng, paint_land, share_down
+from embodied.scene.backdrop import EYE, land_rng, paint_land
+from embodied.scene.far_canvas import Canvas, FarLight, elevations, share_down
 from embodied.scene.landscapes import Scenery, scenery_of
 from embodied.seeds import stream
 
@@ -36,7 +37,7 @@ class Outdoors:
     sun: np.ndarray
     """(3,) radiosity e = E/pi that the unobstructed sun gives a surface facing it; zero at night."""
     fine: np.ndarray
-    """(h, 4h, 3), the picture as it is shown: rows closest around the horizon (see scene.backdrop.elevations)."""
+    """(h, 4h, 3), the picture as it is shown: rows closest around the horizon (see scene.far_canvas.elevations)."""
     lamps: float = 0.0
     """0 by day, 1 when the neighbours' windows are lit."""
 
