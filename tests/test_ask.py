@@ -24,7 +24,7 @@ from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.envs.make import ask_environment_maker, look_of
 from embodied.evaluation import tables
-from embodied.evaluation.ask import acted, ask_row, observed, read_seeds, submitted
+from embodied.evaluation.ask import acted, observed, read_seeds, submitted
 from embodied.evaluation.metrics import price, success, success_progress, weighted_success
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv, layout_of
@@ -201,7 +201,7 @@ def test_measures_by_hand(world, tasks, make_env):
     graph = world.graph
     assert price(won, graph) == pytest.approx(0.3) and weighted_success(won, graph) == pytest.approx(0.7)
     assert success_progress(won, graph) == pytest.approx(3 / 5) and weighted_success(lost, graph) == 0
-    row = ask_row("by hand", "x", [won, lost], {"grid": world}, seed=0)
+    row = tables.row("by hand", "x", [won, lost], {"grid": graph}, seed=0)
     assert row.values["price per success"].mean == pytest.approx(0.35)
     assert row.values["asks confirm"].mean == 0.5 and "model calls" not in row.values
     assert "weighted success (%)" in tables.markdown([row])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, SHARE, require, require_word
@@ -74,8 +72,3 @@ def folder_name(learner: LearnerConfig) -> str:
         return learner.learner
     annealed = f"_anneal_{learner.anneal_every}" if learner.anneal_every else ""
     return f"{learner.learner}_{learner.mixing:g}{annealed}"
-
-
-def as_dict(config: object) -> Mapping[str, object]:
-    """Field to value, as it is written into checkpoints and weights."""
-    return dataclasses.asdict(config)  # type: ignore[call-overload]

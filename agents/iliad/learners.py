@@ -85,7 +85,7 @@ def adel_loss(
 
 def described_loss(tasks: Sequence[Q], done: Sequence[E], said: Sequence[str | None], student: Student[Q, E]) -> Tensor:
     """-log pi_theta of the executions that were described, summed over actions; 0 where nothing was said."""
-    loss = 0 * next(iter(student.network().parameters())).sum()
+    loss = 0 * next(iter(student.network.parameters())).sum()
     heard = [i for i, d in enumerate(said) if d]
     if heard:
         some, executions = [tasks[i] for i in heard], [done[i] for i in heard]

@@ -86,5 +86,6 @@ class Student(Protocol[Q_in, E]):
     ) -> ExecutionScores:
         """Of the actions of executions, or of other `actions` in their states."""
 
+    @property
     def network(self) -> nn.Module:
         """What is trained."""

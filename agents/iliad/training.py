@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import torch
 
 from agents.common.session import Note, Session, descend, scheduled_rate, set_learning_rate, tasks_of_update
-from agents.iliad.config import LearnerConfig, as_dict, mixing_at
+from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.learners import Asked, IliadLesson, RewardsOf, RunningMean, adel, dagger, mixture, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
 from embodied.identity import Identity
@@ -59,7 +60,7 @@ def train(
       CheckpointError, KeyboardInterrupt, DivergedError: see agents.common.
     """
     learner = _Learner(problem, config)
-    identity = {**problem.identity, "settings": as_dict(config)}
+    identity = {**problem.identity, "settings": dataclasses.asdict(config)}
     with Session(
         folder,
         identity,
@@ -108,9 +109,9 @@ class _Learner(Generic[Q, E]):
 
     def __init__(self, problem: IliadProblem[Q, E], config: LearnerConfig) -> None:
         self.problem, self.config = problem, config
-        self.modules = {"student": problem.student.network()}
+        self.modules = {"student": problem.student.network}
         if config.learner == "adel":
-            self.modules["explorer"] = problem.explorer.network()
+            self.modules["explorer"] = problem.explorer.network
         weights = [p for m in self.modules.values() for p in m.parameters()]
         self.optimizer = torch.optim.Adam(weights, config.rate, fused=True)
         self.mean = RunningMean()

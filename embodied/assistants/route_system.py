@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -95,65 +94,6 @@ def spanning_paths(graph: NavGraph) -> list[tuple[int, ...]]:
     return paths
 
 
-def guide(graph: NavGraph, start: int, goal: int) -> list[tuple[int, ...]]:
-    """Lemma 2: the O(log N) spanning paths that lead from `start` to `goal` by their common ancestor."""
-    return guide_in_tree(spanning_parents(graph)[0], start, goal)
-
-
-def guide_in_tree(parent: np.ndarray, start: int, goal: int) -> list[tuple[int, ...]]:
-    """`guide` for a tree that is known already: (n,) parents, the root its own."""
-    up, down = ancestors(parent, start), ancestors(parent, goal)
-    below = set(down)
-    common = next(v for v in up if v in below)
-    climb = _jumps(up[: up.index(common) + 1])
-    descent = [p[::-1] for p in _jumps(down[: down.index(common) + 1])[::-1]]
-    return climb + descent
-
-
-def _jumps(line: list[int]) -> list[tuple[int, ...]]:
-    """A line of ancestors cut into pieces of 2^i edges, the longest first."""
-    pieces, at = [], 0
-    while at < len(line) - 1:
-        length = 2 ** int(math.log2(len(line) - 1 - at))
-        pieces.append(tuple(line[at : at + length + 1]))
-        at += length
-    return pieces
-
-
-@dataclass(frozen=True)
-class Lemma2:
-    """What Lemma 2 promises, counted in one graph."""
-
-    nodes: int
-    instructions: int
-    """Distinct (start, end) pairs that need an instruction: O(N log N)."""
-    bound: float
-    """2 N log2 N."""
-    most: int
-    """Most instructions between any two nodes: O(log N)."""
-    mean: float
-    detour: float
-    """Mean ratio of the guided walk to the shortest path, both in metres."""
-
-
-def benchmark_lemma2(graph: NavGraph, *, rng: np.random.Generator, pairs: int | None = None) -> Lemma2:
-    """Guide between all ordered pairs of different nodes (or `pairs` random ones) and count."""
-    n = len(graph.positions)
-    every = [(a, b) for a in range(n) for b in range(n) if a != b]
-    if pairs is not None and pairs < len(every):
-        every = [every[i] for i in sorted(rng.choice(len(every), pairs, replace=False))]
-    known = {(p[0], p[-1]) for p in spanning_paths(graph)}
-    parent, _ = spanning_parents(graph)
-    counts, detours = [], []
-    for a, b in every:
-        legs = guide_in_tree(parent, a, b)
-        assert all((leg[0], leg[-1]) in known for leg in legs), "a leg has no instruction"
-        walked = sum(float(graph.distance[u, v]) for leg in legs for u, v in itertools.pairwise(leg))
-        counts.append(len(legs))
-        detours.append(walked / float(graph.distance[a, b]))
-    return Lemma2(n, len(known), 2 * n * math.log2(n), max(counts), float(np.mean(counts)), float(np.mean(detours)))
-
-
 def route_paths(
     graph: NavGraph,
     name: str,
@@ -174,14 +114,6 @@ def build_routes(
     """The sampled route system of one house, each path worded three times."""
     paths = route_paths(world.graph, world.house.name, seed=seed, house_split=house_split, config=config)
     return worded(world, paths, WORDINGS[house_split], seed=seed, language=language)
-
-
-def build_spanning_routes(
-    world: PlaceT, *, seed: int, language: Language[PlaceT], house_split: str
-) -> tuple[Route, ...]:
-    """The route system of Lemma 2, each path worded once per split."""
-    wordings = tuple(dict.fromkeys(WORDINGS[house_split]))
-    return worded(world, spanning_paths(world.graph), wordings, seed=seed, language=language)
 
 
 def worded(

@@ -1,4 +1,4 @@
-"""Benchmarks of play: environment steps with help, on one core, and Lemma 2."""
+"""Benchmarks of play: environment steps with help, on one core."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import functools
 from collections.abc import Iterator
 
 from assets.catalogue import Catalogue
-from embodied.assistants.route_system import benchmark_lemma2, build_routes
-from embodied.bench.timing import Measure, from_values, measure
+from embodied.assistants.route_system import build_routes
+from embodied.bench.timing import Measure, measure
 from embodied.datasets.build import DatasetConfig, make_dataset_house
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import StoredPlace
@@ -16,7 +16,6 @@ from embodied.envs.make import environment_maker
 from embodied.generate import HouseConfig
 from embodied.interface import Ask, Intention, Move, Observation, Task
 from embodied.language.plain import PlainLanguage
-from embodied.seeds import stream
 
 AIMS = {"find": 20_000.0, "hanna": 10_000.0, "vnla": None, "hari": None}
 """Steps per second that the project promises; HANNA's include the assistant's replies."""
@@ -43,12 +42,6 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
             per=counts[0],
             aim=aim,
         )
-        if kind == "hanna":
-            result = benchmark_lemma2(graph, rng=stream(seed, "lemma 2"), pairs=2_000)
-            yield from_values(
-                f"Lemma 2: instructions of 2 N log2 N, N = {result.nodes}", [result.instructions / result.bound], "x"
-            )
-            yield from_values("Lemma 2: most instructions between two nodes", [float(result.most)], "")
 
 
 def walk(env: HelpEnv, tasks: list[Task]) -> tuple[int, int]:

@@ -14,13 +14,11 @@ from typing import Any
 import numpy as np
 
 from embodied.errors import UnableError
-from embodied.evaluation.tables import Row, row
 from embodied.interface import (
     Action,
     Actions,
     Agent,
     Ask,
-    Episode,
     Intention,
     Move,
     Observation,
@@ -70,11 +68,6 @@ def ask_split(
     for place in houses.values():
         tasks += ask_tasks(ask_pool(place, look, seed=seed, unseen=unseen, config=AskConfig()), per_house, seed=seed)
     return tasks
-
-
-def ask_row(agent: str, split: str, episodes: Sequence[Episode], places: Mapping[str, Place], *, seed: int) -> Row:
-    """All measures of one agent."""
-    return row(agent, split, episodes, {n: p.graph for n, p in places.items()}, seed=seed)
 
 
 # Agents of others -------------------------------------------------------------------------------

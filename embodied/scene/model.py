@@ -493,20 +493,3 @@ def _add_boxes(
             density=density,
             friction=[0.9, 0.005, 0.0001],
         )
-
-
-def displacements(scene: Scene, seconds: float = 1.0) -> dict[str, float]:
-    """How far each free object moves in `seconds` of physics, metres.
-
-    Raises:
-      FloatingPointError: the simulation diverged.
-    """
-    data = mujoco.MjData(scene.model)
-    mujoco.mj_forward(scene.model, data)
-    bodies = [scene.model.body(name).id for name in scene.free]
-    start = data.xpos[bodies].copy()
-    while data.time < seconds:
-        mujoco.mj_step(scene.model, data)
-    if not np.isfinite(data.qpos).all() or any(w.number for w in data.warning[-3:]):
-        raise FloatingPointError("the freed house explodes; objects interpenetrate deeply")
-    return dict(zip(scene.free, np.linalg.norm(data.xpos[bodies] - start, axis=1).tolist()))

@@ -29,15 +29,6 @@ def lost_as_programmed(distances: Sequence[float]) -> list[bool]:
     return [t > closest for t in range(len(distances))]
 
 
-def lost_as_written(distances: Sequence[float]) -> list[bool]:
-    """Steps from which the agent gets no strictly closer later on (4.2.3, condition 1).
-
-    It calls an agent lost that stands on its target and is about to stop.
-    """
-    later = [min(distances[t + 1 :], default=np.inf) for t in range(len(distances))]
-    return [after >= now - 1e-9 for now, after in zip(distances, later, strict=True)]
-
-
 def base37_entropy(probabilities: np.ndarray, candidates: Candidates) -> float:
     """Entropy in base 37 of a navigation distribution spread over the 36 views and stop (4.2.3).
 

@@ -109,5 +109,5 @@ def learn(
     problem = problem_of(grounds, learner.seed)
     student = problem.student
     assert isinstance(student, NavStudent)
-    keep = lambda path, identity: save_walker(path, student.follower, grounds.config, student.eyes, identity)
+    keep = lambda path, identity: save_walker(path, student.network, grounds.config, student.eyes, identity)
     return train(problem, learner, folder, keep, minutes=minutes, note=note)

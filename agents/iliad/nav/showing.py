@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-import torch
-
-from agents.common.session import descend
 from agents.iliad.nav.student import NavStudent
 from agents.iliad.nav.world import HORIZON, RADIUS, NavWalk, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
+from agents.iliad.showing import learned_from
+from agents.iliad.showing import lines_of as learned_lines
 from embodied.envs.base import HelpEnv
 from embodied.interface import Episode, FollowRoute, Move, Reply, Stop, Task
 from embodied.seeds import stream
-
-RATE, CLIP = 1e-3, 5.0
-"""Of the one update that shows what is learned from a description."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +52,7 @@ def tell(
     request, world = trip.requests[0], NavWorld(student.eyes.places)
     (done,) = student.sample([trip], [request], rng=rng) if sample else student.greedy([trip], [request])
     (said,) = teacher.describe([trip], [done], rng=rng)
-    before = after = None
-    if said:
-        before = _probability(student, trip, said, done)
-        learner = NavStudent(copy.deepcopy(student.follower).train(), student.eyes)
-        optimizer = torch.optim.Adam(learner.follower.parameters(), RATE)
-        descend(-learner.scores([trip], [said], [done]).log_probabilities.sum(), optimizer, "shown episode", CLIP)
-        after = _probability(learner, trip, said, done)
+    before, after = learned_from(student, trip, said, done)
     missed = float(world.graph(trip).distance[done.nodes[-1], trip.path[-1]])
     told = NavTold(
         trip.world, request, trip.path, done.nodes, rooms(world, trip, trip.path), rooms(world, trip, done.nodes),
@@ -87,13 +76,7 @@ def lines_of(told: NavTold) -> list[str]:
         f"student       {' > '.join(told.gone)}   ({len(told.walk) - 1} moves)",
         f"fulfilled     {'yes' if told.success else 'no'}, {told.missed:.1f} m from the intended end",
     ]
-    if told.description is None or told.before is None or told.after is None:
-        return [*found, "teacher       (nothing to say)", "learned       nothing"]
-    return [
-        *found,
-        f"teacher       {told.description}",
-        f"learned       p(what it did | what was said) {told.before:.4f} -> {told.after:.4f} by one update",
-    ]
+    return [*found, *learned_lines(told.description, told.before, told.after)]
 
 
 def episode_of(student: NavStudent, trip: Trip, walk: NavWalk, description: str | None) -> Episode:
@@ -113,8 +96,3 @@ def episode_of(student: NavStudent, trip: Trip, walk: NavWalk, description: str 
     episode = env.episode("student")
     last = dataclasses.replace(episode.steps[-1], reply=Reply(description or "(nothing to say)"))
     return dataclasses.replace(episode, steps=(*episode.steps[:-1], last))
-
-
-def _probability(student: NavStudent, trip: Trip, said: str, done: NavWalk) -> float:
-    with torch.no_grad():
-        return float(student.scores([trip], [said], [done]).log_probabilities.sum().exp())

@@ -67,7 +67,7 @@ def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note
 
     judge = lambda: {"success": success_rate(world, executor, _sample(data))}
     stage = _stage("executor", folder, config.executor_iterations, config, data)
-    stage.train(executor.follower, loss_of, judge, note)
+    stage.train(executor.network, loss_of, judge, note)
     return executor
 
 

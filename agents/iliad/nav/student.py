@@ -97,10 +97,7 @@ class NavStudent:
     """A policy over neighbouring nodes."""
 
     def __init__(self, follower: Follower, eyes: NavEyes) -> None:
-        self.follower, self.eyes = follower, eyes
-
-    def network(self) -> nn.Module:
-        return self.follower
+        self.network, self.eyes = follower, eyes
 
     def sample(self, tasks: Sequence[Trip], requests: Sequence[str], *, rng: np.random.Generator) -> list[NavWalk]:
         return self._walk(tasks, requests, sampled_choice(rng.random((len(tasks), MOVES))))
@@ -118,11 +115,11 @@ class NavStudent:
         """Of the steps of walks, or of the steps that `actions` take in the walks' states."""
         wanted = [w.steps for w in (executions if actions is None else actions)]
         tracks = [Track(self.eyes, task) for task in tasks]
-        now = self.follower.begin(self.eyes.words(requests))
+        now = self.network.begin(self.eyes.words(requests))
         logs, entropies, mask = [], [], []
         for t in range(max(map(len, wanted))):
             seen = self.eyes.see(tracks)
-            logits, now = self.follower.step(now, seen)
+            logits, now = self.network.step(now, seen)
             log = logits.log_softmax(-1).masked_fill(~seen.mask, 0.0)
             there = [t < len(w) for w in wanted]
             chosen = [k.number(w[t]) if x else 0 for k, w, x in zip(tracks, wanted, there)]
@@ -138,11 +135,11 @@ class NavStudent:
     @torch.no_grad()
     def _walk(self, tasks: Sequence[Trip], requests: Sequence[str], choose: Choice) -> list[NavWalk]:
         tracks = [Track(self.eyes, task) for task in tasks]
-        now = self.follower.begin(self.eyes.words(requests))
+        now = self.network.begin(self.eyes.words(requests))
         rows = torch.arange(len(tasks))
         for t in range(MOVES):
             seen = self.eyes.see(tracks)
-            logits, now = self.follower.step(now, seen)
+            logits, now = self.network.step(now, seen)
             for track, number in zip(tracks, choose(logits, rows, t).tolist()):
                 if not track.stopped:
                     track.go(number)

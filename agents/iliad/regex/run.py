@@ -110,7 +110,7 @@ def learn(
     problem = problem_of(grounds, learner.seed, pretraining, note=note)
     student = problem.student
     assert isinstance(student, RegexStudent)
-    keep = lambda path, identity: save_network(path, student.speller, grounds.config, grounds.requests, identity)
+    keep = lambda path, identity: save_network(path, student.network, grounds.config, grounds.requests, identity)
     return train(problem, learner, folder, keep, minutes=minutes, note=note)
 
 

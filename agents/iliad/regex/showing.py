@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import torch
-
-from agents.common.session import descend
+from agents.iliad.showing import learned_from
+from agents.iliad.showing import lines_of as learned_lines
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
     from agents.iliad.protocol import DescribingTeacher
     from agents.iliad.regex.data import WordTask
     from agents.iliad.regex.world import RegexStudent, Written
-
-RATE, CLIP = 1e-3, 5.0
-"""Of the one update that shows what is learned from a description."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +52,7 @@ def tell(
     request = item.requests[0]
     (done,) = student.sample([item], [request], rng=rng) if sample else student.greedy([item], [request])
     (said,) = teacher.describe([item], [done], rng=rng)
-    before = after = None
-    if said:
-        before = _probability(student, item, said, done)
-        learner = copy.copy(student)
-        learner.speller = copy.deepcopy(student.speller).train()
-        optimizer = torch.optim.Adam(learner.speller.parameters(), RATE)
-        descend(-learner.scores([item], [said], [done]).log_probabilities.sum(), optimizer, "shown episode", CLIP)
-        after = _probability(learner, item, said, done)
+    before, after = learned_from(student, item, said, done)
     success = done.outputs is not None and done.outputs[0] == item.outputs[0]
     return Told(request, item.words, item.outputs, done.rule, done.outputs, success, said, before, after)
 
@@ -79,15 +67,4 @@ def lines_of(told: Told) -> list[str]:
         mark = "right" if out == wanted else f"wanted {wanted}"
         found.append(f"{'word' if k == 0 else '':<14}{word:<{width}}-> {out:<{widest}}{mark}")
     found.append(f"fulfilled     {'yes' if told.success else 'no'}")
-    if told.description is None or told.before is None or told.after is None:
-        return [*found, "teacher       (nothing to say)", "learned       nothing"]
-    return [
-        *found,
-        f"teacher       {told.description}",
-        f"learned       p(what it did | what was said) {told.before:.4f} -> {told.after:.4f} by one update",
-    ]
-
-
-def _probability(student: RegexStudent, item: WordTask, said: str, done: Written) -> float:
-    with torch.no_grad():
-        return float(student.scores([item], [said], [done]).log_probabilities.sum().exp())
+    return [*found, *learned_lines(told.description, told.before, told.after)]

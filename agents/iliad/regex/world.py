@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from agents.common.decoding import Choice, greedy_choice, sampled_choice
 from agents.iliad.protocol import ExecutionScores
@@ -74,10 +74,7 @@ class RegexStudent:
     """A policy over the characters of rules; it learns them with the episode's word alone (docs/sources.md, S97)."""
 
     def __init__(self, speller: Speller, requests: Requests) -> None:
-        self.speller, self.requests = speller, requests
-
-    def network(self) -> nn.Module:
-        return self.speller
+        self.network, self.requests = speller, requests
 
     def sample(self, tasks: Sequence[WordTask], requests: Sequence[str], *, rng: np.random.Generator) -> list[Written]:
         return self._write(tasks, requests, sampled_choice(rng.random((len(tasks), LONGEST))))
@@ -97,11 +94,11 @@ class RegexStudent:
         wanted = states if actions is None else characters([e.rule for e in actions])[:, :LONGEST]
         length = min(states.shape[1], wanted.shape[1])
         states, wanted = states[:, :length], wanted[:, :length]
-        logits = self.speller(*self._inputs(tasks, requests), states)
+        logits = self.network(*self._inputs(tasks, requests), states)
         return scores_of(logits, wanted, (states != PAD) & (wanted != PAD))
 
     def _write(self, tasks: Sequence[WordTask], requests: Sequence[str], choose: Choice) -> list[Written]:
-        numbers = self.speller.write(*self._inputs(tasks, requests), choose, LONGEST)
+        numbers = self.network.write(*self._inputs(tasks, requests), choose, LONGEST)
         return [carried_out(rule, task) for rule, task in zip(texts(numbers), tasks, strict=True)]
 
     def _inputs(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> tuple[Tensor, Tensor]:
