@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -165,7 +164,7 @@ def learn_from_stars(
         "agent": torch.optim.Adam(agent.network.parameters(), config.learning_rate),
         "critic": torch.optim.Adam(critic.parameters(), config.critic_rate),
     }
-    identity = stars_identity(config, rater, begun_with)
+    identity = identity_of("agents.bandit.navigation", settings=config, rater=rater, begin=begun_with)
     parts = {"agent": agent.network, "critic": critic, **{f"{k} optimizer": o for k, o in optimizers.items()}}
     agent.network.eval()
     policy = for_training(agent.policy(split.bank), RULES[agent.config.ask_rule][0])
@@ -178,11 +177,6 @@ def learn_from_stars(
             session.history.append({"update": update + 1, **numbers})
     agent.save(Path(folder) / "best.safetensors", identity)
     return session.history[: config.updates]
-
-
-def stars_identity(config: RatingConfig, rater: Rater, begun_with: str) -> dict[str, Any]:
-    """All that a run depends on; `begun_with` as of learn_from_stars."""
-    return identity_of("agents.bandit.navigation", settings=config, rater=rater, begin=begun_with)
 
 
 def _learn_once(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from agents.common.playing import TaskSet
 from agents.common.session import Note, Progress
@@ -81,14 +80,9 @@ def train_execution(
     executor = new_executor(config, words) if begin is None else begun_with(config, load_executor(begin))
     size = sum(p.numel() for p in executor.network.parameters())
     note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(executor.words)} names, {size:,} parameters")
-    identity = execution_identity(data, config, begin)
-    return pretrain(executor, lessons, folder, identity, minutes=minutes, note=note)
-
-
-def execution_identity(data: Dataset, config: ExecutionConfig, begin: Path | None = None) -> dict[str, Any]:
-    """All that an execution policy depends on; `begin` as of train_execution."""
     more = {} if begin is None else {"begin": weights_digest(begin)}
-    return identity_of("agents.hari.run", settings=config, data=data.digest, **more)
+    identity = identity_of("agents.hari.run", settings=config, data=data.digest, **more)
+    return pretrain(executor, lessons, folder, identity, minutes=minutes, note=note)
 
 
 def train_intention(
@@ -109,11 +103,6 @@ def train_intention(
     size = sum(p.numel() for p in actor.parameters())
     note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {size:,} parameters of each head")
     agent, watch = HariAgent(executor, actor, config), on_validation
-    identity = intention_identity(data, executor, config)
-    return train(agent, critic, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
-
-
-def intention_identity(data: Dataset, executor: Executor, config: IntentionConfig) -> dict[str, Any]:
-    """All that an intention policy depends on."""
     begin = checksum_of(executor.network.state_dict(), {})
-    return identity_of("agents.hari.run", settings=config, data=data.digest, begin=begin)
+    identity = identity_of("agents.hari.run", settings=config, data=data.digest, begin=begin)
+    return train(agent, critic, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)

@@ -17,7 +17,7 @@ from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
 from agents.vln.speaker import load_speaker, spoken_tasks
 from agents.vln.training import VlnLearner
-from embodied.identity import Identity, identity_of
+from embodied.identity import identity_of
 from embodied.interface import Task
 from embodied.tasks.vln import vln_task
 
@@ -48,7 +48,8 @@ def train_follower(
     words = build_vocabulary(t.request for t in training.tasks)
     agent = VlnAgent.new(lessons.about(VlnAbout, config, evaluation, words))
     agent.network.to(lessons.device)
-    identity = training_identity(lessons, config, speaker)
+    spoken = {"speaker": weights_digest(speaker)} if speaker and config.spoken_share else {}
+    identity = identity_of("agents.vln.run", settings=config, **lessons.identity(), **spoken)
     return imitation.train(VlnLearner(agent, training), validation, folder, identity, **options)
 
 
@@ -69,9 +70,3 @@ def mixed(training: Split, config: FollowerSettings, speaker: Path | None) -> li
     spoken = spoken_tasks(load_speaker(speaker), training, config.environment_dropout, seed=config.seed)
     times = config.spoken_share / (1 - config.spoken_share) * len(training.tasks) / len(spoken)
     return [*training.tasks, *spoken * int(times), *spoken[: round(times % 1 * len(spoken))]]
-
-
-def training_identity(lessons: Lessons, config: FollowerSettings, speaker: Path | None = None) -> Identity:
-    """All that a trained follower depends on."""
-    about = lessons.identity() | ({"speaker": weights_digest(speaker)} if speaker and config.spoken_share else {})
-    return identity_of("agents.vln.run", settings=config, **about)

@@ -6,6 +6,7 @@ import ctypes.util
 import functools
 import math
 import time
+import timeit
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from assets.cache import atomic_path, write_bytes, write_json
-from assets.closure import code_digest
+from assets.cache import write_bytes, write_json
 from embodied import gl
 from embodied.bench.timing import Report
 from embodied.generate import HouseConfig, generate_house
@@ -74,27 +74,24 @@ def compare(
 ) -> Report:
     """Draw VIEWS rooms of each of HOUSES houses in every way, measure, write `out`/light.jpg and `out`/light.json.
 
-    Every picture is kept in `out`/shots: a run that was stopped goes on where it was, if the code is the same.
-
     Args:
       seed: of the first house; the others have the next ones, each at another time of day.
     """
     shots: list[Shot] = []
     bakes: list[dict[str, Bake]] = []
     kinds: list[str] = []
-    kept = Kept(Path(out) / "shots")
     for k in range(HOUSES):
         hour, weather = TIMES[k % len(TIMES)]
         house = generate_house(seed + k, HouseConfig(area=AREA, hour=hour, weather=weather), catalogue=catalogue)
         progress(
             f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects"
         )
-        for quality in BAKES if kept.empty(seed + k) else ():
+        for quality in BAKES:
             forget(cache, house, catalogue, quality)
         bakes.append({quality: bake(house, catalogue, cache, quality) for quality in BAKES})
         chosen = viewpoints(house, catalogue, VIEWS, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
-        shots += draw(house, catalogue, bakes[-1], chosen, SIZE, RAYS, functools.partial(kept.once, seed + k))
+        shots += draw(house, catalogue, bakes[-1], chosen, SIZE, RAYS)
     facts = measure(shots, bakes)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
@@ -136,13 +133,8 @@ def draw(
     views: Sequence[tuple[str, np.ndarray, float]],
     size: tuple[int, int],
     rays: int,
-    once: Callable[[str, str, Callable[[], Shot]], Shot] = lambda way, room, make: make(),
 ) -> list[Shot]:
-    """Every view in every way; the milliseconds of the renderers are medians of five 256 x 256 cube faces.
-
-    Args:
-      once: from a way, a room and what draws it to the picture, which may be known already.
-    """
+    """Every view in every way; the milliseconds of the renderers are medians of five 256 x 256 cube faces."""
     shots = []
     for way in WAYS:
         if way in DRAWN:
@@ -152,10 +144,10 @@ def draw(
             overlay = gloss_of(best, detail=False) if way == "gloss" else None
             with Renderer(house, catalogue, lit=lit, painter=painter, overlay=overlay) as r:
                 hour = house.sky.hour
-                shots += [once(way, v[0], functools.partial(_drawn, r, way, v, hour, size)) for v in views]
+                shots += [_drawn(r, way, v, hour, size) for v in views]
         else:
             tracer = Tracer(baked[BAKES[-1]], house, quality=way, rays=16 if way == "glossy" else rays)
-            shots += [once(way, v[0], functools.partial(_traced, tracer, way, v, house.sky.hour, size)) for v in views]
+            shots += [_traced(tracer, way, v, house.sky.hour, size) for v in views]
     return shots
 
 
@@ -174,30 +166,6 @@ def _traced(t: Tracer, way: str, view: tuple[str, np.ndarray, float], hour: floa
     used = time.process_time() - used
     plain = t.plain(eye, camera.forward, camera.up, VFOV, size) if way == "diffuse" else None
     return Shot(room, hour, way, rgb, ms, plain, used)
-
-
-class Kept:
-    """Pictures of a run on disk; those of other code are forgotten."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder / code_digest(__name__)
-
-    def empty(self, seed: int) -> bool:
-        """Whether nothing of a house is kept."""
-        return not any(self._folder.glob(f"{seed}_*.npz"))
-
-    def once(self, seed: int, way: str, room: str, make: Callable[[], Shot]) -> Shot:
-        """The picture of a house's room, made where it is not kept."""
-        path = self._folder / f"{seed}_{way}_{room}.npz"
-        if path.is_file():
-            with np.load(path, allow_pickle=False) as z:
-                plain = z["plain"] if len(z["plain"]) else None
-                return Shot(room, float(z["hour"]), way, z["rgb"], float(z["ms"]), plain, float(z["processor"]))
-        shot = make()
-        plain = np.zeros((0, 0), bool) if shot.plain is None else shot.plain
-        with atomic_path(path) as temporary, open(temporary, "wb") as f:
-            np.savez(f, rgb=shot.rgb, plain=plain, hour=shot.hour, ms=shot.ms, processor=shot.processor)
-        return shot
 
 
 def measure(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict:
@@ -328,11 +296,6 @@ def ssim(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float
     return float(np.mean(alike if where is None else alike[where]))
 
 
-def _median_ms(draw_: Callable[[], object], times: int = 5) -> float:
+def _median_ms(draw_: Callable[[], object]) -> float:
     draw_()
-    took = []
-    for _ in range(times):
-        start = time.perf_counter()
-        draw_()
-        took.append(1e3 * (time.perf_counter() - start))
-    return float(np.median(took))
+    return 1e3 * float(np.median(timeit.repeat(draw_, repeat=5, number=1)))

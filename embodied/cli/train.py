@@ -194,35 +194,23 @@ def train_vision(args: TrainVision) -> int:
 def train_hanna(args: TrainHanna) -> int:
     from agents.hanna.run import train_agent
 
-    watch = _recorder(args) if args.rrd else None
-    train_agent(
-        _lessons(args, "hanna"),
-        args.config,
-        args.evaluation,
-        args.out,
-        minutes=args.minutes,
-        begin=args.begin,
-        note=note,
-        on_validation=watch,
-    )
+    lessons = _lessons(args, "hanna")
+    train_agent(lessons, args.config, args.evaluation, args.out, begin=args.begin, **_session(args))
     return 0
 
 
 def train_vnla(args: TrainVnla) -> int:
     from agents.vnla.run import train_agent
 
-    watch = _recorder(args) if args.rrd else None
-    lessons, minutes = _lessons(args, "vnla"), args.minutes
-    train_agent(lessons, args.config, args.evaluation, args.out, minutes=minutes, note=note, on_validation=watch)
+    train_agent(_lessons(args, "vnla"), args.config, args.evaluation, args.out, **_session(args))
     return 0
 
 
 def train_follower(args: TrainFollower) -> int:
     from agents.vln.run import train_follower
 
-    watch = _recorder(args) if args.rrd else None
-    how: dict[str, Any] = {"speaker": args.speaker, "minutes": args.minutes, "note": note, "on_validation": watch}
-    train_follower(_lessons(args, "vln"), args.config, args.evaluation, args.out, **how)
+    lessons = _lessons(args, "vln")
+    train_follower(lessons, args.config, args.evaluation, args.out, speaker=args.speaker, **_session(args))
     return 0
 
 
@@ -268,8 +256,7 @@ def train_intention(args: TrainIntention) -> int:
     use_threads(args.threads)
     data = dataset_of(args.data, "hari")
     walking = load_executor(args.execution)
-    watch = _recorder(args, sees=False) if args.rrd else None
-    train_intention(data, walking, args.config, args.out, minutes=args.minutes, note=note, on_validation=watch)
+    train_intention(data, walking, args.config, args.out, **_session(args, sees=False))
     return 0
 
 
@@ -301,8 +288,14 @@ def train_nav(args: TrainNav) -> int:
     return 0
 
 
+def _session(args: TrainHanna | TrainVnla | TrainFollower | TrainIntention, *, sees: bool = True) -> dict[str, Any]:
+    """How long it trains now, and who is told."""
+    watch = _recorder(args, sees=sees) if args.rrd else None
+    return {"minutes": args.minutes, "note": note, "on_validation": watch}
+
+
 def _recorder(
-    args: TrainHanna | TrainVnla | TrainFollower | TrainIntention, *, sees: bool = True
+    args: TrainHanna | TrainVnla | TrainFollower | TrainIntention, *, sees: bool
 ) -> Callable[[int, Sequence[Episode]], None]:
     """Writes the first validation episodes of each validation as Rerun recordings, with what it saw if it sees."""
     from agents.vision.drawn import drawn_world, pictures_of
