@@ -13,7 +13,7 @@ from agents.ask.config import AskerConfig, AskEvaluation
 from agents.ask.foresight import Foresight
 from agents.ask.learned import Decisions, LearnedAsker, load_asker, save_asker, shown, train
 from agents.common.session import Note
-from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
+from agents.studies.engine import Figure, Measured, StudyLearner, StudyRow, StudyTable
 from assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
@@ -80,8 +80,8 @@ def _curves() -> tuple[StudyRow, ...]:
 
 
 @dataclass(frozen=True)
-class AskStudy:
-    """Who asks when, and what it is worth; a StudyLearner of agents.studies.engine."""
+class AskStudy(StudyLearner):
+    """Who asks when, and what it is worth."""
 
     cache: Path
     config: AskerConfig
@@ -114,13 +114,6 @@ class AskStudy:
                 "Ask-v0: success against price", (*_curves(), *model), ("success", "price"), SPLITS[:1], figure=figure
             ),
         }
-
-    def seeds(self, row: StudyRow) -> Sequence[int]:
-        return self.repeats if row.train is not None else self.repeats[:1]
-
-    def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None: ...
-
-    def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None: ...
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
         return identity_of("agents.ask.learned", settings=dataclasses.replace(self.config, seed=seed))

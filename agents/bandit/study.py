@@ -20,7 +20,7 @@ from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import NumberedCorpus, bandit, material, pretrain, teach_critic
 from agents.common.checkpoint import read_checkpoint
 from agents.common.session import Note
-from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
+from agents.studies.engine import Figure, Measured, StudyLearner, StudyRow, StudyTable
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 
@@ -107,8 +107,8 @@ TABLES: Mapping[str, StudyTable] = {
 
 
 @dataclass(frozen=True)
-class BanditStudy:
-    """Table 3.2, Figures 3.4 and 3.5; a StudyLearner of agents.studies.engine."""
+class BanditStudy(StudyLearner):
+    """Table 3.2, Figures 3.4 and 3.5."""
 
     data: Path
     """Corpus."""
@@ -128,9 +128,6 @@ class BanditStudy:
         people = _gain("as people rate", "a2c", rater=dataclasses.asdict(self.rater))
         title = f"Gain by NED-A2C from ratings like people's: {self.rater}"
         return {**TABLES, "people": StudyTable(title, (_gain("clean", "a2c"), people), (SENTENCE, HELD_OUT))}
-
-    def seeds(self, row: StudyRow) -> Sequence[int]:
-        return self.repeats
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """A corpus that cannot be read is refused."""

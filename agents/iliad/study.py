@@ -21,7 +21,7 @@ from agents.iliad.regex import run as regex
 from agents.iliad.regex.config import RegexConfig
 from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
-from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
+from agents.studies.engine import Figure, Measured, StudyLearner, StudyRow, StudyTable
 from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
@@ -176,8 +176,8 @@ class NavStudyWorld:
 
 
 @dataclass(frozen=True)
-class IliadStudy:
-    """Tables 3.4, 3.5 and C.1 and Figure 3.7; a StudyLearner of agents.studies.engine."""
+class IliadStudy(StudyLearner):
+    """Tables 3.4, 3.5 and C.1 and Figure 3.7."""
 
     world: StudyWorld
     config: LearnerConfig
@@ -196,9 +196,6 @@ class IliadStudy:
             return TABLES
         both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
         return {name: both(table) for name, table in TABLES.items()}
-
-    def seeds(self, row: StudyRow) -> Sequence[int]:
-        return self.repeats
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data and teachers."""

@@ -16,7 +16,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import joblib
 
@@ -94,24 +94,28 @@ class StudyTable:
     """Names of what is counted over all splits together."""
 
 
-class StudyLearner(Protocol):
-    """What the engine needs of a learner; small, so that it can be sent to other processes."""
+class StudyLearner:
+    """What the engine needs of a learner, whose studies are frozen records of it; small, so that it can be sent to
+    other processes. What has no body here every learner says."""
+
+    repeats: tuple[int, ...]
+    """Training seeds."""
+    threads: int
+    """Of PyTorch, per run."""
+    judges: ClassVar[tuple[str, ...]]
+    """Modules that decide how it is judged."""
 
     @property
-    def name(self) -> str: ...
-    @property
-    def threads(self) -> int:
-        """Of PyTorch, per run."""
-
-    @property
-    def judges(self) -> tuple[str, ...]:
-        """Modules that decide how it is judged."""
+    def name(self) -> str:
+        raise NotImplementedError
 
     def tables(self) -> Mapping[str, StudyTable]:
         """The tables by name, with the rows and splits that the data at hand allow."""
+        raise NotImplementedError
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         """Training seeds of a row; one for a row that does not learn."""
+        return self.repeats if row.train is not None else self.repeats[:1]
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Make what all runs share; refuse what cannot be run before anything is trained."""
@@ -121,18 +125,23 @@ class StudyLearner(Protocol):
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
         """All that a trained run depends on; `folder` is the study's, for what `prepare` made."""
+        raise NotImplementedError
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         """Train a run in `home`, or go on, and return its weights."""
+        raise NotImplementedError
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         """All that a judgement depends on besides the weights."""
+        raise NotImplementedError
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         """What is counted of a run; `seed` is that of its training, `keep` names files of its own, without a suffix."""
+        raise NotImplementedError
 
     def about(self) -> str:
         """What all rows have in common, in sentences."""
+        raise NotImplementedError
 
 
 def run_study(

@@ -9,8 +9,7 @@ from typing import Any, ClassVar
 
 import torch
 
-from agents.common.session import Note
-from agents.studies.engine import Measured, StudyRow, StudyTable
+from agents.studies.engine import Measured, StudyLearner, StudyRow
 from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import evaluate, spread
 from embodied.evaluation.rollout import play
@@ -26,24 +25,18 @@ evaluate_frozen = torch.inference_mode()(evaluate)
 
 
 @dataclass(frozen=True)
-class EpisodeStudy:
-    """A study whose agents play episodes. A learner says `settings`, `train`, `load`, `policies` and its tables.
-
-    It is a StudyLearner of agents.studies.engine.
-    """
+class EpisodeStudy(StudyLearner):
+    """A study whose agents play episodes. A learner says `settings`, `train`, `load`, `policies` and its tables."""
 
     data: Path
     """Data set."""
     repeats: tuple[int, ...]
-    """Training seeds."""
     tasks: int | None = None
     """Judge on at most so many tasks of a split, from all houses alike."""
     judging: tuple[int, ...] = (0,)
     """Seeds of what is drawn in judging; the same tasks are judged with each."""
     threads: int = 1
-    """Of PyTorch, per run."""
 
-    name = ""
     makers: ClassVar[tuple[str, ...]] = ()
     """Modules that decide what is trained."""
     judges: ClassVar[tuple[str, ...]] = JUDGES
@@ -52,15 +45,8 @@ class EpisodeStudy:
 
     # What a learner says ------------------------------------------------------------------------
 
-    def tables(self) -> Mapping[str, StudyTable]:
-        raise NotImplementedError
-
     def settings(self, train: Mapping[str, Any], seed: int) -> object:
         """The settings, a record, with what differs in a row."""
-        raise NotImplementedError
-
-    def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        """As in engine.StudyLearner."""
         raise NotImplementedError
 
     def load(self, weights: Path) -> Any:
@@ -89,16 +75,7 @@ class EpisodeStudy:
         """What is counted of some episodes."""
         return measured(episodes, {name: place.graph for name, place in split.worlds.items()})
 
-    def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
-        """As in engine.StudyLearner."""
-
-    def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
-        """As in engine.StudyLearner."""
-
     # What the engine asks -----------------------------------------------------------------------
-
-    def seeds(self, row: StudyRow) -> Sequence[int]:
-        return self.repeats if row.train is not None else self.repeats[:1]
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
         return identity_of(*self.makers, settings=self.settings(train, seed), **self.depends(train))

@@ -21,7 +21,7 @@ from typing import Any
 
 from agents.common.session import Note
 from agents.common.weights import weights_digest
-from agents.studies.engine import Measured, StudyRow, StudyTable
+from agents.studies.engine import Measured, StudyLearner, StudyRow, StudyTable
 from agents.vision.config import RENDER_PRESETS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder
@@ -50,8 +50,8 @@ STRIPS = 8
 
 
 @dataclass(frozen=True)
-class EncoderStudy:
-    """Encoders of several kinds; a StudyLearner of agents.studies.engine, whose splits are ways of drawing."""
+class EncoderStudy(StudyLearner):
+    """Encoders of several kinds, whose splits are ways of drawing."""
 
     source: StripSource
     config: VisionConfig
@@ -92,9 +92,6 @@ class EncoderStudy:
         for way in ("", *splits):
             houses = houses_of(data, (self.split,)) + (training_houses(data, self.config) if not way else [])
             self._source(way).strips(houses, workers=self.workers, note=note)
-
-    def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
-        """Nothing is shared by a seed."""
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         if READY in train:

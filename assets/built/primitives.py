@@ -150,44 +150,20 @@ def flat(polygon: shapely.Geometry, z: float = 0.0, up: bool = True) -> Shape:
     return Shape(vertices, inverse.reshape(-1, 3), normals, points.copy())
 
 
-def extruded(polygon: shapely.Polygon, z0: float, z1: float, bevel: float = 0.0) -> Shape:
-    """A prism over `polygon` from z0 to z1; `bevel` chamfers the upper edge."""
+def extruded(polygon: shapely.Polygon, z0: float, z1: float) -> Shape:
+    """A prism over `polygon` from z0 to z1."""
     polygon = shapely.geometry.polygon.orient(polygon)
     rings = [polygon.exterior, *polygon.interiors]
-    top = polygon.buffer(-bevel, join_style="mitre") if bevel else polygon
-    if len(shapely.get_coordinates(top)) != len(shapely.get_coordinates(polygon)):
-        top, bevel = polygon, 0.0  # too fine an outline to inset corner by corner
-    shapes = [flat(polygon, z0, up=False), flat(top, z1)]
-    for ring in rings:
-        p = np.asarray(ring.coords)[:-1]
-        shapes.append(wall_band(p, z0, z1 - bevel))
-    if bevel:
-        # The chamfer: a flat ring between outline and inset, split along matching corners.
-        for ring, inner in zip(rings, [top.exterior, *top.interiors]):
-            p, q = (
-                np.asarray(ring.coords)[:-1],
-                np.asarray(
-                    shapely.geometry.polygon.orient(
-                        shapely.Polygon(inner), 1 if ring is rings[0] else -1
-                    ).exterior.coords
-                )[:-1],
-            )
-            q = np.roll(q, -int(np.argmin(np.linalg.norm(q - p[0], axis=1))), axis=0)
-            shapes.append(_band_between(p, z1 - bevel, q, z1))
-    return joined(*shapes)
+    walls = [wall_band(np.asarray(ring.coords)[:-1], z0, z1) for ring in rings]
+    return joined(flat(polygon, z0, up=False), flat(polygon, z1), *walls)
 
 
 def wall_band(ring: np.ndarray, z0: float, z1: float) -> Shape:
     """Vertical band under a closed ring (k, 2), facing outward for a counter-clockwise ring."""
-    return _band_between(ring, z0, ring, z1)
-
-
-def _band_between(low: np.ndarray, z0: float, high: np.ndarray, z1: float) -> Shape:
-    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.roll(low, -1, 0) - low, axis=1))])
-    a = np.column_stack([low, np.full(len(low), z0)])
-    b = np.column_stack([high, np.full(len(high), z1)])
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1))])
+    a, b = (np.column_stack([ring, np.full(len(ring), z)]) for z in (z0, z1))
     corners = np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], axis=1)
-    uv = np.empty((len(low), 4, 2))
+    uv = np.empty((len(ring), 4, 2))
     uv[:, [0, 3], 0], uv[:, [1, 2], 0] = along[:-1, None], along[1:, None]
     uv[:, :2, 1], uv[:, 2:, 1] = z0, z1
     return quads(corners, uv)

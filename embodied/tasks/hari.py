@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 from embodied.interface import Language, Place, Task
@@ -21,18 +20,10 @@ class HariConfig:
     reach: float = 2.5
 
 
-def hari_pool(
-    world: Place, *, seed: int, config: HariConfig = HariConfig(), objects: Collection[str] | None = None
-) -> Pool:
-    """One request per object instance: the node nearest to it is what the human has in mind.
-
-    Args:
-      objects: object classes to ask for; None for all (the unseen-object condition holds some out).
-    """
+def hari_pool(world: Place, *, seed: int, config: HariConfig = HariConfig()) -> Pool:
+    """One request per object instance: the node nearest to it is what the human has in mind."""
     classes = tuple(
-        GoalClass(x.object_class, x.room_kind, (x.placement,), x.nodes[:1])
-        for x in find_instances(world, config.reach)
-        if objects is None or x.object_class in objects
+        GoalClass(x.object_class, x.room_kind, (x.placement,), x.nodes[:1]) for x in find_instances(world, config.reach)
     )
     return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="hari")
 

@@ -275,13 +275,7 @@ def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thi
 
 
 def wall_poses(
-    space: RoomSpace,
-    width: float,
-    *,
-    score: Callable[[Wall, float], float],
-    gap: float = WALL_GAP,
-    step: float = 0.25,
-    walls: Sequence[Wall] | None = None,
+    space: RoomSpace, width: float, *, score: Callable[[Wall, float], float], gap: float = WALL_GAP, step: float = 0.25
 ) -> list[ScoredPose]:
     """Poses of a group `width` wide with its back to a wall, clear of doors.
 
@@ -289,7 +283,7 @@ def wall_poses(
     its windows, and every `step` metres.
     """
     poses: list[ScoredPose] = []
-    for wall in space.walls if walls is None else walls:
+    for wall in space.walls:
         half = width / 2 + 0.01
         doors = [(s0 - 0.1, s1 + 0.1) for s0, s1, o in wall.openings if o.kind != "window"]
         if wall.length < 2 * half:
