@@ -107,30 +107,10 @@ class WarpRenderer:
         with wp.ScopedDevice(self.device):
             self._model = mjw.put_model(model)
             self._data = mjw.put_data(model, data, nworld=worlds)
-            context = mjw.create_render_context(
-                model,
-                worlds,
-                cam_res=(width, height),
-                render_rgb=True,
-                render_depth=True,
-                render_seg=True,
-                use_textures=False,  # it would upload them as floats
-                use_ambient_lighting=False,
-                enabled_geom_groups=[VISUAL],
-                enable_vertex_normals=False,
-                enable_specular=False,
-            )
-            context.use_textures, context.textures_registry = True, [_texture(model, t) for t in range(model.ntex)]
-            context.textures = wp.array(context.textures_registry, dtype=wp.Texture2D)
-            context.znear, context.zfar = NEAR, FAR
-            yes, no = (wp.array([x], dtype=bool) for x in (True, False))
-            self._context = context
+            self._context = context = _context(model, worlds, size)
             self._passes = {
                 (rgb, rest): dataclasses.replace(
-                    context,
-                    render_rgb=yes if rgb else no,
-                    render_depth=yes if rest else no,
-                    render_seg=yes if rest else no,
+                    context, render_rgb=_flag(rgb), render_depth=_flag(rest), render_seg=_flag(rest)
                 )
                 for rgb, rest in ((True, True), (True, False), (False, True))
             }
@@ -262,6 +242,31 @@ def card() -> str | None:
     """Name of the GPU that is used by default; None where there is none."""
     device = device_of(None)
     return str(device.name) if device.is_cuda else None
+
+
+def _context(model: mujoco.MjModel, worlds: int, size: tuple[int, int]) -> Any:
+    """What MuJoCo Warp draws colour, depth and ids of every world with."""
+    context = mjw.create_render_context(
+        model,
+        worlds,
+        cam_res=size[::-1],
+        render_rgb=True,
+        render_depth=True,
+        render_seg=True,
+        use_textures=False,  # it would upload them as floats
+        use_ambient_lighting=False,
+        enabled_geom_groups=[VISUAL],
+        enable_vertex_normals=False,
+        enable_specular=False,
+    )
+    context.use_textures, context.textures_registry = True, [_texture(model, t) for t in range(model.ntex)]
+    context.textures = wp.array(context.textures_registry, dtype=wp.Texture2D)
+    context.znear, context.zfar = NEAR, FAR
+    return context
+
+
+def _flag(on: bool) -> Any:
+    return wp.array([on], dtype=bool)
 
 
 def _compiled(
