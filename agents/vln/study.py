@@ -21,6 +21,7 @@ from agents.vln.speaker import load_speaker, reranked, speaker_identity, train_s
 from agents.vln.unheard import unheard
 from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import spread
+from embodied.identity import key_of
 from embodied.records import save_lines
 
 COLUMNS = ("success", "spl", "nDTW", "SDTW", "navigation error")
@@ -90,7 +91,7 @@ class VlnStudy(SightedStudy):
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         spoken = train.get("spoken_share", self.config.spoken_share)
-        return {**super().depends(train), **({"speaker": self._speaker()} if spoken else {})}
+        return {**super().depends(train), **({"speaker": key_of(self._speaker())} if spoken else {})}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """The speaker, if a row wants it."""
