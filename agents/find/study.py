@@ -50,7 +50,7 @@ class FindStudy(SightedStudy):
     judged_tasks: int = 50
     """Tasks of each house that agents are judged on."""
 
-    name, agent_kind, all_tables = "find", Finder
+    name, agent_kind = "find", Finder
     makers = ("agents.find.run",)
     judges = (*JUDGES, "agents.find.run")
 

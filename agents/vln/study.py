@@ -21,7 +21,7 @@ from agents.vln.speaker import load_speaker, reranked, speaker_identity, train_s
 from agents.vln.unheard import unheard
 from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import spread
-from embodied.identity import key_of
+from embodied.identity import Identity, key_of
 from embodied.records import save_lines
 
 COLUMNS = ("success", "spl", "nDTW", "SDTW", "navigation error")
@@ -108,7 +108,7 @@ class VlnStudy(SightedStudy):
         if not judge.get("unheard"):
             return whole
         assert agent is not None, "rows with unheard words learn"
-        return dataclasses.replace(whole, tasks=[unheard(t, agent.about.words) for t in whole.tasks])
+        return dataclasses.replace(whole, tasks=tuple(unheard(t, agent.about.words) for t in whole.tasks))
 
     @torch.inference_mode()
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
@@ -127,7 +127,7 @@ class VlnStudy(SightedStudy):
         about = super().judged(row, split)
         return {**about, "speaker": self._speaker()} if row.judge["played"] == RERANKED else about
 
-    def _speaker(self) -> object:
+    def _speaker(self) -> Identity:
         return speaker_identity(self.lessons(), self.speaker)
 
 
