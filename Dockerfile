@@ -1,6 +1,7 @@
 # docker build -t embodied .                                   houses, light, pictures, agents on the processor
 # docker build -t embodied --build-arg BASE=nvidia/cuda:12.6.3-runtime-ubuntu24.04 .        the same on an NVIDIA GPU
 # docker run --rm -v "$PWD/out:/out" embodied demo --small --out /out
+# Run in a Debian 12 root, step by step. Not run yet: on the CUDA base.
 ARG BASE=debian:bookworm-slim
 FROM ${BASE}
 ENV DEBIAN_FRONTEND=noninteractive NVIDIA_DRIVER_CAPABILITIES=all EMBODIED_CACHE=/cache PATH=/venv/bin:$PATH
