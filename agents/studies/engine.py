@@ -369,7 +369,7 @@ def result(
             codes = {k: identity.get(k) for k in (MAKERS, CODE)}
         shown.append({"label": row.label, "values": values, "printed": printed.get("rows", {}).get(row.label, {})})
     notes = [*(f"Not run: {', '.join(missing)}." for _ in missing[:1]), *_comparisons(learner, table, out, rows)]
-    if seconds:
+    if sum(seconds.values()) > 0:  # learners of seconds count none
         notes.append(f"Processor time of training: {sum(seconds.values()) / 3600:.2f} hours.")
     identity = {"judged": identity_of(*learner.judges), "trained": codes or identity_of(*learner.judges), "runs": runs}
     identity |= {"settings": learner.about()}
