@@ -67,6 +67,8 @@ def cell(row: dict, key: str, digits: int, most: int) -> str:
     value = row["values"].get(key)
     if value is None:
         return ""
+    if value.get("mean") is None and "text" not in value:  # nothing to divide by
+        return "–"
     digits = min(max(digits, decimals(value)), most)
     text = value["text"] if "text" in value else number(value["mean"], digits)
     if value.get("half_width") is not None:
