@@ -73,6 +73,7 @@ class Presser:
         with torch.no_grad():
             self.table.weight.copy_(torch.from_numpy(stream(seed, "presser").normal(size=(5, 4))) * 0.1)
 
+    @property
     def network(self) -> nn.Module:
         return self.table
 

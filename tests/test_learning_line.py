@@ -182,7 +182,8 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     assert value["n"] == 6 and body["rows"][1]["printed"]["success_test_unseen"] == 45.43, "three tasks by two seeds"
     assert "success_test_ood" in body["rows"][0]["values"] and body["paper"] == "the dissertation, Table 4.4"
     assert any(
-        note.startswith("+ language instruction less Target image only, success, test_unseen") for note in body["notes"]
+        note.startswith("+ language instruction minus Target image only, success, test unseen")
+        for note in body["notes"]
     )
     assert "(45.43)" in (out / "hanna-4.4.md").read_text()
     assert "success_test_unseen_as_shipped" in body["rows"][0]["values"]

@@ -17,7 +17,7 @@ from hand_serve import HEAD, TOGETHER, make_data, write_study
 from agents.bandit.ratings import Rater, fitted
 from agents.common.weights import load_weights
 from agents.iliad.nav.stages import NavAbout
-from agents.vnla.agent import load_agent as load_vnla
+from agents.vnla.agent import VnlaAgent
 from agents.vnla.run import vocabulary_of
 from embodied.cli import main as start
 from embodied.envs.base import ActionError
@@ -519,7 +519,7 @@ def test_iliad_and_vnla_train_on_what_people_said(tmp_path, shared_cache, kind):
     if kind == "vnla":
         small = ["--hidden-size=16", "--batch=4", "--validate-every=2", "--validation-tasks=4"]
         assert start(["train", "vnla", *learn, *small]) == 0
-        words = load_vnla(tmp_path / "out" / "best.safetensors").vocabulary.words
+        words = VnlaAgent.load(tmp_path / "out" / "best.safetensors").vocabulary.words
     else:
         small = ["--hidden-size=16", "--heads=2", "--candidates=2", "--executor-iterations=2"]
         small += [

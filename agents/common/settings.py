@@ -104,7 +104,7 @@ class ImitationSettings(ValidatedRunSettings):
     instruction_length: int = 50
     """Longest instruction, words."""
     word_vectors: str = LEARNED_WORDS
-    """What is known of words: 'learned' alone, or 'minilm', pre-trained vectors besides (docs/sources.md, S180)."""
+    """What is known of words: 'learned' alone, or 'minilm', pre-trained vectors besides (docs/sources.md, S181)."""
     validation_tasks: int = 200
     """Tasks of each validation."""
 
