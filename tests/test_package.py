@@ -134,3 +134,21 @@ def test_the_wheel_is_named_after_the_distribution(wheel):
 def test_the_citation_names_the_version_that_is_packed():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+SLIM = """
+import sys
+
+for name in ("torch", "matplotlib", "rerun", "av", "pyarrow", "trimesh", "safetensors", "sacrebleu", "networkx"):
+    sys.modules[name] = None  # importing it fails, as where it is not installed
+import embodied.cli.demo, embodied.cli.house, embodied.gym.continuous, embodied.gym.env, embodied.world
+from embodied.house.floor_plan import paint_plan
+from conftest import two_rooms
+
+assert paint_plan(two_rooms()).width > 100
+"""
+
+
+def test_a_small_installation_has_environments_and_floor_plans():
+    run = subprocess.run([sys.executable, "-c", SLIM], cwd=ROOT / "tests", capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr[-500:]

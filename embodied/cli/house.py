@@ -6,11 +6,10 @@ connectivity.json (the navigation graph in Matterport's format) and plan.png.
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from typing import Annotated
 
-from embodied.cli.common import Furnished, Printed, Stages, catalogue_of, fetch, note, show
+from embodied.cli.common import Furnished, Printed, Stages, catalogue_of, fetch, show
 from embodied.cli.options import InputPath, OutputFolder, Settings
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
@@ -45,6 +44,7 @@ class Options(Furnished, Printed):
 
 
 def run(args: Options) -> int:
+    from embodied.house.floor_plan import save_plan
     from embodied.navigation.graph import build_graph, to_matterport
     from embodied.scene.export import export_mjcf
 
@@ -63,10 +63,7 @@ def run(args: Options) -> int:
         args.out.mkdir(parents=True, exist_ok=True)
         house.save(args.out / "house.json")
         to_matterport(graph, house, args.out / "connectivity.json")
-        if drew_plan := importlib.util.find_spec("matplotlib") is not None:
-            from embodied.house.floor_plan import save_plan
-
-            save_plan(house, args.out / "plan.png", graph=graph)
+        save_plan(house, args.out / "plan.png", graph=graph)
         stages.next()
         if args.glb or not args.no_mjcf:
             fetch(catalogue, house)
@@ -76,8 +73,6 @@ def run(args: Options) -> int:
         stages.next()
         if args.glb:
             export_glb(house, catalogue, args.out / "house.glb")
-    if not drew_plan:
-        note("plan.png is left out, because Matplotlib is not installed: pip install 'embodied-houses[viz]'")
     facts = {
         "seed": args.seed,
         "digest": house.digest,

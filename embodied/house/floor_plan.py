@@ -5,14 +5,15 @@ paint_plan(house).save("plan.png")
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 import io
 import itertools
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Protocol, TypedDict, Unpack
+from typing import Protocol, TypedDict, Unpack, cast
 
-import matplotlib as mpl
 import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFont
@@ -137,9 +138,26 @@ def save_plan(house: House, file: Path, **options: Unpack[PlanOptions]) -> None:
     write_bytes(Path(file), data.getvalue())
 
 
+@functools.cache
+def _dejavu() -> Path | None:
+    """DejaVu Sans as Matplotlib ships it, found without importing Matplotlib."""
+    spec = importlib.util.find_spec("matplotlib")
+    if spec is None or spec.origin is None:
+        return None
+    return Path(spec.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
+
+
 def font(size: float) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans as Matplotlib ships it, so that pictures agree between machines."""
-    return ImageFont.truetype(str(Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), max(6.0, size))
+    """DejaVu Sans, so that pictures agree between machines; without Matplotlib the font of Pillow."""
+    path = _dejavu()
+    if path is None:
+        return cast(ImageFont.FreeTypeFont, ImageFont.load_default(max(6.0, size)))
+    return ImageFont.truetype(str(path), max(6.0, size))
+
+
+def _square_metres(area: str) -> str:
+    """Pillow's own font has no superscript."""
+    return f"{area} m2" if _dejavu() is None else f"{area} m²"
 
 
 class _Sheet:
@@ -396,7 +414,7 @@ def _draw_graph(sheet: _Sheet, graph: Graph, path: tuple[int, ...]) -> None:
 def _label(sheet: _Sheet, house: House, room: Room) -> None:
     """Name and area in the room's freest spot, on a pale plate where furniture lies below."""
     inside = house.floor(room)
-    name, area = room.kind.replace("_", " "), f"{inside.area:.1f} m²"
+    name, area = room.kind.replace("_", " "), _square_metres(f"{inside.area:.1f}")
     x0, y0, x1, y1 = inside.bounds
     centre = _calm_spot(house, room, inside)
     size = float(np.clip(0.24 * sheet.scale, 9, 20))
@@ -482,7 +500,7 @@ def _legend(sheet: _Sheet, house: House, titles: bool) -> None:
     sheet.draw.text(tuple(c + 1.35 * r * d), "N", font=small, fill=INK, anchor="mm")
     if titles:
         floor = sum(house.floor(r).area for r in house.rooms)
-        text = f"{house.name}  ·  {floor:.0f} m² floor  ·  seed {house.seed}"
+        text = f"{house.name}  ·  {_square_metres(f'{floor:.0f}')} floor  ·  seed {house.seed}"
         while sheet.draw.textlength(text, font=face) > width - 1.0 * s and face.size > 7:
             face = font(face.size - 1)
         sheet.draw.text((0.6 * s, 0.25 * s), text, font=face, fill=INK)
