@@ -11,7 +11,7 @@ from torch import nn
 
 from agents.common import word_vectors
 from agents.common.vocabulary import build_vocabulary
-from agents.common.word_vectors import Lexicon, WordEmbedding, found_on, vocabulary_with
+from agents.common.word_vectors import Lexicon, WordEmbedding, use_vectors, vocabulary_with
 from agents.hanna.attention import TextEncoder
 from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
@@ -37,7 +37,7 @@ def by_hand(monkeypatch):
 def embedding(words=WORDS) -> tuple[WordEmbedding, Lexicon]:
     torch.manual_seed(0)
     part, lexicon = WordEmbedding(len(words), 6), Lexicon(words)
-    found_on(nn.Sequential(part), lexicon)
+    use_vectors(nn.Sequential(part), lexicon)
     return part.eval(), lexicon
 
 
@@ -95,7 +95,7 @@ def test_a_trained_agent_is_stored_with_its_vectors_and_hears_new_words_again(tm
 
 def test_hannas_and_navs_text_encoder_reads_new_words():
     reader, lexicon = TextEncoder(len(WORDS), 8, 2, 0.0), Lexicon(WORDS)
-    found_on(reader, lexicon)
+    use_vectors(reader, lexicon)
     tread, nothing = (torch.from_numpy(lexicon.encode(t, 3))[None] for t in ("tread", "%"))
     assert torch.isfinite(reader(tread)).all() and not torch.allclose(reader(tread)[0, 0], reader(nothing)[0, 0])
 

@@ -13,7 +13,7 @@ from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import half_precision, load_weights, save_weights
-from agents.common.word_vectors import found_on, vocabulary_with
+from agents.common.word_vectors import use_vectors, vocabulary_with
 from embodied.identity import Identity
 
 
@@ -67,7 +67,7 @@ class SightedAgent:
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(about.config.seed)
             network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors)
-            found_on(network, vocabulary)
+            use_vectors(network, vocabulary)
             return cls(about, network, vocabulary)
 
     def save(self, path: Path, identity: Identity | None = None) -> None:

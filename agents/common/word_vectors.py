@@ -86,14 +86,14 @@ def vocabulary_with(words: tuple[str, ...], vectors: str) -> Vocabulary:
 
 
 class WordEmbedding(nn.Embedding):
-    """Word numbers (...) to (..., h): learned alone; or, after `found_on`, the sum of what is learned of a word and a
+    """Word numbers (...) to (..., h): learned alone; or, with `use_vectors`, the sum of what is learned of a word and a
     linear map of its pre-trained vector. Of a word never heard it is that map alone."""
 
     def __init__(self, words: int, width: int) -> None:
         super().__init__(words, width, padding_idx=0)
         self.lexicon: Lexicon | None = None
 
-    def found_on(self, lexicon: Lexicon) -> None:
+    def use_vectors(self, lexicon: Lexicon) -> None:
         """Use the vectors of `lexicon`; before training, and before weights are loaded."""
         self.lexicon, self.meaning = lexicon, nn.Linear(len(lexicon.mean), self.embedding_dim, bias=False)
         nn.init.normal_(self.meaning.weight, std=float(self.weight.detach().std()))
@@ -110,9 +110,9 @@ class WordEmbedding(nn.Embedding):
         return own + self.meaning(nn.functional.dropout(rows[numbers], VECTOR_DROPOUT, self.training))
 
 
-def found_on(network: nn.Module, vocabulary: Vocabulary) -> None:
+def use_vectors(network: nn.Module, vocabulary: Vocabulary) -> None:
     """Let all word embeddings of a network use the pre-trained vectors of its vocabulary, if that has any."""
     if isinstance(vocabulary, Lexicon):
         for part in network.modules():
             if isinstance(part, WordEmbedding):
-                part.found_on(vocabulary)
+                part.use_vectors(vocabulary)

@@ -14,7 +14,7 @@ from agents.common.decoding import greedy_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
 from agents.common.weights import load_weights, save_weights
-from agents.common.word_vectors import found_on, vocabulary_with
+from agents.common.word_vectors import use_vectors, vocabulary_with
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
 from agents.iliad.nav.network import Follower, WalkDescriber
@@ -49,7 +49,7 @@ def new_walker(kind: Callable[..., Network], config: NavConfig, eyes: NavEyes, s
         torch.manual_seed(int(stream(seed, "nav", "begin", name).integers(2**31)))
         words, features = len(eyes.vocabulary), eyes.bank.size
         walker = kind(words, config.hidden_size, config.heads, features, eyes.action_size, HORIZON)
-        found_on(walker, eyes.vocabulary)
+        use_vectors(walker, eyes.vocabulary)
         return walker
 
 
