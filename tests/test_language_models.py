@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import dataclasses
 import io
+import itertools
 import json
+import socketserver
 import sqlite3
+import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +167,25 @@ def test_a_server_that_drips_is_given_up(answers):
     slow = ChatServer(lambda r: said('{"word": "yes"}'), delay=0.6)
     with slow as server, pytest.raises(UnableError, match="after 2 tries"):
         client_of(server, answers, timeout=0.2, tries=2).ask(ASKED, ONE)
+
+
+def test_headers_without_an_end_are_a_broken_answer(answers):
+    class Drips(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            self.request.recv(100_000)
+            with contextlib.suppress(OSError):
+                for letter in itertools.chain(b"HTTP/1.1 200 OK\r\nX: ", itertools.repeat(97)):
+                    self.request.sendall(bytes([letter]))
+                    time.sleep(0.02)
+
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Drips) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        url = f"http://127.0.0.1:{server.server_address[1]}/v1"
+        with contextlib.closing(AnswerCache(answers)) as kept:
+            answer = Client(ServerSettings("m", url, timeout=0.3), kept).ask(ASKED, ONE)
+        server.shutdown()
+    assert answer.value is None and "too slow" in answer.problem
 
 
 @pytest.mark.parametrize("form", ["schema", "object", "tools", "text"])

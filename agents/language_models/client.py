@@ -9,10 +9,11 @@ from __future__ import annotations
 import functools
 import json
 import os
+import queue
 import random
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -179,8 +180,7 @@ class Client:
                 pause = min(max(s.wait * 2 ** (attempt - 1), told), 30.0)
                 time.sleep(pause * random.uniform(0.75, 1.25))  # so that clients do not come back together
             try:
-                with self._connection().chat.completions.with_streaming_response.create(**request) as response:
-                    body = _body(response.iter_bytes(), time.monotonic() + s.timeout)
+                body = _within(2 * s.timeout, lambda: self._received(request))
             except openai.APIStatusError as e:
                 problem = self._hidden(f"status {e.status_code}: {e}")
                 if e.status_code not in AGAIN:
@@ -196,6 +196,10 @@ class Client:
             f"no answer from {s.base_url} after {s.tries} tries ({problem}); start the server and run the same command "
             f"again: {len(self.cache)} answers are kept in {self.cache.path}, it goes on from there"
         )
+
+    def _received(self, request: Mapping[str, Any]) -> bytes | None:
+        with self._connection().chat.completions.with_streaming_response.create(**request) as response:
+            return _body(response.iter_bytes(), time.monotonic() + self.settings.timeout)
 
     def _counted(self, said: _Kept) -> _Kept:
         with self._lock:
@@ -328,6 +332,26 @@ def _body(chunks: Iterable[bytes], deadline: float) -> bytes | None:
             return None
         parts.append(chunk)
     return b"".join(parts)
+
+
+def _within(seconds: float, call: Callable[[], bytes | None]) -> bytes | None:
+    """What a call returns; None when the time is up: headers that drip are read on, by a thread left behind."""
+    done: queue.SimpleQueue[tuple[bytes | None, BaseException | None]] = queue.SimpleQueue()
+
+    def run() -> None:
+        try:
+            done.put((call(), None))
+        except BaseException as e:  # raised where the call was made
+            done.put((None, e))
+
+    threading.Thread(target=run, daemon=True).start()
+    try:
+        value, error = done.get(timeout=seconds)
+    except queue.Empty:
+        return None
+    if error is not None:
+        raise error
+    return value
 
 
 def _cut_short(response: Any, seconds: float) -> None:
