@@ -20,7 +20,6 @@ from tqdm import tqdm
 
 import embodied
 from agents.bandit.config import BanditConfig
-from agents.bandit.rating_config import RatingConfig
 from agents.hanna.training_config import TrainingConfig
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.vision.config import VisionConfig
@@ -406,7 +405,7 @@ def test_help_imports_no_subcommand_and_import_embodied_is_light():
 
 
 @pytest.mark.parametrize(
-    "kind", [HouseConfig, TrainingConfig, VisionConfig, BanditConfig, RatingConfig, ExecutionConfig, IntentionConfig]
+    "kind", [HouseConfig, TrainingConfig, VisionConfig, BanditConfig, ExecutionConfig, IntentionConfig]
 )
 def test_every_field_that_is_an_option_is_explained(kind):
     assert [f.name for f in dataclasses.fields(kind) if not field_docs(kind).get(f.name)] == []

@@ -8,7 +8,6 @@ import math
 import pytest
 
 from agents.bandit.config import BanditConfig
-from agents.bandit.rating_config import RatingConfig
 from agents.common.settings import RunSettings, ValidatedRunSettings
 from agents.hanna.training_config import TrainingConfig
 from agents.hari.config import ExecutionConfig, IntentionConfig
@@ -17,7 +16,7 @@ from agents.vnla.config import VnlaSettings
 
 VALIDATED = (TrainingConfig(), ExecutionConfig(), IntentionConfig(), VnlaSettings())
 RUNS = (*VALIDATED, BanditConfig())
-ALL = (*RUNS, RatingConfig(), VisionConfig())
+ALL = (*RUNS, VisionConfig())
 
 
 @pytest.mark.parametrize("settings", ALL, ids=lambda s: type(s).__name__)

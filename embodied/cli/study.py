@@ -8,7 +8,6 @@
     embodied study vln followers speaker --data DATA --out STUDY
     embodied study ask houses classes curves --out STUDY
     embodied study bandit 3.2 3.4 3.5 --data CORPUS --out STUDY
-    embodied study stars --data DATA --out STUDY
     embodied study iliad regex 3.4 3.5 C.1 --out STUDY
     embodied study iliad nav 3.4 3.5 --data DATA --out STUDY
     embodied study check STUDY
@@ -35,9 +34,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from agents.ask.config import AskerConfig, AskEvaluation
 from agents.bandit.config import SCALES as BANDIT_SCALES
 from agents.bandit.config import BanditConfig
-from agents.bandit.rating_config import DECISIONS, RatingConfig
 from agents.common.settings import EvaluationSettings
-from agents.common.shipped import SHIPPED_AGENT
 from agents.find.config import FinderConfig
 from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
 from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, IntentionConfig
@@ -80,7 +77,6 @@ from embodied.cli.train import EVALUATION, TRAINING, RegexFiles, Strips
 from embodied.records import load_json
 
 if TYPE_CHECKING:
-    from agents.bandit.ratings import Rater
     from agents.studies.engine import StudyLearner
     from embodied.interface import Agent
 
@@ -118,22 +114,6 @@ class Judged:
 class JudgeSeed:
     judge_seed: int = 0
     """Random seed of the evaluation."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LikePeople:
-    rater: InputPath | None = None
-    """Learn from ratings like people's, too: rater.json of `embodied dataset from-people`."""
-
-    def read_rater(self) -> Rater | None:
-        """The rater of --rater.
-
-        Raises:
-          RecordError: the file holds none.
-        """
-        from agents.bandit.ratings import Rater
-
-        return None if self.rater is None else load_json(self.rater, Rater)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,7 +205,7 @@ class VlnOptions(Study, Trained, Judged, WithData, Encoded):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BanditOptions(Study, Trained, LikePeople):
+class BanditOptions(Study, Trained):
     """A translator that learns from ratings."""
 
     tables: Tables
@@ -234,25 +214,9 @@ class BanditOptions(Study, Trained, LikePeople):
     """The corpus, a folder that `embodied corpus` made."""
     scale: Annotated[str, SMALL_SCALE] = "mini"
     """The settings to start from."""
+    rater: InputPath | None = None
+    """Learn from ratings like people's, too: rater.json of `embodied dataset from-people`."""
     config: Annotated[BanditConfig, Settings(TRAINING, BANDIT_SCALES)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class StarsOptions(Study, Trained, Judged, WithData, Encoded, LikePeople):
-    """HANNA agents that learn from ratings of their episodes."""
-
-    agent: InputPath = SHIPPED_AGENT
-    """The agent to begin with (default: shipped)."""
-    split: str = "test_unseen"
-    """Evaluate in the houses of this split."""
-    rated: Annotated[str, Option(metavar="SPLIT")] = "train"
-    """Collect ratings in the houses of this split."""
-    decisions: Annotated[str, Option(words=DECISIONS)] = "drawn"
-    """Decoding in evaluation: moves and questions are sampled, as in training (drawn), or chosen as in `embodied
-    evaluate` (usual)."""
-    judgings: Count = 3
-    """Evaluate every task N times with different seeds."""
-    config: Annotated[RatingConfig, Settings(TRAINING, RatingConfig())]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -373,17 +337,11 @@ def vln(args: VlnOptions) -> int:
 
 
 def bandit(args: BanditOptions) -> int:
+    from agents.bandit.ratings import Rater
     from agents.bandit.study import BanditStudy
 
-    return run_table(args, study_of(BanditStudy, args, rater=args.read_rater()))
-
-
-def stars(args: StarsOptions) -> int:
-    from agents.bandit.stars_study import StarsStudy
-    from agents.vision.run import encoder_of
-
-    judging, encoder = tuple(range(args.judgings)), encoder_of(args.encoder, args.network)
-    return run_table(args, study_of(StarsStudy, args, judging=judging, encoder=encoder, rater=args.read_rater()))
+    rater = load_json(args.rater, Rater) if args.rater else None
+    return run_table(args, study_of(BanditStudy, args, rater=rater))
 
 
 def iliad(args: RegexOptions | NavOptions) -> int:
@@ -431,7 +389,6 @@ COMMANDS: Mapping[str, Any] = {
     "vnla": (VnlaOptions, vnla),
     "vln": (VlnOptions, vln),
     "bandit": (BanditOptions, bandit),
-    "stars": (StarsOptions, stars),
     "iliad": (
         "Students that learn from descriptions of what they did.",
         {"regex": (RegexOptions, iliad), "nav": (NavOptions, iliad)},
