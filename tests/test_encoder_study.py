@@ -77,15 +77,15 @@ def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_i
         for way in ("fast", "unlit"):
             assert found[name][f"AP_{way}"]["mean"] > found[name][f"chance_AP_{way}"]["mean"]
     assert found["two"]["AP_fast"]["half_width"] is not None and found["one"]["AP_fast"]["half_width"] is None
-    assert "Not run: compact, compact_maxpool" in (out / "vision-encoders.md").read_text()
+    assert "Not run: compact" in (out / "vision-encoders.md").read_text()
     kept = {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
     run_study(setting, ["pictures"], out, rows=rows, note=lambda line: None)
     assert kept == {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
 
 
 def test_an_encoder_that_the_study_trains_keeps_its_name(setting):
-    with pytest.raises(ValueError, match=r"\['compact_maxpool'\] are trained by the study"):
-        dataclasses.replace(setting, ready={"compact_maxpool": [setting.source.folder]})
+    with pytest.raises(ValueError, match=r"\['compact'\] are trained by the study"):
+        dataclasses.replace(setting, ready={"compact": [setting.source.folder]})
 
 
 def test_files_of_one_name_are_training_seeds(tmp_path):

@@ -9,13 +9,8 @@ from dataclasses import dataclass, field
 from embodied.render.photograph import check_camera
 from embodied.render.pictures import PictureSettings
 
-OURS = ("compact", "compact_maxpool", "lite0", "lite0_means")
-IMAGENET = ("lite0", "lite0_means")
-"""Networks for which ImageNet weights come in a package."""
 TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
-NETWORKS = (*OURS, *TORCHVISIONS)
-"""Keys of agents.vision.designs.DESIGNS."""
-BEGINNINGS = ("random", "imagenet")
+"""Networks that encode without training here, with weights from disk."""
 PLAIN = PictureSettings(size=192)
 """How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
 
@@ -67,14 +62,6 @@ class RenderedInputs:
 class VisionConfig:
     """How the encoder is trained."""
 
-    network: str = "compact"
-    """'compact' and 'compact_maxpool' are small residual networks, 'lite0' and 'lite0_means' are EfficientNet-Lite0,
-    'resnet18' to 'resnet152' are torchvision's. Half of the features of 'compact_maxpool' and 'lite0' are max-pooled
-    over a view, all others mean-pooled."""
-    begin: str = "random"
-    """Initial weights: 'random', or 'imagenet' for 'lite0' and 'lite0_means'."""
-    frozen: bool = False
-    """Freeze the backbone; train only the neck and the heads."""
     training_houses: int = 0
     """Train on this many of the data set's training houses; 0: on all."""
     epochs: int = 6
@@ -102,13 +89,6 @@ class VisionConfig:
             raise ValueError("cameras must name at least one kind of camera; 'ideal' leaves the strips as drawn")
         for name in self.cameras:
             check_camera(name)
-        if self.network not in NETWORKS:
-            raise ValueError(f"network must be one of {NETWORKS}, got {self.network!r}")
-        if self.begin not in BEGINNINGS or (self.begin == "imagenet" and self.network not in IMAGENET):
-            raise ValueError(
-                f"begin must be one of {BEGINNINGS}, and 'imagenet' goes with networks {IMAGENET}, got {self.begin!r} "
-                f"with {self.network!r}"
-            )
         for name, least in (("training_houses", 0), ("epochs", 1), ("batch", 1), ("least_views", 1)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")

@@ -16,10 +16,8 @@ from torch import Tensor
 from agents.common.shipped import SHIPPED_ENCODER
 from agents.common.tensor_file import load_into, read_weights
 from agents.common.weights import load_weights, save_weights
-from agents.vision.designs import DESIGNS, build
-from agents.vision.network import Network
-from agents.vision.resnet import load_torchvision
-from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
+from agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
+from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from embodied.identity import Identity
 
 DIGESTED = "embodied-encoder-1"
@@ -46,9 +44,9 @@ class EncoderAbout:
 class Encoder:
     """A frozen network and what is done with its output."""
 
-    network: Network
+    network: ResNet
     name: str
-    """Key of designs.DESIGNS."""
+    """Key of resnet.ARCHITECTURES."""
     sharing: str = "strip"
     """'strip': one look at the panorama, views are windows of the feature map; 'views': every view
     is looked at alone, as the VLN literature does with ImageNet networks."""
@@ -84,7 +82,7 @@ class Encoder:
         sent = self._send(strips)
         # a processor keeps one strip in its cache, not several
         parts = sent.split(1) if sent.device.type == "cpu" else [sent]
-        views = torch.cat([pool_views(strip_map(self.network, part), self.network.peaks) for part in parts])
+        views = torch.cat([pool_views(strip_map(self.network, part)) for part in parts])
         return self.finish(views).cpu().numpy()
 
     @torch.no_grad()
@@ -111,7 +109,7 @@ class Encoder:
         return torch.from_numpy(np.ascontiguousarray(images)).to(next(self.network.parameters()).device)
 
 
-def strip_map(network: Network, strips: Tensor) -> Tensor:
+def strip_map(network: ResNet, strips: Tensor) -> Tensor:
     """(n, 192, 576, 3) uint8 -> (n, D, 12, 36) feature map of strips; left and right ends know each other."""
     if strips.shape[1:] != (HEIGHT, WIDTH, 3) or network.stride != CELL:
         raise ValueError(
@@ -124,16 +122,10 @@ def strip_map(network: Network, strips: Tensor) -> Tensor:
     return maps[..., MARGIN // CELL : -(MARGIN // CELL)]
 
 
-def pool_views(maps: Tensor, peaks: int = 0) -> Tensor:
-    """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window, but for the last `peaks`
-    channels, of which it is the largest value."""
+def pool_views(maps: Tensor) -> Tensor:
+    """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window."""
     weights = torch.from_numpy(windows()).to(maps.device).view(36, ROWS * COLUMNS)
-    cells, means = maps.flatten(2), maps.shape[1] - peaks
-    mean = torch.einsum("vc,ndc->nvd", weights, cells[:, :means])
-    if not peaks:
-        return mean
-    inside = torch.from_numpy(inside_windows()).to(maps.device)
-    return torch.cat([mean, cells[:, means:, inside].amax(-1).transpose(1, 2)], -1)
+    return torch.einsum("vc,ndc->nvd", weights, maps.flatten(2))
 
 
 def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
@@ -148,11 +140,11 @@ def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
     return mean, ((vectors * scale) @ vectors.T).float()
 
 
-def random_encoder(name: str = "compact", *, seed: int, sharing: str = "strip") -> Encoder:
+def random_encoder(name: str = COMPACT, *, seed: int, sharing: str = "strip") -> Encoder:
     """An untrained encoder: the floor that training has to beat."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return Encoder(build(name).eval(), name, sharing)
+        return Encoder(ResNet(ARCHITECTURES[name]).eval(), name, sharing)
 
 
 def imagenet_encoder(name: str, weights: Path) -> Encoder:
@@ -174,11 +166,11 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
     """
     remedy = "train the encoder again with `embodied train vision`"
     tensors, told = load_weights(path, "encoder", EncoderAbout, remedy)
-    if told.name not in DESIGNS or told.sharing not in SHARINGS:
+    if told.name not in ARCHITECTURES or told.sharing not in SHARINGS:
         raise ValueError(f"{path}: unknown settings {told}; {remedy}")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
-    network = build(told.name)
+    network = ResNet(ARCHITECTURES[told.name])
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     load_into(network, {**counters, **tensors}, path)
     encoder = Encoder(network.eval(), told.name, told.sharing, mean, mix, told.like)

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.vision.network import Network
+MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Of ImageNet's RGB in [0, 1]; what torchvision's weights expect."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,10 @@ class Architecture:
 
 
 EXPANSION = {"basic": 1, "bottleneck": 4}
+COMPACT = "compact"
+"""The network that is trained here: its stride is a cell of the strip."""
 ARCHITECTURES: dict[str, Architecture] = {
-    "compact": Architecture("basic", (1, 1, 1, 1), (32, 64, 128, 192), 32, (1, 2, 2, 1)),
+    COMPACT: Architecture("basic", (1, 1, 1, 1), (32, 64, 128, 192), 32, (1, 2, 2, 1)),
     "resnet18": Architecture("basic", (2, 2, 2, 2)),
     "resnet34": Architecture("basic", (3, 4, 6, 3)),
     "resnet50": Architecture("bottleneck", (3, 4, 6, 3)),
@@ -93,10 +97,15 @@ def _downsample(inputs: int, outputs: int, stride: int) -> nn.Module | None:
     return nn.Sequential(nn.Conv2d(inputs, outputs, 1, stride, bias=False), nn.BatchNorm2d(outputs))
 
 
-class ResNet(Network):
-    """Images to a feature map; `fc` classifies its average, when there are classes."""
+class ResNet(nn.Module):
+    """Images to a feature map."""
 
-    def __init__(self, architecture: Architecture, classes: int = 0) -> None:
+    size: int
+    """D, channels of the map."""
+    stride: int
+    """Pixels per cell of the map."""
+
+    def __init__(self, architecture: Architecture) -> None:
         super().__init__()
         a = architecture
         self.size, self.stride = a.size, a.stride
@@ -110,7 +119,6 @@ class ResNet(Network):
                 blocks.append(block(inputs, width, stride if j == 0 else 1))
                 inputs = width * EXPANSION[a.block]
             setattr(self, f"layer{i}", nn.Sequential(*blocks))
-        self.fc = nn.Linear(inputs, classes) if classes else None
         for module in self.modules():
             if isinstance(module, nn.Conv2d):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
@@ -122,11 +130,14 @@ class ResNet(Network):
             x = getattr(self, f"layer{stage}")(x)
         return x
 
-    def forward(self, images: Tensor) -> Tensor:
-        """(n, 3, H, W) -> (n, classes) logits."""
-        if self.fc is None:
-            raise RuntimeError("this network was built without classes; use `features`, or build it with classes")
-        return self.fc(self.features(images))
+    def features(self, images: Tensor) -> Tensor:
+        """(n, 3, H, W) -> (n, D), of pictures looked at alone: what VLN calls ResNet features."""
+        return self.feature_map(images).mean((2, 3))
+
+    def normalise(self, images: Tensor) -> Tensor:
+        """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as the weights expect, in memory pixel by pixel."""
+        mean, deviation = (torch.tensor(x, device=images.device).view(1, 3, 1, 1) for x in (MEAN, DEVIATION))
+        return (images.permute(0, 3, 1, 2).float() / 255 - mean) / deviation
 
 
 def load_torchvision(name: str, weights: Mapping[str, Tensor]) -> ResNet:

@@ -64,7 +64,7 @@ def train_vision(
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         shown = seen if target is None else [*seen, *target.strips.values()]  # plain ones as one more lighting
         encoder, classes = trained_encoder(shown, config, out, note, target=target, device=device)
-        untrained = whitened(random_encoder(config.network, seed=config.seed), seen)
+        untrained = whitened(random_encoder(seed=config.seed), seen)
         numbers = {}
         for name, who, alone in (
             ("trained", encoder, False),

@@ -25,10 +25,9 @@ from agents.common.checkpoint import Stateful
 from agents.common.session import Session, descend
 from agents.common.tensor_file import save_tensors
 from agents.vision.config import VisionConfig
-from agents.vision.designs import body_of, build, load_imagenet
 from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
-from agents.vision.network import Network
+from agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet
 from agents.vision.strip import CELL, COLUMNS
 from assets.cache import digest, write_json
 from assets.records import ROOM_KINDS
@@ -97,10 +96,10 @@ class DistillationTarget:
     """By house, as many nodes as in the lit ones."""
 
 
-def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
+def vision_loss(network: ResNet, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
     """Sum of the five losses, and each as a number."""
     maps = strip_map(network, batch.rgb)  # (n, D, 12, 36)
-    return head_losses(heads, maps, pool_views(maps, network.peaks), batch)
+    return head_losses(heads, maps, pool_views(maps), batch)
 
 
 def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
@@ -120,18 +119,18 @@ def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) ->
 
 
 def distillation_loss(
-    network: Network, heads: Heads, batch: StripBatch, target: Encoder
+    network: ResNet, heads: Heads, batch: StripBatch, target: Encoder
 ) -> tuple[Tensor, dict[str, float]]:
     """Mean square between the finished features of `network` and those of `target` in unlit strips, and the losses
     of the heads, whose gradients do not reach the network."""
     if batch.plain is None:
         raise ValueError("the batch holds no unlit strips to distil from; give `batches` `plain`")
     maps = strip_map(network, batch.rgb)
-    views = target.finish(pool_views(maps, network.peaks))
+    views = target.finish(pool_views(maps))
     with torch.no_grad():
-        aim = target.finish(pool_views(strip_map(target.network, batch.plain), target.network.peaks))
+        aim = target.finish(pool_views(strip_map(target.network, batch.plain)))
     distillation = F.mse_loss(views, aim)
-    told, parts = head_losses(heads, maps.detach(), pool_views(maps.detach(), network.peaks), batch)
+    told, parts = head_losses(heads, maps.detach(), pool_views(maps.detach()), batch)
     return distillation + told, {"distillation": float(distillation.detach()), **parts}
 
 
@@ -245,7 +244,6 @@ def train_encoder(
       ValueError: no strips, or strips with different classes.
       DivergedError: the loss is no longer a number.
       CheckpointError: damaged, or of other settings.
-      UnableError: it should start from ImageNet weights, and their package is not installed.
     """
     if not houses or len({h.classes for h in houses}) != 1:
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
@@ -265,7 +263,7 @@ def train_encoder(
     network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
     names = [houses[0].classes[i] for i in classes]
     if target is None:
-        return Encoder(network, config.network), heads, names
+        return Encoder(network, COMPACT), heads, names
     return (
         dataclasses.replace(target.encoder, network=network, distilled_from=target.encoder.feature_space),
         heads,
@@ -285,10 +283,10 @@ def _check_target(houses: Sequence[HouseStrips], config: VisionConfig, target: D
         )
     if target is None:
         return
-    if (target.encoder.name, target.encoder.sharing) != (config.network, "strip"):
+    if (target.encoder.name, target.encoder.sharing) != (COMPACT, "strip"):
         raise ValueError(
             f"the encoder to distil from is a {target.encoder.name!r} on {target.encoder.sharing}, training one of "
-            f"{config.network!r} on strips; say --network {target.encoder.name}"
+            f"{COMPACT!r} on strips; name an encoder of `embodied train vision`"
         )
     for house in houses:
         if house.name not in target.strips or len(target.strips[house.name].rgb) != len(house.rgb):
@@ -309,17 +307,13 @@ class _Training:
         self.config, self._device, self._target = config, device, target
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(config.seed)
-            self.network = build(config.network)
+            self.network = ResNet(ARCHITECTURES[COMPACT])
             self.heads = Heads(self.network.size, classes)
-        if config.begin == "imagenet":
-            load_imagenet(self.network)
         if target is not None:
             self.network.load_state_dict(target.encoder.network.state_dict())
-        if config.frozen:
-            body_of(self.network).requires_grad_(False)
         self.network.to(device)
         self.heads.to(device)
-        parameters = [p for p in (*self.network.parameters(), *self.heads.parameters()) if p.requires_grad]
+        parameters = [*self.network.parameters(), *self.heads.parameters()]
         self._optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(
             self._optimizer, config.learning_rate, total_steps=max(config.epochs * updates, 1)
@@ -338,8 +332,6 @@ class _Training:
         """Learn once from every strip; returns the losses, smoothed."""
         # not in channels_last: its backward pass corrupts memory in PyTorch 2.13 on CPUs with few channels
         self.network.train()
-        if self.config.frozen:
-            body_of(self.network).eval()
         began, smooth = time.monotonic(), dict[str, float]()
         rng = stream(self.config.seed, "vision", "epoch", epoch)
         target = None if self._target is None else self._target.encoder.to(self._device)

@@ -237,56 +237,6 @@ def read_vlnce(path: Path) -> list[Excursion]:
     return found
 
 
-def write_objectnav(folder: Path, split: str, excursions: Sequence[Excursion], scenes: str = "embodied") -> list[Path]:
-    """<split>.json.gz and a file per house in content/, as ObjectNav's; returns all."""
-    classes = sorted({e.object_class for e in excursions})
-    categories = {name: k for k, name in enumerate(classes)}
-    head = {"category_to_task_category_id": categories, "category_to_scene_annotation_category_id": categories}
-    home = Path(folder) / split
-    files = [_write(home / f"{split}.json.gz", {**head, "episodes": []})]
-    for world in sorted({e.world for e in excursions}):
-        here = [e for e in excursions if e.world == world]
-        goals = {f"{world}.glb_{e.object_class}": [_goal(a, e) for a in e.aims] for e in here}
-        episodes = [_object_episode(e, scenes) for e in here]
-        files.append(
-            _write(home / "content" / f"{world}.json.gz", {**head, "goals_by_category": goals, "episodes": episodes})
-        )
-    return files
-
-
-def _goal(aim: Aim, e: Excursion) -> dict[str, Any]:
-    views = [
-        {"agent_state": {"position": to_habitat(v), "rotation": rotation_of(_towards(v, aim.position))}, "iou": 0.0}
-        for v in aim.views
-    ]
-    return {
-        "position": to_habitat(aim.position),
-        "radius": None,
-        "object_id": aim.placement,
-        "object_name": aim.placement,
-        "object_name_id": None,
-        "object_category": e.object_class,
-        "room_id": None,
-        "room_name": None,
-        "view_points": views,
-    }
-
-
-def _object_episode(e: Excursion, scenes: str) -> dict[str, Any]:
-    straight = min(math.dist(e.start[:2], a.position[:2]) for a in e.aims)
-    return {
-        "episode_id": e.id,
-        "scene_id": f"{scenes}/{e.world}/{e.world}.glb",
-        "start_position": to_habitat(e.start),
-        "start_rotation": rotation_of(e.yaw),
-        "info": {"euclidean_distance": straight},
-        "goals": [],
-        "start_room": None,
-        "shortest_paths": None,
-        "object_category": e.object_class,
-    }
-
-
 def read_objectnav(path: Path) -> list[Excursion]:
     """The episodes of an ObjectNav file and of those in content/ beside it.
 
@@ -325,10 +275,6 @@ def read_objectnav(path: Path) -> list[Excursion]:
 def scene_name(scene_id: str) -> str:
     """The house of 'mp3d/flat_0/flat_0.glb'."""
     return re.sub(r"\.[^./]*$", "", scene_id.rsplit("/", 1)[-1])
-
-
-def _towards(a: Point, b: Point) -> float:
-    return math.atan2(b[1] - a[1], b[0] - a[0])
 
 
 def _write(path: Path, value: object) -> Path:
