@@ -107,7 +107,7 @@ def test_parameters_are_those_of_the_maker():
     "table",
     [
         pytest.param(tables().rooms, id="generate/furnish/rooms.toml"),
-        pytest.param(ROOM_NOUNS, id="language/lexicon.py"),
+        pytest.param(ROOM_NOUNS, id="language/words.toml"),
         pytest.param(ROOM_COLOURS, id="house/floor_plan.py"),
         pytest.param(REGIONS, id="datasets/matterport.py"),
     ],

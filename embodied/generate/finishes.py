@@ -14,7 +14,7 @@ import shapely
 
 from embodied.generate.kinds import BEDROOMS
 from embodied.generate.novelty import styles_of, taste_of
-from embodied.generate.tastes import KIDS, KIDS_PAPERS, ROUGH
+from embodied.generate.tastes import TABLE
 from embodied.house.house import House, HouseError, Room
 from embodied.house.validation import STYLES
 
@@ -73,7 +73,7 @@ def draw_palette(style: str | None, novelty: str | None = None, *, rng: np.rando
         kitchen_floor=kitchen,
         private_floor=private,
         wet_floors=_some(taste.wet_floors, 2, rng),
-        rough_floor=_one(ROUGH, rng),
+        rough_floor=_one(TABLE.rough, rng),
         walls=_some(taste.walls, 3, rng),
         wet_walls=_some(taste.wet_walls, 2, rng),
         accents=_some(taste.accents, 2, rng),
@@ -158,7 +158,7 @@ def _wall(room: Room, palette: Palette, nth: int, rng: np.random.Generator) -> s
     if kind in ("garage", "workshop", "laundry_room", "pantry", "closet"):
         return "paint_white/0"
     if kind == "kids_room":
-        return _one(KIDS, rng)
+        return _one(TABLE.kids, rng)
     if kind in TALK or kind in ("kitchen", "sun_room"):
         return palette.walls[0]
     if palette.style == "classic" and kind in BEDROOMS and rng.random() < 0.3:
@@ -182,6 +182,6 @@ def _accent(room: Room, house: House, palette: Palette, rng: np.random.Generator
     if not walls:
         return None, None
     if room.kind == "kids_room":
-        return walls[int(pick * len(walls))], KIDS_PAPERS[int(paper * len(KIDS_PAPERS))]
+        return walls[int(pick * len(walls))], TABLE.kids_papers[int(paper * len(TABLE.kids_papers))]
     choice = palette.papers if paper < 0.4 and room.kind in BEDROOMS else palette.accents
     return walls[int(pick * len(walls))], choice[int(pick * 997) % len(choice)]

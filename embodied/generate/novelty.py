@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from assets.catalogue import Catalogue
 from assets.records import Asset
-from embodied.generate.tastes import KIDS, KIDS_PAPERS, ROUGH, TASTES, Taste
+from embodied.generate.tastes import TABLE, TASTES, Taste
 from embodied.house.validation import STYLES
 from embodied.novelty import FAMILIAR, NOVEL, novel_among
 
@@ -49,7 +49,7 @@ def taste_of(style: str, novelty: str | None) -> Taste:
     if novelty != NOVEL:
         return taste
     tastes = [keys for name, other in TASTES.items() if name != style for keys in _finishes(other).values()]
-    others = {key for keys in (*tastes, KIDS, KIDS_PAPERS, ROUGH) for key in keys}
+    others = {key for keys in (*tastes, TABLE.kids, TABLE.kids_papers, TABLE.rough) for key in keys}
     own = {field: tuple(k for k in keys if k not in others) for field, keys in _finishes(taste).items()}
     return dataclasses.replace(taste, **{field: keys for field, keys in own.items() if len(keys) > 1})
 

@@ -33,20 +33,7 @@ from embodied.language.clauses import (
 )
 from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
 from embodied.language.speakers import NOVEL_HABIT
-from embodied.language.templates import (
-    ARRIVED_LINKS,
-    FILLERS,
-    HEDGES,
-    LINKS,
-    NUMBERS,
-    ORDINALS,
-    PLAYFUL,
-    SLIPS,
-    SOON,
-    TEMPLATES,
-    VERBS,
-    Template,
-)
+from embodied.language.templates import TEMPLATES, WORDS, Template
 from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
@@ -98,7 +85,9 @@ NOVEL_TEMPLATES = frozenset(
     if t.text in texts or t.habit == NOVEL_HABIT
 )
 """What people who are kept from learning say; the first template of a clause is everybody's."""
-NOVEL_WORDS = novel_among({*VERBS[1:], *SOON[1:], *(noun for nouns in ROOM_NOUNS.values() for noun in nouns[1:])})
+NOVEL_WORDS = novel_among(
+    {*WORDS.verbs[1:], *WORDS.soon[1:], *(noun for nouns in ROOM_NOUNS.values() for noun in nouns[1:])}
+)
 """Verbs, adverbs and nouns for rooms that only they use."""
 PLAIN = 3.0
 """How much likelier than its other templates the first few of a clause are: what most people say."""
@@ -151,9 +140,9 @@ def _fill(
     template: Template, phrases: Sequence[Phrase], again: Sequence[str], speaker: Speaker, rng: np.random.Generator
 ) -> str:
     own = functools.partial(of_novelty, novel=NOVEL_WORDS, novelty=speaker.novelty)
-    verbs, soon = own(VERBS + PLAYFUL if speaker.habit == "chatty" else VERBS), own(SOON)
+    verbs, soon = own(WORDS.verbs + WORDS.playful if speaker.habit == "chatty" else WORDS.verbs), own(WORDS.soon)
     slots = {
-        "walk": VERBS[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
+        "walk": WORDS.verbs[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
         "soon": soon[int(rng.integers(len(soon)))],
     }
     rooms = [(kind, before) for p, before in zip(phrases, again) if (kind := room_of(p.clause)) is not None]
@@ -163,10 +152,10 @@ def _fill(
     for p in phrases:
         if isinstance(p.clause, Metres):
             n, many = p.clause.count, "s" * (p.clause.count != 1)
-            spelt = NUMBERS[n] if n < len(NUMBERS) and (n == 1 or rng.random() < 0.7) else str(n)
+            spelt = WORDS.numbers[n] if n < len(WORDS.numbers) and (n == 1 or rng.random() < 0.7) else str(n)
             slots |= {"metres": f"{spelt} meter{many}", "steps": f"{spelt} big step{many}"}
         if isinstance(p.clause, Enter) and p.clause.nth:
-            slots["nth"] = ORDINALS[p.clause.nth]
+            slots["nth"] = WORDS.ordinals[p.clause.nth]
         if (side := side_of(p.clause)) is not None:
             slots["side"] = side
         if p.word is not None:
@@ -206,10 +195,14 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
         if current:
             sentences.append(current)
         current, length, hedged = text, 1, False
-        if n == 0 and rng.random() < speaker.openings and (fillers := (*FILLERS[speaker.habit], *FILLERS[""])):
+        if (
+            n == 0
+            and rng.random() < speaker.openings
+            and (fillers := (*WORDS.fillers[speaker.habit], *WORDS.fillers[""]))
+        ):
             current = f"{fillers[int(rng.integers(len(fillers)))]}, {text}"
         elif rng.random() < speaker.hedges:
-            current, hedged = f"{text}, {HEDGES[int(rng.integers(len(HEDGES)))]}", True
+            current, hedged = f"{text}, {WORDS.hedges[int(rng.integers(len(WORDS.hedges)))]}", True
     sentences.append(current)
     return " ".join(s[0].upper() + s[1:] + "." for s in sentences)
 
@@ -227,8 +220,8 @@ def _stands_alone(text: str, kinds: tuple[str, ...], last: str, before: tuple[st
 def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
     """What joins a clause to the one before it."""
     own = speaker.habit == "terse" or rng.random() < 0.6
-    links = LINKS[speaker.habit if own else ""]
-    if arrived and rng.random() < 0.25 and (more := ARRIVED_LINKS[speaker.habit if own else ""]):
+    links = WORDS.links[speaker.habit if own else ""]
+    if arrived and rng.random() < 0.25 and (more := WORDS.arrived_links[speaker.habit if own else ""]):
         links = more
     return links[int(rng.integers(len(links)))]
 
@@ -236,7 +229,7 @@ def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
 def _slip(text: str, speaker: Speaker, rng: np.random.Generator) -> str:
     """Now and then a misspelt word."""
     words = text.split(" ")
-    return " ".join(SLIPS.get(w, w) if rng.random() < speaker.slips else w for w in words)
+    return " ".join(WORDS.slips.get(w, w) if rng.random() < speaker.slips else w for w in words)
 
 
 # Reading back -----------------------------------------------------------------------------------
@@ -267,16 +260,16 @@ def normalised(text: str) -> str:
     """Lower case without punctuation, slips mended, hedges and openings removed."""
     plain = re.sub(r"[.,;!?]+", " ", text)
     plain = " " + re.sub(r"\s+", " ", plain).strip().lower() + " "
-    for right, wrong in SLIPS.items():
+    for right, wrong in WORDS.slips.items():
         plain = plain.replace(f" {wrong} ", f" {right} ")
     for empty in _EMPTY:
         plain = plain.replace(f" {empty} ", " ")
     return plain.strip()
 
 
-_JOINING = (*FILLERS.values(), *LINKS.values(), *ARRIVED_LINKS.values())
+_JOINING = (*WORDS.fillers.values(), *WORDS.links.values(), *WORDS.arrived_links.values())
 _EMPTY = sorted(
-    {h.lower() for h in HEDGES} | {f for fs in _JOINING for f in fs if " " in f}, key=lambda s: (-len(s), s)
+    {h.lower() for h in WORDS.hedges} | {f for fs in _JOINING for f in fs if " " in f}, key=lambda s: (-len(s), s)
 )
 
 
@@ -335,11 +328,11 @@ def _patterns() -> tuple[_Pattern, ...]:
         "side": "(?P<side>left|right)",
         "room": f"{again}(?P<room>{rooms})",
         "other": f"{again}(?P<other>{rooms})",
-        "metres": rf"(?P<n>\d+|{_any(NUMBERS)}) meters?",
-        "steps": rf"(?P<n>\d+|{_any(NUMBERS)}) big steps?",
-        "nth": f"(?P<nth>{_any(ORDINALS)})",
-        "walk": f"(?:{_any(VERBS + PLAYFUL)})",
-        "soon": f"(?:{_any(SOON)})",
+        "metres": rf"(?P<n>\d+|{_any(WORDS.numbers)}) meters?",
+        "steps": rf"(?P<n>\d+|{_any(WORDS.numbers)}) big steps?",
+        "nth": f"(?P<nth>{_any(WORDS.ordinals)})",
+        "walk": f"(?:{_any(WORDS.verbs + WORDS.playful)})",
+        "soon": f"(?:{_any(WORDS.soon)})",
     }
     found = []
     for t in TEMPLATES:
@@ -383,12 +376,12 @@ class _Slots:
 
     @property
     def nth(self) -> int:
-        return ORDINALS.index(self._said["nth"])
+        return WORDS.ordinals.index(self._said["nth"])
 
     @property
     def metres(self) -> int:
         count = self._said["n"]
-        return NUMBERS.index(count) if count in NUMBERS else int(count)
+        return WORDS.numbers.index(count) if count in WORDS.numbers else int(count)
 
     @property
     def thing(self) -> Referent:

@@ -11,83 +11,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.language.clauses import Referent
-from embodied.language.nouns import MORE_NOUNS
-from embodied.language.templates import BODY_PRAISE, PRAISE, SEAT_PRAISE, SIZES
+from embodied.language.templates import WORDS
 from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
     from assets.records import Asset
 
-ROOM_NOUNS: dict[str, tuple[str, ...]] = {
-    "living_room": ("living room", "lounge", "sitting room", "front room", "parlor"),
-    "family_room": ("family room", "TV room", "den", "snug"),
-    "kitchen": ("kitchen", "cooking area"),
-    "dining_room": ("dining room", "dining area"),
-    "main_bedroom": ("main bedroom", "master bedroom", "big bedroom", "primary bedroom", "parents' bedroom"),
-    "bedroom": ("bedroom", "sleeping room"),
-    "kids_room": ("kids room", "children's room", "nursery", "child's bedroom"),
-    "guest_room": ("guest room", "spare room", "visitors' room", "guest bedroom"),
-    "bathroom": ("bathroom", "washroom"),
-    "toilet": ("toilet room", "restroom", "powder room", "half bath"),
-    "hall": ("hall", "entrance hall", "entryway", "foyer", "vestibule", "lobby"),
-    "corridor": ("corridor", "hallway", "passageway", "passage"),
-    "study": ("study", "home office", "office", "workroom"),
-    "laundry_room": ("laundry room", "utility room"),
-    "pantry": ("pantry", "larder", "storeroom", "food store"),
-    "closet": ("closet", "walk-in closet", "dressing room"),
-    "library": ("library", "reading room", "book room"),
-    "playroom": ("playroom", "games room", "rec room"),
-    "gym": ("gym", "exercise room", "fitness room", "workout room", "weight room"),
-    "garage": ("garage", "car garage"),
-    "sun_room": ("sun room", "conservatory", "sunroom", "solarium", "sun porch"),
-    "workshop": ("workshop", "hobby room", "craft room", "tool room"),
-    "stairwell": ("stairwell", "staircase"),
-}
-"""Room kind to the nouns for it, the plainest first."""
+ROOM_NOUNS = WORDS.rooms
 ROOM_OF_NOUN = {noun.lower(): kind for kind, nouns in ROOM_NOUNS.items() for noun in nouns}
 PASSAGES = frozenset({"corridor", "hall", "stairwell"})
 """Kinds of room that one is in only to go elsewhere."""
 MOST_WORDS = 8
 """Longest wording of a thing: three adjectives of up to two words, then a noun."""
-UNFIT = frozenset(
-    {
-        "person",
-        "wall socket",
-        "double socket",
-        "network socket",
-        "aerial socket",
-        "light switch",
-        "double light switch",
-        "dimmer switch",
-        "smoke detector",
-        "ceiling lamp",
-        "strip light",
-        "spotlight",
-        "track light",
-        "fluorescent lamp",
-        "security camera",
-        "thermometer",
-        "toilet paper holder",
-        "keys",
-        "cap",
-    }
-)
-"""Classes that nobody would steer by."""
-
-
-EMPTY = frozenset({*PRAISE, *SEAT_PRAISE, *BODY_PRAISE, *SIZES})
+UNFIT = frozenset(WORDS.unfit)
+EMPTY = frozenset({*WORDS.praise, *WORDS.seat_praise, *WORDS.body_praise, *WORDS.sizes})
 """Adjectives that a listener passes over."""
 
 
-SEATS = frozenset(
-    {"sofa", "armchair", "chair", "bed", "bench", "stool", "ottoman", "pouf", "futon", "loveseat", "recliner", "chaise"}
-)
-"""Words in the names of classes that one sits or lies on."""
-
-
 def sizes_of(asset: Asset) -> list[str]:
-    """The words of SIZES that are true of an asset."""
+    """The words of WORDS.sizes that are true of an asset."""
     w, d, h = asset.size
     found = []
     if w * d > 1.4:
@@ -104,9 +47,9 @@ def sizes_of(asset: Asset) -> list[str]:
 def praise_of(asset: Asset) -> tuple[str, ...]:
     """Words of praise that somebody might use for an asset; comfort comes to mind three times as readily for a seat."""
     w, d, h = asset.size
-    seat = bool(SEATS & set(asset.object_class.split()))
+    seat = bool({*WORDS.seats} & {*asset.object_class.split()})
     body = asset.support not in ("surface", "ceiling") and min(w, d) > 0.25 and h > 0.3
-    return (*PRAISE, *(SEAT_PRAISE * 3 if seat else ()), *(BODY_PRAISE if body else ()))
+    return (*WORDS.praise, *(WORDS.seat_praise * 3 if seat else ()), *(WORDS.body_praise if body else ()))
 
 
 @dataclass(frozen=True)
@@ -145,7 +88,7 @@ class Lexicon:
     @staticmethod
     def _nouns(asset: Asset) -> tuple[str, ...]:
         """The class's name first, then the asset's synonyms, then what else people say."""
-        return (asset.object_class, *asset.synonyms, *MORE_NOUNS.get(asset.object_class, ()))
+        return (asset.object_class, *asset.synonyms, *WORDS.things.get(asset.object_class, ()))
 
     def thing(self, word: Word) -> Referent:
         """What a word may stand for.

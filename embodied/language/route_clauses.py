@@ -35,7 +35,7 @@ from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
 from embodied.language.listener import BESIDE, NEAR
 from embodied.language.seen import Lookout, Seen, SeenThing, doorway
 from embodied.language.speakers import Speaker
-from embodied.language.templates import ORDINALS
+from embodied.language.templates import WORDS
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
 """Smallest angles called 'slightly', a turn, and turning around."""
@@ -213,7 +213,7 @@ def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
 def _counted(eyes: Lookout, walked: Sequence[int], crossing: list[Phrase]) -> list[Phrase]:
     """The crossing by 'the second door on the left', where there is more than one to choose from; else nothing."""
     found = doorway(eyes, walked)
-    if found is None or found[2] < 2 or found[1] >= len(ORDINALS) or not isinstance(crossing[-1].clause, Enter):
+    if found is None or found[2] < 2 or found[1] >= len(WORDS.ordinals) or not isinstance(crossing[-1].clause, Enter):
         return []
     side, nth, _ = found
     return [Phrase(Enter(crossing[-1].clause.kind, side, nth))]
