@@ -179,7 +179,7 @@ def _write_others(folder: Path) -> None:
     hari.save_agent(hari.HariAgent(executor, hari.new_heads(intention, 8)[0], intention), folder / "hari.safetensors")
     words = Words(Vocabulary((PAD, UNKNOWN, END, "door")))
     material = NumberedCorpus(BanditConfig(hidden_size=8), {}, (words, words), "", "")
-    save_network(Translator(4, 4, 8), material, folder / "translator.safetensors", {})
+    save_network(Translator(4, 4, 8), material.config, material.lexicons, folder / "translator.safetensors", {})
 
 
 def _weights(network: torch.nn.Module) -> list[float]:

@@ -40,7 +40,7 @@ def tmp(tmp_path_factory) -> str:
 
 
 def batch(tmp, n=3, **options) -> SharedSyncVectorEnv:
-    return embodied.gym.env.make_vec("find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
+    return embodied.gym.in_step.make_vec("find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
 
 
 def times(envs) -> list[int]:
@@ -114,7 +114,7 @@ def test_seeds_are_integers_of_any_kind_and_nothing_else(tmp):
 
 @pytest.mark.parametrize("wrong", [{"patience": -1}, {"patience": 0}, {"patience": 2.5}, {"render_mode": "human"}])
 def test_options_are_refused_before_anything_is_opened(wrong, tmp_path):
-    for maker in (embodied.gym.env.make, embodied.gym.env.make_vec):
+    for maker in (embodied.gym.env.make, embodied.gym.in_step.make_vec):
         with pytest.raises(ValueError, match=f"{next(iter(wrong))} should be"):
             maker("find", data="no/such/folder", cache=str(tmp_path), **wrong)
 

@@ -21,7 +21,8 @@ import torch
 from hand_data import build, small_house
 
 from agents.common.weights import load_weights, save_weights
-from agents.studies.engine import Figure, StudyRow, StudyTable, check, run_study
+from agents.studies.engine import check, run_study
+from agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.cli import main
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of

@@ -13,7 +13,8 @@ from agents.ask.config import AskerConfig, AskEvaluation
 from agents.ask.foresight import Foresight
 from agents.ask.learned import Decisions, LearnedAsker, load_asker, save_asker, shown, train
 from agents.common.session import Note
-from agents.studies.engine import Figure, Measured, StudyLearner, StudyRow, StudyTable
+from agents.studies.engine import Measured, StudyLearner
+from agents.studies.tables import Figure, StudyRow, StudyTable
 from assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from torch import nn
 
@@ -15,9 +14,6 @@ from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import load_weights, save_weights
 from embodied.identity import Identity
-
-if TYPE_CHECKING:
-    from agents.bandit.training import NumberedCorpus
 
 REMEDY = "delete it and train it again with `embodied study bandit`"
 
@@ -32,10 +28,12 @@ class BanditAbout:
     """The words of the two languages."""
 
 
-def save_network(network: nn.Module, m: NumberedCorpus, path: Path, identity: Identity) -> None:
+def save_network(
+    network: nn.Module, config: BanditConfig, lexicons: tuple[Words, Words], path: Path, identity: Identity
+) -> None:
     """Write weights, settings, words and what they were trained with, atomically."""
-    source, target = (x.vocabulary.words for x in m.lexicons)
-    save_weights(path, "bandit", network.state_dict(), BanditAbout(m.config, source, target), identity)
+    source, target = (x.vocabulary.words for x in lexicons)
+    save_weights(path, "bandit", network.state_dict(), BanditAbout(config, source, target), identity)
 
 
 def load_network(network: nn.Module, path: Path) -> None:

@@ -18,7 +18,8 @@ from agents.bandit.ratings import CLEAN, Rater, rater_of
 from agents.bandit.training import NumberedCorpus, bandit, material, pretrain, teach_critic
 from agents.common.checkpoint import read_checkpoint
 from agents.common.session import Note
-from agents.studies.engine import Figure, Measured, StudyLearner, StudyRow, StudyTable
+from agents.studies.engine import Measured, StudyLearner
+from agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 

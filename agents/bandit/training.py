@@ -126,9 +126,9 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
         found = perplexity(translator, m.splits["dev"])
         before = [h["dev perplexity"] for h in history]
         if turn == 0:
-            save_network(translator, m, folder / "weak.safetensors", identity)
+            save_network(translator, m.config, m.lexicons, folder / "weak.safetensors", identity)
         if found < min(before, default=math.inf):
-            save_network(translator, m, folder / "full.safetensors", identity)
+            save_network(translator, m.config, m.lexicons, folder / "full.safetensors", identity)
         if turn + 1 >= config.decay_from and before and found > before[-1]:
             for group in optimizer.param_groups:
                 group["lr"] /= 2
@@ -167,7 +167,7 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
         return {"error": 2 * float(loss.detach()) * len(chosen), "words": int(rated.mask.sum())}
 
     def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
-        save_network(critic, m, folder / "critic.safetensors", identity)
+        save_network(critic, m.config, m.lexicons, folder / "critic.safetensors", identity)
         return {"mean square error": sums["error"] / sums["words"]}
 
     plan = Passes("critic", config.critic_passes, step, finish)
@@ -230,7 +230,7 @@ def bandit(
         return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
     found = _run(Passes("bandit", passes, step, finish), folder, identity, parts, config, data, note)
-    save_network(translator, m, folder / "best.safetensors", identity)
+    save_network(translator, m.config, m.lexicons, folder / "best.safetensors", identity)
     return found
 
 

@@ -11,8 +11,8 @@ from typing import Any
 from agents.common.session import Note
 from agents.find.config import FinderConfig
 from agents.find.run import Finder, tasks_in, train_finder
-from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES
+from agents.studies.tables import StudyRow, StudyTable
 from agents.vision.lessons import Lessons
 from agents.vision.run import encoder_of
 from agents.vision.sighted_study import SightedStudy

@@ -14,8 +14,9 @@ from agents.hanna.agent import HannaAgent
 from agents.hanna.evaluation import all_policies, by_the_text, counted
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.studies.engine import Measured, StudyRow, StudyTable
+from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES
+from agents.studies.tables import StudyRow, StudyTable
 from agents.vision.lessons import Lessons
 from agents.vision.sighted_study import SPLITS as TEST
 from agents.vision.sighted_study import SightedStudy

@@ -15,8 +15,9 @@ from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.judging import RANDOM, TEST, policies, validation_means
 from agents.hari.networks import INTENTIONS
 from agents.hari.run import CONDITIONS, rules_of, train_execution, train_intention
-from agents.studies.engine import Figure, Measured, StudyRow, StudyTable
+from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES, EpisodeStudy
+from agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.datasets.store import SplitData, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of

@@ -21,7 +21,8 @@ from agents.iliad.regex import run as regex
 from agents.iliad.regex.config import RegexConfig
 from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
-from agents.studies.engine import Figure, Measured, StudyLearner, StudyRow, StudyTable
+from agents.studies.engine import Measured, StudyLearner
+from agents.studies.tables import Figure, StudyRow, StudyTable
 from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples

@@ -25,6 +25,7 @@ from agents.common.device import use_threads
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.studies.pages import draw, page
+from agents.studies.tables import StudyRow, StudyTable
 from assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import PERCENT, Samples, interval, less
 from embodied.identity import (
@@ -45,53 +46,6 @@ PRINTED = Path(__file__).parent / "data" / "printed.json"
 """Numbers of papers: table to row to column, in the table's own units."""
 Measured = Mapping[str, Samples]
 """What was counted of one run, by name."""
-
-
-@dataclass(frozen=True)
-class StudyRow:
-    """One row: what is trained for it and how that is judged."""
-
-    label: str
-    train: Mapping[str, Any] | None = field(default_factory=dict)
-    """What differs from the settings of the study; None for a row that does not learn."""
-    judge: Mapping[str, Any] = field(default_factory=dict)
-    """Who plays, and how, in the learner's words."""
-    minus: StudyRow | None = None
-    """The row whose numbers are subtracted, task by task and seed by seed."""
-    x: float | None = None
-    """Where a figure draws it."""
-    series: str = ""
-    """The curve of the figure that it belongs to."""
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure of a table: its rows over their `x`, one curve per series and column; without any x its columns."""
-
-    columns: tuple[str, ...]
-    xlabel: str
-    ylabel: str
-    against: str = ""
-    """Key of the column over whose mean rows are drawn, instead of their `x`."""
-    log: bool = False
-    """Whether x grows by factors."""
-
-
-@dataclass(frozen=True)
-class StudyTable:
-    """A table as data."""
-
-    title: str
-    rows: tuple[StudyRow, ...]
-    columns: tuple[str, ...] = ()
-    """Names of what is counted; none for all that is."""
-    splits: tuple[str, ...] = ("",)
-    """Where agents are judged; '' where there is nothing to choose."""
-    compared: tuple[tuple[StudyRow, StudyRow], ...] = ()
-    """Pairs that differ in one thing, whose difference is told task by task."""
-    figure: Figure | None = None
-    pooled: tuple[str, ...] = ()
-    """Names of what is counted over all splits together."""
 
 
 class StudyLearner:

@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 
 import torch
 
-from agents.studies.engine import Measured, StudyLearner, StudyRow
+from agents.studies.engine import Measured, StudyLearner
+from agents.studies.tables import StudyRow
 from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import evaluate, spread
 from embodied.evaluation.rollout import play

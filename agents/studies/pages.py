@@ -5,14 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from matplotlib.figure import Figure as Picture
 
+from agents.studies.tables import StudyTable
 from assets.cache import atomic_path
-
-if TYPE_CHECKING:
-    from agents.studies.engine import StudyTable
 
 
 def page(body: Mapping[str, Any], picture: str | None = None) -> str:

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.sighted import SightedAgent
-from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import EpisodeStudy
+from agents.studies.tables import StudyRow, StudyTable
 from agents.vision.lessons import Lessons
 from agents.vision.run import encoder_of
 from assets.cache import default_cache

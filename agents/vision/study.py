@@ -21,7 +21,8 @@ from typing import Any
 
 from agents.common.session import Note
 from agents.common.weights import weights_digest
-from agents.studies.engine import Measured, StudyLearner, StudyRow, StudyTable
+from agents.studies.engine import Measured, StudyLearner
+from agents.studies.tables import StudyRow, StudyTable
 from agents.vision.config import RENDER_PRESETS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder

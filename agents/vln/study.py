@@ -11,8 +11,9 @@ from typing import Any
 import torch
 
 from agents.common.session import Note
-from agents.studies.engine import Measured, StudyRow, StudyTable
+from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES
+from agents.studies.tables import StudyRow, StudyTable
 from agents.vision.sighted_study import SPLITS, SightedStudy
 from agents.vln.agent import VlnAgent
 from agents.vln.config import FollowerSettings, SpeakerSettings

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from agents.common.session import Note
-from agents.studies.engine import StudyRow, StudyTable
 from agents.studies.episodes import JUDGES
+from agents.studies.tables import StudyRow, StudyTable
 from agents.vision.lessons import Lessons
 from agents.vision.sighted_study import NOTHING, SPLITS, SightedStudy
 from agents.vnla.agent import VnlaAgent

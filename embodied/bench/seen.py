@@ -13,8 +13,9 @@ from assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, measure, one_core, ratio
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
-from embodied.gym.env import HelpGymEnv, make, make_vec
+from embodied.gym.env import HelpGymEnv, make
 from embodied.gym.eyes import CameraSensor, PanoramaStore, Sensor, ViewSettings
+from embodied.gym.in_step import make_vec
 from embodied.gym.playground import flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
@@ -40,10 +41,6 @@ LINES = (
     ("rgb, the 36 views at 128 x 128", ("rgb",), ViewSettings("views36"), 60.0),
 )
 """What is seen, and how many steps per second the project promises with it."""
-WORKERS = 2
-"""Processes of the second vectorised line."""
-TOGETHER = 1.6
-"""Times as many steps that a batch is to make on two cores as one environment on one."""
 
 
 def seen(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
@@ -82,13 +79,12 @@ def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
     walk = _Alone(make("find", **asked))
     alone = measure("steps of one environment, rgb, 128 x 128", walk, "1/s", per=STEPS, warm=ROUNDS)
     yield alone
-    for workers in (1, WORKERS):
-        envs = make_vec("find", BATCH, workers=workers, **asked)
-        name = f"steps of {BATCH} environments in {workers} process{'es' if workers > 1 else ''}"
-        together = measure(name, _Together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
-        envs.close()
-        yield together
-        yield ratio(f"{name} against one", together, alone, aim=TOGETHER if workers > 1 else None)
+    envs = make_vec("find", BATCH, **asked)
+    name = f"steps of {BATCH} environments in one process"
+    together = measure(name, _Together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
+    envs.close()
+    yield together
+    yield ratio(f"{name} against one", together, alone)
 
 
 class _Alone:

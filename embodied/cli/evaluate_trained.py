@@ -14,7 +14,7 @@ from embodied.cli.common import bar, note
 
 if TYPE_CHECKING:
     from agents.vision.lessons import Lessons
-    from embodied.cli.evaluate import Options
+    from embodied.cli.evaluate_options import Options
     from embodied.datasets.store import Dataset, SplitData
     from embodied.evaluation.tables import Row
     from embodied.interface import Agent, Episode

@@ -35,7 +35,6 @@ from embodied.gym.eyes import (
     PIXELS,
     CameraSensor,
     FeatureSensor,
-    NoSensor,
     PanoramaStore,
     Sensor,
     SensorSuite,
@@ -43,7 +42,6 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.in_step import SharedSyncVectorEnv, refuse_too_many
 from embodied.gym.playground import Playground, Variants, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
@@ -382,33 +380,6 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
         opened=shared.opened,
         **own,
     )
-
-
-def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> SharedSyncVectorEnv:
-    """`num_envs` environments that share resources: houses, pages and decoded panoramas are held once.
-
-    Each has its own task, target, instruction and generator.
-
-    Args:
-      options: as of `make`, and `threads` that look (default: one per core).
-
-    Raises:
-      ValueError: fewer than one, or more than memory has room for.
-    """
-    if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
-        raise ValueError(f"num_envs should be a whole number of at least 1, got {num_envs!r}")
-    own = {name: options.pop(name) for name in OWN if name in options}
-    check_options(render_mode, **own)
-    threads = options.pop("threads", None)
-    shared = open_resources(kind, **options)
-
-    def one() -> HelpGymEnv:
-        return HelpGymEnv(
-            shared.make_env, shared.tasks, NoSensor(), layout=shared.layout, render_mode=render_mode, **own
-        )
-
-    refuse_too_many(num_envs, observation_space(shared.layout, shared.sensor))
-    return SharedSyncVectorEnv(one, int(num_envs), shared.sensor, threads=threads, opened=shared.opened)
 
 
 @dataclass(frozen=True, eq=False)

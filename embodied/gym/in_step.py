@@ -20,15 +20,43 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from embodied.gym.eyes import Arrays, Sensor
+from embodied.gym.env import OWN, HelpGymEnv, check_options, open_resources
+from embodied.gym.eyes import Arrays, NoSensor, Sensor
+from embodied.gym.spaces import observation_space
 from embodied.seeds import checked_seed
 
 if TYPE_CHECKING:
-    from embodied.gym.env import HelpGymEnv
     from embodied.world import World
 
 COPIES = 2
 """Of an observation that a batch holds per slot: what was handed out last, and what is being filled."""
+
+
+def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> SharedSyncVectorEnv:
+    """`num_envs` environments that share resources: houses, pages and decoded panoramas are held once.
+
+    Each has its own task, target, instruction and generator.
+
+    Args:
+      options: as of `make`, and `threads` that look (default: one per core).
+
+    Raises:
+      ValueError: fewer than one, or more than memory has room for.
+    """
+    if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
+        raise ValueError(f"num_envs should be a whole number of at least 1, got {num_envs!r}")
+    own = {name: options.pop(name) for name in OWN if name in options}
+    check_options(render_mode, **own)
+    threads = options.pop("threads", None)
+    shared = open_resources(kind, **options)
+
+    def one() -> HelpGymEnv:
+        return HelpGymEnv(
+            shared.make_env, shared.tasks, NoSensor(), layout=shared.layout, render_mode=render_mode, **own
+        )
+
+    refuse_too_many(num_envs, observation_space(shared.layout, shared.sensor))
+    return SharedSyncVectorEnv(one, int(num_envs), shared.sensor, threads=threads, opened=shared.opened)
 
 
 class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):

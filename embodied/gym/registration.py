@@ -31,7 +31,7 @@ def register(gymnasium: ModuleType) -> None:
             gymnasium.register(
                 f"embodied/{name}-v0",
                 entry_point="embodied.gym.env:make",
-                vector_entry_point="embodied.gym.env:make_vec",
+                vector_entry_point="embodied.gym.in_step:make_vec",
                 kwargs={"kind": kind},
             )
     for kind, name in CONTINUOUS.items():

@@ -1,0 +1,115 @@
+"""Options of `embodied evaluate`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from embodied.cli.common import Furnished, Printed
+from embodied.cli.learning import SHOWN, Encoded, Threaded
+from embodied.cli.model import WithModel
+from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, not_negative
+
+if TYPE_CHECKING:
+    from embodied.envs.hari import HariRules
+
+KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
+VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
+"""As in embodied.envs.vnla, which --help should not import."""
+STATES = ("none", "sparse", "dense")
+"""As in embodied.envs.hari, which --help should not import."""
+SEES = ("names", "strip", "panorama", "nothing")
+TEMPLATE = "template"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskOptions:
+    """Tasks."""
+
+    data: InputFolder | None = None
+    """The data set, a folder that `embodied dataset` built (default: one generated flat)."""
+    split: tuple[Annotated[str, Option(metavar="SPLIT")], ...] = ()
+    """Splits of the data set (default: test_unseen; hari: its three test splits)."""
+    tasks: Count | None = None
+    """Evaluate on at most N tasks of a split, spread over its houses (default: all, or 20 for a language model or
+    without --data)."""
+    steps: Count | None = None
+    """Longest episode in steps (default: its task's)."""
+    seed: int = 0
+    """Random seed."""
+    assistant: Annotated[str, Option(metavar="WHO")] = TEMPLATE
+    """Who answers requests: template (the kind's own assistant), llm, person, or MODULE:CLASS of your own."""
+    batch: Count | None = None
+    """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
+    rules: Annotated[str, Option(words=VNLA_RULES)] = VNLA_RULES[0]
+    """VNLA's rule of play: help in words (indirect), the advisor acts and says it (direct) or does not (direct-mute),
+    the program's 'forward' (goal-aware), Algorithm 6 as printed."""
+    seeds: InputPath | None = None
+    """ask: seeds of the houses, one per line."""
+    unseen_classes: bool = False
+    """ask: use only classes held out from training."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HariVariants:
+    """HARI's variants (defaults: Table E.2 of the dissertation)."""
+
+    stack: Count = 2
+    """Largest number of goals on the stack."""
+    longest: Count = 3
+    """Longest path to a sub-goal, in nodes."""
+    cost: Annotated[float, Option(not_negative, "X")] = 0.01
+    """Cost of each action."""
+    horizon: Count | None = None
+    """Longest episode in steps (default: its task's, 30)."""
+    uncooperative: bool = False
+    """The assistant answers a different question from the one asked."""
+    states: Annotated[str, Option(words=STATES)] = "sparse"
+    """How the agent's own place is described without a request."""
+    kept: Annotated[float, Option(metavar="SHARE")] = 0.1
+    """Share of the object classes, the most common first, that sparse descriptions keep."""
+
+    def hari_rules(self) -> HariRules:
+        from embodied.envs.hari import Costs, HariRules
+
+        costs, cooperative = Costs.alike(self.cost), not self.uncooperative
+        return HariRules(costs, self.stack, self.longest, cooperative, self.states, self.horizon, self.kept)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results(Printed):
+    """Results."""
+
+    out: OutputFolder | None = None
+    """Folder for the table and the episodes."""
+    rrd: Count | None = None
+    """Record the first N episodes of a trained agent into OUT/recordings."""
+    as_programs: bool = False
+    """Print a second table that is computed as in the authors' program, where that differs (docs/sources.md, S3, S5,
+    S6)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfTrained:
+    """Trained agents."""
+
+    rows: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
+    """Rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' where
+    other agents are named)."""
+    shown: Annotated[str, Option(words=SHOWN)] = "same"
+    """How goal images differ from what the agent sees there; same: not at all; camera: taken by a robot's camera; hour:
+    at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
+    another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(TaskOptions, Results, OfTrained, HariVariants, WithModel, Encoded, Threaded, Furnished):
+    kind: Annotated[str, Option(words=KINDS, name="kind")]
+    """The kind of task."""
+    agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
+    """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', or for ask a
+    folder with an agent.py or the http:// address of an agent (default: shipped, else all baselines)."""
+    threads: Count = 2
+    sees: Annotated[str, Option(words=SEES)] = "names"
+    """What a language model is given: the true names of what is visible (an oracle), the candidate views as one strip,
+    the panorama with markers, or nothing."""
