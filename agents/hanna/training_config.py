@@ -7,6 +7,7 @@ success radius with the task (embodied.tasks.hanna).
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 from agents.common.settings import (
@@ -86,19 +87,8 @@ class TrainingConfig(ImitationSettings):
 
     def network_config(self, words: int, feature_size: int) -> HannaSizes:
         """The sizes of the networks for a vocabulary and an encoder."""
-        return HannaSizes(
-            words=words,
-            feature_size=feature_size,
-            hidden_size=self.hidden_size,
-            navigation_embedding=self.navigation_embedding,
-            ask_embedding=self.ask_embedding,
-            self_heads=self.self_heads,
-            text_heads=self.text_heads,
-            dropout=self.dropout,
-            reset_inter_task=self.reset_inter_task,
-            predict_reasons=self.predict_reasons,
-            similarity_attention=self.similarity_attention,
-        )
+        shared = {f.name for f in dataclasses.fields(HannaSizes)} & {f.name for f in dataclasses.fields(self)}
+        return HannaSizes(words=words, feature_size=feature_size, **{name: getattr(self, name) for name in shared})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -104,15 +104,12 @@ def _evaluate(
     """Play, print the table, and write what goes into --out."""
     from agents.hanna.evaluation import behaviour
     from assets.cache import write_json
-    from embodied.evaluation import as_programs, tables
+    from embodied.evaluation import tables
     from embodied.records import episodes_file, fingerprint, save_lines
 
-    theirs: list[Row] = []
     found: dict[str, object] = {}
 
     def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
-        if args.as_programs and data is not None:
-            theirs.append(as_programs.row(name, split, episodes, data.places(split), seed=args.seed))
         if args.out:
             save_lines(args.out / episodes_file(split, name), episodes)
         if data is not None and files and args.kind == "hanna" and name == "learned":
@@ -132,8 +129,6 @@ def _evaluate(
         rows, about = [*rows, *more], about | facts
     if args.out:
         tables.save(rows, args.out, "table")
-        if theirs:
-            tables.save(theirs, args.out, "table_as_programs")
         if found:
             write_json(args.out / "behaviour.json", found, indent=1)
         write_json(args.out / "run.json", fingerprint(**about), indent=1)
@@ -143,9 +138,6 @@ def _evaluate(
         text += f"\n{json.dumps(found, indent=1)}"
     result: dict[str, object] = {"data": data and data.digest, "rows": json.loads(tables.as_json(rows))}
     result |= {"behaviour": found, "listener": heard}
-    if theirs:
-        result["as programs"] = json.loads(tables.as_json(theirs))
-        text += f"\nAs the authors' program computes it:\n\n{tables.markdown(theirs)}"
     for name, (right, total) in heard.items():
         text += f"\n{name}: a scripted listener arrives with {right} of the {total} routes that it was told"
     if client.cache_info().currsize:

@@ -84,9 +84,6 @@ class Results(Printed):
     """Folder for the table and the episodes."""
     rrd: Count | None = None
     """Record the first N episodes of a trained agent into OUT/recordings."""
-    as_programs: bool = False
-    """Print a second table that is computed as in the authors' program, where that differs (docs/sources.md, S3, S5,
-    S6)."""
 
 
 @dataclass(frozen=True, kw_only=True)

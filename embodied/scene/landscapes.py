@@ -3,6 +3,7 @@ house's seed."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -221,19 +222,7 @@ def near_buildings(house: House, place: Scenery) -> list[Building]:
             at = middle + along * (t + b.wide / 2) + away * (reach + b.deep / 2)
             turn = yaw + math.pi + math.pi / 2 + (rng.normal(0, 0.12) if kind == "villas" else 0.0)
             if kind == "terrace" or rng.random() < (0.85 if k == 0 else 0.6 if kind == "villas" else 0.4):
-                out.append(
-                    Building(
-                        (float(at[0]), float(at[1])),
-                        float(turn),
-                        b.wide,
-                        b.deep,
-                        b.eaves,
-                        b.ridge,
-                        b.paint,
-                        b.tiles,
-                        b.storey,
-                    )
-                )
+                out.append(dataclasses.replace(b, at=(float(at[0]), float(at[1])), yaw=float(turn)))
             t += b.wide + gap
     return out
 
