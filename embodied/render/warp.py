@@ -114,24 +114,23 @@ class WarpRenderer:
                 )
                 for rgb, rest in ((True, True), (True, False), (False, True))
             }
-            self._behind = None
-            if (opacities < 1).any():
-                clear = model.geom_rgba.copy()
-                clear[opacities < 1, 3] = 0
-                self._behind = (
-                    dataclasses.replace(self._model, geom_rgba=wp.array(clear[None], dtype=wp.vec4)),
-                    dataclasses.replace(
-                        self._passes[True, False],
-                        rgb_data=wp.zeros_like(context.rgb_data),
-                        seg_data=wp.zeros_like(context.seg_data),
-                    ),
-                )
+            self._behind = self._pass_behind(model.geom_rgba, opacities) if (opacities < 1).any() else None
             self._opacities, self._owned = wp.array(opacities, dtype=float), wp.array(owned, dtype=int)
             self._batch = Batch(
                 wp.zeros((worlds, height, width, 3), dtype=wp.uint8),
                 wp.zeros((worlds, height, width), dtype=float),
                 wp.zeros((worlds, height, width), dtype=int),
             )
+
+    def _pass_behind(self, colours: np.ndarray, opacities: np.ndarray) -> tuple[Any, Any]:
+        """Model and context of what is seen through glass: all that is opaque, in pictures of its own."""
+        clear = colours.copy()
+        clear[opacities < 1, 3] = 0
+        rgb, seg = wp.zeros_like(self._context.rgb_data), wp.zeros_like(self._context.seg_data)
+        return (
+            dataclasses.replace(self._model, geom_rgba=wp.array(clear[None], dtype=wp.vec4)),
+            dataclasses.replace(self._passes[True, False], rgb_data=rgb, seg_data=seg),
+        )
 
     def views(
         self,
