@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+from conftest import two_rooms
 from hand_data import build, built, small_house
-from handmade import HandCatalogue
+from handmade import HandCatalogue, furnished
 
 from agents.common.shipped import SHIPPED_ENCODER
 from agents.vision.encoder import load_encoder
@@ -16,6 +19,7 @@ from embodied import cli
 from embodied.datasets.folders import names_of
 from embodied.datasets.matterport import read_features
 from embodied.render.pictures import PictureSettings
+from embodied.world import open_world
 
 
 @pytest.fixture
@@ -80,3 +84,17 @@ def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
     (row,) = json.loads((tmp_path / "out/annotations.json").read_text())
     assert row["instructions"] == [data.tasks("train")[0].request]
     assert len(list((tmp_path / "out" / row["video"] / "rgb").iterdir())) == len(row["actions"])
+
+
+@pytest.mark.gl
+def test_drives_are_written_in_every_house_of_a_split(data, tmp_path, monkeypatch):
+    from embodied.gym import drive
+
+    flat, how = furnished(two_rooms()), {"size": 32, "pictures": "unlit"}
+    houses = [dataclasses.replace(flat, name=name) for name in ("left", "right")]
+    worlds = {house.name: open_world(house, HandCatalogue(), tmp_path / "cache", **how) for house in houses}
+    monkeypatch.setattr(drive, "data_worlds", lambda *_: worlds)
+    order = ["export", "lerobot-drive", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--size", "16"]
+    assert cli.main([*order, "--drives", "2"]) == 0
+    episodes = pq.read_table(tmp_path / "out/meta/episodes/chunk-000/file-000.parquet").to_pydict()
+    assert episodes["embodied/house"] == ["left", "right"]

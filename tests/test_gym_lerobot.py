@@ -5,13 +5,16 @@ from __future__ import annotations
 import importlib.util
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
 from gymnasium.utils.env_checker import check_env
 from handmade import HandCatalogue, furnished
 
 from embodied.envs.continuous import POSITION
-from embodied.gym.lerobot import ENVS, hub_file, make_env, make_one
+from embodied.gym.lerobot import ENVS, hub_file, make_env, make_one, sizes
+from embodied.gym.lerobot.drives import DRIVES, export_drives
+from embodied.seeds import stream
 from embodied.world import open_world
 
 pytestmark = pytest.mark.gl
@@ -67,3 +70,44 @@ def test_the_hubs_file_makes_the_environment(world, tmp_path, monkeypatch):
     assert envs.reset(seed=0)[0]["pixels"].shape == (1, 32, 32, 3)
     with pytest.raises(ValueError, match="use one of"):
         make_env(env="Arena")
+
+
+@pytest.mark.parametrize("name", ENVS)
+def test_the_blind_see_black_and_feel_the_same(world, name):
+    (seeing, _), (blind, _) = (
+        make_one(name, worlds={world.name: world}, **SMALL, **sees).reset(seed=2) for sees in ({}, {"sees": ()})
+    )
+    assert seeing["pixels"].any() and not blind["pixels"].any() and seeing["pixels"].shape == blind["pixels"].shape
+    assert (seeing["agent_pos"] == blind["agent_pos"]).all()
+
+
+@pytest.fixture(scope="module")
+def drives(world, tmp_path_factory):
+    home = tmp_path_factory.mktemp("drives")
+    env = make_one("Drive", worlds={world.name: world}, farthest=4.0, **SMALL)
+    steps = {wander: export_drives(env, home / str(wander), 3, seed=5, wander=wander) for wander in (0.0, 0.3)}
+    tables = {
+        wander: pq.read_table(next((home / str(wander) / "data").rglob("*.parquet"))).to_pydict() for wander in steps
+    }
+    assert {wander: len(table["index"]) for wander, table in tables.items()} == steps
+    return tables
+
+
+def test_whoever_takes_the_written_commands_sees_the_written_states_and_arrives(world, drives):
+    table, env = drives[0.0], make_one("Drive", worlds={world.name: world}, farthest=4.0, sees=(), **SMALL)
+    assert tuple(DRIVES[key][0].list_size for key in ("action", "observation.state")) == sizes("Drive")
+    for k in range(3):
+        mine = [i for i, number in enumerate(table["episode_index"]) if number == k]
+        seed = int(stream(5, "drives", k).integers(2**31))
+        o, _ = env.reset(seed=seed, options={"world": world.name})
+        for i in mine:
+            assert np.allclose(o["agent_pos"], table["observation.state"][i], atol=1e-5)
+            o, _, terminated, _, info = env.step(np.array(table["action"][i], np.float32))
+        assert terminated and info["is_success"] and table["next.success"][mine[-1]]
+
+
+def test_who_wanders_is_elsewhere_and_is_told_what_the_expert_does_there(drives):
+    straight, wandering = (np.array(drives[wander]["observation.state"]) for wander in (0.0, 0.3))
+    assert np.ptp(wandering[:, 0]) > np.ptp(straight[:, 0]) + 0.1, "the expert never drives backwards"
+    assert all(0 <= ahead <= 1 for ahead, _ in drives[0.3]["action"])
+    assert sum(drives[0.3]["next.success"]) == 3

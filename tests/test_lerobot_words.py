@@ -40,7 +40,16 @@ def test_what_an_assistant_says_is_what_the_expert_is_to_do_next(kind, tmp_path)
 def test_another_agent_plays_where_it_is_named(tmp_path, capsys):
     rows = exported("hanna", tmp_path, "--agent", "shortest")
     assert all(row["words"].startswith("find") and not row["language_events"] for row in rows)
-    order = ["export", "lerobot", "--data", str(tmp_path / "data"), "--out", str(tmp_path / "b"), "--agent"]
-    assert main([*order, "scripted listener"]) == 2
+    order = ["export", "lerobot", "--data", str(tmp_path / "data"), "--out", str(tmp_path / "b")]
+    assert main([*order, "--agent", "scripted listener"]) == 2
     assert "or export the --episodes" in capsys.readouterr().err
-    assert main([*order, "shortest", "--episodes", str(tmp_path / "x.jsonl")]) == 2
+
+
+@pytest.mark.parametrize(
+    "option", [("--agent", "shortest"), ("--split", "train"), ("--tasks", "1")], ids=lambda o: o[0]
+)
+def test_episodes_say_who_played_what(option, tmp_path, capsys):
+    built(tmp_path / "data", "hanna", size="1x4", make_house=small_house)
+    order = ["export", "lerobot", "--data", str(tmp_path / "data"), "--out", str(tmp_path / "b")]
+    assert main([*order, *option, "--episodes", str(tmp_path / "x.jsonl")]) == 2
+    assert f"leave {option[0]} out" in capsys.readouterr().err

@@ -5,6 +5,7 @@
   matterport                    graphs and skyboxes for the Matterport3D simulator
   vlnce, streamvln, uninavid, internnav, lerobot-vlnce
                                 continuous walks of an expert in `vln` data: images, actions, instructions
+  lerobot-drive                 drives of an expert on wheels, for policies of LeRobot in Drive-v0
   parquet                       tables and a card, for `datasets.load_dataset`
   lerobot                       episodes with video, poses, actions and instructions, for `LeRobotDataset`
   glb, mjcf, usd                a house for web viewers and Blender, for MuJoCo's viewer, for USD programs
@@ -31,11 +32,13 @@ from embodied.cli.options import (
     InputPath,
     Option,
     OutputFolder,
+    drawn_as,
     file_ending_in,
     file_to_write,
     not_negative,
     video_side,
 )
+from embodied.render.pictures import PICTURES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -90,12 +93,12 @@ class LeRobotOptions(OfData):
     """Episodes as a LeRobot data set (v3.0)."""
 
     episodes: tuple[InputPath, ...] = ()
-    """Episodes (.jsonl) of `embodied evaluate` (default: --agent plays --split)."""
+    """Episodes (.jsonl) of `embodied evaluate` (default: --agent plays --split); they say who played which tasks."""
     agent: Annotated[str | None, Option(metavar="NAME")] = None
     """Who plays: an agent of `embodied evaluate` that needs no training and no pictures (default: an expert, which asks
     where the kind of task has help)."""
-    split: str = "train"
-    """The split whose tasks are played."""
+    split: str | None = None
+    """The split whose tasks are played (default: train)."""
     tasks: Count | None = None
     """Play the first N tasks (default: all)."""
     size: Annotated[int, Option(video_side, "PIXELS")] = 224
@@ -118,6 +121,22 @@ class WalkOptions(OfData, Cached):
     """Width of the pictures (default: that of the program)."""
     depth: bool = False
     """Also write videos of depth (lerobot-vlnce)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveOptions(OfData, Cached):
+    """Drives of an expert on wheels to points, as LeRobot data (v3.0), in houses of any kind of data."""
+
+    split: str = "train"
+    """The split whose houses are driven in."""
+    drives: Count = 100
+    """Drive N times, as often in each house."""
+    wander: Annotated[float, Option(not_negative, "SHARE")] = 0.0
+    """Share of the commands that are random; the stored command is always the expert's, as in DAgger."""
+    pictures: Annotated[str | None, drawn_as(PICTURES)] = None
+    """How houses are drawn (default: as the data set's pictures are)."""
+    size: Annotated[int, Option(video_side, "PIXELS")] = 128
+    """Side of the pictures."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,8 +248,9 @@ def run_lerobot(args: LeRobotOptions) -> int:
 
     data = Dataset(args.data)
     name = args.agent or EXPERTS.get(data.kind, "shortest")
-    if args.agent and args.episodes:
-        raise ValueError("--episodes says who played; leave --agent out")
+    chosen = {"--agent": args.agent, "--split": args.split, "--tasks": args.tasks}
+    if args.episodes and (twice := [option for option, value in chosen.items() if value is not None]):
+        raise ValueError(f"--episodes says who played which tasks; leave {' and '.join(twice)} out")
     if name not in AGENTS[data.kind]:
         raise ValueError(
             f"--agent is {name!r}; of {data.kind!r} use one of {[*AGENTS[data.kind]]}, or export the --episodes that "
@@ -241,7 +261,7 @@ def run_lerobot(args: LeRobotOptions) -> int:
         for episode in episodes:
             data.place_of(episode)
     else:
-        whole_split = data.split(args.split)
+        whole_split = data.split(args.split or "train")
         tasks = whole_split.tasks[: args.tasks]
         episodes = play(whole_split.make_env, agent(data.kind, name), tasks, seed=data.config.seed, agent=name)
 
@@ -300,6 +320,23 @@ def run_walks(what: str, args: WalkOptions) -> int:
     return 0
 
 
+def run_drives(args: DriveOptions) -> int:
+    from embodied.datasets.store import Dataset
+    from embodied.gym.drive import make
+    from embodied.gym.lerobot import DriveForLeRobot
+    from embodied.gym.lerobot.drives import export_drives
+
+    seen: dict[str, Any] = {"height": args.size, "width": args.size, "sees": ("rgb",), "pictures": args.pictures}
+    env = DriveForLeRobot(make(data=args.data, split=args.split, cache=args.cache, **seen))
+    watch = functools.partial(bar, name="drives", unit="drive")
+    seed = Dataset(args.data).config.seed
+    steps = export_drives(env, args.out, args.drives, seed=seed, wander=args.wander, watch=watch)
+    env.close()
+    facts = {"drives": args.drives, "steps": steps, "out": str(args.out)}
+    show(args, facts, f"{args.drives} drives, {steps} steps in {args.out}")
+    return 0
+
+
 def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> int:
     from embodied.house.validation import load_house
     from embodied.locks import locked
@@ -346,6 +383,7 @@ COMMANDS: Mapping[str, Any] = {
     "parquet": (ParquetOptions, run_parquet),
     "lerobot": (LeRobotOptions, run_lerobot),
     **{name: (WalkOptions, functools.partial(run_walks, name)) for name in WALKS},
+    "lerobot-drive": (DriveOptions, run_drives),
     "glb": (GlbOptions, functools.partial(run_house, "glb")),
     "mjcf": (MjcfOptions, functools.partial(run_house, "mjcf")),
     "usd": (UsdOptions, functools.partial(run_house, "usd")),

@@ -275,7 +275,7 @@ def make_course(
     episodes: str | Path | None = None,
     seed: int = 0,
     cache: str | Path | None = None,
-    pictures: PictureSettings | None = None,
+    pictures: PictureSettings | str | None = None,
     worlds: Mapping[str, World] | None = None,
     preset: str | None = None,
     sees: str | Sequence[str] = SEES,

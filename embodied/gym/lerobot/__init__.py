@@ -4,8 +4,8 @@
     envs = make_env(n_envs=4, env="VLNCE", data="DIR", split="val_unseen")     # {"embodied/VLNCE-v0": {0: VectorEnv}}
 
 Observations are `pixels` (pictures) and `agent_pos` (a vector), actions are vectors of float32: in VLNCE-v0 and
-ObjectNav-v0 a score for each action, of which the largest is taken; in Drive-v0 the velocities. Every info has
-`is_success`; `task_description`, `task` and `_max_episode_steps` are attributes.
+ObjectNav-v0 a score for each action, of which the largest is taken; in Drive-v0 the velocities. With `sees=()` pixels
+are black. Every info has `is_success`; `task_description`, `task` and `_max_episode_steps` are attributes.
 
 EnvHub reads a file `env.py` of a repository; `hub_file` writes one that makes these environments.
 """
@@ -45,6 +45,7 @@ class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
                 "agent_pos": spaces.Box(-LARGE, LARGE, (len(POSITION),), np.float32),
             }
         )
+        self._black = black(self.observation_space)
         self.action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
         self.render_mode = env.render_mode
         self._max_episode_steps = env.course.body.steps
@@ -77,7 +78,7 @@ class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         self.env.close()
 
     def _seen(self) -> dict[str, Any]:
-        return {"pixels": self.env.pixels()["rgb"], "agent_pos": self.env.own_way()}
+        return {"pixels": self.env.pixels().get("rgb", self._black), "agent_pos": self.env.own_way()}
 
 
 class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
@@ -93,8 +94,12 @@ class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         settings = env.driving.settings
         self._parts = [name for name in DRIVEN if name in known.spaces]
         self.observation_space = spaces.Dict(
-            {"pixels": known["rgb"], "agent_pos": spaces.Box(-LARGE, LARGE, (_driven(settings),), np.float32)}
+            {
+                "pixels": spaces.Box(0, 255, (settings.height, settings.width, 3), np.uint8),
+                "agent_pos": spaces.Box(-LARGE, LARGE, (_driven(settings),), np.float32),
+            }
         )
+        self._black = black(self.observation_space)
         self._max_episode_steps = round(settings.seconds / settings.control)
 
     @property
@@ -124,7 +129,15 @@ class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         self.env.close()
 
     def _seen(self, o: dict[str, Any]) -> dict[str, Any]:
-        return {"pixels": o["rgb"], "agent_pos": np.concatenate([o[name] for name in self._parts]).astype(np.float32)}
+        state = np.concatenate([o[name] for name in self._parts]).astype(np.float32)
+        return {"pixels": o.get("rgb", self._black), "agent_pos": state}
+
+
+def black(seen: spaces.Dict) -> np.ndarray:
+    """(h, w, 3) uint8: the pixels of a blind agent."""
+    shape = seen["pixels"].shape
+    assert shape is not None, "a Box"
+    return np.zeros(shape, np.uint8)
 
 
 def _driven(settings: DriveSettings) -> int:

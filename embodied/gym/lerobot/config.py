@@ -26,8 +26,12 @@ class EmbodiedEnvConfig(EnvConfig):
     data: str | None = None
     """Folder of a data set; a generated flat without one."""
     split: str = "val_unseen"
+    pictures: str | None = None
+    """How houses are drawn, 'unlit' or 'fast-matte' for instance; as the data set's pictures are where not given."""
     height: int = 128
     width: int = 128
+    blind: bool = False
+    """Whether pictures are black."""
     steps: int = 500
     """Longest episode of VLNCE and ObjectNav, in actions."""
     fps: int = 4
@@ -49,9 +53,11 @@ class EmbodiedEnvConfig(EnvConfig):
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
-        house = {"data": self.data, "split": self.split} if self.data else {}
+        house: dict[str, Any] = {"data": self.data, "split": self.split} if self.data else {}
         longest = {} if self.task == "Drive" else {"steps": self.steps}
-        return {"height": self.height, "width": self.width, **longest, **house}
+        sees = () if self.blind else ("rgb",)
+        sides = {"height": self.height, "width": self.width}
+        return {**sides, "sees": sees, "pictures": self.pictures, **longest, **house}
 
     def create_envs(self, n_envs: int, use_async_envs: bool = False) -> dict[str, dict[int, gym.vector.VectorEnv]]:
         return make_env(n_envs, use_async_envs, env=self.task or "VLNCE", **self.gym_kwargs)

@@ -1,0 +1,91 @@
+"""Drives of an expert as LeRobot data (v3.0), in the columns that Drive-v0 shows to LeRobot's policies.
+
+observation.image    (height, width, 3) what is seen before a command
+observation.state    agent_pos of embodied.gym.lerobot.DriveForLeRobot
+action               what the expert commands there, ahead and left, from -1 to 1
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
+from embodied.gym.driving import guided
+from embodied.gym.lerobot import DriveForLeRobot
+from embodied.seeds import stream
+
+STATE = ("metres per second", "radians per second", "touched", "metres to goal", "sine", "cosine")
+"""observation.state: motion ahead and to the left, touch, and where the goal is, left positive."""
+COMMAND = ("ahead", "left")
+DRIVES: Columns = {
+    **COLUMNS,
+    "observation.state": (pa.list_(pa.float32(), len(STATE)), STATE),
+    "action": (pa.list_(pa.float32(), len(COMMAND)), COMMAND),
+}
+HELD = 5
+"""Commands that a random one is held for."""
+CARD = """$COUNT$ of drives in generated houses, written by `embodied export lerobot-drive`.
+
+`observation.image` is what is seen before a command, `observation.state` the motion, touch and the direction of the
+goal, `action` what an expert commands there. `lerobot-eval` judges policies in embodied.gym.lerobot.
+"""
+
+
+def export_drives(
+    env: DriveForLeRobot,
+    folder: Path,
+    drives: int,
+    *,
+    seed: int,
+    wander: float = 0.0,
+    watch: Callable[[Iterable[int]], Iterable[int]] = iter,
+) -> int:
+    """Play episodes, as many in each house, and write them; returns how many steps there are.
+
+    Args:
+      folder: new or empty.
+      wander: the share of commands, below 1, that are drawn instead; what is written stays the expert's.
+      watch: goes through the numbers of the drives, as a progress bar does.
+
+    Raises:
+      ValueError: a folder with files, or an impossible share.
+    """
+    if not 0 <= wander < 1:
+        raise ValueError(f"wander is a share from 0 to below 1, got {wander}")
+    settings, names = env.env.driving.settings, sorted(env.env.driving.worlds)
+    camera = RecordedCamera(settings.height, settings.width, settings.vfov)
+    with whole_folder(folder) as draft:
+        fps = round(1 / settings.control)
+        writer = Writer(draft, camera, DRIVES, key="observation.image", fps=fps)
+        for k in watch(range(drives)):
+            name, rng = names[k * len(names) // drives], stream(seed, "drives", k)
+            first, _ = env.reset(seed=int(rng.integers(2**31)), options={"world": name})
+            seen, labels, infos = zip(*_driven(env, first, wander, rng), strict=True)
+            rows = {"observation.state": np.stack([o["agent_pos"] for o in seen]), "action": np.stack(labels)}
+            facts = {"embodied/task": f"{name}_{k}", "embodied/house": name, "embodied/agent": "expert"}
+            words = [env.task_description] * len(seen)
+            said = [""] * len(seen)
+            writer.add(rows, [o["pixels"] for o in seen], [], words, said, infos[-1]["is_success"], facts)
+        return writer.finish("embodied drive", CARD)
+
+
+def _driven(
+    env: DriveForLeRobot, seen: dict[str, Any], wander: float, rng: np.random.Generator
+) -> Iterator[tuple[dict[str, Any], np.ndarray, dict[str, Any]]]:
+    """What is seen before each command, what the expert commands there, and info after what is done."""
+    held, drawn, ended = 0, np.zeros(len(COMMAND)), False
+    begin = wander / (HELD * (1 - wander))
+    while not ended:
+        label = guided(env.env.driving)
+        if not held and rng.random() < begin:
+            held, drawn = HELD, rng.uniform(-1.0, 1.0, len(COMMAND))
+        command = drawn if held else label
+        held = max(held - 1, 0)
+        after, _, terminated, truncated, info = env.step(command)
+        yield seen, label, info
+        seen, ended = after, terminated or truncated
