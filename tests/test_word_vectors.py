@@ -10,14 +10,14 @@ import torch
 from torch import nn
 
 from agents.common import word_vectors
+from agents.common.unheard import UNHEARD, Reworded, in_synonyms
 from agents.common.vocabulary import build_vocabulary
-from agents.common.word_vectors import Lexicon, WordEmbedding, use_vectors, vocabulary_with
+from agents.common.word_vectors import Lexicon, WordEmbedding, take_weights, use_vectors, vocabulary_with
 from agents.hanna.attention import TextEncoder
 from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
-from agents.vln.unheard import UNHEARD, unheard
 from embodied.errors import UnableError
-from embodied.interface import FollowRoute, Pose, Task
+from embodied.interface import Candidates, Mode, Observation, Sight, Stop
 
 WORDS = build_vocabulary(["walk to the hall, turn left", "stop near the bed"]).words
 ALIKE = {"stroll": "walk", "corridor": "hall"}
@@ -109,9 +109,40 @@ def test_settings_name_the_vectors_there_are_and_a_missing_package_is_named(monk
 
 
 def test_common_words_of_an_instruction_are_replaced_by_ones_that_are_not_known():
-    task = Task("t", "vln", "grid", Pose(0), FollowRoute("r", (0, 1)), (1,), "Walk to the Sofa, then left.", 3.0, 20)
-    assert unheard(task, {"walk", "tramp"}).request == "tread to the loveseat, thereafter leftward."
-    assert unheard(task, {*UNHEARD, *(w for many in UNHEARD.values() for w in many)}).request == task.request.lower()
+    say = in_synonyms({"walk", "tramp"})
+    assert say("Walk to the Sofa, then left.") == "tread to the loveseat, thereafter leftward."
+    synonyms = UNHEARD.synonyms
+    everything = in_synonyms({*synonyms, *(w for many in synonyms.values() for w in many)})
+    assert everything("Walk to the Sofa") == "walk to the sofa"
+
+
+def test_a_policy_hears_other_words_and_all_else_as_it_is():
+    class Listening:
+        def act(self, observations, memory, *, rngs):
+            heard.append(observations)
+            return [Stop() for _ in observations], memory
+
+    heard, none = [], np.zeros(0, np.float32)
+    nowhere = Candidates(none, none, np.zeros(0, int), np.zeros(0, bool))
+    o = Observation(Sight("house", 0), 0, 0, nowhere, "find a mug", None, Mode.MAIN, (), None, 0, 0)
+    actions, memory = Reworded(Listening(), str.upper).act([o, None], "kept", rngs=[])
+    assert memory == "kept" and len(actions) == 2
+    (same, nothing), *_ = heard
+    assert nothing is None and same == dataclasses.replace(o, instruction="FIND A MUG") != o
+
+
+def test_an_agent_that_learned_words_alone_begins_with_vectors_and_acts_as_before():
+    torch.manual_seed(1)
+    before, after = (nn.Sequential(WordEmbedding(len(WORDS), 6)) for _ in range(2))
+    use_vectors(after, Lexicon(WORDS))
+    take_weights(after, before.state_dict())
+    said = torch.arange(3, len(WORDS))
+    assert torch.allclose(before.eval()(said), after.eval()(said), atol=1e-6)
+    assert after[0].meaning.weight.any(), "words never heard mean something at once"
+    again = nn.Sequential(WordEmbedding(len(WORDS), 6))
+    use_vectors(again, Lexicon(WORDS))
+    take_weights(again, after.state_dict())
+    assert torch.equal(again[0].meaning.weight, after[0].meaning.weight), "vectors that were learned stay"
 
 
 def test_minilms_vectors_know_that_words_are_alike():

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.common.choosing import choose_at
+from agents.common.settings import LEARNED_WORDS
 from agents.common.sighted import About, SightedAgent
 from agents.common.weights import check_features
+from agents.common.word_vectors import take_weights as take_into
 from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.config import HannaSizes
 from agents.hanna.lstm import LstmNetwork
@@ -73,14 +75,14 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
       ValueError: their networks differ, or the features that they know.
     """
     mine, its = agent.about, other.about
-    if _kind(mine) != _kind(its):
+    if _kind(mine) != _kind(its) or its.config.word_vectors not in (LEARNED_WORDS, mine.config.word_vectors):
         raise ValueError(
             f"{source} cannot be begun with: it is a {its.config.model!r} of {its.sizes} on encoder "
             f"{its.encoder[:12]}, this run a {mine.config.model!r} of {mine.sizes} on encoder "
             f"{mine.encoder[:12]}; give this run its settings"
         )
-    agent.network.load_state_dict(other.network.state_dict())
+    take_into(agent.network, other.network.state_dict())
 
 
-def _kind(about: HannaAbout) -> tuple[str, str, str, HannaSizes]:
-    return about.encoder, about.config.model, about.config.word_vectors, about.sizes
+def _kind(about: HannaAbout) -> tuple[str, str, HannaSizes]:
+    return about.encoder, about.config.model, about.sizes

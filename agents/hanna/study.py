@@ -17,6 +17,7 @@ from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES
 from agents.studies.tables import StudyRow, StudyTable
+from agents.studies.wordings import words_table
 from agents.vision.lessons import Lessons
 from agents.vision.sighted_study import SPLITS as TEST
 from agents.vision.sighted_study import SightedStudy
@@ -92,6 +93,7 @@ TABLES: Mapping[str, StudyTable] = {
         ("test_unseen",),
         tuple((OURS_SEEING, row) for row in SIGHT_ROWS if row.train is not None),
     ),
+    "words": words_table(learned, FULL, TEST[1:]),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
     "4.5": StudyTable(
         "Help-request policies",
@@ -185,7 +187,8 @@ class HannaStudy(SightedStudy):
             return super().policies(agent, judge, split)
         bank = self.judged_lessons(judge).split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
-        return all_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
+        policy = all_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
+        return self.heard(agent, policy, judge)
 
     def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         return super().where(agent, judge, split.removesuffix(SHIPPED))

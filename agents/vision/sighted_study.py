@@ -12,6 +12,7 @@ from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.sighted import SightedAgent
 from agents.studies.episodes import EpisodeStudy
 from agents.studies.tables import StudyRow, StudyTable
+from agents.studies.wordings import WORDING, hearing
 from agents.vision.lessons import Lessons
 from agents.vision.run import encoder_of
 from assets.cache import default_cache
@@ -63,7 +64,12 @@ class SightedStudy(EpisodeStudy):
     def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return agent_without_learning(self.name, judge["played"])
-        return agent.policy(self.judged_lessons(judge).split(split).bank)
+        return self.heard(agent, agent.policy(self.judged_lessons(judge).split(split).bank), judge)
+
+    def heard(self, agent: Any, policy: Any, judge: Mapping[str, Any]) -> Agent:
+        """The policy of an agent, to which everything is said as the row has it."""
+        how = judge.get(WORDING)
+        return hearing(policy, how, agent.about.words, self.cache) if how else policy
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return self.judged_lessons(judge).data

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +13,12 @@ from agents.common.session import Note
 from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES
 from agents.studies.tables import StudyRow, StudyTable
+from agents.studies.wordings import words_table
 from agents.vision.sighted_study import SPLITS, SightedStudy
 from agents.vln.agent import VlnAgent
 from agents.vln.config import FollowerSettings, SpeakerSettings
 from agents.vln.run import train_follower
 from agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
-from agents.vln.unheard import unheard
-from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import spread
 from embodied.identity import Identity, key_of
 from embodied.records import save_lines
@@ -41,11 +39,6 @@ def _without(name: str) -> StudyRow:
 
 FOLLOWER, BLIND = _row("DAgger"), _row("DAgger, blind", blind=True)
 CHOSEN, SPOKEN = _row("DAgger, reranked", RERANKED), _row("DAgger, back-translation", spoken_share=0.5)
-READER = _row("pre-trained word vectors", word_vectors="minilm")
-UNHEARD_BY_FOLLOWER, UNHEARD_BY_READER = (
-    dataclasses.replace(row, label=f"{row.label}, unheard words", judge={**row.judge, "unheard": True})
-    for row in (FOLLOWER, READER)
-)
 TABLES: Mapping[str, StudyTable] = {
     "followers": StudyTable(
         "Followers of route instructions",
@@ -69,13 +62,7 @@ TABLES: Mapping[str, StudyTable] = {
         SPLITS,
         ((CHOSEN, FOLLOWER), (SPOKEN, FOLLOWER)),
     ),
-    "words": StudyTable(
-        "Instructions in words that were never heard",
-        (FOLLOWER, UNHEARD_BY_FOLLOWER, READER, UNHEARD_BY_READER),
-        COLUMNS,
-        SPLITS[1:],
-        ((FOLLOWER, UNHEARD_BY_FOLLOWER), (READER, UNHEARD_BY_READER), (UNHEARD_BY_READER, UNHEARD_BY_FOLLOWER)),
-    ),
+    "words": words_table(_row, COLUMNS, SPLITS[1:]),
 }
 
 
@@ -103,13 +90,6 @@ class VlnStudy(SightedStudy):
         speaker = _file(folder) if train.get("spoken_share") else None
         train_follower(self.lessons(), self.settings(train, seed), self.evaluation, home, speaker=speaker, note=note)
         return home / "best.safetensors"
-
-    def where(self, agent: VlnAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
-        whole = super().where(agent, judge, split)
-        if not judge.get("unheard"):
-            return whole
-        assert agent is not None, "rows with unheard words learn"
-        return dataclasses.replace(whole, tasks=tuple(unheard(t, agent.about.words) for t in whole.tasks))
 
     @torch.inference_mode()
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:

@@ -14,6 +14,7 @@ from typing import Any
 from agents.common.session import Note
 from agents.studies.episodes import JUDGES
 from agents.studies.tables import StudyRow, StudyTable
+from agents.studies.wordings import words_table
 from agents.vision.lessons import Lessons
 from agents.vision.sighted_study import NOTHING, SPLITS, SightedStudy
 from agents.vnla.agent import VnlaAgent
@@ -84,6 +85,7 @@ TABLES: Mapping[str, StudyTable] = {
         _row("b to d", ask_rules="b to d"),
         _row("all"),
     ),
+    "words": words_table(_row, COLUMNS, SPLITS[1:]),
 }
 """The paper's Tables 2, 3, 4 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
 
@@ -115,7 +117,7 @@ class VnlaStudy(SightedStudy):
         return home / "best.safetensors"
 
     def policies(self, agent: VnlaAgent, judge: Mapping[str, Any], split: str) -> Agent:
-        return player(agent, self.lessons(judge).split(split).bank, judge["played"])
+        return self.heard(agent, player(agent, self.lessons(judge).split(split).bank, judge["played"]), judge)
 
     def where(self, agent: VnlaAgent, judge: Mapping[str, Any], split: str) -> SplitData:
         return self.judged_in(judge).split(split, vnla=rules_of_row(agent, judge["played"]))

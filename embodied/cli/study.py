@@ -12,10 +12,10 @@
     embodied study iliad nav 3.4 3.5 --data DATA --out STUDY
     embodied study check STUDY
 
-HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2 and `sight`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b'
+HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `sight` and `words`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b'
 and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and
-`algorithm-6`. VLN's are `followers`, `speaker` and `words`. Ask-v0's are `houses`, `classes` and `curves`. `bandit`
-has Table 3.2, Figures 3.4 and 3.5, `rates` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1,
+`algorithm-6`, and `words`. VLN's are `followers`, `speaker` and `words`. Ask-v0's are `houses`, `classes` and `curves`.
+`bandit` has Table 3.2, Figures 3.4 and 3.5, `rates` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1,
 'figure 3.7' and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share
 are trained once. Each table is written as JSON, Markdown and, for some, as a figure. Rerun an interrupted command to
 resume.
@@ -121,7 +121,7 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2 or sight."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight or words."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
@@ -177,7 +177,7 @@ class VnlaOptions(Study, Trained, Judged, WithData, Encoded):
     """Agents that ask an advisor within a budget."""
 
     tables: Tables
-    """Make these tables: askers, interventions, algorithm-6, rooms or rules."""
+    """Make these tables: askers, interventions, algorithm-6, rooms, rules or words."""
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
     without_rooms: InputFolder | None = None

@@ -1,0 +1,110 @@
+"""Whole sentences that no speaker of the corpus says: an instruction is read by its grammar and said in other frames.
+
+Nouns, colours and numbers stay as they were said; word order, verbs and what joins clauses are others (unheard.toml).
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from agents.common.unheard import UNHEARD
+from assets.catalogue import Catalogue
+from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
+from embodied.language.grammar import kind_of, normalised, parse
+from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
+from embodied.language.plain import heard_subgoal
+from embodied.language.templates import WORDS
+from embodied.seeds import stream
+
+BACKWARD_SHARE = 0.15
+FIND = "find "
+
+
+def paraphraser(catalogue: Catalogue) -> Callable[[str], str]:
+    """What rewords instructions, requests and sub-goals about things of a catalogue; the same text always alike."""
+    return functools.cache(functools.partial(paraphrase, lexicon=lexicon_of(catalogue)))
+
+
+def paraphrase(text: str, lexicon: Lexicon) -> str:
+    """The text in other sentences; what its grammar does not read is left out. A text of which it reads none stays."""
+    rng = stream(0, "paraphrase", text)
+    *subgoals, last = text.split(" . ")
+    if last.startswith(FIND):
+        return " . ".join([*(_actions(heard_subgoal(s), rng) for s in subgoals), _request(last, rng)])
+    try:
+        clauses = parse(text, lexicon).clauses
+    except ValueError:  # no instruction
+        return text
+    return _joined(list(_said(clauses, normalised(text), lexicon, rng)), rng)
+
+
+def _said(clauses: Sequence[Clause], text: str, lexicon: Lexicon, rng: np.random.Generator) -> list[str]:
+    """Each clause, or two at once, in a frame."""
+    said, i = [], 0
+    while i < len(clauses):
+        kinds = " ".join(kind_of(c) for c in clauses[i : i + 2])
+        many = 2 if i + 1 < len(clauses) and kinds in UNHEARD.frames and rng.random() < 0.5 else 1
+        now = clauses[i : i + many]
+        frames = UNHEARD.frames[" ".join(kind_of(c) for c in now)]
+        said.append(frames[int(rng.integers(len(frames)))].format(**_slots(now, text, lexicon)))
+        i += many
+    return said
+
+
+def _slots(clauses: Sequence[Clause], text: str, lexicon: Lexicon) -> dict[str, str]:
+    """What is told of, in the nouns of the text."""
+    slots: dict[str, str] = {}
+    kinds = [kind for c in clauses if (kind := room_of(c)) is not None]
+    for name, kind in zip(("room", "other"), kinds):
+        slots[name] = _longest_in(text, map(str.lower, ROOM_NOUNS[kind])) or ROOM_NOUNS[kind][0]
+    for c in clauses:
+        if (side := side_of(c)) is not None:
+            slots["side"] = side
+        if isinstance(c, Metres):
+            number = WORDS.numbers[c.count] if c.count < len(WORDS.numbers) else str(c.count)
+            slots["metres"] = f"{number} meter{'s' * (c.count != 1)}"
+        if isinstance(c, Enter) and c.nth:
+            slots["nth"] = WORDS.ordinals[c.nth]
+        if (thing := getattr(c, "thing", None)) is not None:
+            slots["thing"] = f"the {' '.join([*thing.words, _noun(thing, text, lexicon)])}"
+    return slots
+
+
+def _noun(thing: Referent, text: str, lexicon: Lexicon) -> str:
+    nouns = (noun for noun, classes in lexicon.classes_of.items() if classes == thing.classes)
+    return _longest_in(text, nouns) or thing.classes[0]
+
+
+def _longest_in(text: str, nouns: Iterable[str]) -> str:
+    """The longest of the nouns that the text has; '' if it has none."""
+    return max((n for n in nouns if f" {n} " in f" {text} "), key=len, default="")
+
+
+def _joined(said: list[str], rng: np.random.Generator) -> str:
+    text = said[0]
+    for before, more in itertools.pairwise(said):
+        if text == before and len(said) > 2 and rng.random() < BACKWARD_SHARE:
+            text = UNHEARD.backwards.format(first=before, second=more)
+        else:
+            text += UNHEARD.joints[int(rng.integers(len(UNHEARD.joints)))] + more
+    return ". ".join(s[:1].upper() + s[1:] for s in text.split(". ")) + "."
+
+
+def _request(text: str, rng: np.random.Generator) -> str:
+    """'find a mug in a kitchen' otherwise."""
+    thing, _, room = text.removeprefix(FIND).partition(" in ")
+    where = UNHEARD.where[int(rng.integers(len(UNHEARD.where)))].format(room=room) if room else ""
+    return UNHEARD.requests[int(rng.integers(len(UNHEARD.requests)))].format(thing=thing, where=where)
+
+
+def _actions(words: Sequence[str], rng: np.random.Generator) -> str:
+    """VNLA's sub-goal otherwise."""
+    said = []
+    for word, group in itertools.groupby(words):
+        n, frames = len(list(group)), UNHEARD.actions[word]
+        said.append(frames[int(rng.integers(len(frames)))].format(n=n if word == "forward" else 30 * n))
+    return " ; ".join(said)

@@ -1,0 +1,54 @@
+"""Instructions in words that no speaker of the corpus says: how well an agent reads what it never heard."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from assets.json_file import from_plain, read_toml
+from embodied.interface import Actions, Observations, Policy
+
+
+@dataclass(frozen=True)
+class Unheard:
+    """What is in unheard.toml."""
+
+    joints: tuple[str, ...]
+    backwards: str
+    requests: tuple[str, ...]
+    where: tuple[str, ...]
+    synonyms: Mapping[str, tuple[str, ...]]
+    frames: Mapping[str, tuple[str, ...]]
+    actions: Mapping[str, tuple[str, ...]]
+
+
+UNHEARD = from_plain(Unheard, read_toml(Path(__file__).with_name("unheard.toml")))
+
+
+def in_synonyms(known: Collection[str]) -> Callable[[str], str]:
+    """What replaces each common word of a text by the first of its like that is not in `known`."""
+    other = {
+        word: new for word, many in UNHEARD.synonyms.items() if (new := next((w for w in many if w not in known), None))
+    }
+    return functools.cache(lambda text: re.sub("[a-z]+", lambda m: new.get(m[0], m[0]), text.lower()))
+
+
+@dataclass(frozen=True)
+class Reworded:
+    """A policy to which everything is said in other words."""
+
+    policy: Policy
+    say: Callable[[str], str]
+
+    def act(
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        heard = [o if o is None else dataclasses.replace(o, instruction=self.say(o.instruction)) for o in observations]
+        return self.policy.act(heard, memory, rngs=rngs)

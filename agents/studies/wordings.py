@@ -1,0 +1,42 @@
+"""The table of every learner that reads: instructions as they were said, in synonyms and paraphrased, with and without
+pre-trained word vectors."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from agents.common.paraphrases import paraphraser
+from agents.common.unheard import Reworded, in_synonyms
+from agents.studies.tables import StudyRow, StudyTable
+from assets.catalogue import load_catalogue
+from embodied.interface import Policy
+
+WORDING, SYNONYMS, PARAPHRASED = "wording", "synonyms", "paraphrased"
+"""In a row's `judge`: how instructions are said; as they are without."""
+
+
+def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
+    """The table of a learner.
+
+    Args:
+      row: makes a row of its label and of what differs in training.
+    """
+    learned, read = row("learned words"), row("pre-trained vectors", word_vectors="minilm")
+    rows = {(r.label, how): _said(r, how) for r in (learned, read) for how in ("", SYNONYMS, PARAPHRASED)}
+    hows = (SYNONYMS, PARAPHRASED)
+    lost = [(rows[r.label, ""], rows[r.label, how]) for how in hows for r in (learned, read)]
+    won = [(rows[read.label, how], rows[learned.label, how]) for how in hows]
+    title = "Instructions in unheard words and sentences"
+    return StudyTable(title, tuple(rows.values()), tuple(columns), tuple(splits), (*lost, *won))
+
+
+def _said(row: StudyRow, how: str) -> StudyRow:
+    return dataclasses.replace(row, label=f"{row.label}, {how}", judge={**row.judge, WORDING: how}) if how else row
+
+
+def hearing(policy: Any, how: str, known: Sequence[str], cache: Path) -> Policy:
+    """A policy that knows the words `known`, to which everything is said as a row has it."""
+    return Reworded(policy, in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache)))

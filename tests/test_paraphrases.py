@@ -1,0 +1,91 @@
+"""Paraphrases say the same in sentences that no speaker of the corpus says."""
+
+from __future__ import annotations
+
+import importlib
+import re
+
+import pytest
+
+from agents.common.paraphrases import paraphrase
+from agents.common.unheard import UNHEARD
+from agents.common.vocabulary import tokenize
+from agents.studies.wordings import PARAPHRASED, SYNONYMS, WORDING
+from assets.catalogue import load_catalogue
+from embodied.language import parse
+from embodied.language.clauses import Enter, Exit, Past, StopIn, Turn
+from embodied.language.grammar import MAKERS, Phrase, say
+from embodied.language.lexicon import Word, lexicon_of
+from embodied.language.speakers import draw_speaker
+from embodied.language.templates import TEMPLATES
+from embodied.seeds import stream
+
+
+@pytest.fixture(scope="module")
+def lexicon():
+    return lexicon_of(load_catalogue())
+
+
+def test_every_clause_has_frames_and_none_is_a_template():
+    pairs = {" ".join(t.kinds) for t in TEMPLATES}
+    assert set(MAKERS) <= set(UNHEARD.frames) <= pairs
+    assert not {f for frames in UNHEARD.frames.values() for f in frames} & {t.text for t in TEMPLATES}
+
+
+def test_frames_name_what_the_templates_of_their_clauses_name():
+    slots = lambda text: set(re.findall(r"{(\w+)}", text)) - {"walk", "soon"}
+    for kinds, frames in UNHEARD.frames.items():
+        named = {
+            "metres" if s == "steps" else s for t in TEMPLATES if " ".join(t.kinds) == kinds for s in slots(t.text)
+        }
+        for frame in frames:
+            assert slots(frame) == named, (kinds, frame)
+
+
+def test_nouns_sides_and_numbers_stay_and_the_sentence_does_not(lexicon):
+    text = "Turn left and walk 3 meters. Go past the brown armchair. Stop by the looking glass."
+    said = paraphrase(text, lexicon)
+    for word in ("left", "three meters", "brown armchair", "looking glass"):
+        assert word in said, word
+    assert said == paraphrase(text, lexicon) != text
+    order = [said.lower().index(word) for word in ("brown armchair", "looking glass")]
+    assert order == sorted(order)
+
+
+def test_what_people_say_is_said_otherwise_at_about_the_same_length(lexicon):
+    sofa = Word("sofa", ("brown",))
+    route = (Turn("left"), Exit("bedroom"), Past(lexicon.thing(sofa)), Enter("kitchen"), StopIn("kitchen"))
+    phrases = [Phrase(c, sofa if isinstance(c, Past) else None) for c in route]
+    rngs = [stream(k, "test") for k in range(30)]
+    texts = [tokenize(say(phrases, draw_speaker(rng), rng=rng)) for rng in rngs]
+    said = [tokenize(paraphrase(" ".join(t), lexicon)) for t in texts]
+    triples = lambda t: set(zip(t, t[1:], t[2:], strict=False))
+    shared = [len(triples(a) & triples(b)) / len(triples(b)) for a, b in zip(texts, said)]
+    assert max(shared) < 0.5 and sum(shared) / len(shared) < 0.2
+    assert 0.6 < sum(map(len, said)) / sum(map(len, texts)) < 1.5
+
+
+def test_requests_and_sub_goals_of_vnla_are_said_otherwise(lexicon):
+    said = paraphrase("turn 60 degrees left , go forward 2 steps . find a mug in a kitchen", lexicon)
+    goal, request = said.split(" . ")
+    assert "60 degrees" in goal and "left" in goal and "2 paces" in goal and "forward" not in goal
+    assert "a mug" in request and "a kitchen" in request and "find" not in request
+    assert paraphrase("hm", lexicon) == "hm", "what says nothing stays"
+
+
+def test_the_grammar_cannot_read_them(lexicon):
+    """Else they would be no news to an agent that learned from its sentences."""
+    text = "Turn left. Leave the bedroom. Walk past the sofa. Stop by the bed."
+    clauses = parse(text, lexicon).clauses
+    try:
+        again = parse(paraphrase(text, lexicon), lexicon).clauses
+    except ValueError:
+        again = ()
+    assert len(again) < len(clauses)
+
+
+@pytest.mark.parametrize("learner", ["vln", "hanna", "vnla"])
+def test_every_reader_is_judged_in_all_wordings(learner):
+    table = importlib.import_module(f"agents.{learner}.study").TABLES["words"]
+    assert [r.judge.get(WORDING) for r in table.rows] == [None, SYNONYMS, PARAPHRASED] * 2
+    assert [bool(r.train) for r in table.rows] == [False] * 3 + [True] * 3
