@@ -34,9 +34,7 @@ UNHEARD = from_plain(Unheard, read_toml(Path(__file__).with_name("unheard.toml")
 
 def in_synonyms(known: Collection[str]) -> Callable[[str], str]:
     """What replaces each common word of a text by the first of its like that is not in `known`."""
-    other = {
-        word: new for word, many in UNHEARD.synonyms.items() if (new := next((w for w in many if w not in known), None))
-    }
+    new = {word: next((w for w in many if w not in known), word) for word, many in UNHEARD.synonyms.items()}
     return functools.cache(lambda text: re.sub("[a-z]+", lambda m: new.get(m[0], m[0]), text.lower()))
 
 
