@@ -178,7 +178,7 @@ class World:
         return self._renderer
 
     def baked(self, progress: bool = False) -> Bake:
-        """The light of this world, baked on first use, after a warning that says how long it takes.
+        """The light of this world, baked on first use.
 
         Args:
           progress: show a progress bar.
@@ -191,9 +191,6 @@ class World:
             with light.progress_bar(shown=progress) as show:
 
                 def tell(stage: str, done: float) -> None:
-                    if not told:
-                        how_long = light.duration(self.house, name)
-                        log.warning("lighting %s takes %s, once; %s keeps it", self.name, how_long, self.cache)
                     if stage not in told:
                         told.append(stage)
                         log.info("lighting %s: %s", self.name, stage)

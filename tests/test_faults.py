@@ -19,7 +19,6 @@ import pytest
 import torch
 from hand_data import build, content, paint, small_house
 from hand_worlds import grid_world
-from handmade import HandCatalogue
 from test_locks import own_files
 
 from agents.common.checkpoint import CheckpointError, read_checkpoint, restore, write_checkpoint
@@ -28,7 +27,7 @@ from agents.common.tensor_file import save_tensors
 from assets.cache import DRAFTS
 from assets.catalogue import CatalogueError, load_catalogue
 from assets.closure import ROOT
-from embodied import cli, light
+from embodied import cli
 from embodied.bench.timing import Measure, Report
 from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
@@ -45,7 +44,6 @@ from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
-from embodied.world import open_world
 from viz import sinks
 
 
@@ -252,18 +250,39 @@ def test_two_that_light_one_house_light_it_once(tmp_path, monkeypatch):
     assert len(made) == 1
 
 
-def test_whoever_opens_an_unlit_house_is_told_how_long_its_light_takes(monkeypatch, tmp_path, caplog):
-    def bake(house, catalogue, cache, quality, *, progress):
-        assert "lighting grid takes about a minute, once" in caplog.text, "before it begins"
+@pytest.mark.parametrize(
+    ("device", "words"),
+    [("llvm", ", takes about a minute$"), ("numpy", "takes about 7 minutes, 8 times as long.*neither.*doctor --fix")],
+)
+def test_whoever_lights_a_house_is_told_before_how_long_it_takes(device, words, monkeypatch, tmp_path, caplog):
+    house = grid_world(4).house
 
-    def begin(house, catalogue, cache, quality, *, progress):
-        progress("unwrapping", 0.0)
-        return bake(house, catalogue, cache, quality, progress=progress)
+    class Begun(Exception):
+        pass
 
-    monkeypatch.setattr(light, "bake", begin)
-    world = grid_world(4)
-    open_world(world.house, HandCatalogue(), tmp_path, "fast", graph=world.graph).baked()
-    assert caplog.messages
+    def begin(*_, **__):
+        assert re.search(f"lighting {house.name}, which .*{words}", caplog.text.strip())
+        raise Begun
+
+    for name, value in {
+        "house_parts": lambda *_: (),
+        "looks_of": lambda _: "",
+        "Shared": begin,
+        "device": lambda: device,
+        "rays_per_second": lambda: house.area * baking.RAYS["fast"] / (6.5 * 60),
+    }.items():
+        monkeypatch.setattr(baking, name, value)
+    monkeypatch.setattr(os, "cpu_count", lambda: 4)
+    with pytest.raises(Begun):
+        baking.bake(house, None, tmp_path, "fast")
+
+
+def test_the_doctor_says_what_light_costs_without_llvm(monkeypatch):
+    assert 1e3 < baking.rays_per_second(faces=100) < 1e9, "measured"
+    monkeypatch.setattr("embodied.light.backend.device", lambda: "numpy")
+    monkeypatch.setattr(baking, "rays_per_second", lambda: baking.RAYS["fast"] / 3)
+    found = doctor.path_tracer(None)
+    assert "3.0 s per square metre" in found.text and "LLVM" in found.remedy and not found.ok and not found.needed
 
 
 # What is read -------------------------------------------------------------------------------------

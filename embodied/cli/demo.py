@@ -133,7 +133,7 @@ def show_a_room(args: Options) -> int:
         fetch(catalogue, house)
     note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects")
     with open_world(house, catalogue, args.cache, size=args.size, pictures="fast") as world:
-        with timed("light, followed through the flat once (about 40 s)", seconds):
+        with timed("light, followed through the flat once", seconds):
             seen = {n: world.panorama(n) for n in range(len(world.graph.ids))}
         best = max(
             ((n, yaw) for n in seen for yaw in np.arange(12) * np.pi / 6),

@@ -2,6 +2,7 @@
 
 Mitsuba's fast variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
 needs a shared libLLVM of version 15 or later (`embodied doctor --fix`, or Debian: `apt install libllvm19`).
+Where Dr.Jit finds neither, NumPy computes the light (`embodied.light.in_numpy`).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from embodied.errors import UnableError
+from embodied.light import in_numpy
 from embodied.light.arrays import Array, RayScene
 from embodied.software import bundled, load_atomic
 
@@ -34,9 +36,10 @@ OLDEST_LLVM = 15
 VARIANTS = (("cuda_ad_rgb", "CUDA"), ("llvm_ad_rgb", "LLVM"))
 """Mitsuba's variants with arrays, best first, and what Dr.Jit needs for each."""
 REMEDY = (
-    f"`embodied doctor --fix` brings LLVM on Linux; else install version {OLDEST_LLVM} or later (Debian: apt install "
-    "libllvm19, macOS: brew install llvm) or name it in DRJIT_LIBLLVM_PATH, or look at houses without light (unlit)"
+    "`embodied doctor --fix` brings LLVM on Linux on x86-64; elsewhere install it (Debian: apt install libllvm19, "
+    "macOS: brew install llvm) or name it in DRJIT_LIBLLVM_PATH"
 )
+"""What makes light fast where it is computed in NumPy."""
 
 
 class LightError(UnableError):
@@ -56,7 +59,7 @@ def find_llvm() -> str | None:
 
 @functools.cache
 def _module() -> types.ModuleType:
-    """Mitsuba itself, with its best variant switched on."""
+    """Mitsuba itself, with its best variant switched on; what stands in for it where it has none."""
     if "DRJIT_LIBLLVM_PATH" not in os.environ and (llvm := find_llvm()):
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm  # Dr.Jit reads it once, when it is imported
     load_atomic()
@@ -70,7 +73,10 @@ def _module() -> types.ModuleType:
             remedy = "apt-get install libatomic1 or, without root on Debian and Ubuntu, embodied doctor --fix"
         raise LightError(f"light needs mitsuba ({why}); {remedy}, or look at houses without light (unlit)") from e
 
-    mi.set_variant(variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name)))))
+    variant = variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name))))
+    if variant == in_numpy.variant():
+        return in_numpy
+    mi.set_variant(variant)
     if (threads := threads_allowed()) is not None:
         dr.set_thread_count(threads)
     return mi
@@ -88,49 +94,60 @@ def threads_allowed() -> int | None:
 
 
 def variant_of(has_backend: Callable[[str], bool]) -> str:
-    """The Mitsuba variant to use: CUDA's before LLVM's.
+    """The Mitsuba variant to use: CUDA's before LLVM's; 'numpy' for none.
 
     Args:
       has_backend: whether Dr.Jit can use 'CUDA' or 'LLVM' here.
-
-    Raises:
-      LightError: it can use neither.
     """
     for variant, name in VARIANTS:
         if has_backend(name):
             return variant
-    raise LightError(f"light needs CUDA or LLVM, and Dr.Jit finds neither; {REMEDY}")
+    return in_numpy.variant()
 
 
 def mitsuba() -> types.ModuleType:
-    """Mitsuba in its best variant.
+    """Mitsuba in its best variant; `embodied.light.in_numpy` where it has none.
 
     Raises:
-      LightError: Mitsuba is not installed, or finds neither CUDA nor LLVM.
+      LightError: Mitsuba is not installed.
     """
     return _module()
 
 
 def drjit() -> types.ModuleType:
-    """Dr.Jit, for what can be done with Mitsuba's arrays."""
-    _module()
+    """Dr.Jit, for what can be done with Mitsuba's arrays; `embodied.light.in_numpy` where Mitsuba has none."""
+    if _module() is in_numpy:
+        return in_numpy
     import drjit as dr
 
     return dr
 
 
 def device() -> str:
-    """'cuda' or 'llvm': what the light is computed on, for fingerprints and tables."""
+    """'cuda', 'llvm' or 'numpy': what the light is computed on, for fingerprints and tables."""
     return _module().variant().split("_")[0]
 
 
 def scene_of(corners: np.ndarray) -> RayScene:
-    """A Mitsuba scene of bare triangles, for ray tests only.
+    """A scene of bare triangles, for ray tests only.
 
     Args:
       corners: (m, 3, 3) metres; triangle i is primitive i.
     """
     mi = _module()
+    if mi is not in_numpy:
+        return _scene(mi, corners)
+    meet = in_numpy.embree(corners)
+    if meet is None:
+        import mitsuba
+
+        mitsuba.set_variant("scalar_rgb")
+        meet = in_numpy.one_by_one(_scene(mitsuba, corners), mitsuba)
+    return in_numpy.Triangles(meet)
+
+
+def _scene(mi: types.ModuleType, corners: np.ndarray) -> RayScene:
+    """`scene_of` in a variant of Mitsuba."""
     m = len(corners)
     mesh = mi.Mesh("triangles", 3 * m, m)
     params = mi.traverse(mesh)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
+import logging
 import math
 import os
 import shutil
@@ -23,7 +24,7 @@ from tqdm import tqdm
 from assets.cache import digest, write_bytes, write_json
 from assets.catalogue import Catalogue
 from embodied.house.house import WEATHERS, House, Sky
-from embodied.light.backend import rest, warn
+from embodied.light.backend import REMEDY, device, rest, warn
 from embodied.light.baking.compose import Composer, Solved, page_of
 from embodied.light.baking.solve import Problem, Radiosity, solve
 from embodied.light.baking.stages import facts_of, kept_light, same_atlas
@@ -44,6 +45,7 @@ from embodied.light.pages.files import (
 )
 from embodied.light.pages.meshes import meshes_of
 from embodied.light.pages.tone import expose
+from embodied.light.pages.unwrap import openness
 from embodied.light.settings import QUALITIES, Settings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
 from embodied.light.tracing.luxels import Luxels, luxels_of, with_glow
@@ -55,6 +57,7 @@ from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 from embodied.seeds import stream
 
+log = logging.getLogger(__name__)
 Progress = Callable[[str, float], None]
 
 
@@ -62,6 +65,10 @@ SECONDS = {"fast": 1.0, "normal": 2.5, "high": 8.0}
 """Of one core per square metre of a house, by quality, with furniture that is new to the cache."""
 MOST_CORES = 8
 """More shorten it little."""
+SLOWER = 2
+"""How many times as long one core takes without CUDA and LLVM; more where Embree is not installed, either."""
+RAYS = {"fast": 2.0e6, "normal": 5.0e6, "high": 16e6}
+"""What light costs then per square metre, by quality, in rays of `rays_per_second`."""
 STAGES = {
     "unwrapping": (0.0, 0.2),
     "direct light": (0.2, 0.4),
@@ -74,10 +81,31 @@ STAGES = {
 
 
 def duration(house: House, quality: str) -> str:
-    """About how long `bake` takes on this machine, in words."""
+    """About how long `bake` takes on this machine, in words; without CUDA and LLVM also how much longer that is, and
+    what helps."""
     cores = min(os.cpu_count() or 1, MOST_CORES)
-    seconds = house.area * SECONDS[quality] / cores
+    if device() != "numpy":
+        return _minutes(house.area * SECONDS.get(quality, SECONDS["normal"]) / cores)
+    about = _minutes(house.area * RAYS.get(quality, RAYS["normal"]) / rays_per_second())
+    return (
+        f"{about}, at least {SLOWER * cores} times as long as with CUDA or LLVM, of which this machine has neither: "
+        f"NumPy computes it on one core; {REMEDY}"
+    )
+
+
+def _minutes(seconds: float) -> str:
     return f"about {math.ceil(seconds / 60)} minutes" if seconds > 60 else "about a minute"
+
+
+def rays_per_second(faces: int = 4000, rays: int = 8) -> float:
+    """How many rays this machine follows among scattered triangles, their arithmetic included, as it is used now."""
+    rng, took = np.random.default_rng(0), []
+    corners = rng.random((faces, 1, 3)) * 2 + rng.normal(0, 0.1, (faces, 3, 3))
+    for _ in range(3):
+        start = time.perf_counter()
+        openness(corners, rays)
+        took.append(time.perf_counter() - start)
+    return 2 * faces * rays / float(np.median(took))
 
 
 @contextlib.contextmanager
@@ -141,7 +169,7 @@ def bake(
       progress: told the stage's name and how far it is, 0 to 1.
 
     Raises:
-      LightError: Mitsuba or LLVM is missing, or the bake disagrees with the path tracer.
+      LightError: Mitsuba is missing, or the bake disagrees with the path tracer.
     """
     return bake_all((house,), catalogue, cache, settings, progress=progress)[0]
 
@@ -178,6 +206,8 @@ def bake_all(
             if done is None:
                 if shared is None:
                     several = len(lightings) > 1
+                    how_long = duration(house, _name_of(settings))
+                    log.warning("lighting %s, which %s keeps, takes %s", house.name, cache, how_long)
                     shared = Shared(house, parts, Path(cache) / "light", settings, several=several, progress=progress)
                 done = _make(house, shared, folder, settings, progress)
         out.append(done)
@@ -397,5 +427,8 @@ def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings |
 
 def _folder(cache: Path, house: House, looks: str, settings: Settings) -> Path:
     """Where the bake of `house` is, or will be; its name begins with the quality's. `looks`: of its parts."""
-    name = next((name for name, known in QUALITIES.items() if known == settings), "custom")
-    return Path(cache) / "light" / f"{name}-{_key(house, looks, settings)}"
+    return Path(cache) / "light" / f"{_name_of(settings)}-{_key(house, looks, settings)}"
+
+
+def _name_of(settings: Settings) -> str:
+    return next((name for name, known in QUALITIES.items() if known == settings), "custom")

@@ -145,7 +145,7 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     if not trusted:
         once = _without_doubles(corners)
         corners, normals, uv, part = (x[once] for x in (corners, normals, uv, part))
-    front, back = (np.ones(len(corners)), np.zeros(len(corners))) if trusted else _openness(corners)
+    front, back = (np.ones(len(corners)), np.zeros(len(corners))) if trusted else openness(corners)
     keep = _with_rings(corners, (front > 0) | (back > 0))
     corners, normals, uv, part, front, back = (x[keep] for x in (corners, normals, uv, part, front, back))
     flip = (back > 2 * front) & (front < 0.1)
@@ -399,7 +399,7 @@ def _on_the_face(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return np.where((normals * n).sum(-1, keepdims=True) < 0.3, n, normals)
 
 
-def _openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarray]:
+def openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarray]:
     """Share of cosine-distributed rays that leave the model from the front and the back of each face."""
     mi, dr = mitsuba(), drjit()
     scene, n, centre = scene_of(corners), vector(face_normals(corners)), vector(corners.mean(1))
