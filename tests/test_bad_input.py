@@ -338,8 +338,8 @@ def test_a_machine_without_a_renderer_is_told_before_any_work(words, capsys, tmp
 
 @pytest.mark.parametrize("words", [*(w for w in DRAWING if "unlit" not in w and "render" not in w), ("light", "house")])
 def test_a_machine_that_cannot_light_is_told_before_any_work(words, capsys, tmp_path, monkeypatch):
-    unable(monkeypatch, "embodied.light.backend._module", LightError("light needs CUDA or LLVM"))
-    refused_at_once(words, "light needs CUDA or LLVM", capsys, tmp_path, monkeypatch)
+    unable(monkeypatch, "embodied.light.backend._module", LightError("light needs mitsuba"))
+    refused_at_once(words, "light needs mitsuba", capsys, tmp_path, monkeypatch)
 
 
 def unable(monkeypatch, function, error):
