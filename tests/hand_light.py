@@ -5,5 +5,15 @@ from __future__ import annotations
 from embodied.light.settings import Settings
 
 TINY = Settings(
-    12.0, 400.0, sky_rays=12, lamp_rays=12, other_rays=12, sun_rays=4, patches=16, bounces=(4, 4, 8, 24), jpeg=90
+    12.0,
+    400.0,
+    sky_rays=12,
+    lamp_rays=12,
+    other_rays=12,
+    sun_rays=4,
+    patches=16,
+    bounce_rays=8,
+    seen_rays=24,
+    rows=512,
+    jpeg=90,
 )

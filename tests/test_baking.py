@@ -13,9 +13,9 @@ from handmade import HandCatalogue, furnished
 from embodied.house.house import Light, Sky
 from embodied.house.shapes import inward
 from embodied.light import LightError, StaleBake, bake, bake_all, lightings_of, open_bake
+from embodied.light.backend import floats
 from embodied.light.baking import check, solve
 from embodied.light.baking import house as baking
-from embodied.light.memory import Memory
 from embodied.light.pages import files
 from embodied.light.tracing import luxels, radiosity
 from embodied.scene.house_meshes import house_parts
@@ -159,16 +159,29 @@ def test_lit_at_several_hours_every_lighting_is_what_it_is_alone(lit, tmp_path, 
         bake_all((house, dataclasses.replace(house, rooms=house.rooms[:1])), catalogue, tmp_path, TINY)
 
 
-def test_rays_remembered_bring_what_they_met(solved):
+def test_rays_bring_the_light_of_what_they_met_whatever_it_is(solved):
     space, lux = solved.space, solved.lux
     p = luxels.subset(lux, np.arange(0, len(lux.position), 50))
-    memory, table = Memory(), lux.albedo.copy()
-    for _ in range(2):
-        for known, asked in zip(
-            radiosity.gather(space, p, table, 8, 3, memory), radiosity.gather(space, p, table, 8, 3)
-        ):
-            np.testing.assert_allclose(known, asked, rtol=1e-4, atol=1e-6)
-        table *= 0.5
+    first, later, all_ = (radiosity.meet(space, p, *rays) for rays in ((3, 0), (5, 3), (8, 0)))
+    np.testing.assert_array_equal(first.bad + later.bad, all_.bad)
+    table = floats(lux.albedo)
+    (a, a2), (b, b2), (whole, squares) = (radiosity.gather(met, table) for met in (first, later, all_))
+    assert whole.max() > 0
+    np.testing.assert_allclose(a + b, whole, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(a2 + b2, squares, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(radiosity.gather(all_, floats(0.5 * lux.albedo))[0], 0.5 * whole, rtol=1e-4)
+
+
+def test_luxels_that_all_rays_find_covered_get_no_light_of_their_own(solved):
+    """They are most of what costs rays for nothing: below cupboards, behind wardrobes, inside drawers."""
+    problem = solve.Problem(
+        solved.house, solved.atlas, solved.lux, solved.space, solved.outdoors, solved.lamps, TINY, None, solved.without
+    )
+    covered = np.setdiff1d(np.arange(len(solved.lux.position)), problem.free)
+    assert 0.02 < len(covered) / len(solved.lux.position) < 0.6
+    assert not (solved.light.good & solved.lux.shell)[covered].any()
+    reached = np.concatenate([solve.shone_on(problem, source).which for source in solve.sources_of(problem)])
+    assert len(reached) and not np.isin(reached, covered).any()
 
 
 def test_a_house_edited_after_its_bake_is_refused_by_name(lit):

@@ -22,11 +22,12 @@ from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, backend, in_numpy, settings_of
 from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, scene_of, threads_allowed, variant_of
 from embodied.light.baking import check, compose, solve
-from embodied.light.baking.denoise import smooth_pages
+from embodied.light.baking.denoise import Grid, smooth_pages
 from embodied.light.baking.house import brightest
 from embodied.light.pages.atlas import atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps
 from embodied.light.pages.cover import rasterise
+from embodied.light.pages.meshes import welded
 from embodied.light.pages.tone import Exposure, develop
 from embodied.light.tracing import luxels, radiosity
 from embodied.light.tracing.emitters import lamps_of, portals_of
@@ -57,7 +58,7 @@ def closed_box(size: float, finish: Finish, lights: tuple[Light, ...] = ()):
     lamps = lamps_of(house, atlas)
     lux = luxels.with_glow(luxels.luxels_of(atlas, ColourMaps()), house, atlas, lamps)
     space = radiosity.space_of(atlas, lux.texels, DARK.picture)
-    settings = dataclasses.replace(TINY, bounces=(8, 8, 8, 8, 8, 8, 32), lamp_rays=24)
+    settings = dataclasses.replace(TINY, bounce_rays=16, seen_rays=32, lamp_rays=24)
     return lux, solve.solve(solve.Problem(house, atlas, lux, space, DARK, lamps, settings))
 
 
@@ -103,11 +104,10 @@ def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_f
     """A row of which the left six luxels are seen and bright, and the rest lie below a bed that lets a tenth in."""
     good = np.arange(24) < 6
     own = np.where(good, 1.0, 0.1)[:, None].astype(np.float32)
-    row = compose.filled(np.arange(24), own, good, (1, 24))[0, :, 0]
+    how = compose.filling(np.arange(24), good, (1, 24))
+    row = compose.filled(how, own)[0, :, 0]
     assert (row[:7] == 1.0).all() and (np.diff(row) <= 0).all() and row[14:] == pytest.approx(0.1)
-    assert compose.filled(np.arange(24), 1.1 - own, good, (1, 24))[0, :, 0] == pytest.approx(
-        0.1
-    )  # never brighter than beside it
+    assert compose.filled(how, 1.1 - own)[0, :, 0] == pytest.approx(0.1)  # never brighter than beside it
 
 
 def flat_luxels(z: float, owner: int, up: float = 1.0, n: int = 40, step: float = 0.025):
@@ -145,7 +145,7 @@ def test_noise_goes_and_an_edge_stays():
     clean = np.where(left, 1.0, 4.0)[:, None].repeat(3, 1).astype(np.float32)
     noise = np.random.default_rng(0).normal(0, 0.1, (len(clean), 1)).astype(np.float32)
     options = {"steps": (1, 2, 4), "likeness": (0.12,) * 3, "variance": np.square(0.1 * clean[:, 0])}
-    out = smooth_pages(clean * (1 + noise), atlas, lux.texels, all_, all_, **options)
+    out = smooth_pages(clean * (1 + noise), Grid(atlas, lux.texels), all_, **options)
     assert np.abs(out / clean - 1).mean() < 0.4 * np.abs(noise).mean()
     assert out[left].max() < 1.6 and out[~left].min() > 3.0
 
@@ -191,6 +191,15 @@ def test_exposure_is_smooth_through_a_door_and_brightens_dark_rooms():
     assert (np.diff(gain) > -1e-5).all() and (gain[1:] / gain[:-1]).max() < 1.04
     many = np.random.default_rng(0).uniform((-2, -2, -1), (10, 6, 4), (500, 3))
     assert np.abs(np.log(exposure.near(many) / exposure.at(many))).max() < 0.25, "the nearest of the grid's points"
+    np.testing.assert_allclose(exposure.many(many), exposure.at(many), rtol=2e-3)
+
+
+def test_welding_finds_the_rows_that_are_alike():
+    rows = np.random.default_rng(0).integers(-2, 3, (4000, 5)).astype(np.float32) * 0.1
+    rows[::7] = -rows[::7]  # where zeros are negative
+    first, which = welded(rows)
+    np.testing.assert_array_equal(rows[first][which], rows)
+    assert len(first) == len(np.unique(rows + 0.0, axis=0))
 
 
 def test_the_film_curve_rises_and_keeps_black_black():

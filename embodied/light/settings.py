@@ -42,12 +42,16 @@ class Settings:
     """Rays over the sun's disc per texel near a shadow's edge."""
     patches: int = 64
     """Small lights that stand for the sun's patches in one room."""
-    bounces: tuple[int, ...] = (2, 2, 4, 32)
-    """Rays per luxel in each round of gathering; the last is what is seen."""
+    bounce_rays: int = 6
+    """Rays per luxel that carry light from bounce to bounce."""
+    seen_rays: int = 24
+    """Rays per luxel, those among them, that gather what is seen."""
     sharpness: float = 1.0
     """Texels per metre, times those that patterns need to look sharp from nearby (`atlas.fineness`)."""
     tolerance: float = 0.10
     """Relative difference from the path tracer that a luxel may have (`embodied.light.baking.check`)."""
+    rows: int = 1024
+    """Of the picture of the outdoors, from zenith to nadir."""
     jpeg: int = 92
     """Quality of the picture pages on disk."""
     texels: float = 29e6
@@ -64,10 +68,12 @@ QUALITIES = {
         other_rays=8,
         sun_rays=4,
         patches=48,
-        bounces=(2, 2, 4, 24),
+        bounce_rays=4,
+        seen_rays=16,
         sharpness=0.45,
         tolerance=0.2,
         jpeg=88,
+        rows=512,
     ),
     "normal": Settings(),
     "high": Settings(
@@ -78,7 +84,8 @@ QUALITIES = {
         other_rays=48,
         sun_rays=16,
         patches=96,
-        bounces=(4, 4, 8, 64),
+        bounce_rays=10,
+        seen_rays=48,
         jpeg=94,
         texels=120e6,
     ),

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 import cv2
 import numpy as np
@@ -68,6 +68,7 @@ class Solved:
     """As in `solve.Problem`."""
 
 
+T = TypeVar("T")
 Mirrors: TypeAlias = tuple[Array, Array, Array, Array, np.ndarray]
 """Metallic share, tint and dullness of faces, what sharp ones show, and a blurred picture for the dull."""
 
@@ -84,6 +85,15 @@ class Composer:
         """(n, 3) all light but the sun's own."""
         self.sun = (solved.outdoors.sun * radiosity.GLASS).astype(np.float32)
         """(3,) e of the sun behind the glass."""
+
+    def kept(self, what: str, number: int, make: Callable[[], T]) -> T:
+        """`make`, of a page's geometry, once for all lightings."""
+        return once(self.memory, (what, number), make)
+
+    @functools.cached_property
+    def gains(self) -> np.ndarray:
+        """(n, 3) exposure at luxels."""
+        return self.solved.exposure.many(self.solved.lux.position)
 
     def luxels(self, number: int) -> slice:
         """Where the luxels of a page lie among all."""
@@ -111,21 +121,25 @@ def page_of(number: int, composer: Composer) -> Ingredients:
     solved = composer.solved
     page, coarse, mine = solved.atlas.pages[number], solved.lux.texels[number], composer.luxels(number)
     light = np.concatenate([composer.soft[mine], solved.light.sun[mine, None]], axis=1)
-    known = filled(coarse.index, light, solved.light.good[mine], coarse.shape)
+    good = solved.light.good[mine]
+    known = filled(composer.kept("filling", number, lambda: filling(coarse.index, good, coarse.shape)), light)
     soft, share = np.ascontiguousarray(known[..., :3]), known[..., 3]
     fine = lambda: cover(page, page.fineness, solved.lux.sheets[number])
-    c = coarse.cover if page.fineness == 1 else once(composer.memory, ("cover", number), fine)
+    c = coarse.cover if page.fineness == 1 else composer.kept("cover", number, fine)
     sun = _sharp_sun(composer, page, coarse, c, share)
-    gain = spread(coarse.index, solved.exposure.at(coarse.position), coarse.shape)
+    nearest_luxel = composer.kept("luxels", number, lambda: sources(coarse.index, coarse.shape))
+    gain = composer.gains[mine][nearest_luxel].reshape(*coarse.shape, 3)
     glow = glow_of(solved.house, solved.atlas, page, c.face, solved.lamps)
     picture, albedo = _painted(composer, number, c, soft, gain, sun, glow, _mirrors(composer, page, coarse, c))
     whole = np.zeros(c.shape, np.uint8)
     if sun is not None:
         whole.ravel()[c.index] = (sun * 255 + 0.5).astype(np.uint8)
-    shown_by = sources(c.index, c.shape)
+    shown_by = (
+        nearest_luxel if page.fineness == 1 else composer.kept("texels", number, lambda: sources(c.index, c.shape))
+    )
     page_like = lambda codes: _unpacked(codes[shown_by] if len(codes) else shown_by.astype(np.uint32), c.shape)
     glow = solved.lux.glow[mine]
-    glow = spread(coarse.index, glow, coarse.shape) if glow.any() else np.zeros((0, 0, 3))
+    glow = glow[nearest_luxel].reshape(*coarse.shape, 3) if glow.any() else np.zeros((0, 0, 3))
     half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)
     return Ingredients(half(soft), whole, page_like(albedo), page_like(picture), half(glow))
 
@@ -156,7 +170,7 @@ def _painted(
         dr.eval(codes)
         return np.array(codes)
 
-    albedo = once(composer.memory, ("albedo", number), colours)
+    albedo = composer.kept("albedo", number, colours)
     colour = _linear(wholes(albedo))
     read = _Bilinear(c, page)
     e = read(soft)
@@ -310,25 +324,53 @@ HIDDEN = (2.0, 8.0)
 the second on."""
 
 
-def filled(index: np.ndarray, own: np.ndarray, good: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """How a page's hidden luxels are filled."""
+
+    shown_by: np.ndarray
+    """(h * w,) which of the n luxels each texel shows: the nearest good one."""
+    shape: tuple[int, int]
+    hidden: np.ndarray
+    """(k,) luxels that are not good, their flat positions, and (k, 1) how much of the good ones' light they take."""
+    index: np.ndarray
+    weight: np.ndarray
+
+
+def filling(index: np.ndarray, good: np.ndarray, shape: tuple[int, int]) -> Filling:
+    """How to fill a page whose n luxels lie at flat positions `index`.
+
+    Args:
+      good: (n,) bool; where none is, none is hidden either.
+    """
+    chosen, hidden = np.flatnonzero(good), np.flatnonzero(~good)
+    if not len(chosen) or not len(hidden):
+        chosen, hidden = np.arange(len(index)), hidden[:0]
+    shown_by = sources(index[chosen], shape)
+    if len(chosen) == len(index):
+        return Filling(shown_by, shape, hidden, index[hidden], np.zeros((0, 1), np.float32))
+    seen = np.zeros(shape, np.uint8)
+    seen.ravel()[index[chosen]] = 1
+    apart = cv2.distanceTransform(1 - seen, cv2.DIST_L2, 5).ravel()[index[hidden]]
+    weight = 1 - np.clip((apart - HIDDEN[0]) / (HIDDEN[1] - HIDDEN[0]), 0.0, 1.0)[:, None].astype(np.float32)
+    return Filling(chosen[shown_by], shape, hidden, index[hidden], weight)
+
+
+def filled(filling: Filling, own: np.ndarray) -> np.ndarray:
     """(h, w, c) of a page: the good luxels' values, and theirs that fade into each hidden luxel's own beyond them.
 
     A luxel below a cupboard that stands on the floor must not darken the floor beside it; one below a
     bed is seen, and dark.
 
     Args:
-      index: (n,) flat positions. own: (n, c). good: (n,) bool.
+      own: (n, c) values of luxels; without any, all is 0.
     """
-    if good.all() or not good.any():
-        return spread(index, own, shape)
-    out, seen = spread(index[good], own[good], shape), np.zeros(shape, np.uint8)
-    seen.ravel()[index[good]] = 1
-    hidden = index[~good]
-    apart = cv2.distanceTransform(1 - seen, cv2.DIST_L2, 5).ravel()[hidden]
-    weight = np.clip((apart - HIDDEN[0]) / (HIDDEN[1] - HIDDEN[0]), 0.0, 1.0)[:, None].astype(out.dtype)
-    flat = out.reshape(-1, out.shape[-1])
-    flat[hidden] = flat[hidden] * (1 - weight) + np.minimum(own[~good], flat[hidden]) * weight
-    return out
+    if not len(own):
+        return np.zeros((*filling.shape, own.shape[1]), own.dtype)
+    flat = own[filling.shown_by]
+    theirs, at = flat[filling.index], filling.index
+    flat[at] = theirs * filling.weight + np.minimum(own[filling.hidden], theirs) * (1 - filling.weight)
+    return flat.reshape(*filling.shape, -1)
 
 
 def spread(index: np.ndarray, values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

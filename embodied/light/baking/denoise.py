@@ -1,6 +1,6 @@
 """Smoothing light over surfaces without carrying it around corners or across edges of shadow.
 
-Every chart is smoothed on its page by an a-trous filter with growing steps (Dammertz et al. 2010), within its plane,
+Every chart is smoothed on its page by an a-trous filter with growing steps (Dammertz et al. 2010), along its surface,
 weighed by likeness of brightness.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from embodied.light.arrays import Array
-from embodied.light.backend import array, constant, drjit, floats, mitsuba, signed, vector, wholes
+from embodied.light.backend import array, constant, drjit, floats, mitsuba, signed, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels
 
@@ -21,38 +21,32 @@ KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)
 
 def smooth_pages(
     e: np.ndarray,
-    atlas: Atlas,
-    luxels: Sequence[Texels],
+    grid: Grid,
     good: np.ndarray,
-    chosen: np.ndarray,
     *,
     steps: Sequence[int] = (1, 2, 4, 8, 16),
     likeness: Sequence[float] = (0.15, 0.12, 0.1, 0.1, 0.1),
     variance: np.ndarray | None = None,
 ) -> np.ndarray:
-    """A-trous smoothing within planes.
+    """A-trous smoothing along surfaces.
 
     Args:
       e: (n, 3) float32.
       good: (n,) bool, luxels whose value counts.
-      chosen: (n,) bool, luxels to smooth.
       likeness: for each step, the standard deviation of log brightness that still counts as the
         same light.
       variance: (n,) of each luxel's brightness; where given, likeness is widened by the noise that is
         left, as in SVGF (Schied et al. 2017, sec. 4.4): noise goes, contact shadows stay.
     """
     mi, dr = mitsuba(), drjit()
-    grid = _Grid(atlas, luxels, chosen)
-    if not len(grid.mine):
+    if not len(e):
         return e
     trust = floats(np.where(good, 1.0, 1e-4))
-    out = np.array(e, np.float32)
-    noise, floor = np.zeros(len(e), np.float32), np.zeros(len(grid.mine), np.float32)
+    out, noise, floor = np.array(e, np.float32), np.zeros(len(e), np.float32), np.zeros(len(e), np.float32)
     if variance is not None:
-        noise[grid.mine], floor = _relative_noise(grid, out, variance)
+        noise, floor = _relative_noise(grid, out, variance)
     for step, like in zip(steps, likeness):
-        values, noises = floats(out), floats(noise)
-        own, own_noise = dr.gather(mi.Color3f, values, grid.own), dr.gather(mi.Float, noises, grid.own)
+        values, own, own_noise = floats(out), mi.Color3f(vector(out)), floats(noise)
         least = floats(floor) + 1e-4
         shade = dr.log(_brightness(own) + least)
         total, weight, squares = mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
@@ -68,21 +62,17 @@ def smooth_pages(
         safe = dr.maximum(weight, 1e-12)
         mean, left = dr.select(weight > 1e-12, total / safe, own), own_noise * dr.sqrt(squares) / safe
         dr.eval(mean, left)
-        out[grid.mine] = array(mean)
-        noise[grid.mine] = np.asarray(left)
+        out, noise = array(mean), np.array(left)
     return out
 
 
-NOISES = 2.5
+NOISES = 1.8
 """How many standard deviations of noise still count as the same light."""
 
 
-def spatial_variance(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], chosen: np.ndarray) -> np.ndarray:
+def spatial_variance(e: np.ndarray, grid: Grid) -> np.ndarray:
     """(n,) variance of brightness among the 25 luxels around: noise where nothing else is known of it."""
     mi, dr = mitsuba(), drjit()
-    grid, out = _Grid(atlas, luxels, chosen), np.zeros(len(e), np.float32)
-    if not len(grid.mine):
-        return out
     values = floats(e.mean(1))
     mean, square, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
@@ -91,14 +81,13 @@ def spatial_variance(e: np.ndarray, atlas: Atlas, luxels: Sequence[Texels], chos
         square += dr.square(v)
         count += dr.select(inside, 1.0, 0.0)
     n = dr.maximum(count, 1.0)
-    out[grid.mine] = np.asarray(dr.maximum(square / n - dr.square(mean / n), 0.0))
-    return out
+    return np.array(dr.maximum(square / n - dr.square(mean / n), 0.0))
 
 
-def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(m,) standard deviation over mean, both over the 25 luxels around: few rays alone know not how noisy they are.
+def _relative_noise(grid: Grid, e: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) standard deviation over mean, both over the 25 luxels around: few rays alone know not how noisy they are.
 
-    And (m,) what to add before logarithms are taken, more where there is more noise: a luxel whose rays
+    And (n,) what to add before logarithms are taken, more where there is more noise: a luxel whose rays
     all missed is no shadow.
     """
     mi, dr = mitsuba(), drjit()
@@ -113,40 +102,61 @@ def _relative_noise(grid: _Grid, e: np.ndarray, variance: np.ndarray) -> tuple[n
     return relative, np.asarray(mean / n) * np.minimum(relative, 1.0)
 
 
-class _Grid:
-    """Chosen luxels and, on the device, what lies around them on their page in the same plane."""
+BENT, TURNED = 0.1, 0.9
+"""Luxels are of one surface if they lie out of each other's plane by at most this share of their distance (or 4 mm),
+and the cosine between their normals is no less: what is curved is smoothed, too."""
 
-    def __init__(self, atlas: Atlas, luxels: Sequence[Texels], chosen: np.ndarray) -> None:
+
+class Grid:
+    """The luxels of a house on the device, and what lies around them on their page in the same plane."""
+
+    def __init__(self, atlas: Atlas, luxels: Sequence[Texels]) -> None:
         sizes = np.array([p.width * p.height for p in atlas.pages])
         base = np.cumsum(sizes) - sizes
         number = np.full(int(sizes.sum()), -1, np.int32)
         flat = np.concatenate([t.index + b for t, b in zip(luxels, base)])
         number[flat] = np.arange(len(flat))
-        self.mine = np.nonzero(chosen)[0]
-        page = np.searchsorted(np.cumsum(sizes), flat[self.mine], side="right")
+        page = np.repeat(np.arange(len(sizes)), [len(t.index) for t in luxels])
         widths = np.array([p.width for p in atlas.pages])[page]
-        self._number, self._at, self._width = signed(number), signed(flat[self.mine]), signed(widths)
+        self._number, self._at, self._width = signed(number), signed(flat), signed(widths)
         self._low, self._high = signed(base[page]), signed(base[page] + sizes[page] - 1)
-        self._column = signed((flat[self.mine] - base[page]) % widths)
-        position = np.concatenate([t.position for t in luxels])
-        normal = np.concatenate([t.normal for t in luxels])
-        self._places, self._normals = (floats(a) for a in (position, normal))
-        self._p, self._n = vector(position[self.mine]), vector(normal[self.mine])
-        self.own = wholes(self.mine)
+        self._column = signed((flat - base[page]) % widths)
+        self._position = np.concatenate([t.position for t in luxels])
+        self._normal = np.concatenate([t.normal for t in luxels])
+        self._together: dict[int, Array] = {}
 
     def around(self, step: int) -> Iterator[tuple[int, int, Array, Array]]:
         """The 25 luxels at multiples of `step`: offsets, luxel numbers, whether each is there and in the same plane."""
         mi, dr = mitsuba(), drjit()
+        if step not in self._together:
+            self._together[step] = self._bits(step)
+        for bit, (i, j, spot) in enumerate(self._spots(step)):
+            inside = ((self._together[step] >> bit) & 1) == 1
+            yield i, j, mi.UInt32(dr.gather(mi.Int32, self._number, mi.UInt32(spot), inside)), inside
+
+    def _spots(self, step: int) -> Iterator[tuple[int, int, Array]]:
+        """Offsets and where in all pages they lead."""
         for j in range(-2, 3):
             for i in range(-2, 3):
-                x, spot = self._column + i * step, self._at + j * step * self._width + i * step
-                inside = (x >= 0) & (x < self._width) & (spot >= self._low) & (spot <= self._high)
-                k = dr.gather(mi.Int32, self._number, mi.UInt32(spot), inside)
-                inside &= k >= 0
-                q = mi.UInt32(k)
-                off = dr.abs(dr.dot(dr.gather(mi.Vector3f, self._places, q, inside) - self._p, self._n))
-                alike = dr.dot(dr.gather(mi.Vector3f, self._normals, q, inside), self._n)
-                yield i, j, q, inside & (off < 0.004) & (alike > 0.98)
+                yield i, j, self._at + j * step * self._width + i * step
+
+    def _bits(self, step: int) -> Array:
+        """For each luxel one bit per luxel around: whether it is there and of the same surface."""
+        mi, dr = mitsuba(), drjit()
+        places, normals = floats(self._position), floats(self._normal)
+        p, n, out = vector(self._position), vector(self._normal), mi.UInt32(0)
+        for bit, (i, _, spot) in enumerate(self._spots(step)):
+            x = self._column + i * step
+            inside = (x >= 0) & (x < self._width) & (spot >= self._low) & (spot <= self._high)
+            k = dr.gather(mi.Int32, self._number, mi.UInt32(spot), inside)
+            inside &= k >= 0
+            q = mi.UInt32(k)
+            apart = dr.gather(mi.Vector3f, places, q, inside) - p
+            inside &= dr.abs(dr.dot(apart, n)) < dr.maximum(0.004, BENT * dr.norm(apart))
+            inside &= dr.dot(dr.gather(mi.Vector3f, normals, q, inside), n) > TURNED
+            out |= dr.select(inside, mi.UInt32(1 << bit), 0)
+        dr.eval(out)
+        return out
 
 
 def _brightness(c: Array) -> Array:

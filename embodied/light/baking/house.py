@@ -310,7 +310,7 @@ def solve_house(
     atlas = shared.atlas
     if folder is not None:
         same_atlas(folder, atlas)
-    outdoors = outdoors_of(house)
+    outdoors = outdoors_of(house, settings.rows)
     clock("outdoors")
     space = with_env(shared.space, outdoors.picture)
     lamps = tuple(in_the_open(x, space.scene) for x in lamps_of(house, atlas))
@@ -321,7 +321,8 @@ def solve_house(
     problem = Problem(house, atlas, lux, space, outdoors, lamps, settings, shared.memory, without)
     light = kept_light(folder, len(lux.position), lambda: solve(problem, progress, clock))
     clock("direct")
-    outside = np.median(outdoors.picture[300:540].reshape(-1, 3), axis=0)
+    rows = len(outdoors.picture)
+    outside = np.median(outdoors.picture[rows * 300 // 1024 : rows * 540 // 1024].reshape(-1, 3), axis=0)
     exposure = expose(house, _light_of_rooms(house, atlas, lux, light), outside)
     return Solved(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
 

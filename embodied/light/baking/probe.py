@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from embodied.house.house import Room
-from embodied.light.backend import array
+from embodied.light.backend import array, floats
 from embodied.light.baking.compose import Solved
 from embodied.light.pages.tone import develop
 from embodied.light.tracing import radiosity
@@ -28,8 +28,8 @@ def ambient_cubes(solved: Solved, *, rays: int = 256) -> np.ndarray:
     spots = np.array([[*(_middle(r) + o), house.storey_of(r).elevation + 1.1] for r in house.rooms for o in ring])
     position, normal = np.repeat(spots, 6, axis=0), np.tile(AXES, (len(spots), 1))
     points = radiosity.points_of(position, normal, normal, np.zeros(len(position), bool))
-    e, _, _ = radiosity.gather(space, points, lux.albedo * (light.soft + AMBIENT) + lux.glow, rays)
-    e = e + AMBIENT
+    table = floats(lux.albedo * (light.soft + AMBIENT) + lux.glow)
+    e = radiosity.gather(radiosity.meet(space, points, rays), table)[0] / rays + AMBIENT
     for portal in portals_of(house):
         e = e + array(radiosity.sky_light(space, points, portal, 16))
     e = np.median(e.reshape(len(house.rooms), len(ring), 6, 3), axis=1)

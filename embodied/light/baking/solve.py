@@ -12,7 +12,7 @@ from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.house.shapes import inward
 from embodied.light.arrays import Array
-from embodied.light.backend import added_up, array, drjit, fraction, mitsuba
+from embodied.light.backend import added_up, array, drjit, floats, fraction, mitsuba
 from embodied.light.baking import denoise
 from embodied.light.memory import Memory, once
 from embodied.light.pages.atlas import Atlas
@@ -20,13 +20,13 @@ from embodied.light.settings import Settings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, Portal, portals_of
 from embodied.light.tracing.luxels import AMBIENT, Luxels, subset
-from embodied.light.tracing.radiosity import Patches, Space
+from embodied.light.tracing.radiosity import Met, Patches, Points, Space
 from embodied.light.tracing.sky import Outdoors
 
 SPARKS = 0.01
 """Share of a room's light that may be lost to keep its brightest spots from sparkling."""
-TAMED = 2
-"""Last rounds of gathering in which they are kept from it."""
+ROUNDS = 3
+"""Of gathering along the same rays, before what is seen is gathered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +66,39 @@ class Problem:
     without: Mapping[str, Space] = field(default_factory=dict)
     """What the shadow rays of a bare bulb meet, by the owner that the bulb hangs in."""
 
+    @functools.cached_property
+    def points(self) -> Points:
+        """All luxels on the device."""
+        every = np.arange(len(self.lux.position))
+        return once(self.memory, "points", lambda: subset(self.lux, every))
+
+    @functools.cached_property
+    def near(self) -> Met:
+        """What the rays meet that carry light from bounce to bounce."""
+        return once(self.memory, "near", lambda: radiosity.meet(self.space, self.points, self.settings.bounce_rays))
+
+    @functools.cached_property
+    def free(self) -> np.ndarray:
+        """Numbers of the luxels that may be seen: not all of those rays meet what is inside or close before them."""
+        return np.nonzero(self.near.bad < self.near.rays)[0]
+
+    @functools.cached_property
+    def far(self) -> Met:
+        """What the other rays of the luxels `free` meet."""
+        first, last = self.settings.bounce_rays, self.settings.seen_rays
+        return once(self.memory, "far", lambda: radiosity.meet(self.space, self.at(self.free), last - first, first))
+
+    def reached(self, sees: Callable[[np.ndarray], np.ndarray], tries: int = 300) -> np.ndarray:
+        """Numbers of the luxels that may be seen and that a light may reach; `sees` as in `radiosity.reached`."""
+        free = self.free
+        if not len(free):
+            return free
+        return free[radiosity.reached(self.lux.unit[free], lambda i: sees(free[i]), tries=tries)]
+
+    def at(self, luxels: np.ndarray) -> Points:
+        """Some luxels on the device, by their numbers."""
+        return radiosity.only(self.points, luxels)
+
 
 @dataclass(frozen=True, eq=False)
 class Source:
@@ -79,13 +112,13 @@ class Source:
 
 def sources_of(problem: Problem) -> list[Source]:
     """Sky and lamps."""
-    lux, space, settings = problem.lux, problem.space, problem.settings
+    space, settings = problem.space, problem.settings
     found = []
     for way in portals_of(problem.house):
         found.append(Source(_sky_of(problem, way), way.id))
     for x in problem.lamps:
         own = problem.without.get(x.owner or "", space)
-        lamp = lambda i, rays, x=x, s=own: radiosity.lamp_light(s, subset(lux, i), x, rays or settings.lamp_rays)
+        lamp = lambda i, rays, x=x, s=own: radiosity.lamp_light(s, problem.at(i), x, rays or settings.lamp_rays)
         found.append(Source(lambda i, rays, memory=None, f=lamp: array(f(i, rays)), x.id, x))
     return found
 
@@ -94,8 +127,7 @@ def _sky_of(problem: Problem, way: Portal) -> Callable:
     """`Source.shine` of the sky through a portal."""
 
     def shine(i: np.ndarray, rays: int, memory: Memory | None = None) -> np.ndarray:
-        p = subset(problem.lux, i)
-        return array(radiosity.sky_light(problem.space, p, way, rays or problem.settings.sky_rays, memory))
+        return array(radiosity.sky_light(problem.space, problem.at(i), way, rays or problem.settings.sky_rays, memory))
 
     return shine
 
@@ -112,10 +144,9 @@ class Shone:
 
 def shone_on(problem: Problem, source: Source) -> Shone:
     """The light of a source at the luxels; rooms that it reaches nowhere are left out."""
-    unit = problem.lux.unit
 
     def shone() -> tuple[np.ndarray, np.ndarray]:
-        seen = lambda: radiosity.reached(unit, lambda i: source.shine(i, 4).sum(1) > 0)
+        seen = lambda: problem.reached(lambda i: source.shine(i, 4).sum(1) > 0)
         which = once(problem.memory, ("reached", source.id), seen)
         e = source.shine(which, 0, problem.memory) if len(which) else np.zeros((0, 3), np.float32)
         return which, e
@@ -150,7 +181,7 @@ def outer_light(problem: Problem, samples: int = 24) -> np.ndarray:
     mine = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
     if not len(mine):
         return e
-    p = subset(lux, mine)
+    p = problem.at(mine)
     portals = radiosity.portal_scene(portals_of(house) or [_nowhere()])
 
     def one(k: Array) -> tuple[Array, ...]:
@@ -173,7 +204,7 @@ def _lit_by(problem: Problem, patches: Patches, which: np.ndarray) -> np.ndarray
     """(k, 3) e of sunlit patches at some luxels; of none at none (a glint may reach no luxel)."""
     if not len(which):
         return np.zeros((0, 3), np.float32)
-    return radiosity.patch_light(problem.space, subset(problem.lux, which), patches)
+    return radiosity.patch_light(problem.space, problem.at(which), patches)
 
 
 def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -184,8 +215,8 @@ def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     if not portals or not outdoors.sun.any():
         return share, e
     through, towards = radiosity.portal_scene(portals), outdoors.sun_direction
-    seen = lambda i, rays: np.asarray(radiosity.sun_share(space, subset(lux, i), through, towards, rays))
-    mine = radiosity.reached(lux.unit, lambda i: seen(i, 1) > 0, tries=1000)
+    seen = lambda i, rays: np.asarray(radiosity.sun_share(space, problem.at(i), through, towards, rays))
+    mine = problem.reached(lambda i: seen(i, 1) > 0, tries=1000)
     mine = mine[lux.thin[mine] | (lux.face_normal[mine] @ towards.astype(np.float32) > 0)]
     if len(mine):
         share[mine] = seen(mine, 4)
@@ -194,7 +225,7 @@ def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
         patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], problem.settings.patches)
         if patches is not None:
             lit = functools.partial(_lit_by, problem, patches)
-            which = radiosity.reached(lux.unit, lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
+            which = problem.reached(lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
             e[which] += lit(which)
     return share, e
 
@@ -227,26 +258,35 @@ class Bounced:
 
 
 def bounce(problem: Problem, soft: np.ndarray, tell: Callable[[float], None]) -> Bounced:
-    """All further bounces, by Jacobi rounds of gathering.
+    """All further bounces, by Jacobi rounds of gathering along the same few rays, and more of them for what is seen.
+
+    In the last round and in what is seen no spot sparkles (`_tamed`).
 
     Args:
       soft: (n, 3) first light, without the sun's own.
     """
-    lux, settings = problem.lux, problem.settings
-    here = subset(lux, np.arange(len(lux.position)))
-    first, total, e = 0, sum(settings.bounces), np.zeros_like(soft)
+    lux, near, free = problem.lux, problem.near, problem.free
     seen = lux.albedo * (soft + AMBIENT.astype(np.float32)) + np.where(lux.sampled[:, None], 0.0, lux.glow).astype(
         np.float32
     )
-    for left, samples in zip(range(len(settings.bounces), 0, -1), settings.bounces, strict=True):
-        tell(first / total)
+    e = np.zeros_like(soft)
+    for k in range(ROUNDS):
+        tell(k / (ROUNDS + 1))
         table = seen + lux.albedo * e
-        if left <= TAMED:
-            table = _tamed(lux, table)
-        more, bad, variance = radiosity.gather(problem.space, here, table, samples, first, problem.memory)
-        e = more if first else more + _endless(lux, more, bad < 0.5)
-        first += samples
-    return Bounced(e, bad < 0.5, variance)
+        e = radiosity.gather(near, floats(table if k < ROUNDS - 1 else _tamed(lux, table)))[0] / near.rays
+        if k == 0:
+            e += _endless(lux, e, near.bad < 0.5 * near.rays)
+    tell(ROUNDS / (ROUNDS + 1))
+    last = floats(_tamed(lux, seen + lux.albedo * e))
+    total, square = radiosity.gather(near, last)
+    bad, rays = near.bad.copy(), np.full(len(e), near.rays, np.float32)
+    if len(free) and problem.settings.seen_rays > near.rays:
+        for all_, more in zip((total, square, bad), (*radiosity.gather(problem.far, last), problem.far.bad)):
+            all_[free] += more
+        rays[free] += problem.far.rays
+    e = total / rays[:, None]
+    variance = np.maximum(square / rays - e.mean(1) ** 2, 0.0) / np.maximum(rays - 1, 1)
+    return Bounced(e, bad < 0.5 * rays, variance)
 
 
 def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
@@ -315,10 +355,10 @@ def solve(
     bounced = bounce(problem, direct + patches, lambda x: tell("bounces", x))
     clock("bounces")
     tell("smoothing", 0.0)
-    good, all_ = bounced.good, np.ones(len(direct), bool)
-    smooth = functools.partial(denoise.smooth_pages, atlas=atlas, luxels=lux.texels, good=good, chosen=all_)
+    good, grid = bounced.good, once(problem.memory, "grid", lambda: denoise.Grid(atlas, lux.texels))
+    smooth = functools.partial(denoise.smooth_pages, grid=grid, good=good)
     indirect = smooth(bounced.e, steps=(1, 2, 4), likeness=(0.08, 0.08, 0.08), variance=bounced.variance)
-    grain = denoise.spatial_variance(direct, atlas, lux.texels, all_) * 0.8
+    grain = denoise.spatial_variance(direct, grid) * 0.8
     direct = smooth(direct, steps=(1, 2), likeness=(0.3, 0.2), variance=grain)
     clock("smooth")
     return Radiosity(direct, share, patches, indirect + outer_light(problem), good | ~lux.shell)

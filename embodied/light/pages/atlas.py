@@ -198,7 +198,7 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
     patterned = sum(a for a, f in zip(used, finishes) if f.texture) > 0.15 * used.sum()
     if kind in SHELL:
         return max(round({"floor": 200, "wall": 120, "ceiling": 80}[kind] * sharpness / density), 2) if patterned else 2
-    side = np.sqrt(areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum() / used.sum())
+    side = np.sqrt(flat_areas(flat.luxels).sum() / used.sum())
     if sum(a for a, f in zip(used, finishes) if f.mirror) > 0.15 * used.sum():
         return int(np.clip(round(400 * sharpness / side), 2, 8))
     if patterned:
@@ -210,6 +210,12 @@ def _fineness(kind: str, flat: Unwrapped, finishes: Sequence[Finish], density: f
             )
         )
     return 1 if side > 80 * sharpness else 2
+
+
+def flat_areas(corners: np.ndarray) -> np.ndarray:
+    """(m,) areas of triangles (m, 3, 2)."""
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from collections.abc import Callable
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,9 +16,8 @@ from assets.cache import atomic_path, digest
 from assets.closure import code_digest
 from embodied.light.arrays import Array
 from embodied.light.backend import array, drjit, floats, mitsuba, wholes
-from embodied.light.pages.atlas import Page
+from embodied.light.pages.atlas import Page, flat_areas
 from embodied.light.pages.cover import Cover
-from embodied.light.pages.unwrap import areas_of
 
 DARKEST, LIGHTEST = 0.02, 0.88
 """Reflectances are kept between these."""
@@ -30,6 +29,8 @@ APART = (
     *(f"embodied.light.pages.{name}" for name in ("atlas", "cover", "unwrap")),
 )
 """What the code of halved maps does not count: packages' names, and the geometry that this module colours."""
+HALVINGS = 8
+"""Of a colour map, at most."""
 CODE = 1023
 """Colour maps lie on the device as three 10-bit square roots of linear light per pixel."""
 
@@ -37,36 +38,36 @@ CODE = 1023
 class ColourMaps:
     """Reads colour maps and remembers the last ones; all of a house would fill hundreds of megabytes."""
 
-    def __init__(self, cache: Path | None = None, kept: int = 96) -> None:
-        """`kept` halved maps are remembered; halved ones are also kept under `cache`, to be decoded once and not per
-        house."""
+    def __init__(self, cache: Path | None = None, kept: int = 256, whole: int = 48) -> None:
+        """`kept` maps are remembered halved, which are also kept under `cache`, to be decoded once and not per house;
+        and `whole` as they are."""
         self._cache = Path(cache) / "maps" if cache else None
-        self._whole = functools.lru_cache(maxsize=4)(read_colours)
+        self._levels = functools.lru_cache(maxsize=kept)(self._read)
+        self._whole = functools.lru_cache(maxsize=whole)(lambda path: _coded(_ROOTS[read_colours(path)]))
         self.shape = functools.cache(self._shape)
         """Height and width of the map at a path."""
-        self.halved = functools.lru_cache(maxsize=kept)(self._halved)
-        """The map at a path, halved so many times: (h, w) uint32 codes of linear colour."""
 
     def _shape(self, path: str) -> tuple[int, int]:
-        h, w = self._kept(path, "shape", lambda: np.array(self._whole(path).shape[:2]))
+        h, w = self._levels(path)[:2]
         return int(h), int(w)
 
-    def _halved(self, path: str, level: int) -> np.ndarray:
+    def halved(self, path: str, level: int) -> np.ndarray:
+        """The map at a path, halved so many times: (h, w) uint32 codes of linear colour."""
         if level == 0:
-            return _coded(self._whole(path), 0)
-        return self._kept(path, str(level), lambda: _coded(self._whole(path), level))
+            return self._whole(path)
+        sizes = [_halved_size(self.shape(path), k) for k in range(1, level + 1)]
+        start = 2 + sum(h * w for h, w in sizes[:-1])
+        return self._levels(path)[start : start + math.prod(sizes[-1])].reshape(sizes[-1])
 
-    def _kept(self, path: str, name: str, make: Callable[[], np.ndarray]) -> np.ndarray:
-        """What `make` returns, from disk where it is there and younger than the map."""
-        if self._cache is None:
-            return make()
-        source = Path(path)
-        if not source.is_file():
+    def _read(self, path: str) -> np.ndarray:
+        """What `_halvings` returns of the map at a path, from disk where it is there and younger than the map."""
+        source, make = Path(path), lambda: _halvings(read_colours(path))
+        if self._cache is None or not source.is_file():
             return make()
         stat = source.stat()
-        file = self._cache / f"{digest(maps_code(), str(source), stat.st_size, stat.st_mtime_ns)[:32]}_{name}.npy"
+        file = self._cache / f"{digest(maps_code(), str(source), stat.st_size, stat.st_mtime_ns)[:32]}.npy"
         with contextlib.suppress(OSError, ValueError, EOFError):
-            return np.load(file, allow_pickle=False)
+            return np.load(file, mmap_mode="r", allow_pickle=False)
         made = make()
         with atomic_path(file) as temporary, open(temporary, "wb") as f:
             np.save(f, made)
@@ -130,12 +131,13 @@ def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
     plain = linear(np.array([f.color[:3] for f in page.finishes], np.float32).reshape(-1, 3))[page.finish]
     first, width, height = (np.zeros(len(page.finish), np.uint32) for _ in range(3))
     maps, end = [np.zeros(1, np.uint32)], 1
+    source, target = flat_areas(page.uv), flat_areas(page.luxels) * scale**2
     for f, finish in enumerate(page.finishes):
         mine = np.nonzero(page.finish == f)[0]
         if finish.texture is None or not len(mine):
             continue
         full = read.shape(finish.texture)
-        levels = _levels(page, mine, full, scale)
+        levels = _levels(source[mine] * math.prod(full), target[mine])
         for level in np.unique(levels):
             image = read.halved(finish.texture, int(level))
             which = mine[levels == level]
@@ -175,24 +177,36 @@ def albedo(page: Page, c: Cover, read: ColourMaps) -> np.ndarray:
     return array(colour_at(paints, wholes(c.face), floats(c.b1), floats(c.b2)))
 
 
-def _levels(page: Page, faces: np.ndarray, shape: tuple[int, ...], scale: float) -> np.ndarray:
-    """(k,) int: how often a map of `shape` must be halved before faces read it."""
-    pad = lambda a: np.pad(a[faces], ((0, 0), (0, 0), (0, 1)))
-    source, target = areas_of(pad(page.uv)) * shape[0] * shape[1], areas_of(pad(page.luxels)) * scale**2
+def _levels(source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """(k,) int: how often a map must be halved for faces that hold `source` pixels of it on `target` texels."""
     ratio = np.maximum(source, 1e-9) / np.maximum(target, 1e-9)
-    return np.clip(np.round(0.5 * np.log2(ratio)), 0, 8).astype(int)
+    return np.clip(np.round(0.5 * np.log2(ratio)), 0, HALVINGS).astype(int)
 
 
-def _coded(image: np.ndarray, level: int) -> np.ndarray:
-    """(h, w) uint32 codes of an (h, w, 3) uint8 sRGB image halved `level` times in linear light."""
-    light = linear(np.arange(256, dtype=np.float32) / 255)
-    if not level:
-        code = np.round(np.sqrt(light) * CODE).astype(np.uint32)[image]
-    else:
-        size = max(1, image.shape[1] >> level), max(1, image.shape[0] >> level)
-        code = np.round(np.sqrt(cv2.resize(light[image], size, interpolation=cv2.INTER_AREA)) * CODE).astype(np.uint32)
-    code = code.reshape(*code.shape[:2], 3)
-    return np.ascontiguousarray(code[..., 0] | code[..., 1] << 10 | code[..., 2] << 20)
+def _halved_size(shape: tuple[int, ...], level: int) -> tuple[int, int]:
+    """Height and width of a map of `shape`, halved so many times."""
+    return max(1, shape[0] >> level), max(1, shape[1] >> level)
+
+
+def _halvings(image: np.ndarray) -> np.ndarray:
+    """(n,) uint32: height and width of an (h, w, 3) uint8 sRGB image, and the codes of it halved 1 to `HALVINGS` times
+    in linear light."""
+    light = linear(np.arange(256, dtype=np.float32) / 255)[image]
+    out = [np.array(image.shape[:2], np.uint32)]
+    for level in range(1, HALVINGS + 1):
+        h, w = _halved_size(image.shape, level)
+        light = cv2.resize(light, (w, h), interpolation=cv2.INTER_AREA)
+        out.append(_coded(np.round(np.sqrt(light) * CODE).astype(np.uint32)).ravel())
+    return np.concatenate(out)
+
+
+_ROOTS = np.round(np.sqrt(linear(np.arange(256, dtype=np.float32) / 255)) * CODE).astype(np.uint32)
+"""Square roots of linear light by sRGB byte, as codes hold them."""
+
+
+def _coded(roots: np.ndarray) -> np.ndarray:
+    """(h, w) uint32 codes of square roots (h, w, 3) of linear colour."""
+    return np.ascontiguousarray(roots[..., 0] | roots[..., 1] << 10 | roots[..., 2] << 20)
 
 
 def _decoded(code: Array) -> Array:

@@ -66,27 +66,20 @@ class Bake:
         """What renderers draw."""
         pages = tuple(_read_picture(self.folder / f"page_{i:03d}.jpg") for i in range(self.manifest["pages"]))
         with open_arrays(self.folder / "meshes.npz") as z:
-            meshes = tuple(
-                LitMesh(
-                    m["owner"],
-                    m["kind"],
-                    m["room"],
-                    m["page"],
-                    z[f"v{i}"],
-                    z[f"f{i}"],
-                    z[f"t{i}"],
-                    m["alpha"],
-                    m["gloss"],
-                )
-                for i, m in enumerate(self.manifest["meshes"])
-            )
+            corners, uv = np.split(z["vertices"], z["vertex_ends"]), np.split(z["uv"], z["vertex_ends"])
+            faces = np.split(z["faces"], z["face_ends"])
+        meshes = tuple(
+            LitMesh(m["owner"], m["kind"], m["room"], m["page"], v, f, t, m["alpha"], m["gloss"])
+            for m, v, f, t in zip(self.manifest["meshes"], corners, faces, uv)
+        )
         return LitPages(meshes, pages, self.manifest["key"], tuple(self.manifest["owners"]))
 
     @functools.cached_property
     def gloss(self) -> tuple[np.ndarray | None, ...]:
         """(m, 4) uint8 of each mesh's faces, from `pages.meshes`; None where nothing is known of them."""
         with open_arrays(self.folder / "meshes.npz") as z:
-            return tuple(z[f"g{i}"] if f"g{i}" in z.files else None for i in range(len(self.manifest["meshes"])))
+            known = np.split(z["gloss"], z["face_ends"][: int(z["glossy"]) - 1])
+        return (*known, *[None] * (len(self.manifest["meshes"]) - len(known)))
 
     def glow(self, page: int) -> np.ndarray | None:
         """(h, w, 3) float16 radiance of what shines itself on a page; None where nothing does."""
@@ -179,10 +172,18 @@ def _jpeg(picture: np.ndarray, quality: int) -> bytes:
 
 
 def packed_meshes(meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> bytes:
-    """meshes.npz: corners, faces, places on the page and gloss of each mesh, in the manifest's order."""
-    arrays = {f"g{i}": g for i, g in enumerate(gloss)}
-    for i, m in enumerate(meshes):
-        arrays |= {f"v{i}": m.vertices, f"f{i}": m.faces, f"t{i}": m.uv}
+    """meshes.npz: corners, faces and places on the page of all meshes and gloss of the first ones, in the manifest's
+    order, and where each ends but the last."""
+    ends = lambda arrays: np.cumsum([len(a) for a in arrays])[:-1]
+    arrays = {
+        "vertices": np.concatenate([m.vertices for m in meshes]),
+        "uv": np.concatenate([m.uv for m in meshes]),
+        "vertex_ends": ends([m.vertices for m in meshes]),
+        "faces": np.concatenate([m.faces for m in meshes]),
+        "face_ends": ends([m.faces for m in meshes]),
+        "gloss": np.concatenate(list(gloss)),
+        "glossy": np.array(len(gloss)),
+    }
     return packed(arrays)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from assets.records import DETAILS, Finish
 from embodied.light.pages.atlas import Atlas, Page
-from embodied.light.pages.unwrap import areas_of, distinct
+from embodied.light.pages.unwrap import areas_of
 from embodied.scene.lit_pages import LitMesh
 
 
@@ -25,10 +25,12 @@ def meshes_of(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]
     out, shine = [], []
     for number, page in enumerate(atlas.pages, first):
         uv = page.luxels / np.array([page.width, page.height], np.float32)
+        gloss = np.array([gloss_of(f) for f in page.finishes], np.uint8).reshape(-1, 3)
+        kinds, areas = np.column_stack([gloss[page.finish], detail_of(page)]), areas_of(page.corners)
         for o in np.unique(page.owner):
             mine = np.nonzero(page.owner == o)[0]
             both = np.concatenate([page.corners[mine], uv[mine]], axis=-1).reshape(-1, 5)
-            corner, index = distinct(np.round(both, 5))
+            corner, index = welded(np.round(both, 5))
             faces = index.reshape(-1, 3).astype(np.int32)
             thin = page.thin[mine]
             faces = np.concatenate([faces, faces[thin][:, ::-1]])
@@ -48,13 +50,29 @@ def meshes_of(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]
                     float(alpha),
                 )
             )
-            kind = np.array([gloss_of(f) for f in page.finishes], np.uint8)[page.finish[mine]]
-            kind = np.column_stack([kind, detail_of(page, mine)])
-            area = areas_of(page.corners[mine])
+            kind, area = kinds[mine], areas[mine]
             mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
             out[-1] = dataclasses.replace(out[-1], gloss=mean)
             shine.append(np.concatenate([kind, kind[thin]])[real])
     return out, shine
+
+
+def welded(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) first occurrence of each different row of (n, c) numbers, in no order, and (n,) which of these each row is.
+
+    Rows are sorted by a hash (odd multiplier and shifts, as in SplitMix64): one sort in place of one for each column.
+    Should two different rows have one hash, some row may occur twice among the k.
+    """
+    mixed = np.zeros(len(rows), np.uint64)
+    for column in (rows.astype(np.float64) + 0.0).view(np.uint64).T:  # + 0.0: -0 is 0
+        mixed = (mixed ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        mixed ^= mixed >> np.uint64(29)
+    order = np.argsort(mixed, kind="stable")
+    in_order, new = rows[order], np.ones(len(rows), bool)
+    new[1:] = (in_order[1:] != in_order[:-1]).any(1)
+    which = np.empty(len(rows), np.int64)
+    which[order] = np.cumsum(new) - 1
+    return order[new], which
 
 
 def gloss_of(finish: Finish) -> tuple[int, int, int]:
@@ -65,14 +83,14 @@ def gloss_of(finish: Finish) -> tuple[int, int, int]:
     return round(255 * rough), round(255 * specular), round(255 * metal)
 
 
-def detail_of(page: Page, faces: np.ndarray) -> np.ndarray:
-    """(k,) uint8 of some faces: number of what they show from nearby, from 1 on, and 16 times that of the axis along
+def detail_of(page: Page) -> np.ndarray:
+    """(m,) uint8 of the faces: number of what they show from nearby, from 1 on, and 16 times that of the axis along
     which their texture's u runs, 3 for none; 0 for smooth ones."""
     number = np.array([1 + DETAILS.index(f.detail) if f.detail else 0 for f in page.finishes], np.uint8)
-    corners, uv = page.corners[faces], page.uv[faces].astype(np.float64)
+    corners, uv = page.corners, page.uv.astype(np.float64)
     sides, turns = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
     area = turns[:, 0, 0] * turns[:, 1, 1] - turns[:, 0, 1] * turns[:, 1, 0]
     along = sides[:, 0] * turns[:, 1, 1, None] - sides[:, 1] * turns[:, 0, 1, None]
     axis = np.where(np.abs(area) > 1e-12, np.abs(along).argmax(1), 3)
-    detail = number[page.finish[faces]]
+    detail = number[page.finish]
     return np.where(detail > 0, detail + 16 * axis, 0).astype(np.uint8)

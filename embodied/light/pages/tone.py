@@ -55,6 +55,14 @@ class Exposure:
             np.stack([map_coordinates(grid[k], where, order=1, mode="nearest") for k in range(3)], axis=-1)
         ).astype(np.float32)
 
+    def many(self, position: np.ndarray) -> np.ndarray:
+        """`at` for many points, on Mitsuba's device."""
+        mi, dr, (grid, low) = mitsuba(), drjit(), self._grid
+        count = np.array(grid.shape[1:])
+        where = ((np.asarray(position, np.float32) - low) / CELL + 0.5) / count
+        field = mi.Texture3f(mi.TensorXf(np.ascontiguousarray(grid.transpose(3, 2, 1, 0))), False)
+        return array(mi.Color3f(*(dr.exp(x) for x in field.eval(mi.Point3f(vector(where))))))
+
     def near(self, position: np.ndarray) -> np.ndarray:
         """(n, 3) float32 gains of the grid's points that are nearest to points (n, 3): `at` for many of them."""
         gains, low = self._near

@@ -208,7 +208,7 @@ def irradiance(
     mi, dr = mitsuba(), drjit()
     sums = np.zeros((p.n, 3), np.float32)
     of = np.flatnonzero(np.broadcast_to(np.asarray(active), p.n))  # the point that each path began at
-    p = _only(p, of)
+    p = radiosity.only(p, of)
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
     for depth in range(deepest if len(of) else 0):
         p = _turned(p, rng)
@@ -243,7 +243,7 @@ def irradiance(
             p = q
             continue
         sums[of] += array(total)
-        of, p = of[living], _only(q, living)
+        of, p = of[living], radiosity.only(q, living)
         total, throughput, alive = mi.Color3f(0.0), mi.Color3f(_gathered(throughput, living)), mi.Bool(True)
     if len(of):
         sums[of] += array(total)
@@ -254,16 +254,6 @@ def _gathered(v: Array, which: np.ndarray) -> Array:
     """Some entries of a vector or colour, by their numbers."""
     mi, dr, numbers = mitsuba(), drjit(), wholes(which)
     return mi.Vector3f(*(dr.gather(mi.Float, v[k], numbers) for k in range(3)))
-
-
-def _only(p: Points, which: np.ndarray) -> Points:
-    """Some of the points, by their numbers."""
-    if len(which) == p.n:
-        return p
-    zero = floats(np.zeros(len(which), np.float32))
-    at, normal, flat = (_gathered(v, which) for v in (p.position, p.normal, p.face_normal))
-    thin = drjit().gather(mitsuba().Bool, p.thin, wholes(which))
-    return Points(len(which), at, normal, flat, thin, zero, zero)
 
 
 def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Points) -> tuple[Array, Array, Points]:

@@ -74,6 +74,17 @@ def points_of(
     return p
 
 
+def only(p: Points, which: np.ndarray) -> Points:
+    """Some of the points, by their numbers."""
+    if len(which) == p.n:
+        return p
+    dr, numbers = drjit(), wholes(which)
+    fields = (p.position, p.normal, p.face_normal, p.thin, p.turn0, p.turn1)
+    some = Points(len(which), *(dr.gather(type(a), a, numbers) for a in fields))
+    dr.eval(some.position, some.normal, some.face_normal, some.thin, some.turn0, some.turn1)
+    return some
+
+
 @dataclass(frozen=True, eq=False)
 class Space:
     """The house as something rays can hit; faces in page order."""
@@ -336,45 +347,55 @@ NOTHING = 0xFFFFFFFF
 """In place of a luxel's number: the ray met nothing that shines."""
 
 
-def gather(
-    space: Space, p: Points, radiosity: np.ndarray, samples: int, first: int = 0, memory: Memory | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mean of what cosine-distributed rays meet.
+@dataclass(frozen=True, eq=False)
+class Met:
+    """What cosine-distributed rays of n points meet, whatever shines there."""
+
+    rays: int
+    """Of each point."""
+    luxels: Array
+    """(rays * n) luxel numbers, ray by ray; `NOTHING` where a ray meets nothing that shines."""
+    bad: np.ndarray
+    """(n,) number of rays that met a back face or something nearer than 12 mm."""
+
+
+def meet(space: Space, p: Points, rays: int, first: int = 0) -> Met:
+    """Send rays from points.
 
     Args:
-      radiosity: (n luxels, 3) of the whole house.
-      first: index of the first point of the R2 sequence, so that rounds differ.
-      memory: keeps what the rays met, for the same points under another light.
-
-    Returns:
-      (n, 3) e, (n,) share of rays that met a back face or something nearer than 12 mm, and (n,)
-      variance of the mean brightness.
+      first: index of the first point of the R2 sequence, so that later rays of the same points differ.
     """
     mi, dr = mitsuba(), drjit()
-    b = floats(radiosity)
-    meet = _rays(space, p, first)
-    none, black = dr.zeros(mi.Float, p.n), dr.zeros(mi.Color3f, p.n)
-    if memory is None:
+    one_ray, found = _rays(space, p, first), dr.zeros(mi.UInt32, rays * p.n)
+    lane, count = dr.arange(mi.UInt32, p.n), number(p.n)
 
-        def one(k: Array) -> tuple[Array, ...]:
-            luxel, seen, wrong = meet(k)
-            colour = dr.gather(mi.Color3f, b, luxel, seen)
-            return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0)), wrong
+    def one(k: Array) -> tuple[Array, ...]:
+        luxel, seen, wrong = one_ray(k)
+        dr.scatter(found, dr.select(seen, luxel, NOTHING), k * count + lane)
+        return (wrong,)
 
-        total, square, bad = added_up(samples, one, black, none, none)
-    else:
-        hits, bad = memory.once(("hits", first, samples), lambda: _hits(meet, p.n, samples))
-        lane, count = dr.arange(mi.UInt32, p.n), number(p.n)
+    (bad,) = added_up(rays, one, dr.zeros(mi.Float, p.n))
+    dr.eval(found)
+    return Met(rays, found, np.array(bad))
 
-        def known(k: Array) -> tuple[Array, ...]:
-            luxel = dr.gather(mi.UInt32, hits, k * count + lane)
-            colour = dr.gather(mi.Color3f, b, luxel, luxel != NOTHING)
-            return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0))
 
-        total, square = added_up(samples, known, black, none)
-    mean = array(total) / samples
-    variance = np.maximum(np.asarray(square) / samples - mean.mean(1) ** 2, 0.0) / max(samples - 1, 1)
-    return mean, np.asarray(bad) / samples, variance
+def gather(met: Met, table: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Sums over all rays of each of n points: (n, 3) radiosity that they meet, and (n,) its squared brightness.
+
+    Args:
+      table: flat (n luxels * 3), radiosity of the whole house on the device.
+    """
+    mi, dr = mitsuba(), drjit()
+    n = len(met.bad)
+    lane, count = dr.arange(mi.UInt32, n), number(n)
+
+    def one(k: Array) -> tuple[Array, ...]:
+        luxel = dr.gather(mi.UInt32, met.luxels, k * count + lane)
+        colour = dr.gather(mi.Color3f, table, luxel, luxel != NOTHING)
+        return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0))
+
+    total, square = added_up(met.rays, one, dr.zeros(mi.Color3f, n), dr.zeros(mi.Float, n))
+    return array(total), np.array(square)
 
 
 def _rays(space: Space, p: Points, first: int) -> Callable:
@@ -385,7 +406,7 @@ def _rays(space: Space, p: Points, first: int) -> Callable:
 
     def meet(k: Array) -> tuple[Array, ...]:
         u0, u1 = r2(mi.Float(k + start) + 1)
-        side = dr.select(p.thin & ((k & 1) == 1), -1.0, 1.0)
+        side = dr.select(p.thin & (((k + start) & 1) == 1), -1.0, 1.0)
         u = fraction(mi.Point2f(p.turn0 + u0, p.turn1 + u1))
         d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(u))
         out = p.face_normal * side
@@ -395,21 +416,6 @@ def _rays(space: Space, p: Points, first: int) -> Callable:
         return luxel, hit & front, dr.select(hit & (~front | near), 1.0, 0.0)
 
     return meet
-
-
-def _hits(meet: Callable, n: int, samples: int) -> tuple:
-    """What every ray meets, sample by sample (samples * n luxel numbers), and the sum of what `meet` finds wrong."""
-    mi, dr = mitsuba(), drjit()
-    found, lane, count = dr.zeros(mi.UInt32, samples * n), dr.arange(mi.UInt32, n), number(n)
-
-    def one(k: Array) -> tuple[Array, ...]:
-        luxel, seen, wrong = meet(k)
-        dr.scatter(found, dr.select(seen, luxel, NOTHING), k * count + lane)
-        return (wrong,)
-
-    (bad,) = added_up(samples, one, dr.zeros(mi.Float, n))
-    dr.eval(found)
-    return found, bad
 
 
 def hit_luxel(space: Space, ray: Ray, active: Array = True, met: Array = None) -> Array:

@@ -61,9 +61,9 @@ def sun_direction(sky: Sky) -> np.ndarray:
     return np.array([*flat, np.sin(height)])
 
 
-def outdoors(house: House) -> Outdoors:
-    """Sky, sun and landscape around `house`; the same for the same seed and sky."""
-    return paint(house.sky, house.seed, scenery_of(house))
+def outdoors(house: House, rows: int = HEIGHT) -> Outdoors:
+    """Sky, sun and landscape around `house`, painted in so many rows; the same for the same seed and sky."""
+    return paint(house.sky, house.seed, scenery_of(house), rows)
 
 
 def paint(sky: Sky, seed: int, place: Scenery, height: int = HEIGHT) -> Outdoors:
