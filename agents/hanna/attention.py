@@ -131,25 +131,23 @@ class SelfAttend(nn.Module):
         return torch.cat([values, self.attend.value(state)[:, None]], 1)
 
 
-def sim_attend(query: Tensor, keys: Tensor, values: Tensor, mask: Tensor, normalise: str = "kept") -> Tensor:
+def sim_attend(query: Tensor, keys: Tensor, values: Tensor, mask: Tensor) -> Tensor:
     """SIMATTEND(q, K, V), Eqs D.3 and D.4: weighted average of values whose keys equal the query, nearly.
+
+    Weights are divided by the sum of the kept similarities, as in the text under D.4 and in the authors' program; the
+    sum over all entries, as D.3 is printed, can be zero or negative (docs/sources.md, S26).
 
     Args:
       query: (B, h).
       keys, values: (B, n, h), not projected.
       mask: (B, n) bool, entries that may be considered.
-      normalise: 'kept' divides by the sum of the kept similarities, as the text under D.4 ("the
-        weighted average of values corresponding to those keys") and the authors' program do;
-        'all' divides by the sum over all entries, as D.3 is printed: that sum can be zero or
-        negative, so it is here for comparison only.
 
     Returns:
       (B, h); zero where no key is similar enough.
     """
     similarity = F.cosine_similarity(query[:, None], keys, dim=-1, eps=1e-8).masked_fill(~mask, 0.0)  # (B, n) D.4
     kept = similarity * (similarity > SIMILARITY_THRESHOLD)
-    total = kept if normalise == "kept" else similarity
-    weights = kept / (total.sum(-1, keepdim=True) + 1e-8)  # D.3
+    weights = kept / (kept.sum(-1, keepdim=True) + 1e-8)  # D.3
     return torch.einsum("bn,bnh->bh", weights, values)
 
 

@@ -27,8 +27,6 @@ class HannaSizes:
     """False: ablation 'no condition prediction': the request is read off the state directly."""
     similarity_attention: bool = True
     """False: ablation 'no cosine-similarity attention' (beta = 0)."""
-    similarity_normaliser: str = "kept"
-    """'kept' or 'all', see attention.sim_attend (docs/sources.md, S26)."""
 
     def __post_init__(self) -> None:
         for name in ("words", "feature_size", "hidden_size", "navigation_embedding", "ask_embedding"):
@@ -36,8 +34,6 @@ class HannaSizes:
                 raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
         if not 0 <= self.dropout < 1:
             raise ValueError(f"dropout must be in [0, 1), got {self.dropout}")
-        if self.similarity_normaliser not in ("kept", "all"):
-            raise ValueError(f"similarity_normaliser must be 'kept' or 'all', got {self.similarity_normaliser!r}")
 
     @property
     def action_size(self) -> int:

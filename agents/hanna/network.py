@@ -159,9 +159,7 @@ class StateNetwork(nn.Module):
         similar_mask = torch.cat([m.similar_mask, similar[:, None]], 1)  # (B, n)
         state = tentative
         if self.config.similarity_attention:
-            past = sim_attend(  # (B, h) tilde h^intra, D.14
-                intra_in, m.intra_inputs, m.intra_states, similar_mask, self.config.similarity_normaliser
-            )
+            past = sim_attend(intra_in, m.intra_inputs, m.intra_states, similar_mask)  # (B, h) tilde h^intra, D.14
             beta = torch.sigmoid(self.gate(torch.cat([tentative, past], -1)))  # (B, h) D.17
             state = tentative - beta * past  # (B, h) D.16
 

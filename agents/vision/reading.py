@@ -12,27 +12,15 @@ import numpy as np
 from agents.vision.encoder import Encoder
 from agents.vision.labels import HouseStrips, mean_log_depth_of_views, visible_in_views
 from agents.vision.probe import LabelledFeatures, ProbeScores
-from agents.vision.strip import view_of_strip
 from embodied.datasets.store import Dataset
-from embodied.interface import VIEWS
 
 
 def labelled(
-    data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str], *, alone: bool = False
+    data: Dataset, houses: Sequence[HouseStrips], encoder: Encoder, classes: Sequence[str]
 ) -> LabelledFeatures:
-    """Features of houses and what a linear reader should read from them.
-
-    Args:
-      alone: the network looks at each of the 36 views by itself, four times the work, instead of
-        once at the strip that they overlap in.
-    """
+    """Features of houses and what a linear reader should read from them."""
     columns = [houses[0].classes.index(c) for c in classes]
-    encode = encoder.encode_strips
-    if alone:
-        encode = lambda strips: encoder.encode_views(
-            np.stack([[view_of_strip(s, k) for k in range(VIEWS)] for s in strips])
-        )
-    features = [np.concatenate([encode(h.rgb[i : i + 8]) for i in range(0, len(h.rgb), 8)]) for h in houses]
+    features = [encoder.encode_strips(h.rgb[i : i + 8]) for h in houses for i in range(0, len(h.rgb), 8)]
     return LabelledFeatures(
         np.concatenate(features),
         np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),

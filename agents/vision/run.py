@@ -66,12 +66,8 @@ def train_vision(
         encoder, classes = trained_encoder(shown, config, out, note, target=target, device=device)
         untrained = whitened(random_encoder(seed=config.seed), seen)
         numbers = {}
-        for name, who, alone in (
-            ("trained", encoder, False),
-            ("trained, each view alone", encoder, True),
-            ("random", untrained, False),
-        ):
-            halves = [labelled(data, houses, who, classes, alone=alone) for houses in (seen, unseen)]
+        for name, who in (("trained", encoder), ("random", untrained)):
+            halves = [labelled(data, houses, who, classes) for houses in (seen, unseen)]
             numbers[name] = as_numbers(read(halves[0], halves[1], seed=config.seed), classes)
             note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
         write_json(out / "readings.json", numbers, indent=1)

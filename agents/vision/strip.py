@@ -15,7 +15,6 @@ from __future__ import annotations
 import functools
 import math
 
-import cv2
 import numpy as np
 
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
@@ -38,32 +37,6 @@ def directions() -> np.ndarray:
     yaw = np.pi - (np.arange(WIDTH) + 0.5) / WIDTH * 2 * np.pi
     pitch, yaw = np.meshgrid(pitch, yaw, indexing="ij")
     return np.stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)], -1)
-
-
-def view_of_strip(strip: np.ndarray, view: int, size: tuple[int, int] = (96, 128)) -> np.ndarray:
-    """(h, w, 3) uint8: view `view` as a perspective picture, resampled from a strip.
-
-    Its corners reach a little beyond the strip; there the strip's border is repeated.
-    """
-    yaw, pitch = VIEW_YAWS[view], VIEW_PITCHES[view]
-    x, y = _perspective(yaw, pitch, size)
-    wide = np.concatenate([strip, strip[:, :1]], 1)  # the last column's neighbour is the first
-    return cv2.remap(wide, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-
-
-@functools.cache
-def _perspective(yaw: float, pitch: float, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Where in the strip each pixel of a view lies: two (h, w) float32 maps."""
-    h, w = size
-    right = (np.arange(w) + 0.5) / w * 2 - 1
-    up = 1 - (np.arange(h) + 0.5) / h * 2
-    right, up = np.meshgrid(right * ASPECT * math.tan(VFOV / 2), up * math.tan(VFOV / 2))
-    ahead, z = math.cos(pitch) - up * math.sin(pitch), math.sin(pitch) + up * math.cos(pitch)
-    azimuth = yaw - np.arctan2(right, ahead)
-    elevation = np.arctan2(z, np.hypot(ahead, right))
-    x = (np.pi - azimuth) % (2 * np.pi) / (2 * np.pi) * WIDTH - 0.5
-    y = (HALF - elevation) / (2 * HALF) * HEIGHT - 0.5
-    return (x % WIDTH).astype(np.float32), y.astype(np.float32)
 
 
 def view_coverage(view: int) -> np.ndarray:
