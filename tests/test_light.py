@@ -243,6 +243,7 @@ def test_arrays_in_numpy_mean_the_same():
         yield from (dr.max(found), dr.select(mi.Bool(active), 1.0, -1.0), mi.Color3f(0.5 * u.x), mi.UInt32(u.y * 7) % 3)
         yield from (dr.clip(u.x, 0.2, u.y), dr.dot(frame.s, found), dr.sign(u.x - 0.5), dr.power(1 - u.x, 5))
         yield from (dr.squared_norm(found), dr.asin(u.x), dr.isfinite(1 / (u.x - 0.5)), dr.arange(mi.UInt32, 5) * 2)
+        yield from (dr.gather(type(a), a, mi.UInt32(index)) for a in (u, frame.s, u.x, mi.Bool(active)))
         written = dr.zeros(mi.UInt32, 10)
         dr.scatter(written, mi.UInt32(0xFFFFFFFF) >> dr.arange(mi.UInt32, 5), dr.arange(mi.UInt32, 5) * 2)
         yield written

@@ -108,8 +108,13 @@ def select(mask: Array, a: Array, b: Array) -> Values:
     return _values(np.where(_bare(mask), _bare(a), _bare(b)), dtype)
 
 
-def gather(kind: Type, source: np.ndarray, index: np.ndarray, active: Array = True) -> Values:
-    """Entries of a flat array, or vectors of entries that follow each other; zero where not active."""
+def gather(kind: Type | type, source: np.ndarray, index: np.ndarray, active: Array = True) -> Values:
+    """Entries of a flat array, or vectors of entries that follow each other; zero where not active.
+
+    Of the type of `source` itself they are entries of its components.
+    """
+    if not isinstance(kind, Type):
+        return source[..., _bare(index)]
     source, index, active = _bare(source), _bare(index), _bare(active)
     if active is not True:
         index = np.where(active, index, 0)
