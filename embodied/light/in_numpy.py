@@ -114,7 +114,7 @@ def gather(kind: Type | type, source: np.ndarray, index: np.ndarray, active: Arr
     Of the type of `source` itself they are entries of its components.
     """
     if not isinstance(kind, Type):
-        return source[..., _bare(index)]
+        return source[..., _bare(index)].view(Values)
     source, index, active = _bare(source), _bare(index), _bare(active)
     if active is not True:
         index = np.where(active, index, 0)
