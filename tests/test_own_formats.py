@@ -233,7 +233,7 @@ def test_a_leaf_card_cuts_in_pictures_as_in_the_exported_glb(tmp_path):
     house = dataclasses.replace(two_rooms(), placements=(thing,))
     with Renderer(house, Catalogue(), size=64) as renderer:
         ids = renderer.view((1.0, 2.0, 1.0), 0.0, vfov=np.radians(30), size=(64, 64)).ids
-    shown = ids == 1 + renderer.scene.owners.index("card")
+    shown = ids == 1 + renderer.owners.index("card")
     quarters = [shown[y : y + 20, x : x + 20].mean() for y in (8, 36) for x in (8, 36)]
     assert sorted(quarters) == pytest.approx([0, 0, 1, 1], abs=0.05)
     scene = trimesh.load_scene(export_glb(house, Catalogue(), tmp_path / "house.glb"))

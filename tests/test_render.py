@@ -15,8 +15,9 @@ from handmade import HandCatalogue, furnished
 
 from embodied import gl
 from embodied.render import visibility
-from embodied.render.camera import camera_at, face_cameras
-from embodied.render.classic import NEAR, Renderer, depth_of_reversed_z, two_thirds
+from embodied.render.camera import FAR, NEAR, camera_at, face_cameras
+from embodied.render.classic import Renderer, two_thirds
+from embodied.render.geoms import depth_of_reversed_z
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.render.pictures import KINDS, PictureSettings
 from embodied.scene.house_meshes import owners
@@ -223,10 +224,10 @@ def test_rooms_seen_through_two_windows_of_an_l_shape_are_kept():
 
 def test_depth_buffer_is_inverted_exactly():
     z = np.array([0.03, 0.5, 3.0, 50.0, 199.0])
-    near, far = NEAR, 200.0
+    near, far = NEAR, FAR
     buffer = near * (far - z) / (z * (far - near))
-    assert np.allclose(depth_of_reversed_z(buffer.astype(np.float32)), z, rtol=1e-3)
-    assert np.isinf(depth_of_reversed_z(np.zeros(1, np.float32)))
+    assert np.allclose(depth_of_reversed_z(buffer.astype(np.float32), near, far), z, rtol=1e-3)
+    assert np.isinf(depth_of_reversed_z(np.zeros(1, np.float32), near, far))
 
 
 def test_camera_axes_are_a_right_handed_frame():

@@ -194,11 +194,14 @@ class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
             return found
         renderer, size = self.course.world(self.play.excursion.world).renderer, (lens.height, lens.width)
         camera = camera_at(self.play.eye, self.play.yaw, self.play.pitch, lens.vfov)
+        if "depth" not in sees:
+            return {"rgb": np.ascontiguousarray(renderer.rgb(camera, size))}
         if "rgb" in sees:
-            found["rgb"] = np.ascontiguousarray(renderer.rgb(camera, size))
-        if "depth" in sees:
-            found["depth"] = np.ascontiguousarray(np.minimum(renderer.depth_and_ids(camera, size)[0], np.float32(FAR)))
-        return found
+            view = renderer.through(camera, size)
+            found["rgb"], depth = np.ascontiguousarray(view.rgb), view.depth
+        else:
+            depth, _ = renderer.depth_and_ids(camera, size)
+        return found | {"depth": np.ascontiguousarray(np.minimum(depth, np.float32(FAR)))}
 
     def gps(self) -> np.ndarray:
         """(2,) float32 metres ahead and to the left of the start, in the start's frame."""

@@ -10,6 +10,9 @@ import numpy as np
 
 from embodied.render.panorama import FACES
 
+NEAR, FAR = 0.03, 200.0
+"""Nothing nearer or farther is drawn, metres."""
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -32,6 +35,12 @@ class Camera:
     up: tuple[float, float, float]
     vfov: float = math.pi / 2
     """Vertical field of view, radians."""
+
+    @property
+    def right(self) -> np.ndarray:
+        """(3,) unit."""
+        (a, b, c), (x, y, z) = self.forward, self.up
+        return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
 def camera_at(

@@ -1,7 +1,7 @@
 """The classic renderer: a house drawn off-screen by OpenGL into rgb, depth and instance ids.
 
-The house is uploaded once. To move the camera is to write six vectors; what cannot be seen (rooms
-behind walls, things outside the field of view) is left out of the list of geoms to draw.
+The house is uploaded once. What cannot be seen (rooms behind walls, things outside the field of view) is left out of
+the list of geoms to draw. MuJoCo draws them; where the CPU draws a lit house, embodied.render.raster does.
 """
 
 from __future__ import annotations
@@ -16,30 +16,52 @@ from embodied import gl
 gl.prepare()
 
 import cv2
-import mujoco
 import numpy as np
 
 from embodied.house.house import House
-from embodied.render import visibility
-from embodied.render.camera import Camera, View, camera_at, face_cameras
+from embodied.render import raster, visibility
+from embodied.render.camera import FAR, NEAR, Camera, View, camera_at, face_cameras
+from embodied.render.geoms import Geoms
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
+from embodied.scene.house_meshes import owners
 from embodied.scene.lit_pages import LitPages
-from embodied.scene.model import COLLISION, VISUAL, Scene, compile_scene, give_memory_back
+from embodied.scene.model import compile_scene, drawn_meshes, give_memory_back
 
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-NEAR, FAR = 0.03, 200.0
-"""Clipping planes, metres."""
 SUPERSAMPLING = 1.5
 """Where the CPU draws, colours are drawn this many times larger and averaged: cheaper there than multi-sampling, which
 multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
 MULTISAMPLES = 4
-HIDDEN = 5
-"""Geom group of what is left out."""
-NUMBERS = [mujoco.mjtRndFlag.mjRND_SEGMENT.value, mujoco.mjtRndFlag.mjRND_IDCOLOR.value]
-"""Flags of a scene that paint every geom in its number's colour."""
+
+
+class Drawing(Protocol):
+    """A house on the graphics side. Its methods are called within gl.drawing(); their pictures have the bottom row
+    first, and show the geoms `chosen` (k,), `whole` or with fewer triangles where that cannot be seen."""
+
+    middles: np.ndarray
+    reaches: np.ndarray
+    """(geoms, 3) metres: of the boxes along the world's axes that hold the geoms, and half their sizes."""
+
+    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool) -> np.ndarray:
+        """(h, w, 3 or 4) uint8."""
+        ...
+
+    def depth_and_ids(
+        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w) float32 metres along the optical axis and (h, w) int32."""
+        ...
+
+    def view(
+        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray, *, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`rgb` of the size `drawn`, and `depth_and_ids` of `size`."""
+        ...
+
+    def close(self) -> None: ...
 
 
 class Painter(Protocol):
@@ -80,7 +102,6 @@ class Renderer:
         size: int = 256,
         lit: LitPages | None = None,
         painter: Painter | None = None,
-        scene: Scene | None = None,
         overlay: Overlay | None = None,
     ) -> None:
         """Compile `house`, open OpenGL and upload.
@@ -91,7 +112,6 @@ class Renderer:
           size: side of a cube face of `panorama`, pixels.
           lit: the baked pages to show; even light from all sides without.
           painter: draws the colours instead, from the same pages; it is closed with the renderer.
-          scene: a scene compiled before from the same house and pages, to save compiling again.
           overlay: adds reflections; depth and ids stay as they are.
 
         Raises:
@@ -100,27 +120,24 @@ class Renderer:
         """
         check_size(size)
         self.house, self.size = house, size
-        self._mjr, self._painter, self._overlay = None, painter, overlay
-        self.scene = scene or compile_scene(house, catalogue, collisions=False, lit=lit)
-        model = self.scene.model
-        self._data = mujoco.MjData(model)
-        mujoco.mj_forward(model, self._data)
+        self._drawing: Drawing | None = None
+        self._painter, self._overlay = painter, overlay
         self._software = gl.info().software
-        model.vis.quality.offsamples = 0 if self._software else MULTISAMPLES
-        self._buffer = self._drawn_size((size, size))
-        model.vis.global_.offheight, model.vis.global_.offwidth = self._buffer
-        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._mjr)
-        self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        self._drawn = _empty_scene(model)
-        self._option = mujoco.MjvOption()
-        self._option.geomgroup[:] = 0
-        self._option.geomgroup[VISUAL] = 1
-        self._camera, self._perturb = mujoco.MjvCamera(), mujoco.MjvPerturb()
-        self._is_visual = np.array([k != "collision" for k in self.scene.kind_of_geom])
+        if lit is not None and painter is None and self._software and raster.able():
+            meshes, self.owners = tuple(m for _, m in drawn_meshes(lit, house)), owners(house)
+            number = {name: i + 1 for i, name in enumerate(self.owners)}
+            ids = np.array([number.get(m.owner, 0) for m in meshes], np.int32)
+            kinds, rooms = [m.kind for m in meshes], [m.room for m in meshes]
+            self._drawing = raster.Raster(meshes, ids, lit.pages, (NEAR, FAR))
+        else:
+            scene = compile_scene(house, catalogue, collisions=False, lit=lit)
+            self.owners, ids = scene.owners, scene.owner_of_geom
+            kinds, rooms = list(scene.kind_of_geom), list(scene.room_of_geom)
+            samples = 0 if self._software else MULTISAMPLES
+            self._drawing = Geoms(scene, self._drawn_size((size, size)), samples, (NEAR, FAR))
+        self._is_visual = np.array([k != "collision" for k in kinds])
         self._portals = visibility.portals_of(house)
-        self._geoms_of_room = _geoms_by_room(house, self.scene)
-        self._middles, self._reaches = world_boxes(model, self._data)
+        self._geoms_of_room = _geoms_by_room(house, [self.owners[i - 1] if i else "" for i in ids], kinds, rooms)
 
     def view(
         self,
@@ -143,22 +160,25 @@ class Renderer:
 
     @gl.drawing()
     def through(self, camera: Camera, size: tuple[int, int], *, cull: bool = True) -> View:
-        """The picture of (height, width) that `camera` takes; `cull` as in `view`."""
-        drawn = self._choose(camera, size, cull)
-        rgb = self._rgb(camera, size)
-        depth, ids = self._depth_and_ids(size, drawn)
-        return View(rgb, depth, ids)
+        """The picture of (height, width) that `camera` takes; `cull` as in `view`.
+
+        Where the CPU draws a lit house, ids are of a point a sixth of a pixel beside the middle, which tells at edges.
+        """
+        drawing, chosen = self._open(), self._chosen(camera, size, cull)
+        if self._painter is not None:
+            return View(self._rgb(camera, size, chosen), *self._seen(camera, size, chosen))
+        picture, depth, ids = drawing.view(camera, size, self._drawn_size(size), chosen, whole=not cull)
+        return View(self._overlaid(shrunk(picture, size), camera), cv2.flip(depth, 0), cv2.flip(ids, 0))
 
     @gl.drawing()
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8: colours alone."""
-        self._choose(camera, size, True)
-        return self._rgb(camera, size)
+        return self._rgb(camera, size, self._chosen(camera, size))
 
     @gl.drawing()
     def depth_and_ids(self, camera: Camera, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, without the colours."""
-        return self._depth_and_ids(size, self._choose(camera, size, True))
+        return self._seen(camera, size, self._chosen(camera, size))
 
     @gl.drawing()
     def panorama(self, position: Sequence[float] | np.ndarray, size: int | None = None) -> Panorama:
@@ -167,9 +187,9 @@ class Renderer:
         rgb = np.empty((6, s, s, 3), np.uint8)
         depth, ids = np.empty((6, s, s), np.float32), np.empty((6, s, s), np.int32)
         for k, camera in enumerate(face_cameras(position)):
-            drawn = self._choose(camera, (s, s), True)
-            rgb[k] = self._rgb(camera, (s, s))
-            depth[k], ids[k] = self._depth_and_ids((s, s), drawn)
+            chosen = self._chosen(camera, (s, s))
+            rgb[k] = self._rgb(camera, (s, s), chosen)
+            depth[k], ids[k] = self._seen(camera, (s, s), chosen)
         return Panorama(rgb, depth, ids)
 
     @gl.drawing()
@@ -185,10 +205,10 @@ class Renderer:
         if self._painter is not None:
             self._painter.close()
             self._painter = None
-        if self._mjr is not None:
+        if self._drawing is not None:
             with gl.drawing():
-                self._mjr.free()
-            self._mjr = None
+                self._drawing.close()
+            self._drawing = None
             give_memory_back()
 
     def __enter__(self) -> Self:
@@ -197,36 +217,25 @@ class Renderer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _choose(self, camera: Camera, size: tuple[int, int], cull: bool) -> np.ndarray:
-        """Prepare OpenGL and the list of geoms to draw; returns their indices, in drawing order."""
-        if self._mjr is None:
+    def _open(self) -> Drawing:
+        if self._drawing is None:
             raise RuntimeError("the renderer is closed; make a new one")
-        mujoco.mjr_restoreBuffer(self._mjr)
-        if any(n > b for n, b in zip(self._drawn_size(size), self._buffer, strict=True)):
-            height, width = self._drawn_size(size)
-            self._buffer = max(height, self._buffer[0]), max(width, self._buffer[1])
-            mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
-        mask = self._is_visual
-        if cull:
-            mask = self._in_view(camera, size)
-        model = self.scene.model
-        model.geom_group[:] = np.where(mask, VISUAL, HIDDEN)
-        mujoco.mjv_updateScene(
-            model, self._data, self._option, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._drawn
-        )
-        model.geom_group[:] = np.where(self._is_visual, VISUAL, COLLISION)
-        _aim(self._drawn, camera, size)
-        return np.flatnonzero(mask)
+        return self._drawing
+
+    def _chosen(self, camera: Camera, size: tuple[int, int], cull: bool = True) -> np.ndarray:
+        """The numbers of the geoms to draw."""
+        return np.flatnonzero(self._in_view(camera, size) if cull else self._is_visual)
 
     def _in_view(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(ngeom,) bool: what may be seen: through doors and windows, with its box in the field of view."""
+        drawing = self._open()
         forward, up = np.array(camera.forward), np.array(camera.up)
-        right, tall = np.cross(forward, up), math.tan(camera.vfov / 2)
+        right, tall = camera.right, math.tan(camera.vfov / 2)
         wide = tall * size[1] / size[0]
         planes = np.stack([forward * wide - right, forward * wide + right, forward * tall - up, forward * tall + up])
-        planes /= np.linalg.norm(planes, axis=1, keepdims=True)
-        apart = self._middles - np.array(camera.position)
-        framed = np.all(apart @ planes.T >= -self._reaches @ np.abs(planes.T) - 1e-3, axis=1)
+        planes /= np.sqrt((planes**2).sum(1, keepdims=True))
+        apart = drawing.middles - np.array(camera.position)
+        framed = (apart @ planes.T >= -drawing.reaches @ np.abs(planes.T) - 1e-3).all(1)
         towards = visibility.sector_of(forward, right, up, wide, tall)
         rooms = visibility.visible_rooms(self.house, self._portals, camera.position, towards)
         if rooms is None:
@@ -238,7 +247,7 @@ class Renderer:
             return np.zeros_like(framed)
         geoms = np.concatenate([g for _, g in there])
         sectors = np.repeat([s for s, _ in there], [len(g) for _, g in there], axis=0)
-        spans = visibility.spans_of(np.array(camera.position), self._middles, self._reaches)
+        spans = visibility.spans_of(np.array(camera.position), drawing.middles, drawing.reaches)
         mask = np.zeros_like(framed)
         mask[geoms[spans.within(sectors, geoms)]] = True
         return mask & framed
@@ -248,63 +257,35 @@ class Renderer:
         factor = SUPERSAMPLING if self._software else 1.0
         return math.ceil(size[0] * factor), math.ceil(size[1] * factor)
 
-    def _rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        rgb = self._drawn_rgb(camera, size)
+    def _rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
+        if self._painter is not None:
+            return self._overlaid(self._painter.rgb(camera, size, NEAR, FAR), camera)
+        picture = self._open().rgb(camera, self._drawn_size(size), chosen, whole=False)
+        return self._overlaid(shrunk(picture, size), camera)
+
+    def _overlaid(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
         return rgb if self._overlay is None else self._overlay.over(rgb, camera)
 
-    def _drawn_rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        if self._painter is not None:
-            return self._painter.rgb(camera, size, NEAR, FAR)
-        height, width = self._drawn_size(size)
-        rect, rgb = mujoco.MjrRect(0, 0, width, height), np.empty((height, width, 3), np.uint8)
-        mujoco.mjr_render(rect, self._drawn, self._mjr)
-        mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
-        if (height % 3, width % 3, 2 * height, 2 * width) == (0, 0, 3 * size[0], 3 * size[1]):
-            return two_thirds(rgb)
-        if (height, width) != tuple(size):
-            rgb = cv2.resize(rgb, (size[1], size[0]), interpolation=cv2.INTER_AREA)
-        return rgb[::-1]
-
-    def _depth_and_ids(self, size: tuple[int, int], drawn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A second pass that paints every geom in its number's colour."""
-        flags = self._drawn.flags
-        flags[NUMBERS] = 1
-        rect, numbers = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
-        reversed_z = np.empty(size, np.float32)
-        mujoco.mjr_render(rect, self._drawn, self._mjr)
-        mujoco.mjr_readPixels(numbers, reversed_z, rect, self._mjr)
-        flags[NUMBERS] = 0
-        owner_of_number = np.zeros(len(drawn) + 1, np.int32)
-        owner_of_number[1:] = self.scene.owner_of_geom[drawn]
-        packed = cv2.cvtColor(numbers, cv2.COLOR_RGB2RGBA).view("<u4")[::-1, :, 0] & 0xFFFFFF
-        ids = owner_of_number.take(packed)
-        depth = depth_of_reversed_z(reversed_z[::-1])
-        depth[ids == 0] = np.inf  # a painted sky is no thing
-        return depth, ids
+    def _seen(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        depth, ids = self._open().depth_and_ids(camera, size, chosen, whole=False)
+        return cv2.flip(depth, 0), cv2.flip(ids, 0)
 
 
-def world_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
-    """(ngeom, 3) middles and (ngeom, 3) half sizes of boxes along the world's axes that hold the geoms, metres."""
-    axes = data.geom_xmat.reshape(-1, 3, 3)
-    middles = data.geom_xpos + np.einsum("gij,gj->gi", axes, model.geom_aabb[:, :3])
-    return middles, np.einsum("gij,gj->gi", np.abs(axes), model.geom_aabb[:, 3:])
-
-
-def depth_of_reversed_z(z: np.ndarray, near: float = NEAR, far: float = FAR) -> np.ndarray:
-    """Metres along the optical axis (float32) from a depth buffer that is 1 at `near` and 0 at `far`; inf at 0.
-
-    Source: the inverse of glFrustum's mapping with both ends exchanged (OpenGL 2.1 reference, glFrustum).
-    """
-    depth = near * far / (near + z * np.float32(far - near))
-    depth[z <= 0] = np.inf
-    return depth
+def shrunk(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(h, w, 3) uint8 of `size`, top row first, from a larger picture of 3 or 4 channels, bottom row first."""
+    height, width = picture.shape[:2]
+    if (height % 3, width % 3, 2 * height, 2 * width) == (0, 0, 3 * size[0], 3 * size[1]):
+        return two_thirds(picture)
+    if (height, width) != tuple(size):
+        picture = cv2.resize(picture, (size[1], size[0]), interpolation=cv2.INTER_AREA)
+    return picture[::-1, :, :3]
 
 
 def two_thirds(picture: np.ndarray) -> np.ndarray:
-    """(2 h, 2 w, 3) uint8 from (3 h, 3 w, 3), bottom row first: the mean over each pixel's area, top row first."""
-    rgba = cv2.remap(
-        cv2.cvtColor(picture, cv2.COLOR_RGB2RGBA), *_thirds(*picture.shape[:2]), interpolation=cv2.INTER_LINEAR
-    )
+    """(2 h, 2 w, 3) uint8 from (3 h, 3 w, 3 or 4), bottom row first: the mean over each pixel's area, top row first."""
+    if picture.shape[2] == 3:
+        picture = cv2.cvtColor(picture, cv2.COLOR_RGB2RGBA)
+    rgba = cv2.remap(picture, *_thirds(*picture.shape[:2]), interpolation=cv2.INTER_LINEAR)
     return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
 
 
@@ -318,33 +299,15 @@ def _thirds(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
     return x.astype(np.float32), y.astype(np.float32)
 
 
-def _empty_scene(model: mujoco.MjModel) -> mujoco.MjvScene:
-    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 16)
-    for name in ("SHADOW", "REFLECTION", "FOG", "HAZE"):
-        scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{name}")] = 0
-    return scene
-
-
-def _aim(scene: mujoco.MjvScene, camera: Camera, size: tuple[int, int]) -> None:
-    """Write `camera` into both eyes of `scene`."""
-    top = NEAR * math.tan(camera.vfov / 2)
-    for eye in scene.camera:
-        eye.pos, eye.forward, eye.up = camera.position, camera.forward, camera.up
-        eye.frustum_near, eye.frustum_far = NEAR, FAR
-        eye.frustum_bottom, eye.frustum_top = -top, top
-        eye.frustum_center, eye.frustum_width = 0.0, top * size[1] / size[0]
-
-
-def _geoms_by_room(house: House, scene: Scene) -> dict[str, np.ndarray]:
+def _geoms_by_room(
+    house: House, owner_of_geom: Sequence[str], kinds: Sequence[str], rooms: Sequence[str]
+) -> dict[str, np.ndarray]:
     """Room id to the geoms seen when that room is seen; joinery and stairs belong to both their rooms."""
     sides = {o.id: tuple(r or visibility.OUTDOORS for r in o.rooms) for o in house.openings}
     sides |= {s.id: s.rooms for s in house.stairs}
     geoms: dict[str, list[int]] = {}
-    for g, kind in enumerate(scene.kind_of_geom):
-        if kind == "collision":
-            continue
-        owner = scene.owners[scene.owner_of_geom[g] - 1] if scene.owner_of_geom[g] else ""
-        rooms = sides.get(owner.partition("/")[0], (scene.room_of_geom[g],))
-        for room in rooms:
-            geoms.setdefault(room, []).append(g)
+    for g, (owner, kind) in enumerate(zip(owner_of_geom, kinds, strict=True)):
+        if kind != "collision":
+            for room in sides.get(owner.partition("/")[0], (rooms[g],)):
+                geoms.setdefault(room, []).append(g)
     return {room: np.array(list_of, int) for room, list_of in geoms.items()}

@@ -6,10 +6,11 @@ Visual geoms are in group 2 and touch nothing; collision boxes are in group 3 an
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import functools
 import math
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -176,7 +177,7 @@ def build_spec(
         _add_parts(spec, parts, bodies)
     else:
         spec.visual.headlight.active = 0
-        _add_pages(spec, lit, {p.id for p in house.placements if p.object_class in HOLLOW})
+        _add_pages(spec, lit, house)
     if collisions:
         _add_collisions(spec, house, catalogue, bodies)
         _add_leaves(spec, parts or shell_parts(house, catalogue.finish))
@@ -192,8 +193,7 @@ def _empty_spec(house: House) -> mujoco.MjSpec:
     spec.option.timestep = 0.004
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    corners = np.array([c for r in house.rooms for c in r.polygon])
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    low, high = bounds_of(house)
     spec.stat.center = [*(low + high) / 2, 1.0]
     spec.stat.extent = float(np.linalg.norm(high - low))
     view = spec.visual
@@ -385,36 +385,50 @@ def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 
 
-def _add_pages(spec: mujoco.MjSpec, lit: LitPages, hollow: Collection[str]) -> None:
-    """The meshes of a lit house; those of owners in `hollow` are seen from inside, too."""
+def _add_pages(spec: mujoco.MjSpec, lit: LitPages, house: House) -> None:
     for i, page in enumerate(lit.pages):
         add_texture(spec, f"page_{i}", page)
         material = spec.add_material(name=f"page_{i}", rgba=[1, 1, 1, 1], emission=1.0, specular=0.0, shininess=0.0)
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = f"page_{i}"
     count: dict[str, int] = {}
-    for i, m in enumerate(lit.meshes):
-        for vertices, uv, faces in _pieces(m, spec.stat.center[:2]):
-            k = count[m.owner] = count.get(m.owner, -1) + 1
-            name = f"{i:04d}_{k}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
-            if m.owner in hollow:
+    for i, m in drawn_meshes(lit, house):
+        k = count[m.owner] = count.get(m.owner, -1) + 1
+        name = f"{i:04d}_{k}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
+        _add_mesh(spec, name, m.vertices, None, m.uv, m.faces)
+        spec.worldbody.add_geom(
+            name=f"{m.owner}#{k}",
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            material=f"page_{m.page}",
+            rgba=[1, 1, 1, m.alpha],
+            group=VISUAL,
+            contype=0,
+            conaffinity=0,
+            mass=0,
+        )
+
+
+def drawn_meshes(lit: LitPages, house: House) -> Iterator[tuple[int, LitMesh]]:
+    """The meshes of a lit house as they are drawn, each with its number in LitPages.meshes: those of HOLLOW things
+    seen from inside, too; what stands around the house in pieces, of which a window shows few."""
+    hollow = {p.id for p in house.placements if p.object_class in HOLLOW}
+    low, high = bounds_of(house)
+    for i, mesh in enumerate(lit.meshes):
+        for vertices, uv, faces in _pieces(mesh, (low + high) / 2):
+            if mesh.owner in hollow:
                 faces = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
                 vertices, uv = np.concatenate([vertices, vertices]), np.concatenate([uv, uv])
-            _add_mesh(spec, name, vertices, None, uv, faces)
-            spec.worldbody.add_geom(
-                name=f"{m.owner}#{k}",
-                type=mujoco.mjtGeom.mjGEOM_MESH,
-                meshname=name,
-                material=f"page_{m.page}",
-                rgba=[1, 1, 1, m.alpha],
-                group=VISUAL,
-                contype=0,
-                conaffinity=0,
-                mass=0,
-            )
+            yield i, dataclasses.replace(mesh, vertices=vertices, uv=uv, faces=faces)
+
+
+def bounds_of(house: House) -> tuple[np.ndarray, np.ndarray]:
+    """(2,) the least and the greatest corner of its rooms, metres."""
+    corners = np.array([c for r in house.rooms for c in r.polygon])
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _pieces(mesh: LitMesh, centre: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Vertices, uv and faces of a mesh; what stands around the house comes in pieces, of which a window shows few."""
+    """Vertices, uv and faces of a mesh, or of its pieces."""
     if mesh.kind != "outdoor":
         if len(mesh.faces):
             yield mesh.vertices, mesh.uv, mesh.faces

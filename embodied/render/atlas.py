@@ -1,0 +1,48 @@
+"""The pages of a house side by side in one large picture, with smaller copies of it to its right."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+LEVELS = 5
+"""Smaller copies, each half as large as the last."""
+BLOCK = 2**LEVELS
+"""Pages begin at multiples of this, so that no texel of a copy is of two of them."""
+GUTTER = BLOCK // 2
+"""Texels around a page that repeat its edge, at least."""
+NARROWEST = 8192
+"""Least width of the picture without its copies, texels; it is about square where that is more."""
+
+
+def packed(pages: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """One picture of all `pages`, (h, w, 3) uint8 each.
+
+    Returns:
+      (h, w + w / 2, 4) uint8: right of the pages their copies, from the top down, the largest first.
+      (pages, 2) int: column and row of each page.
+    """
+    corners = np.zeros((len(pages), 2), int)
+    sides = [[-(-(n + 2 * GUTTER) // BLOCK) * BLOCK for n in p.shape[:2]] for p in pages]
+    width = -(-max(NARROWEST, math.isqrt(sum(h * w for h, w in sides))) // BLOCK) * BLOCK
+    column = row = tall = 0
+    for i in sorted(range(len(pages)), key=lambda i: -sides[i][0]):
+        if column + sides[i][1] > width:
+            column, row, tall = 0, row + tall, 0
+        corners[i] = column, row
+        column, tall = column + sides[i][1], max(tall, sides[i][0])
+    height = max(row + tall, BLOCK)
+    picture = np.zeros((height, width + width // 2, 4), np.uint8)
+    for page, (column, row), (rows, columns) in zip(pages, corners.tolist(), sides, strict=True):
+        below, beside = rows - page.shape[0] - GUTTER, columns - page.shape[1] - GUTTER
+        image = cv2.copyMakeBorder(np.ascontiguousarray(page), GUTTER, below, GUTTER, beside, cv2.BORDER_REPLICATE)
+        picture[row : row + rows, column : column + columns, :3] = image
+    image, row = picture[:, :width], 0
+    for _ in range(LEVELS):
+        image = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        picture[row : row + len(image), width : width + image.shape[1]] = image
+        row += len(image)
+    return picture, corners + GUTTER

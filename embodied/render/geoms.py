@@ -1,0 +1,137 @@
+"""Geoms: a house drawn by MuJoCo's own renderer, which tells apart what it draws by painting each in its number."""
+
+from __future__ import annotations
+
+import math
+
+from embodied import gl
+
+gl.prepare()
+
+import cv2
+import mujoco
+import numpy as np
+
+from embodied.render.camera import Camera
+from embodied.scene.model import VISUAL, Scene
+
+HIDDEN = 5
+"""Geom group of what is left out."""
+NUMBERS = [mujoco.mjtRndFlag.mjRND_SEGMENT.value, mujoco.mjtRndFlag.mjRND_IDCOLOR.value]
+"""Flags of a scene that paint every geom in its number's colour."""
+
+
+class Geoms:
+    """Owns the textures and display lists of a compiled house until `close`."""
+
+    def __init__(self, scene: Scene, buffer: tuple[int, int], samples: int, planes: tuple[float, float]) -> None:
+        """
+        Args:
+          buffer: (height, width), pixels, of the first off-screen buffer; it grows when needed.
+          samples: of a pixel.
+          planes: nothing nearer or farther is drawn, metres.
+        """
+        self._scene, self._buffer, self._planes = scene, buffer, planes
+        model = scene.model
+        self._data = mujoco.MjData(model)
+        mujoco.mj_forward(model, self._data)
+        model.vis.quality.offsamples = samples
+        model.vis.global_.offheight, model.vis.global_.offwidth = buffer
+        self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._mjr)
+        self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._drawn = _empty_scene(model)
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[VISUAL] = 1
+        self._camera, self._perturb = mujoco.MjvCamera(), mujoco.MjvPerturb()
+        self._groups = model.geom_group.copy()
+        self.middles, self.reaches = world_boxes(model, self._data)
+
+    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool) -> np.ndarray:
+        """(h, w, 3) uint8, bottom row first, of the geoms `chosen` (k,), which are always drawn whole."""
+        self._choose(camera, size, chosen)
+        rect, rgb = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
+        mujoco.mjr_render(rect, self._drawn, self._mjr)
+        mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
+        return rgb
+
+    def depth_and_ids(
+        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w) float32 metres along the optical axis and (h, w) int32, bottom row first; as in `rgb`."""
+        self._choose(camera, size, chosen)
+        flags = self._drawn.flags
+        flags[NUMBERS] = 1
+        rect, numbers = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
+        reversed_z = np.empty(size, np.float32)
+        mujoco.mjr_render(rect, self._drawn, self._mjr)
+        mujoco.mjr_readPixels(numbers, reversed_z, rect, self._mjr)
+        flags[NUMBERS] = 0
+        owner_of_number = np.zeros(len(chosen) + 1, np.int32)
+        owner_of_number[1:] = self._scene.owner_of_geom[chosen]
+        packed = cv2.cvtColor(numbers, cv2.COLOR_RGB2RGBA).view("<u4")[..., 0] & 0xFFFFFF
+        ids = owner_of_number.take(packed)
+        depth = depth_of_reversed_z(reversed_z, *self._planes)
+        depth[ids == 0] = np.inf  # a painted sky is no thing
+        return depth, ids
+
+    def view(
+        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray, *, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`rgb` of the size `drawn`, and `depth_and_ids` of `size`."""
+        picture = self.rgb(camera, drawn, chosen, whole=whole)
+        return picture, *self.depth_and_ids(camera, size, chosen, whole=whole)
+
+    def close(self) -> None:
+        """Free what lies on the graphics side."""
+        self._mjr.free()
+
+    def _choose(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> None:
+        """Prepare OpenGL and the list of geoms to draw."""
+        mujoco.mjr_restoreBuffer(self._mjr)
+        if any(n > b for n, b in zip(size, self._buffer, strict=True)):
+            self._buffer = max(size[0], self._buffer[0]), max(size[1], self._buffer[1])
+            mujoco.mjr_resizeOffscreen(self._buffer[1], self._buffer[0], self._mjr)
+        model = self._scene.model
+        model.geom_group[:] = HIDDEN
+        model.geom_group[chosen] = VISUAL
+        mujoco.mjv_updateScene(
+            model, self._data, self._option, self._perturb, self._camera, mujoco.mjtCatBit.mjCAT_ALL.value, self._drawn
+        )
+        model.geom_group[:] = self._groups
+        self._aim(camera, size)
+
+    def _aim(self, camera: Camera, size: tuple[int, int]) -> None:
+        """Write `camera` into both eyes of the scene."""
+        near, far = self._planes
+        top = near * math.tan(camera.vfov / 2)
+        for eye in self._drawn.camera:
+            eye.pos, eye.forward, eye.up = camera.position, camera.forward, camera.up
+            eye.frustum_near, eye.frustum_far = near, far
+            eye.frustum_bottom, eye.frustum_top = -top, top
+            eye.frustum_center, eye.frustum_width = 0.0, top * size[1] / size[0]
+
+
+def world_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """(ngeom, 3) middles and (ngeom, 3) half sizes of boxes along the world's axes that hold the geoms, metres."""
+    axes = data.geom_xmat.reshape(-1, 3, 3)
+    middles = data.geom_xpos + np.einsum("gij,gj->gi", axes, model.geom_aabb[:, :3])
+    return middles, np.einsum("gij,gj->gi", np.abs(axes), model.geom_aabb[:, 3:])
+
+
+def depth_of_reversed_z(z: np.ndarray, near: float, far: float) -> np.ndarray:
+    """Metres along the optical axis (float32) from a depth buffer that is 1 at `near` and 0 at `far`; inf at 0.
+
+    Source: the inverse of glFrustum's mapping with both ends exchanged (OpenGL 2.1 reference, glFrustum).
+    """
+    depth = near * far / (near + z * np.float32(far - near))
+    depth[z <= 0] = np.inf
+    return depth
+
+
+def _empty_scene(model: mujoco.MjModel) -> mujoco.MjvScene:
+    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 16)
+    for name in ("SHADOW", "REFLECTION", "FOG", "HAZE"):
+        scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{name}")] = 0
+    return scene

@@ -1,0 +1,367 @@
+"""Draws a lit house with shaders of its own: colours, or depth and ids, with a handful of calls of OpenGL.
+
+For where the CPU draws. MuJoCo's renderer leads every corner through lamps that a lit house does not have, changes its
+state at every geom, and reads a page for every pixel of the blocks that a triangle touches. Here all meshes lie in one
+buffer, and OpenGL notes for every pixel only which texel of the atlas is in front; OpenCV reads them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import math
+from collections.abc import Mapping, Sequence
+
+from embodied import gl
+
+gl.prepare()
+
+import cv2
+import numpy as np
+from OpenGL import GL
+
+from embodied.render import atlas, coarser, shaders
+from embodied.render.camera import Camera
+from embodied.scene.lit_pages import LitMesh
+
+CORNER = np.dtype([("xyz", "<f4", 3), ("at", "<f4", 2), ("id", "<u2"), ("opacity", "<u2")])
+"""Of a corner: where it is, metres; its texel in the atlas; its owner's id; its opacity, 0 to 255."""
+ATTRIBUTES = (("xyz", 3), ("at", 2), ("id", 2))
+"""First fields, and how many numbers from there on, as shaders.CORNERS reads them."""
+VERSION = (4, 5)
+"""Of OpenGL, the oldest."""
+NOWHERE = -9.0
+"""Column and row of a pixel that shows nothing."""
+PICTURES = {
+    "column": (GL.GL_R32F, GL.GL_RED, GL.GL_FLOAT, np.float32, NOWHERE),
+    "row": (GL.GL_R32F, GL.GL_RED, GL.GL_FLOAT, np.float32, NOWHERE),
+    "number": (GL.GL_R32UI, GL.GL_RED_INTEGER, GL.GL_INT, np.int32, 0),
+    "metres": (GL.GL_R32F, GL.GL_RED, GL.GL_FLOAT, np.float32, math.inf),
+}
+"""How what shaders write is kept and read, and what it is where nothing is."""
+FRAMES = {"places": ("column", "row"), "numbers": ("number", "metres"), "all": tuple(PICTURES)}
+"""What shaders write, in their order."""
+COARSE = 0.7
+"""Widest cell of a copy that is drawn in place of a mesh, pixels."""
+
+
+class Raster:
+    """Owns the triangles and the pages of a house until `close`. Its methods are called within gl.drawing()."""
+
+    def __init__(
+        self, meshes: Sequence[LitMesh], ids: np.ndarray, pages: Sequence[np.ndarray], planes: tuple[float, float]
+    ) -> None:
+        """
+        Args:
+          ids: (meshes,) of their owners, below 65536.
+          pages: (h, w, 3) uint8 each.
+          planes: nothing nearer or farther is drawn, metres.
+        """
+        self._planes = planes
+        self._is_clear = np.array([m.alpha < 1 for m in meshes])
+        lows, highs = (np.array([f(m.vertices, axis=0) for m in meshes], float) for f in (np.min, np.max))
+        self.middles, self.reaches = (lows + highs) / 2, (highs - lows) / 2
+        """(meshes, 3) metres, of the boxes that hold them and half their sizes."""
+        used = [sorted({m.page for m in meshes if (m.alpha < 1) == clear}) for clear in (False, True)]
+        pictures, places = zip(*(atlas.packed([pages[i] for i in some]) for some in used), strict=True)
+        self._atlas = pictures[0]
+        place_of = [dict(zip(some, p, strict=True)) for some, p in zip(used, places, strict=True)]
+        self._buffers = [int(b) for b in GL.glGenBuffers(2)]
+        self._array = int(GL.glGenVertexArrays(1))
+        corners, triangles, self._starts, self._counts = _arranged(meshes, ids, pages, place_of)
+        _upload_corners(self._array, self._buffers, corners)
+        self._triangles = triangles.astype(np.uint32)
+        self._facing = _facing(corners["xyz"], triangles)
+        self._through, self._canvas = (int(t) for t in GL.glGenTextures(2))
+        _make_texture(self._through, pictures[1].shape[:2], pictures[1])
+        pixels = {"through": shaders.THROUGH, "numbers": shaders.NUMBERS, "places": shaders.PLACES, "all": shaders.ALL}
+        size_of = {"through": pictures[1].shape, "numbers": (0, 0)}
+        self._programs = {name: _program(p, size_of.get(name, pictures[0].shape)) for name, p in pixels.items()}
+        self._frames = {name: int(GL.glGenFramebuffers(1)) for name in (*FRAMES, "canvas")}
+        self._pictures = {name: int(GL.glGenRenderbuffers(1)) for name in (*PICTURES, "depth")}
+        GL.glUseProgram(0)
+        self._size = (0, 0)
+
+    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool) -> np.ndarray:
+        """(h, w, 4) uint8, bottom row first.
+
+        Args:
+          size: (height, width), pixels.
+          chosen: (k,) numbers of the meshes to draw.
+          whole: draw no copies, however small things are.
+        """
+        picture = self._coloured("places", camera, size, *self._sorted(camera, size, chosen, whole))
+        self._end()
+        return picture
+
+    def depth_and_ids(
+        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w) float32 metres along the optical axis, inf where no owner is, and (h, w) int32, bottom row first; as
+        in `rgb`."""
+        self._begin("numbers", size)
+        self._draw("numbers", self._matrix(camera, size), self._ranges(camera, size, chosen, whole))
+        ids, depth = (_read("numbers", name, size) for name in FRAMES["numbers"])
+        self._end()
+        return depth, ids
+
+    def view(
+        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray, *, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`rgb` of the size `drawn`, and `depth_and_ids` of `size`; from one pass where that is two thirds of it.
+
+        Then a pixel has the id of the nearest of the larger ones, whose middle is a sixth of a pixel from its own, and
+        the depth of its surface in its own middle.
+        """
+        if any(2 * d != 3 * s or s % 2 for s, d in zip(size, drawn, strict=True)):
+            picture = self.rgb(camera, drawn, chosen, whole=whole)
+            return picture, *self.depth_and_ids(camera, size, chosen, whole=whole)
+        solid, clear = self._sorted(camera, drawn, chosen, whole)
+        picture = self._coloured("all", camera, drawn, solid, clear)
+        if len(clear):
+            GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frames["all"])
+            self._draw("all", self._matrix(camera, drawn), clear)
+        ids, depth = (_read("all", name, drawn).take(_nearest(size)) for name in FRAMES["numbers"])
+        self._end()
+        return picture, depth, ids
+
+    def close(self) -> None:
+        """Free what lies on the graphics side."""
+        GL.glDeleteBuffers(len(self._buffers), self._buffers)
+        GL.glDeleteTextures(2, [self._through, self._canvas])
+        GL.glDeleteVertexArrays(1, [self._array])
+        GL.glDeleteFramebuffers(len(self._frames), list(self._frames.values()))
+        GL.glDeleteRenderbuffers(len(self._pictures), list(self._pictures.values()))
+        for program, _ in self._programs.values():
+            GL.glDeleteProgram(program)
+
+    def _sorted(
+        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """`_ranges` of what is opaque, the nearest first, and of what shines through, the farthest first."""
+        order = chosen[((self.middles[chosen] - np.array(camera.position)) ** 2).sum(1).argsort()]
+        clear = self._is_clear[order]
+        ranges = self._ranges(camera, size, order, whole)
+        return ranges[~clear], ranges[clear][::-1]
+
+    def _ranges(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, whole: bool) -> np.ndarray:
+        """(k, 2) first and number of the triangles to draw of the meshes `chosen` (k,)."""
+        if whole:
+            return np.stack([self._starts[0, chosen], self._counts[0, chosen]], axis=1)
+        forward = np.array(camera.forward)
+        near = (self.middles[chosen] - np.array(camera.position)) @ forward - self.reaches[chosen] @ np.abs(forward)
+        widest = COARSE * 2 * math.tan(camera.vfov / 2) / size[0] * np.maximum(near, 0)
+        counts = self._counts[:, chosen]
+        fits = (CELLS[:, None] <= widest) & (counts > 0)
+        level = len(fits) - 1 - fits[::-1].argmax(0)
+        return np.stack([self._starts[level, chosen], counts[level, np.arange(len(chosen))]], axis=1)
+
+    def _coloured(
+        self, frame: str, camera: Camera, size: tuple[int, int], solid: np.ndarray, clear: np.ndarray
+    ) -> np.ndarray:
+        """(h, w, 4) uint8, bottom row first; what else is in `frame` is of what is solid."""
+        matrix = self._matrix(camera, size)
+        self._begin(frame, size)
+        self._draw(frame, matrix, solid)
+        column, row = (_read(frame, name, size) for name in FRAMES["places"])
+        picture = cv2.remap(self._atlas, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        if len(clear):
+            self._lay(clear, matrix, picture)
+        return picture
+
+    def _lay(self, clear: np.ndarray, matrix: np.ndarray, picture: np.ndarray) -> None:
+        """Lay what shines through over `picture` (h, w, 4), which shows what is behind."""
+        height, width = picture.shape[:2]
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self._canvas)
+        GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, 0, 0, width, height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, picture)
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frames["canvas"])
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self._through)
+        GL.glEnable(GL.GL_BLEND)
+        GL.glBlendFunc(GL.GL_SRC_ALPHA, GL.GL_ONE_MINUS_SRC_ALPHA)
+        GL.glDepthMask(False)
+        self._draw("through", matrix, clear)
+        GL.glDepthMask(True)
+        GL.glDisable(GL.GL_BLEND)
+        GL.glReadPixels(0, 0, width, height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, picture)
+
+    def _matrix(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        """`projection` to the depths that this OpenGL takes at present; MuJoCo leaves it with 0 to 1."""
+        mode = np.ravel(GL.glGetIntegerv(GL.GL_CLIP_DEPTH_MODE))[0]
+        lowest = 0.0 if mode == GL.GL_ZERO_TO_ONE else -1.0
+        return projection(camera, self._planes, size, lowest)
+
+    def _begin(self, frame: str, size: tuple[int, int]) -> None:
+        if any(n > s for n, s in zip(size, self._size, strict=True)):
+            self._size = max(size[0], self._size[0]), max(size[1], self._size[1])
+            self._make_frames()
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frames[frame])
+        GL.glViewport(0, 0, size[1], size[0])
+        GL.glEnable(GL.GL_CULL_FACE)
+        GL.glEnable(GL.GL_DEPTH_TEST)
+        GL.glDepthFunc(GL.GL_GREATER)
+        GL.glDisable(GL.GL_DITHER)
+        GL.glClearBufferfv(GL.GL_DEPTH, 0, (0.0,))
+        for k, name in enumerate(FRAMES[frame]):
+            clear = GL.glClearBufferiv if PICTURES[name][3] is np.int32 else GL.glClearBufferfv
+            clear(GL.GL_COLOR, k, (PICTURES[name][4], 0, 0, 0))
+
+    def _draw(self, program: str, matrix: np.ndarray, ranges: np.ndarray) -> None:
+        """Triangles of `ranges` (k, 2), those that face the other way left out before OpenGL looks at their corners."""
+        if not len(ranges):
+            return
+        eye = np.linalg.solve(matrix[[0, 1, 3], :3].astype(float), -matrix[[0, 1, 3], 3].astype(float))
+        some = [slice(first, first + count) for first, count in ranges.tolist()]
+        seen = np.concatenate([self._facing[k] for k in some]) @ np.array([*eye, 1.0], np.float32) > 0
+        triangles = np.concatenate([self._triangles[k] for k in some])[seen]
+        number, place = self._programs[program]
+        GL.glUseProgram(number)
+        GL.glUniformMatrix4fv(place, 1, True, matrix)
+        GL.glBindVertexArray(self._array)
+        GL.glBufferData(GL.GL_ELEMENT_ARRAY_BUFFER, triangles.nbytes, triangles, GL.GL_STREAM_DRAW)
+        GL.glDrawElements(GL.GL_TRIANGLES, triangles.size, GL.GL_UNSIGNED_INT, None)
+
+    def _end(self) -> None:
+        GL.glBindVertexArray(0)
+        GL.glUseProgram(0)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, 0)
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, 0)
+
+    def _make_frames(self) -> None:
+        """Frame buffers of `_size`, which share their pictures and one buffer of depths; the canvas is a texture."""
+        forms = {name: form for name, (form, *_) in PICTURES.items()} | {"depth": GL.GL_DEPTH_COMPONENT32F}
+        for name, picture in self._pictures.items():
+            GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, picture)
+            GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, forms[name], *self._size[::-1])
+        _make_texture(self._canvas, self._size, None)
+        for frame, number in self._frames.items():
+            GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, number)
+            places = [GL.GL_COLOR_ATTACHMENT0 + k for k in range(len(FRAMES.get(frame, "1")))]
+            for place, name in zip((GL.GL_DEPTH_ATTACHMENT, *places), ("depth", *FRAMES.get(frame, ())), strict=False):
+                GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, place, GL.GL_RENDERBUFFER, self._pictures[name])
+            if frame == "canvas":
+                GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, places[0], self._canvas, 0)
+            GL.glDrawBuffers(len(places), places)
+            if GL.glCheckFramebufferStatus(GL.GL_FRAMEBUFFER) != GL.GL_FRAMEBUFFER_COMPLETE:
+                raise gl.GLError(
+                    f"this OpenGL has no frame buffer of {self._size[1]} x {self._size[0]} pixels for {frame}"
+                )
+
+
+def able() -> bool:
+    """Whether the OpenGL of this process, within gl.drawing(), knows what a `Raster` needs."""
+    return (GL.glGetIntegerv(GL.GL_MAJOR_VERSION), GL.glGetIntegerv(GL.GL_MINOR_VERSION)) >= VERSION
+
+
+def projection(camera: Camera, planes: tuple[float, float], size: tuple[int, int], lowest: float) -> np.ndarray:
+    """(4, 4) float32 from metres of the world to clip space, with a depth of 1 at the near plane and `lowest` at the
+    far."""
+    near, far = planes
+    forward, up = np.array(camera.forward), np.array(camera.up)
+    tall = math.tan(camera.vfov / 2)
+    rows = np.empty((4, 4))
+    rows[0, :3], rows[1, :3] = camera.right / (tall * size[1] / size[0]), up / tall
+    rows[2, :3], rows[3, :3] = forward * ((lowest * far - near) / (far - near)), forward
+    rows[:, 3] = -rows[:, :3] @ np.array(camera.position)
+    rows[2, 3] += (1 - lowest) * near * far / (far - near)
+    return rows.astype(np.float32)
+
+
+CELLS = np.array([0.0, *coarser.CELLS])
+
+
+def _arranged(
+    meshes: Sequence[LitMesh],
+    ids: np.ndarray,
+    pages: Sequence[np.ndarray],
+    place_of: Sequence[Mapping[int, np.ndarray]],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(n,) CORNER and (m, 3) triangles of all meshes and of coarser copies of the things among them; and where those
+    of each mesh begin and how many they are, (CELLS, meshes) each."""
+    sizes = [len(m.vertices) for m in meshes]
+    corners, number = np.zeros(sum(sizes), CORNER), np.repeat(np.arange(len(meshes)), sizes)
+    first = np.cumsum(sizes) - sizes
+    for m, owner, at in zip(meshes, ids, first, strict=True):
+        part = corners[at : at + len(m.vertices)]
+        part["xyz"], part["id"] = m.vertices, owner
+        part["at"] = m.uv * np.array(pages[m.page].shape[1::-1], np.float32) + place_of[int(m.alpha < 1)][m.page]
+        part["opacity"] = round(255 * (1 - (1 - m.alpha) ** 2))  # MuJoCo draws what shines through twice
+    triangles = np.concatenate([m.faces + at for m, at in zip(meshes, first, strict=True)])
+    whole = coarser.Corners(corners["xyz"], corners["at"], number, triangles)
+    things = np.array([m.kind == "object" for m in meshes])
+    copies = coarser.copies(whole, len(meshes), things)
+    more = [corners[first[c.mesh]] for c in copies]
+    for copy, part in zip(copies, more, strict=True):
+        part["xyz"], part["at"] = copy.xyz, copy.uv
+    begin = np.cumsum([len(corners), *(len(part) for part in more)])[:-1]
+    faces = [triangles, *(c.faces + b for c, b in zip(copies, begin, strict=True))]
+    counts = np.array([np.bincount(c.mesh[c.faces[:, 0]], minlength=len(meshes)) for c in (whole, *copies)])
+    starts = np.cumsum(counts).reshape(counts.shape) - counts
+    return np.concatenate([corners, *more]), np.concatenate(faces), starts, counts
+
+
+def _facing(xyz: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(m, 4) float32, of which the product with a point (x, y, z, 1) is positive where a triangle is seen from."""
+    a, b, c = xyz[triangles].astype(float).swapaxes(0, 1)
+    normals = np.cross(b - a, c - a)
+    return np.concatenate([normals, -np.einsum("ij,ij->i", normals, a)[:, None]], axis=1).astype(np.float32)
+
+
+def _upload_corners(array: int, buffers: Sequence[int], corners: np.ndarray) -> None:
+    """Fill the first of two buffers; the other gets the triangles to draw."""
+    GL.glBindVertexArray(array)
+    GL.glBindBuffer(GL.GL_ARRAY_BUFFER, buffers[0])
+    GL.glBufferData(GL.GL_ARRAY_BUFFER, corners.nbytes, corners.view(np.uint8), GL.GL_STATIC_DRAW)
+    GL.glBindBuffer(GL.GL_ELEMENT_ARRAY_BUFFER, buffers[1])
+    for k, (name, count) in enumerate(ATTRIBUTES):
+        form, offset = CORNER.fields[name][:2]  # type: ignore[index]
+        kind = GL.GL_FLOAT if form.base == np.float32 else GL.GL_UNSIGNED_SHORT
+        if name == "id":
+            GL.glVertexAttribIPointer(k, count, kind, CORNER.itemsize, ctypes.c_void_p(offset))
+        else:
+            GL.glVertexAttribPointer(k, count, kind, False, CORNER.itemsize, ctypes.c_void_p(offset))
+        GL.glEnableVertexAttribArray(k)
+    GL.glBindVertexArray(0)
+    GL.glBindBuffer(GL.GL_ARRAY_BUFFER, 0)
+
+
+def _make_texture(texture: int, size: tuple[int, int], picture: np.ndarray | None) -> None:
+    """(h, w, 4) uint8 without smaller copies."""
+    GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
+    form = GL.GL_RGBA
+    GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, GL.GL_RGBA8, size[1], size[0], 0, form, GL.GL_UNSIGNED_BYTE, picture)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MIN_FILTER, GL.GL_LINEAR)
+    GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MAG_FILTER, GL.GL_LINEAR)
+    GL.glBindTexture(GL.GL_TEXTURE_2D, 0)
+
+
+def _read(frame: str, name: str, size: tuple[int, int]) -> np.ndarray:
+    """(h, w) of a picture of the bound frame."""
+    _, kind, number, dtype, _ = PICTURES[name]
+    out = np.empty(size, dtype)
+    GL.glReadBuffer(GL.GL_COLOR_ATTACHMENT0 + FRAMES[frame].index(name))
+    GL.glReadPixels(0, 0, size[1], size[0], kind, number, out)
+    return out
+
+
+@functools.lru_cache(maxsize=8)
+def _nearest(size: tuple[int, int]) -> np.ndarray:
+    """(h, w) into the pixels of a picture half as large again: those nearest to the middles."""
+    rows, columns = (np.arange(n) // 2 * 3 + np.arange(n) % 2 * 2 for n in size)
+    return rows[:, None] * (size[1] * 3 // 2) + columns
+
+
+def _program(pixels: str, size: Sequence[int]) -> tuple[int, int]:
+    """A program of shaders.CORNERS and `pixels` for an atlas of `size`, and where its camera is."""
+    program = GL.glCreateProgram()
+    for kind, source in ((GL.GL_VERTEX_SHADER, shaders.CORNERS), (GL.GL_FRAGMENT_SHADER, pixels)):
+        shader = GL.glCreateShader(kind)
+        GL.glShaderSource(shader, source.replace("LEVELS", str(atlas.LEVELS)))
+        GL.glCompileShader(shader)
+        GL.glAttachShader(program, shader)
+        GL.glDeleteShader(shader)
+    GL.glLinkProgram(program)
+    if not GL.glGetProgramiv(program, GL.GL_LINK_STATUS):
+        raise gl.GLError(f"this OpenGL does not take a shader of embodied: {GL.glGetProgramInfoLog(program)}")
+    GL.glUseProgram(program)
+    GL.glUniform2f(GL.glGetUniformLocation(program, "pages"), size[1] * 2 / 3, size[0])
+    return int(program), int(GL.glGetUniformLocation(program, "camera"))

@@ -1,0 +1,175 @@
+"""Where the CPU draws a lit house, its pictures are MuJoCo's; things that are small in them lose triangles unseen."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished, painted
+
+from embodied.render import atlas, coarser, raster
+from embodied.render.camera import camera_at
+from embodied.render.classic import Renderer
+
+gl_test = pytest.mark.gl
+EYE = (2.5, 2.6, 1.2)
+VIEWS = [(EYE, 0.0, -0.3), (EYE, math.pi / 2, -0.2), ((4.5, 1.0, 1.5), 0.1, 0.0), ((7.5, 1.0, 1.5), 2.0, -0.5)]
+LENS, SIZE = 1.2, (96, 128)
+
+
+@pytest.fixture(scope="module")
+def house():
+    return furnished(two_rooms())
+
+
+@pytest.fixture(scope="module")
+def lit(house):
+    """Pages whose colours change smoothly, with glass that one looks through."""
+    u, v = np.meshgrid(np.linspace(0, 1, 128), np.linspace(0, 1, 64))
+    page = np.stack([60 + 180 * u, 220 - 160 * v, 90 + 60 * u + 60 * v], -1).astype(np.uint8)
+    pages = painted(house, HandCatalogue())
+    uv = lambda m: np.clip(m.vertices[:, [0, 2]] / (10, 3) + m.vertices[:, [1, 1]] / (50, 20), 0, 1).astype(np.float32)
+    alpha = lambda m: 0.3 if m.owner.endswith("/glass") else 1.0
+    meshes = tuple(dataclasses.replace(m, uv=uv(m), alpha=alpha(m)) for m in pages.meshes)
+    assert any(m.alpha < 1 for m in meshes)
+    return dataclasses.replace(pages, pages=(page,) * len(pages.pages), meshes=meshes)
+
+
+@pytest.fixture(scope="module")
+def mine(house, lit):
+    with Renderer(house, HandCatalogue(), size=64, lit=lit) as r:
+        if not isinstance(r._drawing, raster.Raster):
+            pytest.skip("a GPU draws here")
+        yield r
+
+
+@pytest.fixture(scope="module")
+def mujocos(house, lit):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(raster, "able", lambda: False)
+        with Renderer(house, HandCatalogue(), size=64, lit=lit) as r:
+            yield r
+
+
+def decibels(a: np.ndarray, b: np.ndarray) -> float:
+    return float(10 * np.log10(255**2 / max(np.mean((a.astype(float) - b) ** 2), 1e-9)))
+
+
+@gl_test
+@pytest.mark.parametrize(("eye", "yaw", "pitch"), VIEWS)
+def test_pictures_are_those_of_mujoco(mine, mujocos, eye, yaw, pitch):
+    camera = camera_at(eye, yaw, pitch, LENS)
+    a, b = mine.rgb(camera, SIZE), mujocos.rgb(camera, SIZE)
+    assert a.shape == b.shape == (*SIZE, 3)
+    assert decibels(a, b) > 40
+    for ours, theirs in zip(mine.depth_and_ids(camera, SIZE), mujocos.depth_and_ids(camera, SIZE), strict=True):
+        assert ours.dtype == theirs.dtype
+        assert np.isclose(ours, theirs, rtol=1e-3).mean() > 0.995
+
+
+@gl_test
+@pytest.mark.parametrize(("eye", "yaw", "pitch"), VIEWS)
+@pytest.mark.parametrize("size", [SIZE, (95, 127)])
+def test_one_pass_shows_what_two_show(mine, eye, yaw, pitch, size):
+    """But for edges, where ids come from a sixth of a pixel beside; depth is that of the middle of the pixel."""
+    camera = camera_at(eye, yaw, pitch, LENS)
+    view, (depth, ids) = mine.through(camera, size), mine.depth_and_ids(camera, size)
+    assert np.array_equal(view.rgb, mine.rgb(camera, size))
+    same = view.ids == ids
+    assert same.mean() > 0.97
+    assert np.isclose(view.depth, depth, rtol=1e-4)[same].mean() > 0.96
+    glass = [i + 1 for i, owner in enumerate(mine.owners) if owner.endswith("/glass")]
+    assert (np.isin(view.ids, glass) == np.isin(ids, glass)).mean() > 0.98
+
+
+@gl_test
+def test_mujoco_and_shaders_do_not_disturb_each_other(mine, mujocos):
+    camera = camera_at(EYE, 0.4, -0.2, LENS)
+    first = [r.through(camera, SIZE) for r in (mine, mujocos)]
+    again = [r.through(camera, SIZE) for r in (mine, mujocos, mine, mujocos)][2:]
+    for one, other in zip(first, again, strict=True):
+        assert np.array_equal(one.rgb, other.rgb) and np.array_equal(one.ids, other.ids)
+
+
+@gl_test
+def test_who_looks_away_from_everything_sees_nothing(mine):
+    away = mine.view((500.0, 500.0, 300.0), math.pi / 4, 0.5, LENS, SIZE)
+    assert not away.rgb.any() and not away.ids.any() and np.isinf(away.depth).all()
+
+
+@gl_test
+def test_a_larger_picture_than_before_is_drawn_and_a_closed_renderer_says_so(house, lit):
+    with Renderer(house, HandCatalogue(), size=16, lit=lit) as r:
+        small, large = (r.view(EYE, 0.0, size=(n, n)).rgb for n in (32, 256))
+        assert np.abs(large.reshape(32, 8, 32, 8, 3).mean((1, 3)) - small).mean() < 2
+    with pytest.raises(RuntimeError, match="closed"):
+        r.view(EYE, 0.0)
+
+
+def test_each_page_lies_in_the_atlas_with_its_copies():
+    rng = np.random.default_rng(0)
+    pages = [np.full((h, w, 3), rng.integers(0, 255, 3), np.uint8) for h, w in ((70, 33), (5, 200), (64, 64))]
+    picture, corners = atlas.packed(pages)
+    width = picture.shape[1] * 2 // 3
+    for page, (column, row) in zip(pages, corners, strict=True):
+        place = picture[row : row + page.shape[0], column : column + page.shape[1], :3]
+        assert np.array_equal(place, page)
+        for k in range(1, atlas.LEVELS + 1):
+            above = picture.shape[0] - (picture.shape[0] >> (k - 1))
+            copy = picture[above + (row >> k), width + (column >> k), :3]
+            assert np.array_equal(copy, page[0, 0]), k
+
+
+def sphere(rings: int, radius: float) -> coarser.Corners:
+    around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * rings + 1), np.linspace(0, np.pi, rings + 1))
+    xyz = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], -1) * radius
+    i = np.arange(rings * (2 * rings + 1)).reshape(rings, -1)[:, :-1].ravel()
+    faces = np.concatenate(
+        [np.stack(t, 1) for t in ((i, i + 2 * rings + 1, i + 1), (i + 1, i + 2 * rings + 1, i + 2 * rings + 2))]
+    )
+    return corners_of(xyz.reshape(-1, 3), faces)
+
+
+def corners_of(xyz: np.ndarray, faces: np.ndarray) -> coarser.Corners:
+    uv = xyz[:, :2].astype(np.float32)
+    return coarser.Corners(xyz.astype(np.float32), uv, np.zeros(len(xyz), int), faces)
+
+
+def test_copies_are_smaller_stay_within_a_cell_and_keep_their_texture():
+    whole, counts = sphere(60, 0.2), []
+    for cell, copy in zip(coarser.CELLS, coarser.copies(whole, 1, np.ones(1, bool)), strict=True):
+        if not len(copy.faces):
+            continue
+        counts.append(len(copy.faces))
+        assert np.abs(np.linalg.norm(copy.xyz, axis=1) - 0.2).max() < cell
+        assert np.abs(copy.uv - copy.xyz[:, :2]).max() < cell
+        a, b, c = copy.xyz[copy.faces].swapaxes(0, 1)
+        assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).mean() > 0.99, "they face outwards"
+    assert len(counts) >= 2 and counts == sorted(counts, reverse=True) and counts[-1] < len(whole.faces) / 4
+
+
+def test_no_copy_loses_surface():
+    """Neither a bar thinner than the cells nor leaves smaller than they vanish."""
+    ring = 0.003 * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    bar = np.concatenate([np.c_[ring, np.full(4, z)] for z in np.linspace(0, 1, 40)])
+    i, k = (np.arange(39)[:, None] * 4).repeat(4, 1).ravel(), np.tile(np.arange(4), 39)
+    a, b = i + k, i + (k + 1) % 4
+    sides = np.concatenate([np.stack([a, b, b + 4], 1), np.stack([a, b + 4, a + 4], 1)])
+    rng = np.random.default_rng(0)
+    leaves = rng.uniform(0, 1, (300, 1, 3)) + rng.normal(0, 0.003, (300, 3, 3))
+    for whole in (
+        corners_of(bar, sides),
+        corners_of(leaves.reshape(-1, 3), np.arange(900).reshape(-1, 3)),
+        sphere(60, 0.2),
+    ):
+        copies = coarser.copies(whole, 1, np.ones(1, bool))
+        assert all(surface(c) > 0.9 * surface(whole) for c in copies if len(c.faces))
+        assert not any(len(c.faces) for c in coarser.copies(whole, 1, np.zeros(1, bool)))
+
+
+def surface(meshes: coarser.Corners) -> float:
+    a, b, c = meshes.xyz[meshes.faces].swapaxes(0, 1)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
