@@ -10,7 +10,6 @@ import ast
 import functools
 import importlib.metadata
 import sys
-import types
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,7 +58,7 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
         if name in found or name in without or path is None:
             continue
         found[name] = path
-        names = _names_in(path.read_bytes(), name, path.name == "__init__.py")
+        names, _ = _read(path.read_bytes(), name, path.name == "__init__.py")
         ours = [n for n in names if n.split(".")[0] in OURS]
         waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if "." in n]  # packages run before their modules
         libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in known)
@@ -97,15 +96,18 @@ def code_digest(*makers: str, root: Path = ROOT, without: tuple[str, ...] = ()) 
     named = [f for f in folders if ".".join(f.relative_to(root).parts) not in without]
     data = sorted(f for folder in named for f in folder.glob("*") if f.is_file())
     return digest(
-        {name: _code_of(path.read_bytes()) for name, path in whole.modules.items()},
+        {name: _read(path.read_bytes(), name, path.name == "__init__.py")[1] for name, path in whole.modules.items()},
         {f.relative_to(root).as_posix(): digest(f) for f in data},
         {name: _version(name) for name in whole.libraries},
     )[:16]
 
 
 @functools.lru_cache(maxsize=1024)
-def _names_in(source: bytes, module: str, package: bool) -> tuple[str, ...]:
-    return tuple(imported(ast.parse(source), module, package=package))
+def _read(source: bytes, module: str, package: bool) -> tuple[tuple[str, ...], str]:
+    """What a module imports, and the digest of its syntax tree: the same in all versions of Python."""
+    tree = ast.parse(source)
+    names = tuple(imported(tree, module, package=package))
+    return names, digest(repr(_described(tree)))
 
 
 def _last_name(node: ast.expr) -> str:
@@ -129,23 +131,23 @@ def _absolute(node: ast.ImportFrom, module: str, package: bool) -> str:
     return ".".join([*above, *([node.module] if node.module else [])])
 
 
-@functools.lru_cache(maxsize=1024)
-def _code_of(source: bytes) -> str:
-    """Digest of the compiled module, without docstrings and positions."""
-    return digest(_described(compile(source, "", "exec", dont_inherit=True, optimize=2)))
-
-
 def _described(value: object) -> object:
-    """Constants and code objects as plain JSON that says the same in every process."""
-    if isinstance(value, types.CodeType):
-        names = [value.co_names, value.co_varnames, value.co_freevars, value.co_cellvars, value.co_name]
-        counts = [value.co_argcount, value.co_posonlyargcount, value.co_kwonlyargcount, value.co_flags]
-        return [value.co_code.hex(), names, counts, [_described(c) for c in value.co_consts]]
-    if isinstance(value, tuple):
-        return [_described(v) for v in value]
-    if isinstance(value, frozenset):
-        return sorted(repr(v) for v in value)
-    return repr(value)
+    """Syntax as tuples, without docstrings, positions and what is empty, in which versions of Python differ."""
+    if isinstance(value, ast.JoinedStr):
+        value = ast.JoinedStr([part for part in value.values if getattr(part, "value", None) != ""])
+    if isinstance(value, ast.AST):
+        parts = [(name, getattr(value, name)) for name in value._fields if name != "ctx"]
+        return type(value).__name__, *(
+            (name, _described(part)) for name, part in parts if part is not None and part != []
+        )
+    if isinstance(value, list):
+        return tuple(_described(part) for part in value if not _is_docstring(part))
+    return value
+
+
+def _is_docstring(node: object) -> bool:
+    """Whether a statement is text alone, behind a module's, class's, function's or field's head."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 
 @functools.cache

@@ -75,6 +75,28 @@ def test_what_a_picture_shows_is_in_its_key(tree, file, old, new):
     assert key(tree, *unlit) != before
 
 
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("x: int = 1", 'x: int = 1  # metres\n"""Length."""', True),
+        ('def f():\n    """Says."""\n    return 1', "def f(): return 1", True),
+        ("f('')", "f()", False),
+        ("x = None", "x = ''", False),
+        ("x = 1", "x = True", False),
+        ("x = f'{a:<{b}} c'", "x = f'{a:<{b}}  c'", False),
+        ("x = [a, b]", "x = (a, b)", False),
+    ],
+)
+def test_what_code_does_counts_and_not_how_it_is_written(tmp_path, one, other, same):
+    package = tmp_path / "embodied"
+    package.mkdir()
+    keys = []
+    for text in (one, other):
+        (package / "made.py").write_text(text)
+        keys.append(key(tmp_path, "embodied.made"))
+    assert (keys[0] == keys[1]) is same
+
+
 PRODUCTS = {
     "bakes": ("embodied.light.baking.house", settings.APART),
     "unwrappings": ("embodied.light.pages.unwrap", unwrap.APART),
