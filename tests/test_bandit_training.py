@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import struct
 from pathlib import Path
 
@@ -379,8 +380,14 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
     assert "(2.82)" in text and "| weakly pre-trained, Δ NED-A2C |" in text
     first = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")}
     assert len(first) == 2 * (1 + 2 + 6)
-    run_study(study, ["3.2"], tmp_path, note=silent)
+    text = run_study(study, ["3.2", "held-out"], tmp_path, note=silent)["held-out"].read_text()
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")} == first
+    rows = {r["label"]: r["values"] for r in json.loads((tmp_path / "bandit-held-out.json").read_text())["rows"]}
+    assert (
+        0 < rows["reference"]["entropy"]["mean"] < np.log(TOY.target_words)
+        and rows["reference"]["perplexity"]["mean"] > 1
+    )
+    assert rows["Δ NED-A2C"]["entropy"]["half_width"] >= 0
     people = dataclasses.replace(study, repeats=(0,), rater=Rater(granularity=4, skew=2.0))
     assert "| as people rate |" in run_study(people, ["people"], tmp_path, note=silent)["people"].read_text()
     (home,) = tmp_path.glob("runs/*rater*")

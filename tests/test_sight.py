@@ -14,6 +14,7 @@ from hand_vnla import lesson
 from test_hanna_learner import agent_for, setting
 
 from agents.hanna.evaluation import sight_policies
+from agents.hanna.places import Query, auc, measured, precision_recall, threshold
 from agents.vision.bank import FeatureBank
 from agents.vision.features import VIEW_SIZE, strip_of
 from agents.vision.lessons import Split
@@ -22,6 +23,7 @@ from agents.vision.strip import VFOV
 from embodied.cli.learning import SHOWN
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
+from embodied.evaluation.tables import interval
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
 from embodied.render.panorama import Panorama, face_rays
 
@@ -132,6 +134,21 @@ def test_pictures_are_of_another_time_and_what_is_seen_is_of_now():
     assert not bank.blind().features(picture).any()
     with pytest.raises(ValueError, match="same worlds"):
         FeatureBank(own, "digest").showing({"b": own["a"]})
+
+
+def test_precision_and_recall_count_places_that_are_found_where_they_are():
+    near, far = np.array([0.0, 2.0]), np.array([3.0, 5.0])
+    asked = [
+        Query("h", np.array([0.9, 0.2]), near),
+        Query("h", np.array([0.3, 0.6]), near),
+        Query("h", np.array([0.4, 0.1]), far),
+    ]
+    assert precision_recall(asked, 0.35) == (1 / 3, 1 / 2), "right once, wrong twice, of two that are on the map"
+    assert precision_recall(asked, 0.8) == (1.0, 1 / 2) and 0.6 < threshold(asked) < 0.9
+    found = measured(asked, 0.35)
+    shares = [interval([found[k]]).mean for k in ("right place first", "precision", "recall")]
+    assert shares == [1 / 2, 1 / 3, 1 / 2]
+    assert auc(np.array([1.0, 2.0]), np.array([0.0, 1.5])) == 3 / 4
 
 
 def test_the_command_line_names_every_occasion():

@@ -1,4 +1,5 @@
-"""Table 3.2, Figures 3.4 and 3.5 as data; BANDIT as a learner of the engine.
+"""Table 3.2, Figures 3.4 and 3.5, and how learners behave on held-out sentences, as data; BANDIT as a learner of the
+engine.
 
 `pretrain_KEY/seed_N` holds reference models and critics that runs of a seed begin with.
 """
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from agents.bandit.behaviour import COLUMNS, behaviour, translator_of_run
 from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import corpus_digest
 from agents.bandit.ratings import CLEAN, Rater, rater_of
@@ -90,6 +92,18 @@ TABLES: Mapping[str, StudyTable] = {
         tuple(_gain(f"{rate:g}, {x}", k, bandit_rate=rate) for rate in RATES for x, k in LEARNERS.items()),
         (SENTENCE, HELD_OUT),
     ),
+    "held-out": StudyTable(
+        "Held-out sentences: how learners translate them after one round of ratings",
+        tuple(
+            dataclasses.replace(
+                row,
+                judge={"behaviour": True},
+                minus=row.minus and dataclasses.replace(row.minus, judge={"behaviour": True}),
+            )
+            for row in (_row("reference", "reference"), _gain("Δ supervised", "supervised"), _gain("Δ NED-A2C", "a2c"))
+        ),
+        COLUMNS,
+    ),
 }
 
 
@@ -107,7 +121,7 @@ class BanditStudy(StudyLearner):
     """Who rates in the table 'people': the rater that people were found to resemble."""
 
     name = "bandit"
-    judges = ("agents.bandit.study",)
+    judges = ("agents.bandit.behaviour",)
 
     def tables(self) -> Mapping[str, StudyTable]:
         if self.rater is None:
@@ -145,7 +159,11 @@ class BanditStudy(StudyLearner):
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         assert weights is not None and row.train is not None, "every row is a run"
-        history = read_checkpoint(weights.parent / "checkpoint.pt")["history"]
+        home = weights.parent
+        if row.judge.get("behaviour"):
+            m = self._material(seed)
+            return {k: Samples((v,)) for k, v in behaviour(translator_of_run(m, home), m, "test").items()}
+        history = read_checkpoint(home / "checkpoint.pt")["history"]
         if row.judge.get("curve"):
             return {f"{c} at {k + 1}": Samples((h[c],)) for c in (SENTENCE, HELD_OUT) for k, h in enumerate(history)}
         return {c: Samples((history[0][c],)) for c in (SENTENCE, HELD_OUT)}

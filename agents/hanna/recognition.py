@@ -18,7 +18,7 @@ SAME = 0.68
 """Least match at which two panoramas of the agent's own, whose headings it knows, are of one place."""
 MATCH, VIEW_MATCH = 0.58, 0.42
 """Least match at which a picture, a panorama or a single view, was taken at a place: of best F1 over pictures of
-another day and hour in validation houses, as SAME is over panoramas through a noisy camera (docs/results/hanna.md)."""
+another day and hour in validation houses, as SAME is over panoramas through a noisy camera (agents.hanna.places)."""
 
 
 @dataclass(frozen=True, eq=False)

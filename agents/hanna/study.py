@@ -12,6 +12,7 @@ from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hanna.agent import HannaAgent
 from agents.hanna.evaluation import all_policies, by_the_text, counted
+from agents.hanna.places import AGAIN, COLUMNS, recognised
 from agents.hanna.run import train_agent
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Measured
@@ -19,6 +20,7 @@ from agents.studies.episodes import JUDGES
 from agents.studies.tables import StudyRow, StudyTable
 from agents.studies.wordings import words_table
 from agents.vision.lessons import Lessons
+from agents.vision.occasions import OCCASIONS
 from agents.vision.sighted_study import SPLITS as TEST
 from agents.vision.sighted_study import SightedStudy
 from embodied.datasets.store import Dataset, SplitData
@@ -57,6 +59,8 @@ SIGHT_ROWS = (
     without("Random walk", "random walk"),
 )
 """What the seeing agent is compared with: without sight, without learning, without help, with other rules of asking."""
+PICTURE = "picture"
+"""In a row's `judge`: no agent plays; places are recognised in pictures that were taken then."""
 LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
 NO_CURIOSITY = learned("Our model, alpha = 0", alpha=0.0)
 OURS = learned("Our model, alpha = 1")
@@ -94,6 +98,12 @@ TABLES: Mapping[str, StudyTable] = {
         tuple((OURS_SEEING, row) for row in SIGHT_ROWS if row.train is not None),
     ),
     "words": words_table(learned, FULL, TEST[1:]),
+    "places": StudyTable(
+        "Recognising places in pictures from another time",
+        tuple(StudyRow(name, None, {PICTURE: name}) for name in (AGAIN, *OCCASIONS)),
+        COLUMNS,
+        ("test_unseen",),
+    ),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
     "4.5": StudyTable(
         "Help-request policies",
@@ -141,7 +151,7 @@ def in_both_ways(table: StudyTable) -> StudyTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(SightedStudy):
-    """Tables 4.3 to 4.6, D.1 and D.2, and what sight is worth."""
+    """Tables 4.3 to 4.6, D.1 and D.2, what sight is worth, and how well places are recognised."""
 
     config: TrainingConfig
     evaluation: HannaEvaluation
@@ -155,7 +165,7 @@ class HannaStudy(SightedStudy):
 
     name, agent_kind = "hanna", HannaAgent
     makers = ("agents.hanna.run",)
-    judges = (*JUDGES, "agents.hanna.evaluation")
+    judges = (*JUDGES, "agents.hanna.evaluation", "agents.hanna.places")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
@@ -192,6 +202,12 @@ class HannaStudy(SightedStudy):
 
     def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         return super().where(agent, judge, split.removesuffix(SHIPPED))
+
+    def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
+        if PICTURE not in row.judge:
+            return super().judge(weights, row, split, seed, folder, keep)
+        lessons = self.judged_lessons({})
+        return recognised(lessons.data, split, row.judge[PICTURE], lessons.encoder.digest, self.pictures)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split.removesuffix(SHIPPED)), "shown": self.shown}

@@ -12,13 +12,13 @@
     embodied study iliad nav 3.4 3.5 --data DATA --out STUDY
     embodied study check STUDY
 
-HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `sight` and `words`. HARI's are 4.7, 4.8, 'figure 4.5', 'figure 4.5b'
-and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs --without-rooms), `rules` and
-`algorithm-6`, and `words`. VLN's are `followers`, `speaker` and `words`. Ask-v0's are `houses`, `classes` and `curves`.
-`bandit` has Table 3.2, Figures 3.4 and 3.5, `rates` and, with --rater, `people`; ILIAD has Tables 3.4, 3.5 and C.1,
-'figure 3.7' and `algorithms`. `check` says which stored tables no longer belong to this code. Rows that tables share
-are trained once. Each table is written as JSON, Markdown and, for some, as a figure. Rerun an interrupted command to
-resume.
+HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `sight`, `words` and `places`. HARI's are 4.7, 4.8, 'figure 4.5',
+'figure 4.5b' and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs
+--without-rooms), `rules` and `algorithm-6`, and `words`. VLN's are `followers`, `speaker` and `words`. Ask-v0's are
+`houses`, `classes` and `curves`. `bandit` has Table 3.2, Figures 3.4 and 3.5, `rates`, `held-out` and, with --rater,
+`people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`. `check` says which stored tables no longer
+belong to this code. Rows that tables share are trained once. Each table is written as JSON, Markdown and, for some, as
+a figure. Rerun an interrupted command to resume.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight or words."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight, words or places."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
@@ -156,7 +156,7 @@ class VisionOptions(Study, Trained, Strips, WithData):
     """Kinds of pictures that the table `pictures` evaluates on (default: all)."""
     split: str = "val_unseen"
     """Evaluate on the houses of this split."""
-    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig(), skip=("like",))]
+    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig(), skip=("network", "begin", "frozen", "like"))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +209,7 @@ class BanditOptions(Study, Trained):
     """A translator that learns from ratings."""
 
     tables: Tables
-    """Make these tables: 3.2, 3.4, 3.5, rates or, with --rater, people."""
+    """Make these tables: 3.2, 3.4, 3.5, rates, held-out or, with --rater, people."""
     data: InputFolder
     """The corpus, a folder that `embodied corpus` made."""
     scale: Annotated[str, SMALL_SCALE] = "mini"
