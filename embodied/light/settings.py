@@ -42,9 +42,9 @@ class Settings:
     """Rays over the sun's disc per texel near a shadow's edge."""
     patches: int = 64
     """Small lights that stand for the sun's patches in one room."""
-    bounce_rays: int = 6
+    bounce_rays: int = 4
     """Rays per luxel that carry light from bounce to bounce."""
-    seen_rays: int = 24
+    seen_rays: int = 20
     """Rays per luxel, those among them, that gather what is seen."""
     sharpness: float = 1.0
     """Texels per metre, times those that patterns need to look sharp from nearby (`atlas.fineness`)."""
@@ -68,7 +68,6 @@ QUALITIES = {
         other_rays=8,
         sun_rays=4,
         patches=48,
-        bounce_rays=4,
         seen_rays=16,
         sharpness=0.45,
         tolerance=0.2,
@@ -84,7 +83,7 @@ QUALITIES = {
         other_rays=48,
         sun_rays=16,
         patches=96,
-        bounce_rays=10,
+        bounce_rays=8,
         seen_rays=48,
         jpeg=94,
         texels=120e6,
