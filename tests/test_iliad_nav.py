@@ -9,13 +9,28 @@ from hand_worlds import grid_world, line_world
 
 from agents.common.decoding import greedy_choice
 from agents.common.vocabulary import build_vocabulary
+from agents.hanna.percept import orientation
 from agents.iliad.config import LearnerConfig
-from agents.iliad.nav.network import Follower, WalkDescriber
-from agents.iliad.nav.student import LoopFree, NavEyes, NavStudent
+from agents.iliad.nav.config import NavConfig
+from agents.iliad.nav.network import WalkDescriber
+from agents.iliad.nav.stages import new_follower
+from agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track
 from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, performance, said, walked
-from agents.iliad.nav.world import HORIZON, NavMarginal, NavWalk, NavWorld, Trip, trips_of, walk_along, without_loops
+from agents.iliad.nav.world import (
+    HORIZON,
+    NavMarginal,
+    NavWalk,
+    NavWorld,
+    Trip,
+    share_left,
+    trips_of,
+    walk_along,
+    without_loops,
+)
 from agents.iliad.training import IliadProblem, success_rate, train
 from agents.vision.bank import FeatureBank
+from agents.vln.network import COPIES
+from assets.records import ROOM_KINDS
 from embodied.interface import FindObject, Pose, Route, Task
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task
@@ -72,9 +87,64 @@ def eyes(place, name: str, texts) -> NavEyes:
     return NavEyes({name: place}, FeatureBank({name: features}, "hand"), build_vocabulary(texts))
 
 
-def student(look: NavEyes, seed: int = 0, kind=NavStudent) -> NavStudent:
-    torch.manual_seed(seed)
-    return kind(Follower(len(look.vocabulary), 32, 2, look.bank.size, look.action_size, HORIZON), look)
+def student(look: NavEyes, seed: int = 0, kind=NavStudent, **settings) -> NavStudent:
+    config = NavConfig(hidden_size=32, heads=2, **settings)
+    return kind(new_follower(config, look, seed, "student"), look, config)
+
+
+def test_the_share_that_is_left_by_hand():
+    assert share_left(LINE.graph, [0], 2) == 1 and share_left(LINE.graph, [0, 1], 2) == pytest.approx(0.5)
+    assert share_left(LINE.graph, [0, 1, 2], 2) == 0
+    assert share_left(LINE.graph, [1, 0], 2) == 1, "who goes away has all of it left, not more"
+
+
+def test_what_is_learned_besides_is_by_hand_the_way_that_is_left_and_the_rooms():
+    look = eyes(GRID, "grid", ["go"])
+    trip, path = Trip("grid", Pose(5), (5, 6), ("go",)), walk_along([5, 6, 7])
+    plain, other = student(look), student(look, progress_weight=0.5, room_weight=0.25)
+    other.network.load_state_dict(plain.network.state_dict())
+    with torch.no_grad():
+        a, b = (s.scores([trip], ["go"], [path]) for s in (plain, other))
+        assert torch.equal(a.log_probabilities, b.log_probabilities) and not a.besides.any()
+        track = Track(look, trip)
+        said, _ = other.network(other.network.begin(look.words(["go"])), look.see([track]))
+    rooms = [kind_of(GRID, n) for n in (5, *(p.node for p in track.ways.poses))]
+    named = -said.rooms[0].log_softmax(-1)[torch.arange(len(rooms)), rooms].mean()
+    assert float(b.besides[0, 0]) == pytest.approx(0.5 * float((said.left - 1) ** 2) + 0.25 * float(named), abs=1e-5)
+
+
+def kind_of(place, node: int) -> int:
+    return ROOM_KINDS.index(place.house.room_by_id[str(place.graph.room_of_node[node])].kind)
+
+
+def test_who_is_guided_all_the_way_arrives_and_who_is_not_is_on_its_own():
+    look = eyes(GRID, "grid", ["go"])
+    trips = [Trip("grid", Pose(n), GRID.graph.path(n, 15), ("go",)) for n in (0, 5, 10)]
+    asked, walks = ["go"] * 3, {}
+    for share in (0.0, 1.0):
+        walks[share] = student(look, guided=share).practise(trips, asked, rng=stream(0, "p"))
+    assert walks[1.0] == [walk_along(t.path) for t in trips]
+    assert walks[0.0] == student(look).sample(trips, asked, rng=stream(0, "p"))
+
+
+def test_dropout_is_for_learning_alone():
+    look = eyes(GRID, "grid", ["go"])
+    walker = student(look, dropout=0.5, environment_dropout=0.5)
+    trip, walk = [Trip("grid", Pose(5), (5, 6), ("go",))], [walk_along([5, 6])]
+    drawn = [float(walker.scores(trip, ["go"], walk).log_probabilities.sum().detach()) for _ in range(4)]
+    with torch.no_grad():
+        judged = [float(walker.scores(trip, ["go"], walk).log_probabilities.sum()) for _ in range(4)]
+    assert len(set(drawn)) == 4 and len(set(judged)) == 1
+    assert not walker.network.training
+
+
+def test_the_blind_see_directions_and_nothing_else():
+    look = eyes(GRID, "grid", ["go"])
+    seen = look.blind().see([Track(look.blind(), Trip("grid", Pose(5, 3), (5, 6), ("go",)))])
+    size = look.bank.size
+    assert not seen.views[..., :size].any() and not seen.actions[..., :size].any()
+    ahead = seen.views[0, 12 + 3, size:]
+    assert torch.allclose(ahead, orientation(torch.zeros(()), torch.zeros(()), COPIES), atol=1e-6), "where it looks"
 
 
 def test_scores_are_those_of_the_steps_that_were_sampled():
@@ -121,7 +191,7 @@ def test_near_walks_get_a_persons_request_and_others_what_is_executed_alike():
 def test_walks_are_read_and_described_whoever_is_beside():
     look = eyes(GRID, "grid", ["go to the end"])
     torch.manual_seed(0)
-    describer = WalkDescriber(len(look.vocabulary), 32, 2, look.bank.size, look.action_size, HORIZON)
+    describer = WalkDescriber(len(look.vocabulary), 32, 2, look.size, HORIZON)
     trips = [Trip("grid", Pose(n), (n,), ("go",)) for n in (5, 0)]
     walks = [walk_along([5, 6, 7]), walk_along([0])]
     both = said(look.vocabulary, describer.write(*walked(look, trips, walks), greedy_choice, 6))

@@ -12,22 +12,24 @@ from hand_data import build, noise_features, small_house
 from agents.common.checkpoint import CheckpointError
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.network import Follower
 from agents.iliad.nav.run import NavSource, learn, prepare
 from agents.iliad.nav.showing import episode_of, lines_of, tell
-from agents.iliad.nav.stages import load_follower, new_walker
+from agents.iliad.nav.stages import config_of, load_follower, new_follower
 from agents.iliad.nav.student import NavStudent
 from agents.iliad.nav.world import NavWorld, walk_along
 from agents.iliad.study import IliadStudy, NavStudyWorld
 from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.datasets.store import Dataset
-from embodied.interface import Stop
+from embodied.interface import Sight, Stop
 from embodied.language.plain import PlainLanguage
 
 pytestmark = pytest.mark.slow
 
-SMALL = NavConfig(hidden_size=16, heads=2, candidates=2, executor_iterations=2, describer_iterations=2, teacher_batch=4)
+SMALL = NavConfig(
+    hidden_size=16, heads=2, candidates=2, executor_iterations=2, describer_iterations=2, teacher_batch=4,
+    dropout=0.1, environment_dropout=0.1, progress_weight=0.5, room_weight=0.5, guided=0.5,
+)  # fmt: skip
 QUICK = LearnerConfig(iterations=4, batch=4, validate_every=2, checkpoint_minutes=1e-9, threshold=0.3)
 silent = lambda line: None
 
@@ -47,18 +49,14 @@ def grounds(source, tmp_path_factory):
     return prepare(SMALL, source, tmp_path_factory.mktemp("shared"), note=silent)
 
 
-def test_held_out_paths_and_houses_are_nobodys_to_learn_from(grounds, source):
+def test_houses_to_validate_and_to_test_in_are_nobodys_to_learn_from(grounds):
     splits, data = grounds.data.splits, grounds.data.source
-    learned = {(t.world, t.path) for t in splits["train"]}
     assert splits["train"] and splits["validation"] and splits["test"]
-    assert not learned & {(t.world, t.path) for t in splits["validation"]}
-    assert {t.world for t in splits["validation"]} <= set(data.names("train"))
-    assert {t.world for t in splits["test"]} == set(data.names("test_unseen"))
+    for part, name in (("train", "train"), ("validation", "val_unseen"), ("test", "test_unseen")):
+        assert {t.world for t in splits[part]} == set(data.names(name))
     assert all(len(t.requests) == 1 for part in ("validation", "test") for t in splits[part])
     asked = {r.instruction for name in data.names("train") for r in data.routes(name)}
-    assert {r for part in ("train", "validation") for t in splits[part] for r in t.requests} == asked
-    other = source.data(dataclasses.replace(SMALL, data_seed=1))
-    assert other.splits["train"] != splits["train"] and other.digest != grounds.data.digest
+    assert {r for t in splits["train"] for r in t.requests} == asked
 
 
 def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch):
@@ -71,7 +69,7 @@ def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch
     assert found["validation"] == few["validation"] and found["test"] == few["test"]
     added = [t for t in found["train"] if t not in few["train"]]
     assert len(added) == 7 * len({t.world for t in few["train"]}) and all(len(t.requests) == 3 for t in added)
-    known = {(t.world, t.path) for part in ("train", "validation") for t in few[part]}
+    known = {(t.world, t.path) for t in few["train"]}
     assert not known & {(t.world, t.path) for t in added}
     monkeypatch.delattr(Dataset, "open_world")
     assert source.data(more).splits["train"] == found["train"]
@@ -90,8 +88,8 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
     a, b = (torch.load(p, weights_only=True)["parts"]["student"] for p in (one, other))
     assert all(torch.equal(a[k], b[k]) for k in a)
     (best,) = (tmp_path / "whole").rglob("best.safetensors")
-    student, loaded = load_follower(best, grounds.data.eyes)
-    assert loaded == SMALL and student.eyes.vocabulary == grounds.data.eyes.vocabulary
+    student = load_follower(best, grounds.data.eyes)
+    assert student.config == SMALL and student.eyes.vocabulary == grounds.data.eyes.vocabulary
     with pytest.raises(CheckpointError, match="batch"):
         learn(grounds, dataclasses.replace(config, batch=5), tmp_path / "cut", note=silent)
 
@@ -106,14 +104,14 @@ def test_a_teacher_is_trained_once(source, tmp_path):
 
 def test_an_episode_is_told_and_recorded_as_it_was_walked(grounds):
     eyes, trip = grounds.data.eyes, grounds.data.splits["test"][0]
-    follower = new_walker(Follower, SMALL, eyes, 0, "told")
+    follower = new_follower(SMALL, eyes, 0, "told")
     before = {k: v.clone() for k, v in follower.state_dict().items()}
 
     class Right(NavStudent):
         def sample(self, tasks, requests, *, rng):
             return [walk_along(t.path) for t in tasks]
 
-    student = Right(follower, eyes)
+    student = Right(follower, eyes, SMALL)
     told, walk = tell(student, grounds.teacher, trip, seed=0)
     assert told.success and told.description == trip.requests[0] and told.walk == trip.path
     assert told.after > told.before, "one update makes it likelier"
@@ -132,8 +130,21 @@ def test_a_study_has_navs_numbers_beside_its_own(source, tmp_path):
     assert "Not run: λ = 0, λ = 1." in text
 
 
+def test_a_study_has_a_blind_row_and_chance(source, tmp_path):
+    study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
+    rows = ["DAgger", "DAgger, blind", "chance: a random shortest path of 2 to 6 edges"]
+    text = run_study(study, ["3.4"], tmp_path, rows=rows, note=silent)["3.4"].read_text()
+    assert all(f"| {row} | " in text for row in rows)
+    best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
+    assert config_of(best["blind_True_learner_dagger"]).blind and not config_of(best["learner_dagger"]).blind
+    eyes = load_follower(best["blind_True_learner_dagger"], source.data(SMALL).eyes).eyes
+    assert not eyes.bank.gather([Sight(next(iter(eyes.places)), 0)]).any()
+
+
 def test_commands_train_and_show(source, tmp_path, capsys):
-    sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "pragmatics")]
+    sizes = [
+        f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "pragmatics", "blind")
+    ]
     where = ["--data", str(source.folder), "--cache", str(source.cache), "--network", "random"]
     out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]
     assert main(["train", "iliad", "nav", *where, *out, *sizes]) == 0

@@ -117,7 +117,7 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
         "embodied/serve/static/app.css",
         "agents/weights/hanna_mini.safetensors",
         "agents/weights/hari_mini.safetensors",
-        "agents/weights/iliad_nav_tiny.safetensors",
+        "agents/weights/iliad_nav_mini.safetensors",
         "agents/weights/iliad_regex_tiny.safetensors",
         "agents/studies/data/printed.json",
     }

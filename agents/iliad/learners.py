@@ -79,7 +79,7 @@ def adel_loss(
         tasks, descriptions, unlabeled = [*own_tasks, *tasks], [*own_descriptions, *descriptions], [*own, *unlabeled]
     if (heard and mixing < 1) or mixing > 0:  # -L(beta), both of its terms at once
         weights = torch.tensor([1 - mixing] * (len(tasks) - len(said)) + [mixing] * len(said))
-        loss = loss - (weights @ explorer.scores(tasks, descriptions, unlabeled).log_probabilities).sum()
+        loss = loss - (weights @ explorer.scores(tasks, descriptions, unlabeled).objective).sum()
     return loss / len(said)
 
 
@@ -89,7 +89,7 @@ def described_loss(tasks: Sequence[Q], done: Sequence[E], said: Sequence[str | N
     heard = [i for i, d in enumerate(said) if d]
     if heard:
         some, executions = [tasks[i] for i in heard], [done[i] for i in heard]
-        loss = loss - student.scores(some, [said[i] or NOTHING for i in heard], executions).log_probabilities.sum()
+        loss = loss - student.scores(some, [said[i] or NOTHING for i in heard], executions).objective.sum()
     return loss
 
 
@@ -109,11 +109,11 @@ def mixture(
 
 
 def dagger(asked: Asked[Q], world: RequestWorld[Q, E], student: Student[Q, E]) -> IliadLesson[Q, E]:
-    """Imitation: the student acts greedily and is shown the best action in every state that it came to."""
-    done = student.greedy(asked.tasks, asked.requests)
+    """Imitation: the student acts and is shown the best action in every state that it came to."""
+    done = student.practise(asked.tasks, asked.requests, rng=asked.rng)
     shown = [world.demonstrate(q, e) for q, e in zip(asked.tasks, done, strict=True)]
     scores = student.scores(asked.tasks, asked.requests, done, shown)
-    return IliadLesson(-scores.log_probabilities.sum() / len(asked.tasks), done)
+    return IliadLesson(-scores.objective.sum() / len(asked.tasks), done)
 
 
 def reinforce(

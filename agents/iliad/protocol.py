@@ -34,6 +34,13 @@ class ExecutionScores:
     """(B, T) of pi(. | s_t, d), nats; carries the gradient."""
     mask: Tensor
     """(B, T) bool, False behind the end."""
+    besides: Tensor | None = None
+    """(B, T) losses of what is learned besides, weighted; carries the gradient."""
+
+    @property
+    def objective(self) -> Tensor:
+        """(B, T), what imitation makes larger."""
+        return self.log_probabilities if self.besides is None else self.log_probabilities - self.besides
 
 
 class RequestWorld(Protocol[Q_in, E]):
@@ -76,6 +83,9 @@ class Student(Protocol[Q_in, E]):
 
     def greedy(self, tasks: Sequence[Q_in], requests: Sequence[str]) -> list[E]:
         """The likeliest action in every state."""
+
+    def practise(self, tasks: Sequence[Q_in], requests: Sequence[str], *, rng: np.random.Generator) -> list[E]:
+        """What it does to be shown better in every state that it comes to."""
 
     def scores(
         self,

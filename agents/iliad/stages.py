@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.checkpoint import Stateful
-from agents.common.session import Note, Session, descend, scheduled_rate, set_learning_rate
+from agents.common.session import Note, Session, descend, scheduled_rate, seeded_dropout, set_learning_rate
 from agents.common.tensor_file import load_into, read_weights
 from agents.common.weights import origin_of, save_weights
 from embodied.identity import Identity, differences
@@ -66,7 +66,8 @@ class TeachingStage:
         ) as session:
             for update in session:
                 set_learning_rate(optimizer, scheduled_rate(self.rate, update, self.updates, COOLDOWN))
-                loss = loss_of(stream(self.seed, self.world, self.name, update))
+                with seeded_dropout(self.seed, update):
+                    loss = loss_of(stream(self.seed, self.world, self.name, update))
                 descend(loss, optimizer, f"{self.name}, update {update}", CLIP)
                 session.add({"loss": float(loss.detach()), "updates": 1.0})
                 if session.due(REPORT):

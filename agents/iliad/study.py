@@ -16,7 +16,7 @@ from agents.iliad.config import LearnerConfig
 from agents.iliad.nav import run as nav
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.stages import load_follower
-from agents.iliad.nav.world import NavWorld
+from agents.iliad.nav.world import NavMarginal, NavWorld
 from agents.iliad.regex import run as regex
 from agents.iliad.regex.config import RegexConfig
 from agents.iliad.regex.world import RegexWorld
@@ -27,6 +27,7 @@ from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
+from embodied.seeds import stream
 
 NEEDED = "thousand episodes to the threshold"
 LEARNERS = (
@@ -35,6 +36,8 @@ LEARNERS = (
     StudyRow("REINFORCE, continuous", {"learner": "continuous"}),
     StudyRow("ADEL"),
 )
+DAGGER, BLIND = LEARNERS[0], StudyRow("DAgger, blind", {"learner": "dagger", "blind": True})
+CHANCE = StudyRow("chance: a random shortest path of 2 to 6 edges", None)
 TABLES: Mapping[str, StudyTable] = {
     "3.4": StudyTable(
         "Learning from descriptions, demonstrations and rewards", LEARNERS, ("success",), ("test",), pooled=(NEEDED,)
@@ -167,8 +170,15 @@ class NavStudyWorld:
         nav.learn(grounds, learner, home, note=note)
 
     def judge(self, grounds: nav.NavGrounds, best: Path, split: str) -> Samples:
-        trips, student = grounds.data.splits[split], load_follower(best, grounds.data.eyes)[0]
+        trips, student = grounds.data.splits[split], load_follower(best, grounds.data.eyes)
         good = successes(NavWorld(grounds.data.eyes.places), student, trips)
+        return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
+
+    def chance(self, grounds: nav.NavGrounds, split: str, seed: int) -> Samples:
+        """Which requests of a split are fulfilled by walks of the marginal, which knows nothing of requests."""
+        trips, places = grounds.data.splits[split], grounds.data.eyes.places
+        walks = NavMarginal(places).draw(trips, rng=stream(seed, "nav", "chance", split))
+        good = [NavWorld(places).success(t, w) for t, w in zip(trips, walks, strict=True)]
         return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 
     def about(self) -> str:
@@ -192,9 +202,11 @@ class IliadStudy(StudyLearner):
         return f"iliad-{self.world.name}"
 
     def tables(self) -> Mapping[str, StudyTable]:
-        """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept."""
+        """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept. In
+        NAV one can be blind, and arrive by chance."""
         if self.world.name == "nav":
-            return TABLES
+            rows = (*LEARNERS, BLIND, CHANCE)
+            return {**TABLES, "3.4": dataclasses.replace(TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND),))}
         both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
         return {name: both(table) for name, table in TABLES.items()}
 
@@ -208,25 +220,29 @@ class IliadStudy(StudyLearner):
         world.begin(_grounds(world, folder), seed, _shared(world, folder) / f"seed_{seed}", note)
 
     def settings(self, train: Mapping[str, Any], seed: int) -> LearnerConfig:
-        changes = dict(train)
+        changes = {name: value for name, value in train.items() if name != "blind"}
         annealed = changes.pop("annealed", 0)
         every = max(1, round(annealed / self.world.updates * self.config.iterations)) if annealed else 0
         return dataclasses.replace(self.config, seed=seed, anneal_every=every, **changes)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         makers, settings = f"agents.iliad.{self.world.name}.run", self.settings(train, seed)
-        return identity_of(makers, settings=settings, **self.world.source())
+        return identity_of(makers, settings=settings, **{**self.world.source(), **_sighted(train)})
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         world, begun = self.world, _shared(self.world, folder) / f"seed_{seed}"
-        world.learn(_grounds(world, folder), self.settings(train, seed), home, begun, note)
+        grounds = _grounds(world, folder)
+        grounds = dataclasses.replace(grounds, config=dataclasses.replace(grounds.config, **_sighted(train)))
+        world.learn(grounds, self.settings(train, seed), home, begun, note)
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {"threshold": self.config.threshold, **self.world.source()}
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
-        assert weights is not None, "every row learns"
+        if weights is None:
+            assert isinstance(self.world, NavStudyWorld), "every row of REGEX learns"
+            return {"success": self.world.chance(_grounds(self.world, folder), split, seed)}
         history = read_checkpoint(weights.parent / "checkpoint.pt")["history"]
         if row.judge.get("curve"):
             return {f"success at {h['episodes']:g}": Samples((h["success"],)) for h in history}
@@ -241,6 +257,11 @@ class IliadStudy(StudyLearner):
             f"(REINFORCE a tenth); seeds {', '.join(map(str, self.repeats))}. The threshold is a validation success of "
             f"{100 * x.threshold:g} %; n seeds reached it."
         )
+
+
+def _sighted(train: Mapping[str, Any]) -> dict[str, Any]:
+    """What a row says of the student's eyes."""
+    return {name: value for name, value in train.items() if name == "blind"}
 
 
 def _shared(world: StudyWorld, folder: Path) -> Path:

@@ -11,7 +11,15 @@ from typing import Generic
 import numpy as np
 import torch
 
-from agents.common.session import Note, Session, descend, scheduled_rate, set_learning_rate, tasks_of_update
+from agents.common.session import (
+    Note,
+    Session,
+    descend,
+    scheduled_rate,
+    seeded_dropout,
+    set_learning_rate,
+    tasks_of_update,
+)
 from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.learners import Asked, IliadLesson, RewardsOf, RunningMean, adel, dagger, mixture, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
@@ -129,8 +137,9 @@ class _Learner(Generic[Q, E]):
         rng = stream(c.seed, "iliad", update)
         asked = Asked(tasks, [world.request(q, rng=rng) for q in tasks], rng)
         before = self.mean.total
-        lesson = self._learn(asked, mixing_at(c, update))
-        descend(lesson.loss, self.optimizer, c.learner, c.clip)
+        with seeded_dropout(c.seed, update):
+            lesson = self._learn(asked, mixing_at(c, update))
+            descend(lesson.loss, self.optimizer, c.learner, c.clip)
         fulfilled = sum(world.success(q, e) for q, e in zip(tasks, lesson.executions, strict=True))
         loss = float(lesson.loss.detach())
         numbers = {"episodes": len(tasks), "fulfilled": fulfilled, "loss": loss, "updates": 1.0}

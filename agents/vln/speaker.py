@@ -22,7 +22,7 @@ from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.weights import check_features, load_weights
 from agents.iliad.nav.network import WalkDescriber
-from agents.iliad.nav.student import COPIES, NavEyes
+from agents.iliad.nav.student import NavEyes
 from agents.iliad.nav.teacher import said, walked
 from agents.iliad.nav.world import HORIZON, Trip, walk_along
 from agents.iliad.stages import TeachingStage
@@ -31,6 +31,7 @@ from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Lessons, Split
 from agents.vln.agent import VlnAgent
 from agents.vln.config import SpeakerSettings
+from agents.vln.network import COPIES
 from agents.vln.policy import SPOKEN, channels_of
 from embodied.assistants.route_system import RouteConfig, sampled_paths
 from embodied.datasets.store import SplitData
@@ -79,8 +80,8 @@ def new_speaker(about: SpeakerAbout) -> Speaker:
     c = about.config
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(stream(c.seed, "speaker", "begin").integers(2**31)))
-        size = about.feature_size + 4 * COPIES
-        network = WalkDescriber(len(about.words), c.hidden_size, c.heads, about.feature_size, size, HORIZON)
+        seen = about.feature_size + 4 * COPIES
+        network = WalkDescriber(len(about.words), c.hidden_size, c.heads, seen, HORIZON)
     return Speaker(network, about)
 
 
@@ -189,13 +190,11 @@ def spoken_tasks(speaker: Speaker, training: Split, dropout: float, *, seed: int
         paths = sampled_paths(place.graph, count, rng=rng, config=RouteConfig())
         routes = [Route(f"{name}{SPOKEN}{k}", p, int(rng.integers(TURNS)), 0, "") for k, p in enumerate(paths)]
         unworded = [vln_task(name, r) for r in routes]
-        views, actions, mask = walked(
-            eyes, [Trip(name, t.start, _path(t), ("",)) for t in unworded], [walk_along(p) for p in paths]
-        )
-        seen = torch.stack([channels_of(t.id, training.bank.size, dropout) for t in unworded])[:, None]
-        actions = torch.cat([actions[..., : training.bank.size] * seen, actions[..., training.bank.size :]], -1)
+        trips = [Trip(name, t.start, _path(t), ("",)) for t in unworded]
+        channels = torch.stack([channels_of(t.id, training.bank.size, dropout) for t in unworded])
         choose = sampled_choice(rng.random((len(paths), LONGEST)))
-        numbers = speaker.network.write(views * seen[:, :, None], actions, mask, choose, LONGEST)
+        seen = walked(eyes, trips, [walk_along(p) for p in paths], channels)
+        numbers = speaker.network.write(*seen, choose, LONGEST)
         texts = said(eyes.vocabulary, numbers)
         tasks += [dataclasses.replace(t, request=text) for t, text in zip(unworded, texts, strict=True)]
     return tasks

@@ -119,7 +119,7 @@ def walks(args: Options, file: Path) -> int:
     shared = args.shared or args.data  # the grammar needs no folder
     more = config.more_paths if teacher == "learned" else 0  # who was taught knows them; the grammar needs none
     grounds = prepare(dataclasses.replace(config, teacher=teacher, more_paths=more), source, shared, note=note)
-    student, _ = load_follower(file, grounds.data.eyes)
+    student = load_follower(file, grounds.data.eyes)
     trips = grounds.data.splits[args.split]
     order = stream(args.seed, "iliad", "shown").permutation(len(trips))[: args.episodes]
     chosen = [trips[int(i)] for i in order]

@@ -245,7 +245,7 @@ class NavOptions(IliadOptions, Nav):
 
     data: InputFolder
     config: Annotated[LearnerConfig, Settings("settings of the student's training", NAV_LEARNER_SCALES, skip=LEARNED)]
-    world: Annotated[NavConfig, Settings("settings of data and teacher", NAV_SCALES)]
+    world: Annotated[NavConfig, Settings("settings of data and teacher", NAV_SCALES, skip=("blind",))]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from agents.common.settings import LEARNED_WORDS, WORD_VECTORS, require_word
+from agents.common.settings import (
+    AT_LEAST_ONE,
+    LEARNED_WORDS,
+    NOT_ALL,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    WORD_VECTORS,
+    require,
+    require_word,
+)
 from agents.iliad.config import LearnerConfig
 
 TEACHERS = ("learned", "grammar")
@@ -18,7 +28,19 @@ class NavConfig:
     hidden_size: int = 256
     """Width of all networks."""
     heads: int = 8
-    """Attention heads."""
+    """Attention heads of the describer."""
+    dropout: float = 0.0
+    """Dropout rate of followers in training."""
+    environment_dropout: float = 0.0
+    """Share of feature channels hidden from a follower for a whole training episode (Tan et al. 2019)."""
+    progress_weight: float = 0.0
+    """Weight of a follower's second loss: to guess which share of the way is left (Ma et al. 2019)."""
+    room_weight: float = 0.0
+    """Weight of a follower's third loss: to name the kinds of the current room and of those ahead."""
+    guided: float = 0.0
+    """DAgger, and the teacher's executor: share of training steps that the demonstrator takes (Ross et al. 2011)."""
+    blind: bool = False
+    """Ablation without vision: all features are zero to the student."""
     teacher: str = "learned"
     """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
     that word the routes of data sets."""
@@ -35,14 +57,12 @@ class NavConfig:
     """Routes per update of the teacher's networks."""
     teacher_rate: float = 1e-4
     """Learning rate of the teacher's networks."""
-    held_out: float = 0.2
-    """Share of the paths of training houses held out for validation."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
     word_vectors: str = LEARNED_WORDS
     """What followers know of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
     data_seed: int = 0
-    """Random seed of the held-out paths and of the teacher, which all students share."""
+    """Random seed of the further paths and of the teacher, which all students share."""
 
     def __post_init__(self) -> None:
         if self.teacher not in TEACHERS:
@@ -50,28 +70,35 @@ class NavConfig:
         require_word(self, "word_vectors", WORD_VECTORS)
         if self.pragmatics not in PRAGMATICS:
             raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
-        for name in ("hidden_size", "heads", "executor_iterations", "describer_iterations", "teacher_batch"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
+        require(self, AT_LEAST_ONE, "hidden_size", "heads", "candidates")
+        require(self, AT_LEAST_ONE, "executor_iterations", "describer_iterations", "teacher_batch")
+        require(self, NOT_NEGATIVE, "more_paths", "progress_weight", "room_weight")
+        require(self, POSITIVE, "teacher_rate")
+        require(self, NOT_ALL, "dropout", "environment_dropout")
+        require(self, SHARE, "guided")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} must be a multiple of heads {self.heads}")
-        if self.candidates < 1 or self.more_paths < 0 or not self.teacher_rate > 0 or not 0 < self.held_out < 1:
-            raise ValueError(
-                f"candidates {self.candidates} must be at least 1, more_paths {self.more_paths} not negative, "
-                f"teacher_rate {self.teacher_rate} above 0, "
-                f"held_out {self.held_out} between 0 and 1"
-            )
 
 
+FOLLOWER = NavConfig(dropout=0.2, environment_dropout=0.3, progress_weight=0.5, room_weight=0.5, guided=0.5)
+"""As of VLN's follower (agents.vln.config)."""
 NAV_SCALES: dict[str, NavConfig] = {
-    "mini": NavConfig(
-        hidden_size=128, heads=4, executor_iterations=4_000, describer_iterations=6_000, teacher_rate=5e-4
+    "mini": replace(
+        FOLLOWER,
+        hidden_size=128,
+        heads=4,
+        executor_iterations=4_000,
+        describer_iterations=6_000,
+        teacher_rate=1e-3,
+        more_paths=64,
     ),
-    "tiny": NavConfig(hidden_size=64, heads=4, executor_iterations=600, describer_iterations=1_500, teacher_rate=2e-3),
+    "tiny": replace(
+        FOLLOWER, hidden_size=64, heads=4, executor_iterations=600, describer_iterations=1_500, teacher_rate=2e-3
+    ),
     "paper": NavConfig(),
 }
 NAV_LEARNER_SCALES: dict[str, LearnerConfig] = {
-    "mini": LearnerConfig(iterations=8_000, learning_rate=5e-4, cooldown=0.3, threshold=0.3, validate_every=250),
+    "mini": LearnerConfig(iterations=4_000, learning_rate=1e-3, cooldown=0.4, threshold=0.2, validate_every=250),
     "tiny": LearnerConfig(iterations=1_000, learning_rate=2e-3, cooldown=0.3, threshold=0.3, validate_every=50),
     "paper": LearnerConfig(iterations=25_000, learning_rate=1e-4, threshold=0.3),
 }

@@ -17,11 +17,10 @@ from agents.vision.drawn import pictures_of
 from agents.vision.features import feature_path, load_bank
 from assets.cache import digest
 from embodied.datasets.store import Dataset
-from embodied.seeds import stream
 from embodied.tasks.vln import vln_task
 
-UNSEEN = "test_unseen"
-"""The split of a data set whose houses are for testing."""
+SPLITS = {"train": "train", "validation": "val_unseen", "test": "test_unseen"}
+"""NAV's splits and the data set's: other houses in each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +30,14 @@ class NavData:
     source: Dataset
     eyes: NavEyes
     splits: Mapping[str, Sequence[Trip]]
-    """'train': paths with all of their wordings. 'validation': other paths of the same houses, 'test': paths of other
-    houses; in these two, each wording is a trip of its own."""
+    """'train': paths with all of their wordings. 'validation' and 'test': paths of other houses; each wording is a trip
+    of its own."""
     pictures: str
     """How what is seen was drawn: 'fast_256', 'unlit_192', or several of them."""
 
     @property
     def digest(self) -> str:
-        """Names the content: the data set, who is held out, and who looks at which pictures."""
+        """Names the content: the data set, its paths, and who looks at which pictures."""
         trips = {part: [(t.world, t.path, t.requests) for t in many] for part, many in self.splits.items()}
         return digest([self.source.digest, trips, self.eyes.bank.digest, self.pictures])
 
@@ -58,19 +57,15 @@ def nav_data(
     """
     if config.more_paths and cache is None:
         raise ValueError("more_paths need the cache: the grammar names what can be seen in the houses")
-    training, unseen = source.names("train"), source.names(UNSEEN)
-    splits: dict[str, list[Trip]] = {"train": [], "validation": [], "test": []}
-    for name in training:
-        trips = house_trips(source, name)
-        order = [int(i) for i in stream(config.data_seed, "nav", "held", name).permutation(len(trips))]
-        held = set(order[: round(config.held_out * len(trips))])
-        splits["train"] += [t for i, t in enumerate(trips) if i not in held]
-        splits["validation"] += [one for i in sorted(held) for one in each_wording(trips[i])]
-        if cache is not None and config.more_paths:
+    houses = {part: source.names(name) for part, name in SPLITS.items()}
+    splits = {part: [trip for name in names for trip in house_trips(source, name)] for part, names in houses.items()}
+    if cache is not None and config.more_paths:
+        for name in houses["train"]:
             routes = more_routes(source, name, config.more_paths, seed=config.data_seed, cache=cache)
             splits["train"] += trips_of([vln_task(name, route) for route in routes])
-    splits["test"] = [one for name in unseen for trip in house_trips(source, name) for one in each_wording(trip)]
-    names = (*training, *unseen)
+    for part in ("validation", "test"):
+        splits[part] = [one for trip in splits[part] for one in each_wording(trip)]
+    names = tuple(name for many in houses.values() for name in many)
     places = {name: source.place(name) for name in names}
     pictures = {name: pictures_of(source, name, picture_kind) for name in names}
     paths: dict[str, Path] = {n: feature_path(source.folder / "features", encoder, n, pictures[n]) for n in names}

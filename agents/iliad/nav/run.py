@@ -8,9 +8,8 @@ from pathlib import Path
 from agents.common.session import Note
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.data import UNSEEN, NavData, nav_data
-from agents.iliad.nav.network import Follower
-from agents.iliad.nav.stages import new_walker, save_walker, teach_describer, teach_executor
+from agents.iliad.nav.data import SPLITS, NavData, nav_data
+from agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from agents.iliad.nav.student import LoopFree, NavStudent
 from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
 from agents.iliad.nav.world import NavMarginal, NavWalk, NavWorld, Trip
@@ -84,16 +83,16 @@ def _teacher(
 def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
     """The houses to learn from and to test in, with what can be seen from every node of them."""
     catalogue = load_catalogue(cache)
-    names = (*source.names("train"), *source.names(UNSEEN))
+    names = [name for split in SPLITS.values() for name in source.names(split)]
     return {name: source.open_world(name, catalogue, cache) for name in names}
 
 
 def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
     """A student of this seed with everything around it."""
     c, data = grounds.config, grounds.data
-    eyes, splits = data.eyes, data.splits
-    student = NavStudent(new_walker(Follower, c, eyes, seed, "student"), eyes)
-    explorer = LoopFree(new_walker(Follower, c, eyes, seed, "student"), eyes)
+    eyes, splits = data.eyes.blind() if c.blind else data.eyes, data.splits
+    student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
+    explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
     identity = identity_of("agents.iliad.nav.run", world="nav", data=data.digest, teacher=c)
     return IliadProblem(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import dataclasses
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,13 +19,15 @@ from agents.common.weights import load_weights, save_weights
 from agents.common.word_vectors import use_vectors, vocabulary_with
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
-from agents.iliad.nav.network import Follower, WalkDescriber
+from agents.iliad.nav.network import WalkDescriber
 from agents.iliad.nav.student import NavEyes, NavStudent
 from agents.iliad.nav.teacher import LONGEST, arrival, said, walked
 from agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
-from agents.iliad.stages import Network, TeachingStage
+from agents.iliad.stages import TeachingStage
 from agents.iliad.training import success_rate
 from agents.iliad.writing import log_likelihood
+from agents.vln.config import FollowerSettings
+from agents.vln.network import FollowerNetwork
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
@@ -43,27 +47,40 @@ class NavAbout:
     """Digest of the encoder whose features it wants."""
 
 
-def new_walker(kind: Callable[..., Network], config: NavConfig, eyes: NavEyes, seed: int, name: str) -> Network:
-    """An untrained follower or describer; its weights follow from seed and name."""
+def new_follower(config: NavConfig, eyes: NavEyes, seed: int, name: str) -> FollowerNetwork:
+    """An untrained follower, which is VLN's; its weights follow from seed and name."""
+    c = FollowerSettings(hidden_size=config.hidden_size, dropout=config.dropout)
+    with _beginning(seed, name):
+        network = FollowerNetwork(c, len(eyes.vocabulary), eyes.bank.size)
+        use_vectors(network, eyes.vocabulary)
+        return network
+
+
+def new_describer(config: NavConfig, eyes: NavEyes) -> WalkDescriber:
+    """An untrained describer."""
+    with _beginning(config.data_seed, "describer"):
+        return WalkDescriber(len(eyes.vocabulary), config.hidden_size, config.heads, eyes.size, HORIZON)
+
+
+@contextmanager
+def _beginning(seed: int, name: str) -> Iterator[None]:
+    """PyTorch's own draws follow from (seed, name) inside, and are as before outside."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(int(stream(seed, "nav", "begin", name).integers(2**31)))
-        words, features = len(eyes.vocabulary), eyes.bank.size
-        walker = kind(words, config.hidden_size, config.heads, features, eyes.action_size, HORIZON)
-        use_vectors(walker, eyes.vocabulary)
-        return walker
+        yield
 
 
 def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note) -> NavStudent:
     """pi_T (3.2.4.1): imitation, walking where it would itself and shown the shortest path from there."""
     eyes, world = data.eyes, NavWorld(data.eyes.places)
-    executor = NavStudent(new_walker(Follower, config, eyes, config.data_seed, "executor"), eyes)
+    executor = NavStudent(new_follower(config, eyes, config.data_seed, "executor"), eyes, config)
     trips = data.splits["train"]
 
     def loss_of(rng: np.random.Generator) -> Tensor:
         chosen, requests = _batch(trips, config.teacher_batch, rng)
-        done = executor.sample(chosen, requests, rng=rng)
+        done = executor.practise(chosen, requests, rng=rng)
         shown = [world.demonstrate(q, e) for q, e in zip(chosen, done, strict=True)]
-        return -executor.scores(chosen, requests, done, shown).log_probabilities.sum() / len(chosen)
+        return -executor.scores(chosen, requests, done, shown).objective.sum() / len(chosen)
 
     judge = lambda: {"success": success_rate(world, executor, _sample(data))}
     stage = _stage("executor", folder, config.executor_iterations, config, data)
@@ -76,7 +93,7 @@ def teach_describer(
 ) -> WalkDescriber:
     """P~_T(d | e) (3.2.4.1): the walk along a path to one of its requests; judged by who follows what it says."""
     eyes, world = data.eyes, NavWorld(data.eyes.places)
-    describer = new_walker(WalkDescriber, config, eyes, config.data_seed, "describer")
+    describer = new_describer(config, eyes)
     trips = data.splits["train"]
 
     def loss_of(rng: np.random.Generator) -> Tensor:
@@ -103,8 +120,8 @@ def save_walker(path: Path, network: nn.Module, config: NavConfig, eyes: NavEyes
     save_weights(path, "nav", network.state_dict(), _about(config, eyes), identity)
 
 
-def load_follower(path: Path, eyes: NavEyes) -> tuple[NavStudent, NavConfig]:
-    """A follower that `save_walker` wrote, with the words that it knows.
+def load_follower(path: Path, eyes: NavEyes) -> NavStudent:
+    """A follower that `save_walker` wrote, with its settings and the words that it knows.
 
     Args:
       eyes: what is seen; its words are replaced.
@@ -118,10 +135,11 @@ def load_follower(path: Path, eyes: NavEyes) -> tuple[NavStudent, NavConfig]:
             f"{path} was taught with features of encoder {about.encoder[:12]}, these are of {eyes.bank.digest[:12]}; "
             "name it by --encoder"
         )
-    own = NavEyes(eyes.places, eyes.bank, vocabulary_with(about.words, about.config.word_vectors))
-    follower = new_walker(Follower, about.config, own, 0, "loaded")
+    c = about.config
+    own = NavEyes(eyes.places, eyes.bank, vocabulary_with(about.words, c.word_vectors))
+    follower = new_follower(c, own, 0, "loaded")
     load_into(follower, tensors, path)
-    return NavStudent(follower.eval(), own), about.config
+    return NavStudent(follower.eval(), own.blind() if c.blind else own, c)
 
 
 def config_of(path: Path) -> NavConfig:
@@ -138,7 +156,8 @@ def _about(config: NavConfig, eyes: NavEyes) -> NavAbout:
 
 
 def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> TeachingStage:
-    settings = {k: getattr(config, k) for k in ("hidden_size", "heads", "teacher_batch", "teacher_rate")}
+    students = ("teacher", "pragmatics", "candidates", "executor_iterations", "describer_iterations", "blind")
+    settings = {k: v for k, v in dataclasses.asdict(config).items() if k not in students}
     parts = {"stage": name, "updates": updates, "seed": config.data_seed, "settings": settings, "data": data.digest}
     identity, rate = identity_of("agents.iliad.nav.stages", **parts), config.teacher_rate
     about = _about(config, data.eyes)

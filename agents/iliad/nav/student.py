@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 from torch import Tensor, nn
 
 from agents.common.decoding import Choice, greedy_choice, sampled_choice
+from agents.common.losses import IGNORE, negative_log_likelihood
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.percept import orientation
-from agents.iliad.nav.network import Follower, StepSeen
-from agents.iliad.nav.world import MOVES, NavWalk, Trip, walk_along, without_loops
+from agents.iliad.nav.config import NavConfig
+from agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
 from agents.iliad.protocol import ExecutionScores
 from agents.vision.bank import FeatureBank
+from agents.vln.network import COPIES, FollowerNetwork, Said, Seen
+from assets.records import ROOM_KINDS
 from embodied.action_spaces import PanoramicMoves
-from embodied.interface import Place, Pose, Sight
+from embodied.geometry import wrap
+from embodied.interface import TURNS, VIEW_PITCHES, VIEW_YAWS, Place, Pose, Sight
+from embodied.teachers.shortest import next_node
 
-COPIES = 32
-"""Of the four orientation features in an action's embedding (Speaker-Follower's and the authors' number)."""
 LONGEST_REQUEST = 80
 """Words of a request that are read."""
 
@@ -31,8 +36,10 @@ class Ways:
 
     poses: tuple[Pose, ...]
     """That the actions after stop lead to."""
-    embedded: Tensor
-    """(1 + n, E): zero for stopping, what is seen that way and its direction for going to a neighbour."""
+    towards: Tensor
+    """(n, E) what is seen that way and its direction, for going to a neighbour."""
+    rooms: Tensor
+    """(1 + n,) int64 kinds of the rooms that actions end in."""
     number_of: Mapping[int, int]
     """Node to the action that leads there; the pose's own node to stopping."""
 
@@ -46,13 +53,21 @@ class NavEyes:
     vocabulary: Vocabulary
 
     def __post_init__(self) -> None:
+        turned = np.arange(TURNS)[:, None] * (2 * np.pi / TURNS)
+        yaws = torch.from_numpy(wrap(VIEW_YAWS - turned)).float()
+        pitches = torch.from_numpy(VIEW_PITCHES).float().expand_as(yaws)
         object.__setattr__(self, "_moves", PanoramicMoves())
+        object.__setattr__(self, "_directions", orientation(yaws, pitches, COPIES))  # (turns, 36, 4 COPIES)
         object.__setattr__(self, "_ways", {})
         object.__setattr__(self, "_words", {})
 
+    def blind(self) -> NavEyes:
+        """In the same houses, seeing nothing."""
+        return dataclasses.replace(self, bank=self.bank.blind())
+
     @property
-    def action_size(self) -> int:
-        """E."""
+    def size(self) -> int:
+        """E: features of a view, and its direction."""
         return self.bank.size + 4 * COPIES
 
     def words(self, requests: Sequence[str]) -> Tensor:
@@ -74,36 +89,52 @@ class NavEyes:
             known[key] = self._look(world, pose)
         return known[key]
 
-    def see(self, tracks: Sequence[Track]) -> StepSeen:
-        """What agents see where they are."""
+    def see(self, tracks: Sequence[Track], channels: Tensor | None = None) -> Seen:
+        """What agents see where they are.
+
+        Args:
+          channels: (B, D) what each of them sees of every feature channel.
+        """
+        directions: Tensor = self._directions  # type: ignore[attr-defined]
         views = self.bank.gather([Sight(k.world, k.pose.node) for k in tracks])
-        embedded = [k.ways.embedded for k in tracks]
-        actions = nn.utils.rnn.pad_sequence(embedded, batch_first=True)
-        counts = torch.tensor([len(a) for a in embedded])
-        mask = torch.arange(actions.shape[1]) < counts[:, None]
-        return StepSeen(views, actions, mask, torch.stack([k.previous for k in tracks]))
+        views = torch.cat([views, directions[[k.pose.turn for k in tracks]]], -1)
+        towards = [k.ways.towards for k in tracks]
+        actions = nn.utils.rnn.pad_sequence(towards, batch_first=True)
+        counts = torch.tensor([1 + len(a) for a in towards])
+        mask = torch.arange(1 + actions.shape[1]) < counts[:, None]
+        if channels is not None:
+            shown = F.pad(channels, (0, 4 * COPIES), value=1.0)[:, None]
+            views, actions = views * shown, actions * shown
+        return Seen(views, actions, mask)
 
     def _look(self, world: str, pose: Pose) -> Ways:
         moves: PanoramicMoves = self._moves  # type: ignore[attr-defined]
-        candidates, poses = moves.at(self.places[world], pose)
+        place = self.places[world]
+        candidates, poses = moves.at(place, pose)
         (views,) = self.bank.gather([Sight(world, pose.node)])
         angles = orientation(torch.from_numpy(candidates.bearing), torch.from_numpy(candidates.slope), COPIES)
-        rows = torch.cat([views[torch.from_numpy(candidates.view)], angles], -1)
+        kind = lambda node: place.house.room_by_id[str(place.graph.room_of_node[node])].kind
+        rooms = torch.tensor([ROOM_KINDS.index(kind(n)) for n in (pose.node, *(p.node for p in poses))])
         numbers = {pose.node: 0} | {p.node: k for k, p in enumerate(poses, 1)}
-        return Ways(poses, torch.cat([rows.new_zeros(1, rows.shape[1]), rows]), numbers)
+        return Ways(poses, torch.cat([views[torch.from_numpy(candidates.view)], angles], -1), rooms, numbers)
 
 
 class NavStudent:
     """A policy over neighbouring nodes."""
 
-    def __init__(self, follower: Follower, eyes: NavEyes) -> None:
-        self.network, self.eyes = follower, eyes
+    def __init__(self, network: FollowerNetwork, eyes: NavEyes, config: NavConfig) -> None:
+        self.network, self.eyes, self.config = network, eyes, config
 
     def sample(self, tasks: Sequence[Trip], requests: Sequence[str], *, rng: np.random.Generator) -> list[NavWalk]:
         return self._walk(tasks, requests, sampled_choice(rng.random((len(tasks), MOVES))))
 
     def greedy(self, tasks: Sequence[Trip], requests: Sequence[str]) -> list[NavWalk]:
         return self._walk(tasks, requests, greedy_choice)
+
+    def practise(self, tasks: Sequence[Trip], requests: Sequence[str], *, rng: np.random.Generator) -> list[NavWalk]:
+        """Sampled, but `guided` of the steps lead along shortest paths."""
+        choose = sampled_choice(rng.random((len(tasks), MOVES)))
+        return self._walk(tasks, requests, choose, rng.random((len(tasks), MOVES)) < self.config.guided)
 
     def scores(
         self,
@@ -112,40 +143,79 @@ class NavStudent:
         executions: Sequence[NavWalk],
         actions: Sequence[NavWalk] | None = None,
     ) -> ExecutionScores:
-        """Of the steps of walks, or of the steps that `actions` take in the walks' states."""
-        wanted = [w.steps for w in (executions if actions is None else actions)]
-        tracks = [Track(self.eyes, task) for task in tasks]
-        now = self.network.begin(self.eyes.words(requests))
-        logs, entropies, mask = [], [], []
-        for t in range(max(map(len, wanted))):
-            seen = self.eyes.see(tracks)
-            logits, now = self.network.step(now, seen)
-            log = logits.log_softmax(-1).masked_fill(~seen.mask, 0.0)
-            there = [t < len(w) for w in wanted]
-            chosen = [k.number(w[t]) if x else 0 for k, w, x in zip(tracks, wanted, there)]
-            logs.append(log.gather(1, torch.tensor(chosen)[:, None])[:, 0])
-            entropies.append(-(log.exp() * log * seen.mask).sum(-1))
-            mask.append(torch.tensor(there))
-            for track, walk in zip(tracks, executions):
-                if t + 1 < len(walk.nodes):
-                    track.go(track.number(walk.nodes[t + 1]))
-        flags = torch.stack(mask, 1)
-        return ExecutionScores(torch.stack(logs, 1) * flags, torch.stack(entropies, 1) * flags, flags)
+        """Of the steps of walks, or of the steps that `actions` take in the walks' states; with dropout where a
+        gradient is wanted."""
+        wanted = executions if actions is None else actions
+        ends = [e.nodes[-1] if actions is None else q.path[-1] for q, e in zip(tasks, executions, strict=True)]
+        tracks, learning = [Track(self.eyes, task) for task in tasks], torch.is_grad_enabled()
+        self.network.train(learning)
+        channels = F.dropout(torch.ones(len(tasks), self.eyes.bank.size), self.config.environment_dropout, learning)
+        heard, rows = self.network.begin(self.eyes.words(requests)), list(range(len(tasks)))
+        found: list[tuple[Tensor, Tensor, Tensor]] = []  # of the steps of all who still act
+        where: list[tuple[int, int]] = []  # row and step of each
+        for t in range(max(len(w.steps) for w in wanted)):
+            going = [k for k, i in enumerate(rows) if t < len(wanted[i].steps)]
+            if len(going) < len(rows):
+                heard, rows = heard.select(torch.tensor(going)), [rows[k] for k in going]
+            now = [tracks[i] for i in rows]
+            seen = self.eyes.see(now, channels[rows] if learning else None)
+            said, heard = self.network(heard, seen)
+            log = said.moves.log_softmax(-1).masked_fill(~seen.mask, 0.0)
+            right = torch.tensor([k.number(wanted[i].steps[t]) for k, i in zip(now, rows)])
+            entropy = -(log.exp() * log * seen.mask).sum(-1)
+            besides = self._besides(said, now, [ends[i] for i in rows])
+            found.append((log.gather(1, right[:, None])[:, 0], entropy, besides))
+            where += [(i, t) for i in rows]
+            taken = [k.number(executions[i].steps[t]) for k, i in zip(now, rows)]
+            heard = dataclasses.replace(heard, taken=said.tokens[torch.arange(len(rows)), torch.tensor(taken)])
+            for track, number in zip(now, taken):
+                track.go(number)
+        at, steps = tuple(torch.tensor(where).T), max(t for _, t in where) + 1
+        spread = lambda parts: torch.zeros(len(tasks), steps).index_put(at, torch.cat(parts))
+        log_probabilities, entropies, besides = map(spread, zip(*found))
+        mask = torch.zeros(len(tasks), steps, dtype=torch.bool).index_put(at, torch.tensor(True))
+        return ExecutionScores(log_probabilities, entropies, mask, besides)
+
+    def _besides(self, said: Said, tracks: Sequence[Track], ends: Sequence[int]) -> Tensor:
+        """(k,) losses of the guesses which share of the way to `ends` is left, and what kinds of rooms are near."""
+        c = self.config
+        left = [share_left(self.eyes.places[k.world].graph, k.nodes, end) for k, end in zip(tracks, ends)]
+        lost = c.progress_weight * (said.left - torch.tensor(left)) ** 2
+        if c.room_weight:
+            rooms = nn.utils.rnn.pad_sequence([k.ways.rooms for k in tracks], batch_first=True, padding_value=IGNORE)
+            each = negative_log_likelihood(said.rooms.flatten(0, 1), rooms.flatten()).view(rooms.shape)
+            lost = lost + c.room_weight * each.sum(1) / (rooms != IGNORE).sum(1)
+        return lost
 
     @torch.no_grad()
-    def _walk(self, tasks: Sequence[Trip], requests: Sequence[str], choose: Choice) -> list[NavWalk]:
-        tracks = [Track(self.eyes, task) for task in tasks]
-        now = self.network.begin(self.eyes.words(requests))
-        rows = torch.arange(len(tasks))
+    def _walk(
+        self, tasks: Sequence[Trip], requests: Sequence[str], choose: Choice, guided: np.ndarray | None = None
+    ) -> list[NavWalk]:
+        """
+        Args:
+          guided: (B, MOVES) bool, the steps that lead along the shortest path.
+        """
+        tracks, rows = [Track(self.eyes, task) for task in tasks], list(range(len(tasks)))
+        self.network.eval()
+        heard = self.network.begin(self.eyes.words(requests))
         for t in range(MOVES):
-            seen = self.eyes.see(tracks)
-            logits, now = self.network.step(now, seen)
-            for track, number in zip(tracks, choose(logits, rows, t).tolist()):
-                if not track.stopped:
-                    track.go(number)
-            if all(track.stopped for track in tracks):
+            now = [tracks[i] for i in rows]
+            said, heard = self.network(heard, self.eyes.see(now))
+            numbers = choose(said.moves, torch.tensor(rows), t).tolist()
+            if guided is not None:
+                numbers = [self._shown(tasks[i], k) if guided[i, t] else n for n, k, i in zip(numbers, now, rows)]
+            heard = dataclasses.replace(heard, taken=said.tokens[torch.arange(len(rows)), torch.tensor(numbers)])
+            for track, number in zip(now, numbers):
+                track.go(number)
+            going = [k for k, n in enumerate(numbers) if n != 0]
+            if not going:
                 break
+            heard, rows = heard.select(torch.tensor(going)), [rows[k] for k in going]
         return [walk_along(track.nodes) for track in tracks]
+
+    def _shown(self, trip: Trip, track: Track) -> int:
+        graph = self.eyes.places[trip.world].graph
+        return track.number(next_node(graph, track.pose.node, trip.path[-1:]))
 
 
 class LoopFree(NavStudent):
@@ -160,8 +230,7 @@ class Track:
 
     def __init__(self, eyes: NavEyes, trip: Trip) -> None:
         self._eyes, self.world = eyes, trip.world
-        self.pose, self.nodes, self.stopped = trip.start, [trip.start.node], False
-        self.previous = torch.zeros(eyes.action_size)
+        self.pose, self.nodes = trip.start, [trip.start.node]
 
     @property
     def ways(self) -> Ways:
@@ -177,10 +246,6 @@ class Track:
 
     def go(self, number: int) -> None:
         """Take an action."""
-        ways = self.ways
-        self.previous = ways.embedded[number]
-        if number == 0:
-            self.stopped = True
-        else:
-            self.pose = ways.poses[number - 1]
+        if number:
+            self.pose = self.ways.poses[number - 1]
             self.nodes.append(self.pose.node)

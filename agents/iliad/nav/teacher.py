@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 import torch
+import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.decoding import greedy_choice, sampled_choice
@@ -35,16 +36,22 @@ def arrival(world: NavWorld, trip: Trip, found: Sequence[int], wanted: Sequence[
     return float(world.graph(trip).distance[found[-1], wanted[-1]] <= RADIUS + 1e-9)
 
 
-def walked(eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk]) -> tuple[Tensor, Tensor, Tensor]:
-    """What a describer reads: (B, T, 36, D) panoramas, (B, T, E) actions taken there, (B, T) which there are."""
+def walked(
+    eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk], channels: Tensor | None = None
+) -> tuple[Tensor, Tensor, Tensor]:
+    """What a describer reads: (B, T, 36, E) panoramas, (B, T, E) actions taken there, (B, T) which there are.
+
+    Args:
+      channels: (B, D) what is seen of every feature channel.
+    """
     tracks, views, actions = [Track(eyes, t) for t in trips], [], []
     longest = max(len(w.steps) for w in walks)
     mask = torch.tensor([[t < len(w.steps) for t in range(longest)] for w in walks])
     for t in range(longest):
-        seen = eyes.see(tracks)
+        seen = eyes.see(tracks, channels)
         numbers = [k.number(w.steps[t]) if t < len(w.steps) else 0 for k, w in zip(tracks, walks)]
         views.append(seen.views)
-        actions.append(seen.actions[torch.arange(len(walks)), torch.tensor(numbers)])
+        actions.append(F.pad(seen.actions, (0, 0, 1, 0))[torch.arange(len(walks)), torch.tensor(numbers)])  # 0 to stop
         for track, number in zip(tracks, numbers):
             track.go(number)
     return torch.stack(views, 1), torch.stack(actions, 1), mask

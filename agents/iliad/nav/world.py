@@ -58,6 +58,12 @@ def without_loops(nodes: Sequence[int]) -> tuple[int, ...]:
     return tuple(found)
 
 
+def share_left(graph: NavGraph, nodes: Sequence[int], end: int) -> float:
+    """Which share of the way from the first of `nodes` to `end` is left at the last of them, at most 1."""
+    whole, rest = float(graph.distance[nodes[0], end]), float(graph.distance[nodes[-1], end])
+    return min(1.0, rest / max(whole, 1e-6))
+
+
 def trips_of(tasks: Sequence[Task]) -> list[Trip]:
     """Tasks of following routes, those of one path together: their requests are its D*.
 

@@ -82,6 +82,11 @@ class RegexStudent:
     def greedy(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> list[Written]:
         return self._write(tasks, requests, greedy_choice)
 
+    def practise(
+        self, tasks: Sequence[WordTask], requests: Sequence[str], *, rng: np.random.Generator
+    ) -> list[Written]:
+        return self.greedy(tasks, requests)
+
     def scores(
         self,
         tasks: Sequence[WordTask],
