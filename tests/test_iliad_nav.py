@@ -205,11 +205,9 @@ def test_walks_are_read_and_described_whoever_is_beside():
 GOALS = (1, 4, 6, 9, 2)
 
 
-class NamesTheEnd:
+def names_the_end(world, path, yaw, *, rng) -> str:
     """A wording that names the last node."""
-
-    def describe(self, world, path, yaw, *, rng) -> str:
-        return f"go to n{path[-1]}"
+    return f"go to n{path[-1]}"
 
 
 class NearMarginal:
@@ -225,7 +223,7 @@ def test_a_small_student_learns_its_way_from_descriptions(tmp_path):
     places = {"grid": GRID}
     trips = [Trip("grid", Pose(5), GRID.graph.path(5, g), (f"go to n{g}",)) for g in GOALS]
     look = eyes(GRID, "grid", [t.requests[0] for t in trips])
-    teacher = PeopleNavTeacher(NavWorld(places), places, NamesTheEnd())
+    teacher = PeopleNavTeacher(NavWorld(places), places, names_the_end)
     walker, explorer = student(look), student(look, kind=LoopFree)
     problem = IliadProblem(
         NavWorld(places), teacher, NearMarginal(), walker, explorer, trips * 20, trips, {"world": "grid"}

@@ -16,6 +16,7 @@ from agents.iliad.nav.run import NavSource, learn, prepare
 from agents.iliad.nav.showing import episode_of, lines_of, tell
 from agents.iliad.nav.stages import config_of, load_follower, new_follower
 from agents.iliad.nav.student import NavStudent
+from agents.iliad.nav.teacher import PeopleNavTeacher
 from agents.iliad.nav.world import NavWorld, walk_along
 from agents.iliad.study import IliadStudy, NavStudyWorld
 from agents.studies.engine import run_study
@@ -23,6 +24,7 @@ from embodied.cli import main
 from embodied.datasets.store import Dataset
 from embodied.interface import Sight, Stop
 from embodied.language.plain import PlainLanguage
+from embodied.language.voice import People, RouteDescriber
 
 pytestmark = pytest.mark.slow
 
@@ -100,6 +102,14 @@ def test_a_teacher_is_trained_once(source, tmp_path):
     prepare(SMALL, source, tmp_path, note=silent)
     assert {p.name for p in times} == {"executor.safetensors", "describer.safetensors"}
     assert all(p.stat().st_mtime_ns == t for p, t in times.items())
+
+
+@pytest.mark.parametrize(("teacher", "voice"), [("grammar", RouteDescriber), ("people", People)])
+def test_the_grammar_or_people_teach_without_training(source, tmp_path, monkeypatch, teacher, voice):
+    monkeypatch.setattr("agents.iliad.nav.run.seen_places", lambda data, cache: {})
+    found = prepare(dataclasses.replace(SMALL, teacher=teacher), source, tmp_path, note=silent).teacher
+    assert isinstance(found, PeopleNavTeacher) and isinstance(found.wording.__self__, voice)
+    assert not any(tmp_path.iterdir())
 
 
 def test_an_episode_is_told_and_recorded_as_it_was_walked(grounds):

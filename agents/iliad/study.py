@@ -183,7 +183,10 @@ class NavStudyWorld:
 
     def about(self) -> str:
         c, data = self.config, Dataset(self.houses.folder)
-        return f"Paths of {data.digest[:16]}; hidden size {c.hidden_size}; teacher: {c.teacher}."
+        return (
+            f"Paths of {data.digest[:16]} and {c.more_paths} more a house, {len(data.names('train'))} training houses; "
+            f"hidden size {c.hidden_size}; teacher: {c.teacher}."
+        )
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@
 
 FILE is a student of `embodied train iliad` or `embodied study iliad`, whose data and teacher are in the folder `shared`
 beside it. The shipped student's are made in --shared if they are missing. In NAV the student walks through the houses
-of a data set with features, and --teacher grammar describes its walks without a trained describer.
+of a data set with features, and --teacher grammar or people describes its walks without a trained describer.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Options(Nav, Printed):
     """A request of your own; nobody describes what the student does."""
     word: str = "banana"
     """The word that your own request is about."""
-    teacher: Annotated[str | None, Option(words=("learned", "grammar"))] = None
+    teacher: Annotated[str | None, Option(words=("learned", "grammar", "people"))] = None
     """NAV: who describes what the student does (default: who taught it)."""
     rrd: OutputRrd | None = None
     """NAV: record the first episode, for Rerun."""

@@ -17,7 +17,7 @@ from agents.common.settings import (
 )
 from agents.iliad.config import LearnerConfig
 
-TEACHERS = ("learned", "grammar")
+TEACHERS = ("learned", "grammar", "people")
 PRAGMATICS = ("program", "text")
 
 
@@ -42,8 +42,8 @@ class NavConfig:
     blind: bool = False
     """Ablation without vision: all features are zero to the student."""
     teacher: str = "learned"
-    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
-    that word the routes of data sets."""
+    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1); 'grammar', the templates
+    that word the routes of data sets; or 'people', the same with other words where a scripted listener gets lost."""
     pragmatics: str = "program"
     """How a candidate description is chosen: by Eq 3.15 and 3.16 ('text'), or the first that leads the executor to the
     end of the walk ('program'; docs/sources.md, S93, S141)."""

@@ -19,7 +19,7 @@ from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.identity import identity_of
 from embodied.interface import SeenPlace
-from embodied.language.voice import RouteDescriber
+from embodied.language.voice import People, RouteDescriber
 
 VALIDATION = 300
 """Trips of each validation, from all houses alike; judging takes all."""
@@ -73,8 +73,9 @@ def _teacher(
     config: NavConfig, data: NavData, cache: Path, folder: Path, note: Note
 ) -> DescribingTeacher[Trip, NavWalk]:
     world = NavWorld(data.eyes.places)
-    if config.teacher == "grammar":
-        return PeopleNavTeacher(world, seen_places(data.source, cache), RouteDescriber())
+    if config.teacher != "learned":
+        wording = People().route if config.teacher == "people" else RouteDescriber().describe
+        return PeopleNavTeacher(world, seen_places(data.source, cache), wording)
     executor = teach_executor(data, config, folder, note=note)
     describer = teach_describer(data, config, executor, folder, note=note)
     return LearnedNavTeacher(world, describer, executor, config.candidates, config.pragmatics)

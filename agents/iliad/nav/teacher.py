@@ -102,9 +102,9 @@ class LearnedNavTeacher(DescribingNetworks[Trip, NavWalk]):
 
 
 class Wording(Protocol):
-    """embodied.language's RouteDescriber, or its like."""
+    """embodied.language's RouteDescriber.describe, or People.route."""
 
-    def describe(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str: ...
+    def __call__(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str: ...
 
 
 class PeopleNavTeacher:
@@ -123,4 +123,4 @@ class PeopleNavTeacher:
             return self.world.request(trip, rng=rng)
         if len(walk.nodes) < 2:
             return None
-        return self.wording.describe(self.places[trip.world], walk.nodes, trip.start.yaw, rng=rng)
+        return self.wording(self.places[trip.world], walk.nodes, trip.start.yaw, rng=rng)
