@@ -6,7 +6,9 @@ climb out of their folder, or whose entries swell like a zip bomb, is refused as
 
 from __future__ import annotations
 
+import functools
 import math
+import os
 import re
 import zipfile
 import zlib
@@ -79,7 +81,7 @@ class Pack:
         """
         entry = _safe_name(self.path, name)
         try:
-            with zipfile.ZipFile(self.path) as z, z.open(entry) as f:
+            with _opened(self.path, self.path.stat().st_mtime_ns, os.getpid()).open(entry) as f:
                 data = f.read(MAX_ENTRY + 1)
         except KeyError as e:
             raise PackError(f"{self.path.name} has no entry {name!r}; install the pack again") from e
@@ -92,6 +94,12 @@ class Pack:
     def names(self) -> tuple[str, ...]:
         with zipfile.ZipFile(self.path) as z:
             return tuple(z.namelist())
+
+
+@functools.lru_cache(maxsize=8)
+def _opened(path: Path, changed: int, process: int) -> zipfile.ZipFile:
+    """The archive, opened once in each process: its table of contents takes longer to read than most entries."""
+    return zipfile.ZipFile(path)
 
 
 def open_pack(path: Path) -> Pack:
