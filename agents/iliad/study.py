@@ -23,6 +23,7 @@ from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
 from agents.studies.engine import Measured, StudyLearner
 from agents.studies.tables import Figure, StudyRow, StudyTable
+from agents.studies.wordings import WORDING, saying, words_table
 from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
@@ -37,6 +38,8 @@ LEARNERS = (
     StudyRow("ADEL"),
 )
 DAGGER, BLIND = LEARNERS[0], StudyRow("DAgger, blind", {"learner": "dagger", "blind": True})
+OWN = ("blind", "word_vectors")
+"""Settings of NAV's students in which rows differ."""
 CHANCE = StudyRow("chance: a random shortest path of 2 to 6 edges", None)
 TABLES: Mapping[str, StudyTable] = {
     "3.4": StudyTable(
@@ -206,10 +209,11 @@ class IliadStudy(StudyLearner):
 
     def tables(self) -> Mapping[str, StudyTable]:
         """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept. In
-        NAV one can be blind, and arrive by chance."""
+        NAV one can be blind, arrive by chance, and hear what one never heard."""
         if self.world.name == "nav":
             rows = (*LEARNERS, BLIND, CHANCE)
-            return {**TABLES, "3.4": dataclasses.replace(TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND),))}
+            seen = dataclasses.replace(TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND),))
+            return {**TABLES, "3.4": seen, "words": words_table(_reader, ("success",), ("test",))}
         both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
         return {name: both(table) for name, table in TABLES.items()}
 
@@ -223,19 +227,19 @@ class IliadStudy(StudyLearner):
         world.begin(_grounds(world, folder), seed, _shared(world, folder) / f"seed_{seed}", note)
 
     def settings(self, train: Mapping[str, Any], seed: int) -> LearnerConfig:
-        changes = {name: value for name, value in train.items() if name != "blind"}
+        changes = {name: value for name, value in train.items() if name not in OWN}
         annealed = changes.pop("annealed", 0)
         every = max(1, round(annealed / self.world.updates * self.config.iterations)) if annealed else 0
         return dataclasses.replace(self.config, seed=seed, anneal_every=every, **changes)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         makers, settings = f"agents.iliad.{self.world.name}.run", self.settings(train, seed)
-        return identity_of(makers, settings=settings, **{**self.world.source(), **_sighted(train)})
+        return identity_of(makers, settings=settings, **{**self.world.source(), **_own(train)})
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         world, begun = self.world, _shared(self.world, folder) / f"seed_{seed}"
         grounds = _grounds(world, folder)
-        grounds = dataclasses.replace(grounds, config=dataclasses.replace(grounds.config, **_sighted(train)))
+        grounds = dataclasses.replace(grounds, config=dataclasses.replace(grounds.config, **_own(train)))
         world.learn(grounds, self.settings(train, seed), home, begun, note)
         return home / "best.safetensors"
 
@@ -250,7 +254,11 @@ class IliadStudy(StudyLearner):
         if row.judge.get("curve"):
             return {f"success at {h['episodes']:g}": Samples((h["success"],)) for h in history}
         needed = episodes_to(history, self.config.threshold) / 1000
-        found = {"success": self.world.judge(_grounds(self.world, folder), weights, split)}
+        grounds, how = _grounds(self.world, folder), row.judge.get(WORDING)
+        if how and isinstance(self.world, NavStudyWorld):
+            say = saying(how, grounds.data.eyes.vocabulary.words, self.world.houses.cache)
+            grounds = nav.reworded(grounds, say)
+        found = {"success": self.world.judge(grounds, weights, split)}
         return found | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
 
     def about(self) -> str:
@@ -262,9 +270,13 @@ class IliadStudy(StudyLearner):
         )
 
 
-def _sighted(train: Mapping[str, Any]) -> dict[str, Any]:
-    """What a row says of the student's eyes."""
-    return {name: value for name, value in train.items() if name == "blind"}
+def _reader(label: str, **train: Any) -> StudyRow:
+    return StudyRow(label, {"learner": "dagger", **train})
+
+
+def _own(train: Mapping[str, Any]) -> dict[str, Any]:
+    """What a row says of NAV's student itself."""
+    return {name: value for name, value in train.items() if name in OWN}
 
 
 def _shared(world: StudyWorld, folder: Path) -> Path:

@@ -37,6 +37,11 @@ def _said(row: StudyRow, how: str) -> StudyRow:
     return dataclasses.replace(row, label=f"{row.label}, {how}", judge={**row.judge, WORDING: how}) if how else row
 
 
+def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
+    """What says a text as a row has it to an agent that knows the words `known`."""
+    return in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache))
+
+
 def hearing(policy: Any, how: str, known: Sequence[str], cache: Path) -> Policy:
-    """A policy that knows the words `known`, to which everything is said as a row has it."""
-    return Reworded(policy, in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache)))
+    """A policy to which everything is said so."""
+    return Reworded(policy, saying(how, known, cache))

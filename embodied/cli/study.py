@@ -16,9 +16,9 @@ HANNA's tables are 4.3, 4.4, 4.5, 4.6, D.1, D.2, `sight`, `words` and `places`. 
 'figure 4.5b' and 'figure 4.6'. VNLA's are the first paper's: `askers`, `interventions`, `rooms` (needs
 --without-rooms), `rules` and `algorithm-6`, and `words`. VLN's are `followers`, `speaker` and `words`. Ask-v0's are
 `houses`, `classes` and `curves`. `bandit` has Table 3.2, Figures 3.4 and 3.5, `rates`, `held-out` and, with --rater,
-`people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`. `check` says which stored tables no longer
-belong to this code. Rows that tables share are trained once. Each table is written as JSON, Markdown and, for some, as
-a figure. Rerun an interrupted command to resume.
+`people`; ILIAD has Tables 3.4, 3.5 and C.1, 'figure 3.7' and `algorithms`, NAV `words`, too. `check` says which stored
+tables no longer belong to this code. Rows that tables share are trained once. Each table is written as JSON, Markdown
+and, for some, as a figure. Rerun an interrupted command to resume.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ class BanditOptions(Study, Trained):
 @dataclass(frozen=True, kw_only=True)
 class IliadOptions(Study, Trained):
     tables: Tables
-    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms."""
+    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms; in NAV also words."""
     scale: Annotated[str, SMALL_SCALE] = "mini"
     """The settings to start from."""
 

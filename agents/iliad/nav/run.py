@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from agents.common.session import Note
+from agents.common.word_vectors import vocabulary_with
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import SPLITS, NavData, nav_data
@@ -88,10 +91,18 @@ def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
     return {name: source.open_world(name, catalogue, cache) for name in names}
 
 
+def reworded(grounds: NavGrounds, say: Callable[[str], str]) -> NavGrounds:
+    """With the test requests in other words."""
+    data = grounds.data
+    test = [dataclasses.replace(t, requests=tuple(map(say, t.requests))) for t in data.splits["test"]]
+    return dataclasses.replace(grounds, data=dataclasses.replace(data, splits={**data.splits, "test": test}))
+
+
 def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
     """A student of this seed with everything around it."""
     c, data = grounds.config, grounds.data
     eyes, splits = data.eyes.blind() if c.blind else data.eyes, data.splits
+    eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(eyes.vocabulary.words, c.word_vectors))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
     explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
