@@ -391,7 +391,7 @@ def _comparisons(learner: StudyLearner, table: StudyTable, out: Path, rows: Sequ
     told = []
     for first, second in table.compared if rows is None else ():
         pair = StudyRow(first.label, first.train, first.judge, minus=second)
-        for (split, metric), samples in _found(learner, table, pair, out).items():
+        for (split, metric), samples in _found(learner, dataclasses.replace(table, pooled=()), pair, out).items():
             scale, e = 100.0 if metric in PERCENT else 1.0, interval(samples)
             told.append(
                 f"{first.label} minus {second.label}, {metric}, {split.replace('_', ' ')}: "
