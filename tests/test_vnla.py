@@ -52,6 +52,26 @@ def go(word: str) -> Move:
     return Move(WORDS.index(word))
 
 
+def test_who_has_walked_where_no_way_leads_back_is_told_moves_that_are_possible():
+    class OneWay(MonocularMoves):
+        def at(self, world, pose):
+            candidates, poses = super().at(world, pose)
+            if pose.node == 3:  # the end of the line, from which nobody can walk
+                allowed = candidates.allowed.copy()
+                allowed[WORDS.index("forward")] = False
+                candidates = dataclasses.replace(candidates, allowed=allowed)
+            return candidates, poses
+
+    world, moves = line_world(), OneWay()
+    plan = VnlaTeacher(moves).plan(world)
+    for turn in range(12):
+        pose = Pose(3, turn)
+        for action in (plan.action(pose, (0,)), plan.action_to(pose, Pose(0, 0))):
+            assert moves.at(world, pose)[0].allowed[action]
+        with pytest.raises(ValueError, match="can be reached"):
+            plan.count(pose, (0,))
+
+
 def test_the_teacher_turns_round_and_walks_the_line():
     world, teacher = line_world(), VnlaTeacher()
     words, end = teacher.plan(world).words(Pose(0, 6), (3,), 20)

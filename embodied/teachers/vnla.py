@@ -38,6 +38,11 @@ ACTION = 1e-3
 """Metres that one action weighs in planning: the shortest walk first, the fewest actions second."""
 
 
+LOST = 1e6
+"""Metres that a state costs from which no goal can be reached in this action space: its best move is one that the state
+has, towards the goal along the graph."""
+
+
 class MonocularPlan:
     """Shortest ways through the poses of one world, whose 'forward' goes where the camera looks.
 
@@ -47,7 +52,7 @@ class MonocularPlan:
 
     def __init__(self, world: Place, moves: MonocularMoves) -> None:
         nodes = len(world.graph.positions)
-        distance = np.asarray(world.graph.distance)
+        self.distance = distance = np.asarray(world.graph.distance)
         states = nodes * VIEWS
         self.next = np.tile(np.arange(states)[:, None], (1, len(WORDS)))
         self.weight = np.full((states, len(WORDS)), np.inf)
@@ -79,9 +84,14 @@ class MonocularPlan:
     def _best(self, goals: tuple[int, ...]) -> np.ndarray:
         """(states,) int8 index into WORDS of the best move to the nearest of `goals`, the first of equals."""
         if goals not in self._actions:
-            total = np.round(self.weight + self.cost(goals)[self.next], 9)
+            total = np.round(self.weight + self._known(self.cost(goals), goals)[self.next], 9)
             self._actions[goals] = np.argmin(total, axis=1).astype(np.int8)
         return self._actions[goals]
+
+    def _known(self, cost: np.ndarray, goals: tuple[int, ...]) -> np.ndarray:
+        """(states,) costs; where no goal can be reached, how far the nearest is along the graph, behind all others."""
+        behind = LOST + np.repeat(self.distance[:, list(goals)].min(axis=1), VIEWS)
+        return np.where(np.isfinite(cost), cost, behind)
 
     def action_to(self, pose: Pose, end: Pose) -> int | None:
         """Index into WORDS of the best move towards a pose, its angles included; None in it.
@@ -92,7 +102,7 @@ class MonocularPlan:
         if pose == end:
             return None
         if end not in self._cost_to:
-            self._cost_to[end] = dijkstra(self._backwards, indices=state_of(end))
+            self._cost_to[end] = self._known(dijkstra(self._backwards, indices=state_of(end)), (end.node,))
         state = state_of(pose)
         return int(np.argmin(np.round(self.weight[state] + self._cost_to[end][self.next[state]], 9)))
 
