@@ -106,7 +106,7 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
     explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
-    identity = identity_of("agents.iliad.nav.run", world="nav", data=data.digest, teacher=c)
+    identity = identity_of("agents.iliad.nav.run", world="nav", data=data.digest, pictures=data.pictures, teacher=c)
     return IliadProblem(
         NavWorld(eyes.places), grounds.teacher, NavMarginal(eyes.places), student, explorer,
         splits["train"], validation, identity,
