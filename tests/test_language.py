@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from agents.common.more_paths import said_by
 from assets.catalogue import load_catalogue
 from embodied.assistants.route_system import RouteConfig, sampled_paths
 from embodied.generate import HouseConfig, generate_house
+from embodied.interface import Route
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
-from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
+from embodied.language.grammar import NOVEL_WORDS, Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import cost, count_cost, follow
 from embodied.language.plain import with_article
@@ -21,6 +25,7 @@ from embodied.language.seen import Lookout, doorway
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.templates import TEMPLATES, WORDS
 from embodied.language.voice import People, RouteDescriber
+from embodied.tasks.vln import vln_task
 from embodied.world import open_world
 
 pytestmark = pytest.mark.slow
@@ -155,6 +160,27 @@ def test_the_same_generator_says_the_same(world, spoken):
     _, path, yaw = spoken[0]
     said = [People().route(world, path, yaw, rng=np.random.default_rng(5)) for _ in range(2)]
     assert said[0] == said[1]
+
+
+def test_instructions_are_said_anew_by_people_of_a_novelty_and_kept(world, spoken, tmp_path):
+    """Each task alike whatever is asked beside it; heard and unheard people have words of their own."""
+    opened, name = [], world.house.name
+    source = SimpleNamespace(digest="hand", open_world=lambda name, *_: opened.append(name) or world)
+    tasks = [
+        vln_task(name, Route(str(k), path, round(yaw * 6 / np.pi), 0, text, "train"))
+        for k, (text, path, yaw) in enumerate(spoken[:15])
+    ]
+    said = {n: said_by(n, tasks, source, cache=tmp_path) for n in ("familiar", "novel")}
+    assert said["novel"] == said_by("novel", tasks, source, cache=tmp_path) and opened == [name] * 2
+    assert said["novel"][10:] == said_by("novel", tasks[10:], source, cache=tmp_path)
+    wordless = [dataclasses.replace(t, request="") for t in tasks]
+    for mine in said.values():
+        assert [dataclasses.replace(t, request="") for t in mine] == wordless
+        walks = [follow(world, t.request, t.goal.path[0], yaw) for t, (*_, yaw) in zip(mine, spoken)]
+        assert np.mean([world.graph.distance[w.path[-1], t.goal_nodes[0]] <= 3 for w, t in zip(walks, mine)]) > 0.8
+    unheard = [w for w in NOVEL_WORDS if w.isalpha() and len(w) > 4]
+    spoken_by = {n: {w for t in mine for w in re.findall("[a-z]+", t.request.lower())} for n, mine in said.items()}
+    assert spoken_by["novel"] & set(unheard) and not spoken_by["familiar"] & set(unheard)
 
 
 def test_landmarks_are_visible_from_the_route(world, spoken):

@@ -14,7 +14,9 @@ from agents.common.settings import (
     require,
     require_word,
 )
+from embodied.novelty import FAMILIAR
 
+EVERYBODY = "everybody"
 FORCING = ("teacher", "student", "dagger")
 """Whose actions an episode of training takes: the teacher's; the follower's own, sampled; or at first the teacher's,
 then more and more its own (Ross et al. 2011). The label is always the teacher's."""
@@ -42,6 +44,8 @@ class FollowerSettings(ImitationSettings):
     """Share of training episodes on random paths with a speaker's instructions (back-translation)."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
+    speakers: str = EVERYBODY
+    """Whose instructions are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
     least_teacher: float = 0.0
     """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
     iterations: int = 20_000
@@ -54,6 +58,7 @@ class FollowerSettings(ImitationSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_word(self, "forcing", FORCING)
+        require_word(self, "speakers", (EVERYBODY, FAMILIAR))
         require(self, AT_LEAST_ONE, "hidden_size")
         require(self, NOT_ALL, "dropout")
         require(self, NOT_NEGATIVE, "progress_weight", "room_weight")

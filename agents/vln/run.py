@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Unpack
 
 from agents.common import imitation
-from agents.common.more_paths import more_routes
+from agents.common.more_paths import more_routes, said_by
 from agents.common.session import Progress
 from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import build_vocabulary
@@ -19,6 +19,7 @@ from agents.vln.speaker import load_speaker, spoken_tasks
 from agents.vln.training import VlnLearner
 from embodied.identity import identity_of
 from embodied.interface import Task
+from embodied.novelty import FAMILIAR
 from embodied.tasks.vln import vln_task
 
 
@@ -40,11 +41,14 @@ def train_follower(
       ValueError: spoken_share without a speaker.
     """
     training = lessons.split("train", houses=config.training_houses or None, lights=config.lights)
+    validation = lessons.split("val_unseen", limit=config.validation_tasks)
+    if config.speakers == FAMILIAR:
+        heard = lambda split: said_by(FAMILIAR, split.tasks, lessons.data, cache=lessons.cache)
+        training, validation = (dataclasses.replace(split, tasks=heard(split)) for split in (training, validation))
     if config.more_paths:
         training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(lessons, training, config)])
     if config.spoken_share:
         training = dataclasses.replace(training, tasks=mixed(training, config, speaker))
-    validation = lessons.split("val_unseen", limit=config.validation_tasks)
     words = build_vocabulary(t.request for t in training.tasks)
     agent = VlnAgent.new(lessons.about(VlnAbout, config, evaluation, words))
     agent.network.to(lessons.device)
@@ -55,8 +59,9 @@ def train_follower(
 
 def more_tasks(lessons: Lessons, training: Split, config: FollowerSettings) -> list[Task]:
     """Tasks of further paths through the training houses; the same for all training seeds."""
-    source, count = lessons.data, config.more_paths
-    routes = {name: more_routes(source, name, count, seed=0, cache=lessons.cache) for name in training.worlds}
+    novelty = FAMILIAR if config.speakers == FAMILIAR else None
+    more = lambda name: more_routes(lessons.data, name, config.more_paths, seed=0, cache=lessons.cache, novelty=novelty)
+    routes = {name: more(name) for name in training.worlds}
     return [vln_task(name, route) for name, many in routes.items() for route in many]
 
 
