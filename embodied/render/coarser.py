@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 CELLS = (0.004, 0.008, 0.016, 0.032)
-"""Sides of the cells, metres."""
+"""Sides of the cells, metres, each twice the last: what lies in one cell lies in one of every wider kind."""
 KEPT = 0.93
 """Share of a mesh's surface that a copy must have."""
 WORTH = 0.7
@@ -53,6 +53,21 @@ class _Shape:
     """(n,) int: corners that are joined by faces have the same."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Groups:
+    """What is drawn together; by copies with wider cells, too."""
+
+    cluster: np.ndarray
+    """(p,) int of places."""
+    corner: np.ndarray
+    """(n,) int: number of the copy's corner that each corner becomes."""
+    place: np.ndarray
+    first: np.ndarray
+    """One place of each cluster, and one corner of each of the copy's corners."""
+    faces: np.ndarray
+    """(m, 3) int, into the corners before: what is left of the faces."""
+
+
 def copies(meshes: Corners, count: int, wanted: np.ndarray) -> list[Corners]:
     """For each of CELLS the copies of those of `count` meshes that are worth one.
 
@@ -65,8 +80,11 @@ def copies(meshes: Corners, count: int, wanted: np.ndarray) -> list[Corners]:
     most = np.bincount(meshes.mesh[meshes.faces[:, 0]], minlength=count)
     meshes = _some(meshes, wanted & (most >= FEWEST))
     shape, surface, made = _shape(meshes), _surface(meshes, count), []
+    places, corners = np.arange(len(shape.xyz)), np.arange(len(meshes.xyz))
+    groups = _Groups(places, corners, places, corners, meshes.faces)
     for cell in CELLS:
-        copy = _clustered(meshes, shape, cell)
+        groups = _clustered(groups, meshes, shape, cell)
+        copy = _copy(groups, meshes, shape)
         faces = np.bincount(copy.mesh[copy.faces[:, 0]], minlength=count)
         good = (faces > 0) & (faces <= WORTH * most) & (_surface(copy, count) >= KEPT * surface)
         most = np.where(good, faces, most)
@@ -77,12 +95,10 @@ def copies(meshes: Corners, count: int, wanted: np.ndarray) -> list[Corners]:
 def _shape(meshes: Corners) -> _Shape:
     _, first, place = np.unique(_number(meshes.mesh, meshes.xyz.view(np.int32)), return_index=True, return_inverse=True)
     xyz, count = meshes.xyz[first].astype(float), len(first)
-    a, b, c = meshes.xyz[meshes.faces].astype(float).swapaxes(0, 1)
-    normal = np.repeat(np.cross(b - a, c - a), 3, axis=0)
     at = place[meshes.faces].ravel()
-    normals = np.stack([np.bincount(at, normal[:, k], count) for k in range(3)], axis=1)
-    axis = np.abs(normals).argmax(1)
-    facing = 2 * axis + (normals[np.arange(count), axis] > 0)
+    sums = [np.bincount(at, np.repeat(n, 3), count) for n in normals(meshes.xyz, meshes.faces)]
+    axis = np.abs(sums).argmax(0)
+    facing = 2 * axis + (np.choose(axis, sums) > 0)
     joined = meshes.faces[:, [0, 1]], meshes.faces[:, [1, 2]]
     start, end = (np.concatenate([j[:, k] for j in joined]) for k in (0, 1))
     n = len(meshes.xyz)
@@ -90,41 +106,58 @@ def _shape(meshes: Corners) -> _Shape:
     return _Shape(place, xyz, meshes.mesh[first], facing, chart)
 
 
-def _clustered(meshes: Corners, shape: _Shape, cell: float) -> Corners:
-    """Copies of all meshes with all that lies in one cell, and faces one way, drawn together to its middle."""
-    cells = np.floor(shape.xyz / cell).astype(np.int64)
-    _, cluster = np.unique(_number(shape.mesh * 6 + shape.facing, cells), return_inverse=True)
-    middle = _means(cluster, shape.xyz)
-    cluster = cluster[shape.place]
-    _, first, corner = np.unique(
-        cluster.astype(np.int64) * len(meshes.xyz) + shape.chart, return_index=True, return_inverse=True
-    )
-    faces, ends = corner[meshes.faces], cluster[meshes.faces]
-    apart = (ends[:, 0] != ends[:, 1]) & (ends[:, 1] != ends[:, 2]) & (ends[:, 2] != ends[:, 0])
-    faces, ends = faces[apart], ends[apart]
+def _clustered(groups: _Groups, meshes: Corners, shape: _Shape, cell: float) -> _Groups:
+    """Groups of all that lies in one cell and faces one way, made of those of narrower cells."""
+    key = _number((shape.mesh * 6 + shape.facing)[groups.place], np.floor(shape.xyz[groups.place] / cell).astype(int))
+    _, first, which = np.unique(key, return_index=True, return_inverse=True)
+    place, cluster = groups.place[first], which[groups.cluster]
+    key = cluster[shape.place[groups.first]].astype(np.int64) * len(meshes.xyz) + shape.chart[groups.first]
+    _, first, which = np.unique(key, return_index=True, return_inverse=True)
+    ends = cluster[shape.place][groups.faces]
+    a, b, c = ends.T
+    apart = (a != b) & (b != c) & (c != a)
+    ends = ends[apart]
     turn = (ends.argmin(1)[:, None] + np.arange(3)) % 3
     _, once = np.unique(_number(np.zeros(len(ends), int), np.take_along_axis(ends, turn, 1)), return_index=True)
-    faces = faces[np.sort(once)]
+    faces = groups.faces[apart][np.sort(once)]
+    return _Groups(cluster, which[groups.corner], place, groups.first[first], faces)
+
+
+def _copy(groups: _Groups, meshes: Corners, shape: _Shape) -> Corners:
+    """All meshes with every group drawn together to its middle."""
+    middle = _means(groups.cluster, shape.xyz)
     return Corners(
-        middle[cluster[first]].astype(np.float32),
-        _means(corner, meshes.uv).astype(np.float32),
-        meshes.mesh[first],
-        faces,
+        middle[groups.cluster[shape.place[groups.first]]].astype(np.float32),
+        _means(groups.corner, meshes.uv).astype(np.float32),
+        meshes.mesh[groups.first],
+        groups.corner[groups.faces],
     )
 
 
 def _some(meshes: Corners, wanted: np.ndarray) -> Corners:
     """The meshes that are `wanted`, (count,) bool; their numbers stay."""
     faces = meshes.faces[wanted[meshes.mesh[meshes.faces[:, 0]]]]
-    used, faces = np.unique(faces, return_inverse=True)
-    return Corners(meshes.xyz[used], meshes.uv[used], meshes.mesh[used], faces.reshape(-1, 3))
+    used = np.zeros(len(meshes.xyz), bool)
+    used[faces] = True
+    return Corners(meshes.xyz[used], meshes.uv[used], meshes.mesh[used], (np.cumsum(used) - 1)[faces])
 
 
 def _surface(meshes: Corners, count: int) -> np.ndarray:
     """(count,) square metres."""
-    a, b, c = meshes.xyz[meshes.faces].astype(float).swapaxes(0, 1)
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    return np.bincount(meshes.mesh[meshes.faces[:, 0]], areas, count)
+    x, y, z = normals(meshes.xyz, meshes.faces)
+    return np.bincount(meshes.mesh[meshes.faces[:, 0]], np.sqrt(x * x + y * y + z * z) / 2, count)
+
+
+def normals(xyz: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, y and z, (m,) float64 each, of the normals of triangles `faces` (m, 3), as long as twice their areas."""
+    a, b, c = (np.ascontiguousarray(f) for f in faces.T)
+    one, two = [], []
+    for line in xyz.T.astype(float):
+        start = line[a]
+        one.append(line[b] - start)
+        two.append(line[c] - start)
+    (ux, uy, uz), (vx, vy, vz) = one, two
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
 
 
 def _means(group: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -301,9 +301,13 @@ def _arranged(
 
 def _facing(xyz: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(m, 4) float32, of which the product with a point (x, y, z, 1) is positive where a triangle is seen from."""
-    a, b, c = xyz[triangles].astype(float).swapaxes(0, 1)
-    normals = np.cross(b - a, c - a)
-    return np.concatenate([normals, -np.einsum("ij,ij->i", normals, a)[:, None]], axis=1).astype(np.float32)
+    planes = np.empty((len(triangles), 4), np.float32)
+    first, away = triangles[:, 0], np.zeros(len(triangles))
+    for k, n in enumerate(coarser.normals(xyz, triangles)):
+        planes[:, k] = n
+        away -= n * xyz[first, k]
+    planes[:, 3] = away
+    return planes
 
 
 def _upload_corners(array: int, buffers: Sequence[int], corners: np.ndarray) -> None:
