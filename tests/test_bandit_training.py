@@ -230,7 +230,7 @@ def test_padding_changes_nothing():
 
 
 def word_by_word(network: EncoderDecoder, source: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
-    """What `read` computes, by `step` and automatic differentiation."""
+    """What `read` computes, by `step` with all sentences to the end."""
     encoded, now = network.encode(source)
     before, outputs = torch.cat([torch.full_like(target[:, :1], END_NUMBER), target[:, :-1]], 1), []
     for words in before.unbind(1):
@@ -239,7 +239,7 @@ def word_by_word(network: EncoderDecoder, source: torch.Tensor, target: torch.Te
     return torch.stack(outputs, 1)
 
 
-def test_the_gradient_by_hand_is_the_automatic_one():
+def test_known_words_are_read_as_they_are_one_by_one():
     network = networks()[0].body.double()
     with torch.no_grad():
         for p in network.parameters():
@@ -247,9 +247,9 @@ def test_the_gradient_by_hand_is_the_automatic_one():
     source, target = padded(SOURCE), padded([[7, 2], [3, 3, 3, 4, 2], [5, 6, 2]])
     weights = torch.from_numpy(stream(0, "w").normal(size=(3, 5, 16)))
     found = []
-    by_hand, places = network.read(source, target)
+    read, places = network.read(source, target)
     assert sorted(places.tolist()) == (target.flatten() != PAD_NUMBER).nonzero()[:, 0].tolist()
-    for outputs in (by_hand, word_by_word(network, source, target).flatten(0, 1)[places]):
+    for outputs in (read, word_by_word(network, source, target).flatten(0, 1)[places]):
         network.zero_grad()
         (outputs * weights.flatten(0, 1)[places]).sum().backward()
         found.append((outputs.detach(), {n: p.grad.clone() for n, p in network.named_parameters()}))

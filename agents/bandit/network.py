@@ -12,7 +12,6 @@ from typing import TypeVar
 import torch
 from torch import Tensor, nn
 
-from agents.bandit.decoder import Outputs, packing
 from agents.bandit.words import END_NUMBER, PAD_NUMBER
 
 Network = TypeVar("Network", bound=nn.Module)
@@ -31,7 +30,7 @@ class EncodedSentences:
     mask: Tensor
     """(B, S) bool, False on padding."""
 
-    def select(self, rows: Tensor) -> EncodedSentences:
+    def select(self, rows: Tensor | slice) -> EncodedSentences:
         return EncodedSentences(self.states[rows], self.keys[rows], self.mask[rows])
 
 
@@ -45,7 +44,7 @@ class Decoding:
     output: Tensor
     """(B, h) h^dec, fed into the next step."""
 
-    def select(self, rows: Tensor) -> Decoding:
+    def select(self, rows: Tensor | slice) -> Decoding:
         return Decoding(self.hidden[rows], self.cell[rows], self.output[rows])
 
 
@@ -92,13 +91,23 @@ class EncoderDecoder(nn.Module):
         Returns:
           (N, h) of the N words, and (N,) their places in the flat (B, T).
         """
-        packed = packing(target != PAD_NUMBER)
+        known = target != PAD_NUMBER
+        order = known.sum(1).argsort(descending=True, stable=True)
+        step, rank = known[order].t().nonzero(as_tuple=True)
+        places = (
+            order[rank] * target.shape[1] + step
+        )  # all first words, then all second ones, the longest sentence first
         encoded, now = self.encode(source)
+        encoded, now = encoded.select(order), now.select(order)
         begin = torch.full_like(target[:, :1], END_NUMBER)
-        gates = self.word_before(torch.cat([begin, target[:, :-1]], 1).flatten()[packed.places])
-        weights = self.gates.weight, self.combine.weight
-        given = gates, encoded.states, encoded.keys, now.hidden, now.cell
-        return Outputs.apply(packed, encoded.mask, *given, *weights), packed.places
+        before = torch.cat([begin, target[:, :-1]], 1).flatten()[places]
+        outputs = []
+        for gates in self.word_before(before).split(known.sum(0).tolist()):
+            going = slice(len(gates))  # nothing is computed behind a sentence's end: samples differ much in length
+            encoded, now = encoded.select(going), now.select(going)
+            now = self.step(encoded, now, gates)
+            outputs.append(now.output)
+        return torch.cat(outputs), places
 
 
 class Translator(nn.Module):
