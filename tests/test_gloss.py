@@ -11,7 +11,8 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from assets.records import Finish
-from embodied.light.tracing.rays import embree_among, mitsuba_among, rays_among
+from embodied.light.in_numpy import embree
+from embodied.light.tracing.rays import mitsuba_among, rays_among
 from embodied.render import gloss
 from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
@@ -191,10 +192,10 @@ def test_sheer_curtains_and_hidden_panes_mirror_nothing():
     assert not night_window(night_at=1.0).any()
 
 
-@pytest.mark.parametrize("among", [embree_among, mitsuba_among])
+@pytest.mark.parametrize("among", [embree, mitsuba_among])
 def test_rays_meet_what_geometry_says(among):
     """Against all triangles in turn (Moeller and Trumbore 1997)."""
-    if among is embree_among:
+    if among is embree:
         pytest.importorskip("embreex")
     rng = np.random.default_rng(3)
     corners = (rng.uniform(-2, 2, (60, 1, 3)) + rng.uniform(-0.7, 0.7, (60, 3, 3))).astype(np.float32)

@@ -198,7 +198,7 @@ class Found:
 
 Met: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 """Triangle that each of k rays meets first, -1 for none, how far away, and where on it: (k,) each."""
-Meet: TypeAlias = Callable[[np.ndarray, np.ndarray, np.ndarray], Met]
+Meet: TypeAlias = Callable[..., Met]
 """From origins and directions (k, 3) and how far to look (k,) to what is met."""
 
 
@@ -227,7 +227,8 @@ class Triangles:
 
 
 def embree(corners: np.ndarray) -> Meet | None:
-    """Embree's rays among triangles (m, 3, 3); None where it is not installed."""
+    """Embree's rays among triangles (m, 3, 3), on the thread that asks and as far as there is anything where `far` is
+    left out; None where it is not installed."""
     if importlib.util.find_spec("embreex") is None:
         return None
     from embreex import mesh_construction, rtcore_scene  # late: not for every machine
@@ -235,8 +236,9 @@ def embree(corners: np.ndarray) -> Meet | None:
     scene = rtcore_scene.EmbreeScene()
     mesh_construction.TriangleMesh(scene, np.ascontiguousarray(corners, np.float32))
 
-    def meet(o: np.ndarray, d: np.ndarray, far: np.ndarray) -> Met:
-        found = scene.run(o, d, dists=far, output=1)
+    def meet(o: np.ndarray, d: np.ndarray, far: np.ndarray | None = None) -> Met:
+        single = (np.ascontiguousarray(a, np.float32) for a in (o, d))
+        found = scene.run(*single, dists=far, output=1)
         return found["primID"], found["tfar"], found["u"], found["v"]
 
     return meet

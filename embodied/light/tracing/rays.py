@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.light.backend import drjit, mitsuba, scene_of, vector
+from embodied.light.in_numpy import embree
 
 if TYPE_CHECKING:
     from embodied.render.gloss import Rays
@@ -18,25 +18,11 @@ def rays_among(corners: np.ndarray) -> Rays:
 
     Mitsuba is as quick, but its threads wait awake for more work, a third of the processor time of a picture.
     """
-    return embree_among(corners) if importlib.util.find_spec("embreex") else mitsuba_among(corners)
-
-
-def embree_among(corners: np.ndarray) -> Rays:
-    """Rays among triangles by Embree itself, on the thread that asks."""
-    from embreex import mesh_construction, rtcore_scene  # late: not for every machine
-
-    scene = rtcore_scene.EmbreeScene()
-    mesh_construction.TriangleMesh(scene, np.ascontiguousarray(corners, np.float32))
-
-    def first(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        found = scene.run(np.ascontiguousarray(start, np.float32), np.ascontiguousarray(onward, np.float32), output=1)
-        return found["primID"], found["tfar"], found["u"], found["v"]
-
-    return first
+    return embree(corners) or mitsuba_among(corners)
 
 
 def mitsuba_among(corners: np.ndarray) -> Rays:
-    """The same by what bakes the light, on all cores."""
+    """Rays among triangles by what bakes the light, on all cores."""
     scene, mi, dr = scene_of(corners), mitsuba(), drjit()
 
     def first(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
