@@ -34,15 +34,15 @@ quick: setup
 	@.venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist worksteal
 
 docs: setup
-	@.venv/bin/python -c 'import material, mkdocstrings' 2>/dev/null || .venv/bin/python -m pip install -q -c constraints.txt -e '.[docs]'
 	@.venv/bin/python docs/build_results.py
 	@.venv/bin/python docs/build_reference.py
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict -q
 
 browser:
 	@command -v chromium >/dev/null && command -v caddy >/dev/null || { as=$$([ "$$(id -u)" = 0 ] || echo 'sudo -n'); \
-	  $$as apt-get update -qq && $$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-	  chromium caddy fonts-dejavu-core >/dev/null; } || echo 'note: no Chromium or Caddy here; their tests are skipped'
+	  get="$$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium caddy fonts-dejavu-core"; \
+	  $$get >/dev/null 2>&1 || { $$as apt-get update -qq && $$get >/dev/null; }; } \
+	  || echo 'note: no Chromium or Caddy here; their tests are skipped'
 
 page:
 	@cd web && npm ci --no-audit --no-fund && npm run build
