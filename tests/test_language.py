@@ -12,7 +12,9 @@ import pytest
 from agents.common.more_paths import said_by
 from assets.catalogue import load_catalogue
 from embodied.assistants.route_system import RouteConfig, sampled_paths
-from embodied.generate import HouseConfig, generate_house
+from embodied.datasets.build import make_dataset_house
+from embodied.generate import HouseConfig
+from embodied.gym.playground import AREA
 from embodied.interface import Route
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
 from embodied.language.grammar import NOVEL_WORDS, Phrase, kind_of, normalised, parse, say
@@ -41,8 +43,8 @@ def lexicon():
 @pytest.fixture(scope="module")
 def world(shared_cache):
     catalogue = load_catalogue(shared_cache)
-    house = generate_house(8, HouseConfig(area=(90.0, 110.0)), catalogue)
-    with open_world(house, catalogue, catalogue.cache) as world:
+    house, graph = make_dataset_house(0, "flat_0", HouseConfig(area=AREA), catalogue)  # that of Gymnasium's seed 0
+    with open_world(house, catalogue, catalogue.cache, graph=graph) as world:
         yield world
 
 

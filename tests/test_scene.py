@@ -125,7 +125,7 @@ class Unpainted:
 def test_a_generated_flat_stays_put_for_a_second(shared_cache):
     assert find_packs(), "the furniture packs are missing: apt-get install sweethome3d-furniture"
     catalogue = load_catalogue(shared_cache)
-    house = generate_house(5, HouseConfig(area=(38.0, 48.0)), catalogue)
+    house = generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue)  # the README's
     s = scene.compile_scene(house, Unpainted(catalogue), free=scene.loose(house, catalogue))
     moved = np.array(list(displacements(s).values()))
     assert len(moved) > 25
