@@ -18,6 +18,7 @@ from handmade import box_mesh
 
 from assets.records import Finish
 from embodied.bench.light import psnr, ssim
+from embodied.geometry import r2
 from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, backend, in_numpy, settings_of
 from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, scene_of, threads_allowed, variant_of
@@ -157,6 +158,15 @@ def test_bright_spots_are_tamed_without_loss_of_light():
     tamed = solve._tamed(lux, seen)
     assert tamed.max() < 55.0
     assert (tamed * lux.area[:, None]).sum() == pytest.approx((seen * lux.area[:, None]).sum(), rel=1e-4)
+
+
+@pytest.mark.parametrize("corner", [0, 3 * 128 + 100, 71 * 128 + 55])
+def test_samples_of_five_by_five_luxels_lie_evenly(corner):
+    window = corner + (np.arange(5)[:, None] * 128 + np.arange(5)).ravel()
+    turn = radiosity.woven(window, 128, 16)
+    x, y = ((t[:, None] + a % 1.0).ravel() % 1.0 for t, a in zip(turn, r2(np.arange(16) + 1), strict=True))
+    found = np.histogram2d(x, y, 5, ((0, 1), (0, 1)))[0]
+    assert found.sum() == 400 and found.min() >= 12 and found.max() <= 19
 
 
 def test_pixels_left_out_do_not_count_in_the_bench():

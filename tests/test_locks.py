@@ -17,7 +17,7 @@ import pytest
 from conftest import two_rooms
 from hand_data import built, content
 
-from assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes
+from assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes, write_files
 from embodied import cli
 from embodied.errors import UnableError
 from embodied.locks import LOCK, LockedError, locked
@@ -114,6 +114,16 @@ def test_what_a_killed_process_left_is_swept_and_what_others_write_or_own_stays(
         temporary.write_text("")
         assert temporary.exists(), "a draft that somebody writes stays"
     assert swept and set(tmp_path.rglob("*")) == mine - swept | {tmp_path / "b.json", tmp_path / "live"}
+
+
+def test_files_written_together_leave_nothing_unfinished_and_errors_name_theirs(tmp_path):
+    write_files(tmp_path / "house", {"a.json": b"{}", "b.npz": b"12"})
+    (tmp_path / "house" / "c").mkdir()
+    with pytest.raises(OSError) as error:
+        write_files(tmp_path / "house", {"b.npz": b"34", "c": b"56"})
+    assert Path(error.value.filename) == tmp_path / "house" / "c"
+    assert {p.name for p in (tmp_path / "house").iterdir()} == {"a.json", "b.npz", "c"}
+    assert (tmp_path / "house" / "b.npz").read_bytes() == b"34"
 
 
 def test_a_copy_of_what_was_killed_is_nobodys_draft(tmp_path):

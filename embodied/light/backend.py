@@ -207,6 +207,11 @@ def array(v: Array) -> np.ndarray:
     return np.ascontiguousarray(np.stack([np.asarray(v[k]) for k in range(3)], axis=-1), np.float32)
 
 
+def brightness(e: np.ndarray) -> np.ndarray:
+    """(n,) float32 means of (n, 3) light."""
+    return np.asarray(e, np.float32) @ np.full(3, 1 / 3, np.float32)
+
+
 def constant(x: float) -> Array:
     """A number that kernels read as data, so that changing it compiles nothing anew."""
     return drjit().opaque(mitsuba().Float, float(x))

@@ -33,9 +33,9 @@ class Settings:
     """Luxels per metre on walls, floors and ceilings."""
     budget: float = 4000.0
     """Luxels per piece of furniture."""
-    sky_rays: int = 12
+    sky_rays: int = 10
     """Rays per luxel and window."""
-    lamp_rays: int = 12
+    lamp_rays: int = 10
     other_rays: int = 24
     """Rays per luxel outdoors; of what metals mirror, as `compose` says."""
     sun_rays: int = 12
@@ -44,7 +44,7 @@ class Settings:
     """Small lights that stand for the sun's patches in one room."""
     bounce_rays: int = 4
     """Rays per luxel that carry light from bounce to bounce."""
-    seen_rays: int = 20
+    seen_rays: int = 16
     """Rays per luxel, those among them, that gather what is seen."""
     sharpness: float = 1.0
     """Texels per metre, times those that patterns need to look sharp from nearby (`atlas.fineness`)."""

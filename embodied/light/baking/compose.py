@@ -17,6 +17,7 @@ from embodied.light.arrays import Array, RayScene
 from embodied.light.backend import (
     added_up,
     array,
+    brightness,
     constant,
     drjit,
     flags,
@@ -38,12 +39,12 @@ from embodied.light.settings import Settings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, portals_of
 from embodied.light.tracing.luxels import AMBIENT, Luxels, glow_of
-from embodied.light.tracing.radiosity import Space, points_of
+from embodied.light.tracing.radiosity import Space, points_of, woven
 from embodied.light.tracing.sky import Outdoors
 
 METAL = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
-DULL, SHARP_RAYS, DULL_RAYS = 0.1, 1 / 3, 4
+DULL, SHARP_RAYS, DULL_RAYS = 0.1, 1 / 3, 2
 """Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left;
 and the rays of sharp metals per texel and of dull ones per luxel, times the settings' `other_rays`."""
 AROUND = 0.15
@@ -111,7 +112,7 @@ class Composer:
         radiance of all luxels cut to that, on the device."""
         lux, light = self.solved.lux, self.solved.light
         seen = lux.albedo * (light.soft + light.sun[:, None] * self.sun) + lux.glow
-        bright = float(np.percentile(seen.mean(1), 95))
+        bright = float(np.percentile(brightness(seen), 95))
         sharp, dull = ((most * bright, floats(np.minimum(seen, most * bright))) for most in (8.0, 3.0))
         return sharp, dull
 
@@ -253,21 +254,28 @@ def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirror
     blurred, sharp = np.zeros((*coarse.shape, 3), np.float32), np.zeros((len(c.index), 3), np.float32)
     if len(i := np.nonzero((dull & (metal > 0))[coarse.face])[0]):
         around = coarse.position[i], coarse.normal[i], coarse.face_normal[i]
-        seen = _mirrored(composer, page, coarse.face[i], around, rough[coarse.face[i]], dull=True)
+        turn = woven(coarse.index[i], coarse.shape[1], _rays(composer, dull=True))
+        seen = _mirrored(composer, page, coarse.face[i], around, rough[coarse.face[i]], turn)
         blurred = spread(coarse.index[i], evened(seen, coarse.index[i], coarse.shape), coarse.shape)
     if len(i := np.nonzero((~dull & (metal > 0))[c.face])[0]):
-        sharp[i] = _mirrored(composer, page, c.face[i], surface(page, c, i), rough[c.face[i]], dull=False)
+        sharp[i] = _mirrored(composer, page, c.face[i], surface(page, c, i), rough[c.face[i]])
     tint = np.where((metal > 0) & (rough < 0.02), 0.85, 0.0).astype(np.float32)
     return floats(metal), floats(tint), flags(dull), mi.Color3f(vector(sharp)), blurred
 
 
 def _mirrored(
-    composer: Composer, page: Page, face: np.ndarray, surfaces: Sequence[np.ndarray], rough: np.ndarray, *, dull: bool
+    composer: Composer,
+    page: Page,
+    face: np.ndarray,
+    surfaces: Sequence[np.ndarray],
+    rough: np.ndarray,
+    turn: np.ndarray | None = None,
 ) -> np.ndarray:
     """(k, 3) radiance that k places of one page mirror, all of them dull or none.
 
     Args:
       face: (k,) of the page. surfaces: position, normal and face normal, (k, 3) each. rough: (k,).
+      turn: (2, k) of the samples at dull ones; None for sharp ones.
     """
     mi, dr = mitsuba(), drjit()
     house, atlas, space = composer.solved.house, composer.solved.atlas, composer.space
@@ -280,8 +288,9 @@ def _mirrored(
     normal = normal * np.where(page.thin[face][:, None], side, 1.0)
     cos = (normal * to_eye).sum(1, keepdims=True)
     bounced = np.where(cos > 0.05, 2 * cos * normal - to_eye, normal)
-    p = points_of(position, normal, normal, np.zeros(len(face), bool))
-    rays = max(round((DULL_RAYS if dull else SHARP_RAYS) * composer.settings.other_rays), 1)
+    p = points_of(position, normal, normal, np.zeros(len(face), bool), turn)
+    dull = turn is not None
+    rays = _rays(composer, dull=dull)
     width = np.square(rough) + AROUND * dull
     limit, table = composer.seen[dull]
     spread_of, straight = floats(width), vector(bounced)
@@ -295,6 +304,11 @@ def _mirrored(
         return (dr.select(hit, near, radiosity.env_lookup(space, d, ~hit) * radiosity.GLASS),)
 
     return np.minimum(array(added_up(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays, limit)
+
+
+def _rays(composer: Composer, *, dull: bool) -> int:
+    """Rays for each place that mirrors."""
+    return max(round((DULL_RAYS if dull else SHARP_RAYS) * composer.settings.other_rays), 1)
 
 
 def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

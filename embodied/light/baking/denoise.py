@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from embodied.light.arrays import Array
-from embodied.light.backend import array, constant, drjit, floats, mitsuba, signed, vector
+from embodied.light.backend import array, brightness, constant, drjit, floats, mitsuba, signed, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels
 
@@ -73,7 +73,7 @@ NOISES = 1.8
 def spatial_variance(e: np.ndarray, grid: Grid) -> np.ndarray:
     """(n,) variance of brightness among the 25 luxels around: noise where nothing else is known of it."""
     mi, dr = mitsuba(), drjit()
-    values = floats(e.mean(1))
+    values = floats(brightness(e))
     mean, square, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
         v = dr.gather(mi.Float, values, q, inside)
@@ -91,7 +91,7 @@ def _relative_noise(grid: Grid, e: np.ndarray, variance: np.ndarray) -> tuple[np
     all missed is no shadow.
     """
     mi, dr = mitsuba(), drjit()
-    values, squares = floats(e.mean(1)), floats(variance)
+    values, squares = floats(brightness(e)), floats(variance)
     mean, spread, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
         mean += dr.gather(mi.Float, values, q, inside)

@@ -323,7 +323,9 @@ def solve_house(
     clock("direct")
     rows = len(outdoors.picture)
     outside = np.median(outdoors.picture[rows * 300 // 1024 : rows * 540 // 1024].reshape(-1, 3), axis=0)
-    exposure = expose(house, _light_of_rooms(house, atlas, lux, light), outside)
+    light_of_rooms = _light_of_rooms(house, atlas, lux, light)
+    _warn_of_darkness(house, light_of_rooms)
+    exposure = expose(house, light_of_rooms, outside)
     return Solved(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
 
 
@@ -334,9 +336,6 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     start, used = time.perf_counter(), time.process_time()
     s = solve_house(house, shared, settings, folder, progress=progress, took=took)
     clock = _Clock(took)
-    dark = [r.id for r, g in zip(house.rooms, _levels(s)) if g < tone.DARKEST]
-    if dark and house.sky.hour > 8 and house.sky.hour < 17:
-        warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
     error = check(s, settings.tolerance)
     clock("check")
     composer = Composer(s, settings, shared.maps, shared.memory)
@@ -409,9 +408,11 @@ def brightest(e: np.ndarray) -> np.ndarray:
     return np.exp(np.log(np.maximum(tail, 1e-9)).mean(axis=0))
 
 
-def _levels(s: Solved) -> list[float]:
-    light = _light_of_rooms(s.house, s.atlas, s.lux, s.light)
-    return [float(light[r.id] @ [0.2126, 0.7152, 0.0722]) for r in s.house.rooms]
+def _warn_of_darkness(house: House, light: dict[str, np.ndarray]) -> None:
+    """Tell of rooms that are dark by day. `light`: of every room, as `_light_of_rooms` has it."""
+    dark = [r.id for r in house.rooms if light[r.id] @ [0.2126, 0.7152, 0.0722] < tone.DARKEST]
+    if dark and 8 < house.sky.hour < 17:
+        warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
 
 
 def _probes(s: Solved) -> dict[str, list]:

@@ -12,19 +12,21 @@ from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.house.shapes import inward
 from embodied.light.arrays import Array
-from embodied.light.backend import added_up, array, drjit, floats, fraction, mitsuba
+from embodied.light.backend import added_up, array, brightness, drjit, floats, fraction, mitsuba
 from embodied.light.baking import denoise
 from embodied.light.memory import Memory, once
 from embodied.light.pages.atlas import Atlas
 from embodied.light.settings import Settings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, Portal, portals_of
-from embodied.light.tracing.luxels import AMBIENT, Luxels, subset
+from embodied.light.tracing.luxels import AMBIENT, Luxels, points
 from embodied.light.tracing.radiosity import Met, Patches, Points, Space
 from embodied.light.tracing.sky import Outdoors
 
 SPARKS = 0.01
 """Share of a room's light that may be lost to keep its brightest spots from sparkling."""
+TRIES = 300
+"""Luxels of every room and opening that are asked whether a light reaches them."""
 ROUNDS = 3
 """Of gathering along the same rays, before what is seen is gathered."""
 
@@ -65,12 +67,12 @@ class Problem:
     """Where the house is lit more than once."""
     without: Mapping[str, Space] = field(default_factory=dict)
     """What the shadow rays of a bare bulb meet, by the owner that the bulb hangs in."""
+    _own: Memory = field(default_factory=Memory)
 
     @functools.cached_property
     def points(self) -> Points:
         """All luxels on the device."""
-        every = np.arange(len(self.lux.position))
-        return once(self.memory, "points", lambda: subset(self.lux, every))
+        return once(self.memory, "points", lambda: points(self.lux, self.settings.seen_rays))
 
     @functools.cached_property
     def near(self) -> Met:
@@ -88,12 +90,23 @@ class Problem:
         first, last = self.settings.bounce_rays, self.settings.seen_rays
         return once(self.memory, "far", lambda: radiosity.meet(self.space, self.at(self.free), last - first, first))
 
-    def reached(self, sees: Callable[[np.ndarray], np.ndarray], tries: int = 300) -> np.ndarray:
-        """Numbers of the luxels that may be seen and that a light may reach; `sees` as in `radiosity.reached`."""
-        free = self.free
+    def reached(self, sees: Callable[[np.ndarray], np.ndarray], tries: int = TRIES) -> np.ndarray:
+        """Numbers of the luxels that may be seen and that a light may reach.
+
+        Args:
+          sees: from luxel numbers (k,) to whether each is reached, (k,) bool.
+          tries: luxels of every room and opening that are asked.
+        """
+        free, units = self.free, self._units
         if not len(free):
             return free
-        return free[radiosity.reached(self.lux.unit[free], lambda i: sees(free[i]), tries=tries)]
+        some = (self.memory or self._own).once(("tried", tries), lambda: radiosity.tried(units, tries))
+        return free[radiosity.reached(units, some, sees(free[some]))]
+
+    @functools.cached_property
+    def _units(self) -> np.ndarray:
+        """Of the luxels `free`."""
+        return self.lux.unit[self.free].astype(np.int16)  # which are sorted ten times as fast
 
     def at(self, luxels: np.ndarray) -> Points:
         """Some luxels on the device, by their numbers."""
@@ -232,7 +245,7 @@ def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 def _patches(lux: Luxels, flux: np.ndarray, mine: np.ndarray, most: int) -> Patches | None:
     """At most so many small lights for the sunlit luxels `mine` of one room; None for a glint."""
-    power = flux.mean(1)
+    power = brightness(flux)
     at = np.round(lux.position[mine] * 4)
     mine = mine[np.lexsort((at[:, 0], at[:, 1], at[:, 2]))]
     cut = np.cumsum(power[mine])
@@ -285,7 +298,7 @@ def bounce(problem: Problem, soft: np.ndarray, tell: Callable[[float], None]) ->
             all_[free] += more
         rays[free] += problem.far.rays
     e = total / rays[:, None]
-    variance = np.maximum(square / rays - e.mean(1) ** 2, 0.0) / np.maximum(rays - 1, 1)
+    variance = np.maximum(square / rays - brightness(e) ** 2, 0.0) / np.maximum(rays - 1, 1)
     return Bounced(e, bad < 0.5 * rays, variance)
 
 
@@ -293,15 +306,16 @@ def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     """Radiosity cut, room by room, where at most `SPARKS` of the room's light is lost by it: what is smaller
     than a hand beside a bulb would show as sparks on far walls, one ray in hundreds. What was cut is shared out
     over the room, or every bounce would lose it anew."""
-    y = seen.mean(1)
-    out = np.array(seen, np.float32)
-    for unit in np.unique(lux.unit):
-        mine = np.nonzero(lux.unit == unit)[0]
-        most = max(_most(y[mine], lux.area[mine]), 1e-9)
-        out[mine] *= np.minimum(1.0, most / np.maximum(y[mine], 1e-9))[:, None]
-        before, after = ((a[mine] * lux.area[mine, None]).sum(0) for a in (seen, out))
-        out[mine] *= before / np.maximum(after, 1e-12)
-    return out
+    y, units = brightness(seen), lux.unit.astype(np.int16)  # which are sorted ten times as fast
+    order = np.argsort(units, kind="stable")
+    first = np.flatnonzero(np.diff(units[order], prepend=-1))
+    most = np.zeros(int(units.max(initial=0)) + 1, np.float32)
+    for mine in np.split(order, first[1:]):
+        most[units[mine[:1]]] = max(_most(y[mine], lux.area[mine]), 1e-9)
+    out = seen * np.minimum(1.0, most[units] / np.maximum(y, 1e-9))[:, None]
+    before, after = ([np.bincount(units, c * lux.area, len(most)) for c in a.T] for a in (seen, out))
+    scale = np.transpose([b / np.maximum(a, 1e-12) for b, a in zip(before, after, strict=True)])
+    return (out * scale.astype(np.float32)[units]).astype(np.float32, copy=False)
 
 
 def _most(y: np.ndarray, area: np.ndarray) -> float:

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from assets.archives import open_arrays, read_picture
-from assets.cache import write_bytes
+from assets.cache import write_bytes, write_files
 from assets.json_file import read_json
 from embodied.house.house import House
 from embodied.light.backend import LightError, warn
@@ -155,10 +155,13 @@ def write_page(folder: Path, i: int, page: Ingredients, quality: int, memory: Me
     """Page i: light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of
     `quality`."""
     light, sun, shown, picture = page_files(i)
-    write_bytes(folder / light, packed({"soft": page.soft, "glow": page.glow}))
-    write_bytes(folder / sun, cv2.imencode(".png", page.sun)[1].tobytes())
-    write_bytes(folder / shown, once(memory, ("colours", i), lambda: _jpeg(page.albedo, quality)))
-    write_jpeg(folder / picture, page.picture, quality)
+    files = {
+        light: packed({"soft": page.soft, "glow": page.glow}),
+        sun: cv2.imencode(".png", page.sun)[1].tobytes(),
+        shown: once(memory, ("colours", i), lambda: _jpeg(page.albedo, quality)),
+        picture: _jpeg(page.picture, quality),
+    }
+    write_files(folder, files)
 
 
 def write_jpeg(path: Path, picture: np.ndarray, quality: int) -> None:
@@ -167,7 +170,9 @@ def write_jpeg(path: Path, picture: np.ndarray, quality: int) -> None:
 
 
 def _jpeg(picture: np.ndarray, quality: int) -> bytes:
-    data = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    data = cv2.imencode(
+        ".jpg", cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality]
+    )[1]
     return data.tobytes()
 
 

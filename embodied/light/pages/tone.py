@@ -79,24 +79,35 @@ class Exposure:
     @functools.cached_property
     def _grid(self) -> tuple[np.ndarray, np.ndarray]:
         """Log gains (3, nx, ny, nz) on a grid of `CELL` over the house, and its lowest corner."""
-        corners = np.array([c for p in self.polygons for c in p])
-        low = np.array([*(corners.min(0) - 1.0), self.levels[:, 0].min() - 1.0])
-        high = np.array([*(corners.max(0) + 1.0), self.levels[:, 1].max() + 1.0])
-        n = np.ceil((high - low) / CELL).astype(int) + 1
-        x, y, z = (low[k] + np.arange(n[k]) * CELL[k] for k in range(3))
-        points = shapely.points(*np.meshgrid(x, y, indexing="ij"))
-        log, weight = np.zeros((3, *n)), np.zeros(n)
-        for polygon, (bottom, top), gain in zip(self.polygons, self.levels, self.gains):
-            flat = shapely.distance(shapely.Polygon(polygon), points)[..., None]
-            off = np.maximum(np.maximum(bottom - z, z - top), 0.0)
-            w = np.exp(-0.5 * (flat**2 + off**2) / BLEND**2) + 1e-12
+        weights, low = _weights(self.polygons, tuple(map(tuple, self.levels.tolist())))
+        log = np.zeros((3, *weights[0].shape))
+        for w, gain in zip(weights, self.gains, strict=True):
             log += w * np.log(gain)[:, None, None, None]
-            weight += w
-        return (log / weight).astype(np.float32), low
+        return (log / np.sum(weights, axis=0)).astype(np.float32), low
 
 
 CELL = np.array([0.1, 0.1, 0.4])
 """Spacing of the gain grid, metres."""
+
+
+@functools.lru_cache(maxsize=1)
+def _weights(
+    polygons: tuple[tuple[tuple[float, float], ...], ...], levels: tuple[tuple[float, float], ...]
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """How much each room's gain counts, (nx, ny, nz) on a grid of `CELL` over the house, and the grid's lowest corner;
+    the same in every light."""
+    corners, heights = np.array([c for p in polygons for c in p]), np.array(levels)
+    low = np.array([*(corners.min(0) - 1.0), heights[:, 0].min() - 1.0])
+    high = np.array([*(corners.max(0) + 1.0), heights[:, 1].max() + 1.0])
+    n = np.ceil((high - low) / CELL).astype(int) + 1
+    x, y, z = (low[k] + np.arange(n[k]) * CELL[k] for k in range(3))
+    points = shapely.points(*np.meshgrid(x, y, indexing="ij"))
+    weights = []
+    for polygon, (bottom, top) in zip(polygons, levels, strict=True):
+        flat = shapely.distance(shapely.Polygon(polygon), points)[..., None]
+        off = np.maximum(np.maximum(bottom - z, z - top), 0.0)
+        weights.append(np.exp(-0.5 * (flat**2 + off**2) / BLEND**2) + 1e-12)
+    return weights, low
 
 
 def expose(house: House, light: dict[str, np.ndarray], outside: np.ndarray) -> Exposure:

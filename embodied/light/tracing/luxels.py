@@ -13,7 +13,7 @@ from embodied.light.pages.colours import ColourMaps, albedo
 from embodied.light.pages.cover import Sheet, Texels, rasterise, sheets_of
 from embodied.light.pages.unwrap import areas_of
 from embodied.light.tracing.emitters import Lamp
-from embodied.light.tracing.radiosity import Points, points_of
+from embodied.light.tracing.radiosity import Points, points_of, woven
 
 AMBIENT = np.array([4.5e-4, 5e-4, 6e-4])
 """e that every surface receives besides: starlight and the lamps of the street; no room is ever black."""
@@ -121,3 +121,9 @@ def glow_of(house: House, atlas: Atlas, page: Page, face: np.ndarray, lamps: Seq
 def subset(lux: Luxels, i: np.ndarray) -> Points:
     """Some luxels on the device."""
     return points_of(lux.position[i], lux.normal[i], lux.face_normal[i], lux.thin[i])
+
+
+def points(lux: Luxels, rays: int) -> Points:
+    """All luxels on the device, their samples `woven` for so many rays each."""
+    turn = [woven(t.index, t.shape[1], rays) for t in lux.texels]
+    return points_of(lux.position, lux.normal, lux.face_normal, lux.thin, np.concatenate(turn, axis=1))

@@ -56,11 +56,15 @@ class Points:
 
 
 def points_of(
-    position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, seed: int = 0
+    position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, turn: np.ndarray | None = None
 ) -> Points:
-    """Upload points; all arrays (n, 3) but `thin` (n,)."""
+    """Upload points; all arrays (n, 3) but `thin` (n,).
+
+    Args:
+      turn: (2, n) float32 in [0, 1), random by default.
+    """
     mi, dr = mitsuba(), drjit()
-    turn = np.random.default_rng(seed).random((2, len(position)), np.float32)
+    turn = np.random.default_rng(0).random((2, len(position)), np.float32) if turn is None else turn
     p = Points(
         len(position),
         mi.Point3f(vector(position)),
@@ -72,6 +76,16 @@ def points_of(
     )
     dr.eval(p.position, p.normal, p.face_normal, p.thin, p.turn0, p.turn1)
     return p
+
+
+def woven(index: np.ndarray, width: int, rays: int) -> np.ndarray:
+    """(2, n) float32 turns for the texels at flat positions `index` of a page: any five by five of them have
+    consecutive parts, of `rays` points each, of one R2 sequence, and what is smoothed over them has less noise.
+
+    Source: A. Keller and W. Heidrich, Interleaved sampling (2001).
+    """
+    row, column = np.divmod(index, width)
+    return np.stack([x % 1.0 for x in r2((5.0 * row + column) * rays)]).astype(np.float32)
 
 
 def only(p: Points, which: np.ndarray) -> Points:
@@ -475,22 +489,28 @@ def portal_scene(portals: Sequence[Portal]) -> RayScene:
     return scene_of(np.array(quads))
 
 
-def reached(units: np.ndarray, sees: Callable[[np.ndarray], np.ndarray], *, tries: int = 300) -> np.ndarray:
-    """Which luxels a light may reach: whole units (rooms, openings), left out when no tried luxel of them is reached.
+def tried(units: np.ndarray, tries: int) -> np.ndarray:
+    """Numbers of at most so many luxels of every unit (room, opening), drawn at random.
 
     Args:
       units: (n,) unit number of each luxel.
-      sees: luxel numbers to whether each is reached.
-
-    Returns:
-      Luxel numbers in rising order.
     """
     rng = np.random.default_rng(0)
     order = np.argsort(units, kind="stable")
     groups = np.split(order, np.nonzero(np.diff(units[order]))[0] + 1)
-    tried = [g if len(g) <= tries else rng.choice(g, tries, replace=False) for g in groups]
-    hit = np.split(sees(np.concatenate(tried)), np.cumsum([len(t) for t in tried])[:-1])
-    return np.sort(np.concatenate([g for g, h in zip(groups, hit) if h.any()] or [np.zeros(0, np.int64)]))
+    return np.concatenate([g if len(g) <= tries else rng.choice(g, tries, replace=False) for g in groups])
+
+
+def reached(units: np.ndarray, some: np.ndarray, sees: np.ndarray) -> np.ndarray:
+    """Which luxels a light may reach, in rising order: those of units of which a tried luxel is reached.
+
+    Args:
+      units: (n,) unit number of each luxel.
+      some: (k,) luxels that were `tried`, and (k,) bool whether each `sees` the light.
+    """
+    found = np.zeros(int(units.max(initial=0)) + 1, bool)
+    found[units[some[sees]]] = True
+    return np.flatnonzero(found[units])
 
 
 def facing(p: Points, d: Array) -> Array:
