@@ -92,7 +92,6 @@ def record(
     *,
     eyes: World | None = None,
     pictures: Pictures = Pictures(),
-    with_house: bool = True,
     budget: int | None = None,
 ) -> Iterator[Step]:
     """Pass `steps` on while logging each: put it between a rollout and whoever consumes it.
@@ -104,14 +103,12 @@ def record(
       steps: the steps of one episode as they happen.
       eyes: the world whose panoramas the agent looks at; None for an agent that looks at none.
       pictures: sizes of the pictures.
-      with_house: False when the recording holds the house already.
       budget: requests that the episode allowed; None where they were not counted.
 
     Yields:
       The same steps.
     """
-    if with_house:
-        log_world(recording, world)
+    log_world(recording, world)
     log_task(recording, world, task)
     state, views = Story(task, budget), views_of(world, eyes, pictures)
     if task.kind == "vnla":

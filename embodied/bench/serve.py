@@ -21,6 +21,7 @@ from urllib.parse import urlsplit
 import numpy as np
 import psutil
 
+from embodied.bench.timing import Report
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
 from embodied.datasets.scale import own_size
 from embodied.render.pictures import PictureSettings
@@ -48,12 +49,6 @@ tasks = 1000
 answers = 100000
 per_person = 100000
 """
-
-
-@dataclass(frozen=True)
-class LoadReport:
-    facts: dict[str, object]
-    text: str
 
 
 @dataclass
@@ -160,7 +155,7 @@ def served(study: Path) -> Iterator[tuple[str, str, psutil.Process]]:
 
 def measure(
     out: Path, cache: Path, *, people: int, seconds: float, seed: int, progress: Callable[[str], None]
-) -> LoadReport:
+) -> Report:
     """Build a small study in `out`, serve it, and let people take part."""
     folder = out / "serve"
     config = DatasetConfig("hanna", own_size(1, 40), seed, (80.0, 110.0), people=False)
@@ -178,7 +173,7 @@ def measure(
     return report(times, people, seconds, busy)
 
 
-def report(times: Times, people: int, seconds: float, busy: float) -> LoadReport:
+def report(times: Times, people: int, seconds: float, busy: float) -> Report:
     """Percentiles in milliseconds; `busy`: processor seconds of the server."""
     facts: dict[str, object] = {"people": people, "seconds": seconds, "refused": times.refused, "server busy s": busy}
     lines = [
@@ -189,4 +184,4 @@ def report(times: Times, people: int, seconds: float, busy: float) -> LoadReport
         p50, p95 = (1000 * np.percentile(values, [50, 95])).tolist() if values else (float("nan"),) * 2
         facts |= {name: {"count": len(values), "p50 ms": p50, "p95 ms": p95}}
         lines.append(f"{name:9} {len(values):6} times, p50 {p50:6.1f} ms, p95 {p95:6.1f} ms")
-    return LoadReport(facts, "\n".join(lines))
+    return Report(facts, "\n".join(lines))
