@@ -15,7 +15,7 @@ import uuid
 from pathlib import Path
 
 import numpy as np
-from hand_data import build, small_house
+from hand_data import built, small_house
 from websockets.sync.client import connect
 
 from embodied.render.panorama import Panorama
@@ -27,9 +27,9 @@ HEAD = 'title = "Finding things"\ndata = "data"\nconsent = "I agree."\npractice 
 TOGETHER = '[[parts]]\nname = "together"\ntasks = 3\nper_person = 3\n'
 
 
-def make_data(folder: Path, cache: Path, kind: str = "hanna"):
+def make_data(folder: Path, kind: str = "hanna"):
     """A data set with small painted panoramas in folder/data."""
-    data = build(folder / "data", cache, kind, make_house=small_house)
+    data = built(folder / "data", kind, make_house=small_house)
     pictures = PictureSettings(size=64)
     for name in {n for s in data.splits for n in data.names(s)}:
         place = data.place(name)

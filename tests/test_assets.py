@@ -38,14 +38,9 @@ SOME = (
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture(scope="module")
-def catalogue(cache):
+def catalogue(shared_cache):
     assert find_packs(), "the furniture packs are missing: apt-get install sweethome3d-furniture"
-    return load_catalogue(cache)
+    return load_catalogue(shared_cache)
 
 
 # the reviewed catalogue

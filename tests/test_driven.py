@@ -23,8 +23,8 @@ def place():
 
 
 @pytest.fixture(scope="module")
-def catalogue(tmp_path_factory):
-    return load_catalogue(tmp_path_factory.mktemp("cache"))
+def catalogue(shared_cache):
+    return load_catalogue(shared_cache)
 
 
 @pytest.mark.slow

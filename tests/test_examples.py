@@ -1,45 +1,47 @@
-"""The scripts of examples/ run as a newcomer runs them, and do what they say."""
+"""The scripts of examples/ run from another folder, one of them as a newcomer starts it, and do what they say."""
 
 from __future__ import annotations
 
 import os
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 
 import cv2
 import pytest
+import torch
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"
 
 
-@pytest.fixture(scope="module")
-def flats(tmp_path_factory) -> Path:
-    """Where the data set of an example goes."""
-    return tmp_path_factory.mktemp("examples") / "flats"
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Runs an example in this process, which has loaded its libraries, and returns what it prints."""
+    threads = torch.get_num_threads()
 
+    def example(name: str, *words: str) -> str:
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", [name, *words])
+        runpy.run_path(str(EXAMPLES / name), run_name="__main__")
+        return capsys.readouterr().out
 
-def run(name: str, folder: Path, *words: str) -> str:
-    """What an example prints, run in `folder`."""
-    env = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-    script = [sys.executable, str(EXAMPLES / name), *words]
-    done = subprocess.run(script, cwd=folder, env=env, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr[-2000:]
-    return done.stdout
+    yield example
+    torch.set_num_threads(threads)
 
 
 def test_every_example_is_run_here_and_shown_in_the_readme_of_examples():
     here, listed = Path(__file__).read_text(), (EXAMPLES / "README.md").read_text()
     for script in sorted(EXAMPLES.glob("*.py")):
-        assert f'run("{script.name}"' in here and script.name in listed, script.name
+        assert f'"{script.name}"' in here and script.name in listed, script.name
 
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_generate_and_look_writes_a_plan_and_pictures(tmp_path):
-    said = run("generate_and_look.py", tmp_path, "--out", "look")
+def test_generate_and_look_writes_a_plan_and_pictures(run, tmp_path):
+    said = run("generate_and_look.py", "--out", "look")
     assert "digest" in said
     assert cv2.imread(str(tmp_path / "look" / "panorama.png")).std() > 20
     assert cv2.imread(str(tmp_path / "look" / "view.png")).shape == (480, 640, 3)
@@ -48,23 +50,26 @@ def test_generate_and_look_writes_a_plan_and_pictures(tmp_path):
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_the_gymnasium_loop_hears_help(tmp_path):
-    said = run("gymnasium_loop.py", tmp_path, "--episodes", "2")
+def test_the_gymnasium_loop_hears_help(run):
+    said = run("gymnasium_loop.py", "--episodes", "2")
     assert said.count("“find ") >= 2 and said.count("reward") == 2
 
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path, flats):
-    said = run("dataset_to_torch.py", tmp_path, "--data", str(flats))
-    off, same = map(float, re.search(r"unseen house: (\d+) % off, (\d+) %", said).groups())
+def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path):
+    env = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    script = [sys.executable, str(EXAMPLES / "dataset_to_torch.py"), "--data", "flats"]
+    done = subprocess.run(script, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr[-2000:]
+    off, same = map(float, re.search(r"unseen house: (\d+) % off, (\d+) %", done.stdout).groups())
     assert off < same - 5
 
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(tmp_path):
-    said = run("encode.py", tmp_path, "--pictures", "unlit", "--steps", "40")
+def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(run):
+    said = run("encode.py", "--pictures", "unlit", "--steps", "40")
     assert "40 looks of 192 numbers" in said
     one, two = map(float, re.search(r"one room (\S+), from two rooms (\S+)\n", said).groups())
     assert one > two
@@ -72,10 +77,10 @@ def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(tm
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(tmp_path):
+def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(run, tmp_path):
     pytest.importorskip("stable_baselines3")
     short = ("--pictures", "unlit", "--steps", "256", "--envs", "2", "--rollout", "64", "--judge", "3", "--flats", "1")
-    said = run("ppo_pixels.py", tmp_path, *short, "--out", "ppo")
+    said = run("ppo_pixels.py", *short, "--out", "ppo")
     for where in ("flats it learned in", "flats it never saw"):
         assert re.search(where + r": succeeds in \d+ % \(\d+ to \d+\) of 3 episodes, random walk \d+ %", said)
     assert (tmp_path / "ppo" / "agent.zip").exists()

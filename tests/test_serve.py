@@ -46,8 +46,8 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.fixture(scope="module")
-def data(tmp_path_factory, shared_cache):
-    return make_data(tmp_path_factory.mktemp("study"), shared_cache)
+def data(tmp_path_factory):
+    return make_data(tmp_path_factory.mktemp("study"))
 
 
 class Names:
@@ -494,8 +494,8 @@ def test_what_people_answered_is_what_hannas_assistants_say_in_training(data, tm
     )
 
 
-def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path, shared_cache):
-    data = make_data(tmp_path, shared_cache, "vnla")
+def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path):
+    data = make_data(tmp_path, "vnla")
     task, path = played(data, tmp_path / "people", "over there", far=False)
     words = worded_by_people(tmp_path / "people")
     made = write_people_dataset(data, words, tmp_path / "made")
@@ -510,7 +510,7 @@ def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path, share
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["hanna", "vnla"])
 def test_iliad_and_vnla_train_on_what_people_said(tmp_path, shared_cache, kind):
-    data = make_data(tmp_path, shared_cache, kind)
+    data = make_data(tmp_path, kind)
     played(data, tmp_path / "people", "hop over yonder", far=kind == "hanna")
     noise_features(data)
     people = ["--people", str(tmp_path / "people"), "--data", str(data.folder), "--out", str(tmp_path / "made")]

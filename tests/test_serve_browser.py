@@ -53,9 +53,9 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory, shared_cache):
+def server(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browsed")
-    data = make_data(folder, shared_cache)
+    data = make_data(folder)
     served = Served(write_study(folder, PARTS))
     served.data, served.tasks = data, data.tasks("val_seen")
     yield served

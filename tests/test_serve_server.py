@@ -35,9 +35,9 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, shared_cache):
+def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("served")
-    make_data(folder, shared_cache)
+    make_data(folder)
     return folder
 
 

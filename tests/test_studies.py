@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 import torch
-from hand_data import build, small_house
+from hand_data import built, small_house
 
 from agents.common.weights import load_weights, save_weights
 from agents.studies.engine import check, run_study
@@ -247,7 +247,7 @@ def test_the_worked_example_of_the_docs_is_a_learner_in_under_sixty_lines(tmp_pa
     text = (Path(__file__).parent.parent / "docs/guides/add_a_learner.md").read_text()
     learner, use = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert len((learner + use).splitlines()) < 60
-    data = build(tmp_path / "data", tmp_path / "cache", "find", make_house=small_house)
+    data = built(tmp_path / "data", "find", make_house=small_house)
     space = {"__name__": "worked_example", "DATA": str(data.folder), "OUT": str(tmp_path / "out")}
     sys.modules["worked_example"] = types.ModuleType("worked_example")
     exec(compile("from __future__ import annotations\n" + learner + use, "add_a_learner.md", "exec"), space)
