@@ -8,11 +8,13 @@ no copy.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+Normals: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 CELLS = (0.004, 0.008, 0.016, 0.032)
 """Sides of the cells, metres, each twice the last: what lies in one cell lies in one of every wider kind."""
 KEPT = 0.93
@@ -79,24 +81,29 @@ def copies(meshes: Corners, count: int, wanted: np.ndarray) -> list[Corners]:
     """
     most = np.bincount(meshes.mesh[meshes.faces[:, 0]], minlength=count)
     meshes = _some(meshes, wanted & (most >= FEWEST))
-    shape, surface, made = _shape(meshes), _surface(meshes, count), []
+    across = normals(meshes.xyz, meshes.faces)
+    shape, surface, made = _shape(meshes, across), _surface(meshes, across, count), []
     places, corners = np.arange(len(shape.xyz)), np.arange(len(meshes.xyz))
     groups = _Groups(places, corners, places, corners, meshes.faces)
     for cell in CELLS:
         groups = _clustered(groups, meshes, shape, cell)
         copy = _copy(groups, meshes, shape)
         faces = np.bincount(copy.mesh[copy.faces[:, 0]], minlength=count)
-        good = (faces > 0) & (faces <= WORTH * most) & (_surface(copy, count) >= KEPT * surface)
+        good = (
+            (faces > 0)
+            & (faces <= WORTH * most)
+            & (_surface(copy, normals(copy.xyz, copy.faces), count) >= KEPT * surface)
+        )
         most = np.where(good, faces, most)
         made.append(_some(copy, good))
     return made
 
 
-def _shape(meshes: Corners) -> _Shape:
+def _shape(meshes: Corners, across: Normals) -> _Shape:
     _, first, place = np.unique(_number(meshes.mesh, meshes.xyz.view(np.int32)), return_index=True, return_inverse=True)
     xyz, count = meshes.xyz[first].astype(float), len(first)
     at = place[meshes.faces].ravel()
-    sums = [np.bincount(at, np.repeat(n, 3), count) for n in normals(meshes.xyz, meshes.faces)]
+    sums = [np.bincount(at, np.repeat(n, 3), count) for n in across]
     axis = np.abs(sums).argmax(0)
     facing = 2 * axis + (np.choose(axis, sums) > 0)
     joined = meshes.faces[:, [0, 1]], meshes.faces[:, [1, 2]]
@@ -142,13 +149,13 @@ def _some(meshes: Corners, wanted: np.ndarray) -> Corners:
     return Corners(meshes.xyz[used], meshes.uv[used], meshes.mesh[used], (np.cumsum(used) - 1)[faces])
 
 
-def _surface(meshes: Corners, count: int) -> np.ndarray:
+def _surface(meshes: Corners, across: Normals, count: int) -> np.ndarray:
     """(count,) square metres."""
-    x, y, z = normals(meshes.xyz, meshes.faces)
+    x, y, z = across
     return np.bincount(meshes.mesh[meshes.faces[:, 0]], np.sqrt(x * x + y * y + z * z) / 2, count)
 
 
-def normals(xyz: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def normals(xyz: np.ndarray, faces: np.ndarray) -> Normals:
     """x, y and z, (m,) float64 each, of the normals of triangles `faces` (m, 3), as long as twice their areas."""
     a, b, c = (np.ascontiguousarray(f) for f in faces.T)
     one, two = [], []

@@ -96,13 +96,16 @@ class Bake:
         """
         return np.array(self.manifest["probes"][room], np.float32)
 
+    def albedo(self, page: int) -> np.ndarray:
+        """(h, w, 3) uint8 sRGB of a page's own colours."""
+        return _read_picture(self.folder / page_files(page)[2])
+
     def ingredients(self, page: int) -> Ingredients:
         """One page before exposure."""
         with open_arrays(self.folder / page_files(page)[0]) as z:
             soft, glow = z["soft"], z["glow"]
         sun = _read_picture(self.folder / f"sun_{page:03d}.png", cv2.IMREAD_GRAYSCALE)
-        shown = _read_picture(self.folder / f"albedo_{page:03d}.jpg")
-        return Ingredients(soft, sun, shown, _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
+        return Ingredients(soft, sun, self.albedo(page), _read_picture(self.folder / f"page_{page:03d}.jpg"), glow)
 
 
 def open_bake(folder: Path, house: House) -> Bake:

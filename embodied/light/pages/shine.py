@@ -22,7 +22,7 @@ def shine_of(bake: Bake) -> Shine:
             tint.append(None)
             continue
         if mesh.page not in colours:
-            colours[mesh.page] = bake.ingredients(mesh.page).albedo
+            colours[mesh.page] = bake.albedo(mesh.page)
         picture = colours[mesh.page]
         h, w = picture.shape[:2]
         at = mesh.uv[mesh.faces].mean(1)
