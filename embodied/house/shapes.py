@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -32,9 +33,17 @@ def room_at(house: House, position: Sequence[float] | np.ndarray) -> str | None:
     for room in house.rooms:
         storey = house.storey_of(room)
         level = storey.elevation - 0.3 <= position[2] < storey.elevation + storey.height + 0.3
-        if level and shapely.Polygon(room.polygon).intersects(shapely.Point(position[:2])):
+        if level and shapely.intersects_xy(_floor(room.polygon), position[0], position[1]):
             return room.id
     return None
+
+
+@functools.lru_cache(maxsize=256)
+def _floor(polygon: tuple[tuple[float, float], ...]) -> shapely.Polygon:
+    """A room's, made ready for many questions: every picture asks where its camera is."""
+    floor = shapely.Polygon(polygon)
+    shapely.prepare(floor)
+    return floor
 
 
 def room_union(house: House, storey: int) -> shapely.Geometry:
