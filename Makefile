@@ -22,7 +22,7 @@ demo: setup
 	@.venv/bin/embodied demo --out '$(OUT)' $(if $(SEED),--seed $(SEED))
 
 test: setup
-	@.venv/bin/python -m pytest -q -n 2 --dist worksteal
+	@OMP_NUM_THREADS=1 .venv/bin/python -m pytest -q -n 2 --dist worksteal
 
 lint: setup
 	@.venv/bin/ruff check .
@@ -31,7 +31,7 @@ lint: setup
 	@.venv/bin/mypy
 
 quick: setup
-	@.venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist worksteal
+	@OMP_NUM_THREADS=1 .venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist worksteal
 
 docs: setup
 	@.venv/bin/python docs/build_results.py
