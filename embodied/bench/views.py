@@ -57,7 +57,7 @@ def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Me
 def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], turns: Iterator[float]) -> None:
     """VIEWS level views, so many `turns` of 30 degrees to the left."""
     for turn in itertools.islice(turns, VIEWS):
-        grid = perspective_grid(panorama.size, turn * math.pi / 6, 0.0, VFOV36, *size)
+        grid = perspective_grid(panorama.size, turn * math.pi / 6 % math.tau, 0.0, VFOV36, *size)
         for channel in channels:
             panorama.through(grid, channel)
 
