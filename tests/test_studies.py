@@ -166,7 +166,13 @@ def test_what_other_code_judged_is_judged_again_and_the_check_tells_it(tmp_path)
     archer, out = Archer(tmp_path / "log"), tmp_path / "out"
     body = table(archer, out)
     did(archer)
-    assert check(out) == [f"{out / 'archer-1.json'}: archer-1 belongs to this code"]
+    measured = {**body, "identity": {"judged": body["identity"]["judged"]}, "table": "measured"}  # nothing was trained
+    (out / "measured.json").write_text(json.dumps(measured))
+    assert check(out) == [
+        f"{out / 'archer-1.json'}: archer-1 belongs to this code",
+        f"{out / 'measured.json'}: measured belongs to this code",
+    ]
+    (out / "measured.json").unlink()
     for path in out.rglob("judged/*.json"):
         path.write_text(path.read_text().replace(body["identity"]["judged"]["code"], "0" * 16))
     body["identity"]["judged"]["code"] = "0" * 16
