@@ -214,7 +214,8 @@ def test_two_hundred_environments_that_see_leave_neither_memory_nor_files(drawn)
             gc.collect()
             assert not any(house() for house in houses)
             grown.append((process.memory_info().rss, process.num_fds(), process.num_threads()))
-    assert grown[3][0] - grown[0][0] < 10e6 and grown[3][1:] == grown[0][1:]
+    first, last = grown[0], grown[3]  # files that other tests left open may be closed meanwhile
+    assert last[0] - first[0] < 10e6 and last[1] <= first[1] and last[2] <= first[2]
 
 
 WORKERS = """
