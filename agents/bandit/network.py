@@ -94,9 +94,8 @@ class EncoderDecoder(nn.Module):
         known = target != PAD_NUMBER
         order = known.sum(1).argsort(descending=True, stable=True)
         step, rank = known[order].t().nonzero(as_tuple=True)
-        places = (
-            order[rank] * target.shape[1] + step
-        )  # all first words, then all second ones, the longest sentence first
+        # all first words, then all second ones, the longest sentence first
+        places = order[rank] * target.shape[1] + step
         encoded, now = self.encode(source)
         encoded, now = encoded.select(order), now.select(order)
         begin = torch.full_like(target[:, :1], END_NUMBER)
