@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from agents.common.more_paths import said_by
+from agents.common.more_paths import SaidBy
 from assets.catalogue import load_catalogue
 from embodied.assistants.route_system import RouteConfig, sampled_paths
 from embodied.datasets.build import make_dataset_house
+from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
 from embodied.gym.playground import AREA
 from embodied.interface import Route
@@ -164,17 +164,39 @@ def test_the_same_generator_says_the_same(world, spoken):
     assert said[0] == said[1]
 
 
-def test_instructions_are_said_anew_by_people_of_a_novelty_and_kept(world, spoken, tmp_path):
-    """Each task alike whatever is asked beside it; heard and unheard people have words of their own."""
+def test_routes_and_tasks_are_said_anew_by_people_of_a_novelty_and_kept(world, spoken, tmp_path):
+    """Each alike whatever is asked beside it; heard and unheard people have words of their own."""
     opened, name = [], world.house.name
-    source = SimpleNamespace(digest="hand", open_world=lambda name, *_: opened.append(name) or world)
-    tasks = [
-        vln_task(name, Route(str(k), path, round(yaw * 6 / np.pi), 0, text, "train"))
-        for k, (text, path, yaw) in enumerate(spoken[:15])
+    routes = tuple(
+        Route(str(k), path, round(yaw * 6 / np.pi), 0, text, "train") for k, (text, path, yaw) in enumerate(spoken[:15])
+    )
+    tasks = tuple(vln_task(name, route) for route in routes)
+
+    class Source(Dataset):
+        kind, digest = "vln", "hand"
+
+        def __init__(self, asked):
+            self.asked = asked
+
+        def tasks(self, split):
+            return self.asked
+
+        def routes(self, name):
+            return routes
+
+        def open_world(self, name, *_):
+            opened.append(name)
+            return world
+
+    source = Source(tasks)
+    told = {n: SaidBy(n, source, cache=tmp_path) for n in ("familiar", "novel")}
+    said = {n: people.tasks("train") for n, people in told.items()}
+    assert told["novel"].tasks("train") == said["novel"] and opened == [name] * 2
+    assert [dataclasses.replace(r, instruction="") for r in told["novel"].routes(name)] == [
+        dataclasses.replace(r, instruction="") for r in routes
     ]
-    said = {n: said_by(n, tasks, source, cache=tmp_path) for n in ("familiar", "novel")}
-    assert said["novel"] == said_by("novel", tasks, source, cache=tmp_path) and opened == [name] * 2
-    assert said["novel"][10:] == said_by("novel", tasks[10:], source, cache=tmp_path)
+    assert SaidBy("novel", Source(tasks[10:]), cache=tmp_path).tasks("train") == said["novel"][10:]
+    assert len({people.digest for people in (source, *told.values())}) == 3
     wordless = [dataclasses.replace(t, request="") for t in tasks]
     for mine in said.values():
         assert [dataclasses.replace(t, request="") for t in mine] == wordless

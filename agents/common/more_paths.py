@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TypeVar
@@ -14,8 +14,9 @@ from assets.catalogue import load_catalogue
 from assets.closure import code_digest
 from embodied.assistants.route_system import RouteConfig, sampled_paths, worded
 from embodied.datasets.store import Dataset
-from embodied.interface import TURNS, FollowRoute, Route, SeenPlace, Task
+from embodied.interface import TURNS, FollowRoute, Route, Task
 from embodied.language import People
+from embodied.novelty import check_novelty
 from embodied.records import load_lines, save_lines
 from embodied.seeds import stream
 
@@ -39,31 +40,68 @@ def more_routes(
     return _kept(cache, [source.digest, name, count, seed, *filter(None, [novelty])], Route, make)
 
 
-def said_by(novelty: str, tasks: Sequence[Task], source: Dataset, *, cache: Path) -> list[Task]:
-    """Tasks of following routes, house by house, each instruction said anew by somebody of a novelty. They are kept in
-    the cache."""
+class SaidBy(Dataset):
+    """A data set in which somebody of a novelty describes each route anew, and says each task of following one anew.
 
-    def said(world: SeenPlace, task: Task) -> Task:
-        assert isinstance(task.goal, FollowRoute), "a route has words"
-        yaw, rng = task.start.turn * 2 * math.pi / TURNS, stream(0, "said by", novelty, task.id)
-        return dataclasses.replace(task, request=People(novelty=novelty).route(world, task.goal.path, yaw, rng=rng))
+    The words are kept in the cache.
+    """
 
-    found: list[Task] = []
-    for name, many in groupby(tasks, lambda t: t.world):
-        mine = list(many)
+    def __init__(self, novelty: str, source: Dataset, *, cache: Path) -> None:
+        """
+        Raises:
+          ValueError: an unknown novelty.
+        """
+        check_novelty(novelty)
+        vars(self).update(vars(source))  # what was read need not be read again
+        self.novelty, self.source, self.cache = novelty, source, cache
 
-        def make(name: str = name, mine: list[Task] = mine) -> Iterable[Task]:
-            world = source.open_world(name, load_catalogue(cache), cache)
-            return [said(world, task) for task in mine]
+    @property
+    def kind(self) -> str:
+        return self.source.kind
 
-        found += _kept(cache, [source.digest, [t.id for t in mine], novelty], Task, make)
-    return found
+    @property
+    def digest(self) -> str:
+        return digest([self.source.digest, self.novelty, _code()])
+
+    def routes(self, name: str) -> tuple[Route, ...]:
+        return tuple(self._said(name, self.source.routes(name)))
+
+    def tasks(self, split: str) -> tuple[Task, ...]:
+        tasks = self.source.tasks(split)
+        return tuple(self._asked(tasks)) if self.kind == "vln" else tasks
+
+    def _asked(self, tasks: Iterable[Task]) -> Iterator[Task]:
+        for name, many in groupby(tasks, lambda task: task.world):
+            mine = list(many)
+            said = self._said(name, [way_of(task) for task in mine])
+            yield from (dataclasses.replace(t, request=r.instruction) for t, r in zip(mine, said, strict=True))
+
+    def _said(self, name: str, routes: Sequence[Route]) -> list[Route]:
+        people, novelty = People(novelty=self.novelty), self.novelty
+
+        def make() -> Iterator[Route]:
+            world = self.source.open_world(name, load_catalogue(self.cache), self.cache)
+            for route in routes:
+                yaw, rng = route.turn * 2 * math.pi / TURNS, stream(0, "said by", novelty, route.id)
+                yield dataclasses.replace(route, instruction=people.route(world, route.path, yaw, rng=rng))
+
+        about = [self.source.digest, "said by", novelty, [route.id for route in routes]]
+        return _kept(self.cache, about, Route, make)
+
+
+def way_of(task: Task) -> Route:
+    """The route that a task is to follow."""
+    assert isinstance(task.goal, FollowRoute), "a route has words"
+    return Route(task.id, task.goal.path, task.start.turn, 0, task.request)
 
 
 def _kept(cache: Path, about: Sequence[object], kind: type[T], make: Callable[[], Iterable[T]]) -> list[T]:
     """What `make` makes, from the cache if it is there."""
-    code = code_digest("embodied.language.voice", "embodied.assistants.route_system")
-    path = cache / "paths" / f"{digest([*about, code])[:32]}.jsonl"
+    path = cache / "paths" / f"{digest([*about, _code()])[:32]}.jsonl"
     if not path.exists():
         save_lines(path, make())
     return list(load_lines(path, kind))
+
+
+def _code() -> str:
+    return code_digest("embodied.language.voice", "embodied.assistants.route_system")

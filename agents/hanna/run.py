@@ -15,6 +15,7 @@ from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.vision.lessons import Lessons
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
+from embodied.novelty import FAMILIAR
 from embodied.teachers.hanna import HannaTeacher
 
 
@@ -43,6 +44,7 @@ def train_agent(
       ValueError: `begin` has networks of other sizes, or learned from another encoder.
     """
     houses = config.training_houses or None
+    lessons = lessons.said_by(FAMILIAR) if config.speakers == FAMILIAR else lessons
     training = lessons.split("train", houses=houses, lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else HannaAgent.load(begin)

@@ -18,11 +18,11 @@ from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES
 from agents.studies.tables import StudyRow, StudyTable
-from agents.studies.wordings import words_table
+from agents.studies.wordings import speakers_table, words_table
 from agents.vision.lessons import Lessons
 from agents.vision.occasions import OCCASIONS
 from agents.vision.sighted_study import SPLITS as TEST
-from agents.vision.sighted_study import SightedStudy
+from agents.vision.sighted_study import SightedStudy, spoken
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 
@@ -98,6 +98,7 @@ TABLES: Mapping[str, StudyTable] = {
         tuple((OURS_SEEING, row) for row in SIGHT_ROWS if row.train is not None),
     ),
     "words": words_table(learned, FULL, TEST[1:]),
+    "speakers": speakers_table(learned, FULL, TEST[1:]),
     "places": StudyTable(
         "Recognising places in pictures from another time",
         tuple(StudyRow(name, None, {PICTURE: name}) for name in (AGAIN, *OCCASIONS)),
@@ -227,7 +228,7 @@ class HannaStudy(SightedStudy):
         )
 
     def judged_lessons(self, judge: Mapping[str, Any]) -> Lessons:
-        return self.lessons_in(self.elsewhere or self.data)
+        return spoken(self.lessons_in(self.elsewhere or self.data), judge)
 
     def lessons_in(self, folder: Path) -> Lessons:
         return dataclasses.replace(super().lessons_in(folder), device=self.device, shown=self.shown)

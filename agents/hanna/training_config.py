@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 from agents.common.settings import (
     AT_LEAST_ONE,
+    EVERYBODY,
     NOT_ALL,
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
+    SPEAKERS,
     EvaluationSettings,
     ImitationSettings,
     require,
@@ -64,6 +66,8 @@ class TrainingConfig(ImitationSettings):
     """Weight of a needless request in the loss, relative to a missing one; 1: Eq 4.14."""
     read_assistance: bool = True
     """Read the words of routes; False: show only the goal image (Table 4.4)."""
+    speakers: str = EVERYBODY
+    """Whose routes are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
     reset_inter_task: bool = True
     """Reset the inter-task module between sub-tasks; False: ablation of Table D.2."""
     predict_reasons: bool = True
@@ -77,6 +81,7 @@ class TrainingConfig(ImitationSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_word(self, "model", MODELS)
+        require_word(self, "speakers", SPEAKERS)
         require_word(self, "ask_rule", tuple(sorted(RULES)))
         require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
         require(self, AT_LEAST_ONE, "training_steps")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -23,7 +23,7 @@ from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
 from agents.studies.engine import Measured, StudyLearner
 from agents.studies.tables import Figure, StudyRow, StudyTable
-from agents.studies.wordings import WORDING, saying, words_table
+from agents.studies.wordings import SPEAKERS, WORDING, saying, speakers_table, words_table
 from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
@@ -166,6 +166,10 @@ class NavStudyWorld:
     def prepare(self, folder: Path, note: Note) -> nav.NavGrounds:
         return nav.prepare(self.config, self.houses, folder, note=note)
 
+    def with_speakers(self, train: Mapping[str, Any]) -> NavStudyWorld:
+        """In which those people are learned from whom a row names."""
+        return dataclasses.replace(self, config=dataclasses.replace(self.config, **_of(train, (SPEAKERS,))))
+
     def begin(self, grounds: nav.NavGrounds, seed: int, folder: Path, note: Note) -> None:
         """Students of NAV begin with random weights."""
 
@@ -213,38 +217,41 @@ class IliadStudy(StudyLearner):
         if self.world.name == "nav":
             rows = (*LEARNERS, BLIND, CHANCE)
             seen = dataclasses.replace(TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND),))
-            return {**TABLES, "3.4": seen, "words": words_table(_reader, ("success",), ("test",))}
+            heard = {"words": words_table, "speakers": speakers_table}
+            made = {name: table(_reader, ("success",), ("test",)) for name, table in heard.items()}
+            return {**TABLES, "3.4": seen, **made}
         both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
         return {name: both(table) for name, table in TABLES.items()}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data and teachers."""
-        self.world.prepare(_shared(self.world, folder), note)
+        for world in {self._world(row.train): None for row in rows}:
+            world.prepare(_shared(world, folder), note)
 
     def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
         """What students are pretrained to be."""
-        world = self.world
-        world.begin(_grounds(world, folder), seed, _shared(world, folder) / f"seed_{seed}", note)
+        for world in {self._world(row.train): None for row in rows}:
+            world.begin(_grounds(world, folder), seed, _shared(world, folder) / f"seed_{seed}", note)
 
     def settings(self, train: Mapping[str, Any], seed: int) -> LearnerConfig:
-        changes = {name: value for name, value in train.items() if name not in OWN}
+        changes = {name: value for name, value in train.items() if name not in (*OWN, SPEAKERS)}
         annealed = changes.pop("annealed", 0)
         every = max(1, round(annealed / self.world.updates * self.config.iterations)) if annealed else 0
         return dataclasses.replace(self.config, seed=seed, anneal_every=every, **changes)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         makers, settings = f"agents.iliad.{self.world.name}.run", self.settings(train, seed)
-        return identity_of(makers, settings=settings, **{**self.world.source(), **_own(train)})
+        return identity_of(makers, settings=settings, **{**self._world(train).source(), **_of(train, OWN)})
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        world, begun = self.world, _shared(self.world, folder) / f"seed_{seed}"
-        grounds = _grounds(world, folder)
-        grounds = dataclasses.replace(grounds, config=dataclasses.replace(grounds.config, **_own(train)))
+        world = self._world(train)
+        grounds, begun = _grounds(world, folder), _shared(world, folder) / f"seed_{seed}"
+        grounds = dataclasses.replace(grounds, config=dataclasses.replace(grounds.config, **_of(train, OWN)))
         world.learn(grounds, self.settings(train, seed), home, begun, note)
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {"threshold": self.config.threshold, **self.world.source()}
+        return {"threshold": self.config.threshold, **self._world(row.train).source()}
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         if weights is None:
@@ -254,12 +261,18 @@ class IliadStudy(StudyLearner):
         if row.judge.get("curve"):
             return {f"success at {h['episodes']:g}": Samples((h["success"],)) for h in history}
         needed = episodes_to(history, self.config.threshold) / 1000
-        grounds, how = _grounds(self.world, folder), row.judge.get(WORDING)
-        if how and isinstance(self.world, NavStudyWorld):
-            say = saying(how, grounds.data.eyes.vocabulary.words, self.world.houses.cache)
-            grounds = nav.reworded(grounds, say)
-        found = {"success": self.world.judge(grounds, weights, split)}
+        world, how, speakers = self._world(row.train), row.judge.get(WORDING), row.judge.get(SPEAKERS)
+        grounds = _grounds(world, folder)
+        if how and isinstance(world, NavStudyWorld):
+            grounds = nav.reworded(grounds, saying(how, grounds.data.eyes.vocabulary.words, world.houses.cache))
+        if speakers and isinstance(world, NavStudyWorld):
+            grounds = nav.spoken(grounds, speakers, world.houses.cache)
+        found = {"success": world.judge(grounds, weights, split)}
         return found | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
+
+    def _world(self, train: Mapping[str, Any] | None) -> StudyWorld:
+        """What a row learns in."""
+        return self.world.with_speakers(train) if train and isinstance(self.world, NavStudyWorld) else self.world
 
     def about(self) -> str:
         x = self.config
@@ -274,9 +287,9 @@ def _reader(label: str, **train: Any) -> StudyRow:
     return StudyRow(label, {"learner": "dagger", **train})
 
 
-def _own(train: Mapping[str, Any]) -> dict[str, Any]:
-    """What a row says of NAV's student itself."""
-    return {name: value for name, value in train.items() if name in OWN}
+def _of(train: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """What a row says of these settings."""
+    return {name: value for name, value in train.items() if name in names}
 
 
 def _shared(world: StudyWorld, folder: Path) -> Path:

@@ -13,9 +13,12 @@ from agents.common.unheard import Reworded, in_synonyms
 from agents.studies.tables import StudyRow, StudyTable
 from assets.catalogue import load_catalogue
 from embodied.interface import Policy
+from embodied.novelty import FAMILIAR, NOVEL
 
 WORDING, SYNONYMS, PARAPHRASED = "wording", "synonyms", "paraphrased"
 """In a row's `judge`: how instructions are said; as they are without."""
+SPEAKERS = "speakers"
+"""In a row's `judge`: the novelty of who describes routes; those of the data set without."""
 
 
 def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
@@ -31,6 +34,22 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
     won = [(rows[read.label, how], rows[learned.label, how]) for how in hows]
     title = "Instructions in unheard words and sentences"
     return StudyTable(title, tuple(rows.values()), tuple(columns), tuple(splits), (*lost, *won))
+
+
+def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
+    """Learned from familiar people alone, judged by them and by the others; `row` as in words_table."""
+
+    def heard(novelty: str, label: str, **train: Any) -> StudyRow:
+        who = "people never heard" if novelty == NOVEL else "people heard in training"
+        made = row(f"{label}, {who}", speakers=FAMILIAR, **train)
+        return dataclasses.replace(made, judge={**made.judge, SPEAKERS: novelty})
+
+    def pair(label: str, **train: Any) -> tuple[StudyRow, StudyRow]:
+        return heard(FAMILIAR, label, **train), heard(NOVEL, label, **train)
+
+    learned, read = pair("learned words"), pair("pre-trained vectors", word_vectors="minilm")
+    title = "Instructions of people who were never heard in training"
+    return StudyTable(title, (*learned, *read), tuple(columns), tuple(splits), (learned, read, (read[1], learned[1])))
 
 
 def _said(row: StudyRow, how: str) -> StudyRow:

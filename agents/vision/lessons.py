@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
+from agents.common.more_paths import SaidBy
 from agents.common.playing import TaskSet
 from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.sighted import About
@@ -74,6 +76,10 @@ class Lessons:
         bank = load_bank(paths, encoder, split.worlds, pictures, lights).to(self.device)
         shown = showing(bank, data, list(split.worlds), OCCASIONS[self.shown], encoder, self.cache, kind)
         return Split(split.worlds, tasks, split.make_env, shown)
+
+    def said_by(self, novelty: str) -> Lessons:
+        """The same with routes as somebody of a novelty describes them."""
+        return dataclasses.replace(self, data=SaidBy(novelty, self.data, cache=self.cache))
 
     def identity(self) -> dict[str, str]:
         """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""

@@ -12,7 +12,7 @@ from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.sighted import SightedAgent
 from agents.studies.episodes import EpisodeStudy
 from agents.studies.tables import StudyRow, StudyTable
-from agents.studies.wordings import WORDING, hearing
+from agents.studies.wordings import SPEAKERS, WORDING, hearing
 from agents.vision.lessons import Lessons
 from agents.vision.run import encoder_of
 from assets.cache import default_cache
@@ -88,7 +88,7 @@ class SightedStudy(EpisodeStudy):
 
     def judged_lessons(self, judge: Mapping[str, Any]) -> Lessons:
         """What they are judged in."""
-        return self.lessons(judge)
+        return spoken(self.lessons(judge), judge)
 
     def lessons_in(self, folder: Path) -> Lessons:
         """A data set with features."""
@@ -98,3 +98,8 @@ class SightedStudy(EpisodeStudy):
     def about(self) -> str:
         c, drawn = self.config, self.lessons().pictures("train")
         return f"{super().about()} Trained {c.iterations} updates of {c.batch} episodes on pictures {drawn}."
+
+
+def spoken(lessons: Lessons, judge: Mapping[str, Any]) -> Lessons:
+    """Lessons in which those people describe routes whom a row says."""
+    return lessons.said_by(judge[SPEAKERS]) if SPEAKERS in judge else lessons

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 from agents.common.settings import (
     AT_LEAST_ONE,
+    EVERYBODY,
     NOT_ALL,
     NOT_NEGATIVE,
     SHARE,
+    SPEAKERS,
     ImitationSettings,
     RunSettings,
     require,
     require_word,
 )
-from embodied.novelty import FAMILIAR
 
-EVERYBODY = "everybody"
 FORCING = ("teacher", "student", "dagger")
 """Whose actions an episode of training takes: the teacher's; the follower's own, sampled; or at first the teacher's,
 then more and more its own (Ross et al. 2011). The label is always the teacher's."""
@@ -58,7 +58,7 @@ class FollowerSettings(ImitationSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_word(self, "forcing", FORCING)
-        require_word(self, "speakers", (EVERYBODY, FAMILIAR))
+        require_word(self, "speakers", SPEAKERS)
         require(self, AT_LEAST_ONE, "hidden_size")
         require(self, NOT_ALL, "dropout")
         require(self, NOT_NEGATIVE, "progress_weight", "room_weight")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Unpack
 
 from agents.common import imitation
-from agents.common.more_paths import more_routes, said_by
+from agents.common.more_paths import more_routes
 from agents.common.session import Progress
 from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import build_vocabulary
@@ -40,11 +40,9 @@ def train_follower(
     Raises:
       ValueError: spoken_share without a speaker.
     """
-    training = lessons.split("train", houses=config.training_houses or None, lights=config.lights)
-    validation = lessons.split("val_unseen", limit=config.validation_tasks)
-    if config.speakers == FAMILIAR:
-        heard = lambda split: said_by(FAMILIAR, split.tasks, lessons.data, cache=lessons.cache)
-        training, validation = (dataclasses.replace(split, tasks=heard(split)) for split in (training, validation))
+    heard = lessons.said_by(FAMILIAR) if config.speakers == FAMILIAR else lessons
+    training = heard.split("train", houses=config.training_houses or None, lights=config.lights)
+    validation = heard.split("val_unseen", limit=config.validation_tasks)
     if config.more_paths:
         training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(lessons, training, config)])
     if config.spoken_share:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,27 +9,22 @@ from typing import Any
 
 import torch
 
-from agents.common.more_paths import said_by
 from agents.common.session import Note
 from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES
 from agents.studies.tables import StudyRow, StudyTable
-from agents.studies.wordings import words_table
+from agents.studies.wordings import speakers_table, words_table
 from agents.vision.sighted_study import SPLITS, SightedStudy
 from agents.vln.agent import VlnAgent
 from agents.vln.config import FollowerSettings, SpeakerSettings
 from agents.vln.run import train_follower
 from agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
-from embodied.datasets.store import SplitData
 from embodied.evaluation.evaluate import spread
 from embodied.identity import Identity, key_of
-from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import save_lines
 
 COLUMNS = ("success", "spl", "nDTW", "SDTW", "navigation error")
 LEARNED, RERANKED = "learned", "reranked"
-SPEAKERS = "speakers"
-"""In a row's `judge`: whose instructions there are; those of the data set without."""
 CANDIDATES = 10
 """K of Eq 2.19."""
 
@@ -43,14 +37,6 @@ def _without(name: str) -> StudyRow:
     return StudyRow(name, None, {"played": name})
 
 
-def _heard(novelty: str, **train: Any) -> StudyRow:
-    """Learned from familiar people, judged by those of a novelty."""
-    words = "pre-trained vectors" if train else "learned words"
-    label = f"{words}, {'people never heard' if novelty == NOVEL else 'people heard in training'}"
-    return StudyRow(label, {"speakers": FAMILIAR, **train}, {"played": LEARNED, SPEAKERS: novelty})
-
-
-HEARD = tuple((_heard(FAMILIAR, **k), _heard(NOVEL, **k)) for k in ({}, {"word_vectors": "minilm"}))
 FOLLOWER, BLIND = _row("DAgger"), _row("DAgger, blind", blind=True)
 CHOSEN, SPOKEN = _row("DAgger, reranked", RERANKED), _row("DAgger, back-translation", spoken_share=0.5)
 TABLES: Mapping[str, StudyTable] = {
@@ -77,13 +63,7 @@ TABLES: Mapping[str, StudyTable] = {
         ((CHOSEN, FOLLOWER), (SPOKEN, FOLLOWER)),
     ),
     "words": words_table(_row, COLUMNS, SPLITS[1:]),
-    "speakers": StudyTable(
-        "Instructions of people who were never heard in training",
-        tuple(row for pair in HEARD for row in pair),
-        COLUMNS,
-        SPLITS[1:],
-        (*HEARD, (HEARD[1][1], HEARD[0][1])),
-    ),
+    "speakers": speakers_table(_row, COLUMNS, SPLITS[1:]),
 }
 
 
@@ -111,13 +91,6 @@ class VlnStudy(SightedStudy):
         speaker = _file(folder) if train.get("spoken_share") else None
         train_follower(self.lessons(), self.settings(train, seed), self.evaluation, home, speaker=speaker, note=note)
         return home / "best.safetensors"
-
-    def where(self, agent: Any, judge: Mapping[str, Any], split: str) -> SplitData:
-        whole, novelty = super().where(agent, judge, split), judge.get(SPEAKERS)
-        if not novelty:
-            return whole
-        said = said_by(novelty, spread(whole.tasks, self.tasks), self.lessons().data, cache=self.cache)
-        return dataclasses.replace(whole, tasks=tuple(said))
 
     @torch.inference_mode()
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:

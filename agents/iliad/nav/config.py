@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 from agents.common.settings import (
     AT_LEAST_ONE,
+    EVERYBODY,
     LEARNED_WORDS,
     NOT_ALL,
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
+    SPEAKERS,
     WORD_VECTORS,
     require,
     require_word,
@@ -59,6 +61,8 @@ class NavConfig:
     """Learning rate of the teacher's networks."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
+    speakers: str = EVERYBODY
+    """Whose requests are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
     word_vectors: str = LEARNED_WORDS
     """What followers know of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
     data_seed: int = 0
@@ -67,6 +71,7 @@ class NavConfig:
     def __post_init__(self) -> None:
         if self.teacher not in TEACHERS:
             raise ValueError(f"teacher must be one of {TEACHERS}, got {self.teacher!r}")
+        require_word(self, "speakers", SPEAKERS)
         require_word(self, "word_vectors", WORD_VECTORS)
         if self.pragmatics not in PRAGMATICS:
             raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.common.more_paths import more_routes
+from agents.common.more_paths import SaidBy, more_routes
 from agents.common.vocabulary import build_vocabulary
 from agents.common.word_vectors import vocabulary_with
 from agents.iliad.nav.config import NavConfig
@@ -17,6 +17,7 @@ from agents.vision.drawn import pictures_of
 from agents.vision.features import feature_path, load_bank
 from assets.cache import digest
 from embodied.datasets.store import Dataset
+from embodied.novelty import FAMILIAR
 from embodied.tasks.vln import vln_task
 
 SPLITS = {"train": "train", "validation": "val_unseen", "test": "test_unseen"}
@@ -55,13 +56,15 @@ def nav_data(
     Raises:
       FileNotFoundError, ValueError: no features of this encoder, or others.
     """
-    if config.more_paths and cache is None:
-        raise ValueError("more_paths need the cache: the grammar names what can be seen in the houses")
+    novelty = FAMILIAR if config.speakers == FAMILIAR else None
+    if cache is None and (config.more_paths or novelty):
+        raise ValueError("more_paths and speakers need the cache: people name what can be seen in the houses")
+    spoken = SaidBy(novelty, source, cache=cache) if cache and novelty else source
     houses = {part: source.names(name) for part, name in SPLITS.items()}
-    splits = {part: [trip for name in names for trip in house_trips(source, name)] for part, names in houses.items()}
+    splits = {part: [trip for name in names for trip in house_trips(spoken, name)] for part, names in houses.items()}
     if cache is not None and config.more_paths:
         for name in houses["train"]:
-            routes = more_routes(source, name, config.more_paths, seed=config.data_seed, cache=cache)
+            routes = more_routes(source, name, config.more_paths, seed=config.data_seed, cache=cache, novelty=novelty)
             splits["train"] += trips_of([vln_task(name, route) for route in routes])
     for part in ("validation", "test"):
         splits[part] = [one for trip in splits[part] for one in each_wording(trip)]

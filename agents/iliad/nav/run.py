@@ -7,11 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from agents.common.more_paths import SaidBy
 from agents.common.session import Note
 from agents.common.word_vectors import vocabulary_with
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.data import SPLITS, NavData, nav_data
+from agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, nav_data
 from agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from agents.iliad.nav.student import LoopFree, NavStudent
 from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
@@ -95,6 +96,15 @@ def reworded(grounds: NavGrounds, say: Callable[[str], str]) -> NavGrounds:
     """With the test requests in other words."""
     data = grounds.data
     test = [dataclasses.replace(t, requests=tuple(map(say, t.requests))) for t in data.splits["test"]]
+    return dataclasses.replace(grounds, data=dataclasses.replace(data, splits={**data.splits, "test": test}))
+
+
+def spoken(grounds: NavGrounds, novelty: str, cache: Path) -> NavGrounds:
+    """With the test requests of somebody of a novelty."""
+    data = grounds.data
+    people = SaidBy(novelty, data.source, cache=cache)
+    trips = [trip for name in data.source.names(SPLITS["test"]) for trip in house_trips(people, name)]
+    test = [one for trip in trips for one in each_wording(trip)]
     return dataclasses.replace(grounds, data=dataclasses.replace(data, splits={**data.splits, "test": test}))
 
 
