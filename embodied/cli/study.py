@@ -121,7 +121,7 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight, words or places."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight, words, speakers or places."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
@@ -193,7 +193,7 @@ class VlnOptions(Study, Trained, Judged, WithData, Encoded):
     """Agents that follow route instructions, and a speaker."""
 
     tables: Tables
-    """Make these tables: followers, speaker or words."""
+    """Make these tables: followers, speaker, words or speakers."""
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
     others: Count = 1
@@ -222,7 +222,7 @@ class BanditOptions(Study, Trained):
 @dataclass(frozen=True, kw_only=True)
 class IliadOptions(Study, Trained):
     tables: Tables
-    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms; in NAV also words."""
+    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms; in NAV also words and speakers."""
     scale: Annotated[str, SMALL_SCALE] = "mini"
     """The settings to start from."""
 
