@@ -9,7 +9,7 @@ import numpy as np
 
 from embodied.geometry import wrap
 from embodied.house.house import Placement
-from embodied.interface import STEP, FindDescribed, Intention, Language, Place, Reply, Situation, Subtask
+from embodied.interface import STEP, FindDescribed, Intention, Place, Reply, Situation, Subtask
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.graph import nearest
 from embodied.tasks.ask import Look
@@ -57,13 +57,9 @@ def in_view(world: Place, node: int, goal: FindDescribed) -> list[tuple[str, flo
 class AskAssistant:
     """Knows where everything is. `facts` is all that whoever words an answer is told."""
 
-    def __init__(self, look: Look, language: Language | None = None) -> None:
-        """
-        Args:
-          look: words of colour and material of things.
-          language: of routes; plain where not given.
-        """
-        self._look, self._language = look, language or PlainLanguage()
+    def __init__(self, look: Look) -> None:
+        """`look`: words of colour and material of things."""
+        self._look, self._language = look, PlainLanguage()
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         """Confirm at a thing of the class, disambiguate where several are seen that may be it, all others always."""

@@ -92,11 +92,11 @@ def from_values(name: str, values: Sequence[float], unit: str, *, aim: float | N
     return Measure(name, float(middle), unit, float(low), float(high), len(values), aim)
 
 
-def ratio(name: str, slow: Measure, fast: Measure, *, aim: float | None = None) -> Measure:
+def ratio(name: str, slow: Measure, fast: Measure) -> Measure:
     """How many times `fast` is faster than `slow`, both from one run."""
     value = slow.value / fast.value
     repeats = min(slow.repeats, fast.repeats)
-    return Measure(name, value, "x", slow.low / fast.high, slow.high / fast.low, repeats, aim)
+    return Measure(name, value, "x", slow.low / fast.high, slow.high / fast.low, repeats)
 
 
 def share(name: str, part: Measure, whole: Measure, *, aim: float | None = None) -> Measure:

@@ -44,7 +44,7 @@ COMMANDS = (
     "bench",
     "cache",
 )
-"""Subcommands in the order `--help` lists them; each is a module with `add` and `run`."""
+"""Subcommands in the order `--help` lists them; each is a module with `Options` and `run`, or with `COMMANDS`."""
 
 REMEDIES = {
     errno.ENOSPC: "the disk is full; free some space, or put --cache and --out on another disk. What is whole is kept",
@@ -147,11 +147,8 @@ def parser(*chosen: str) -> argparse.ArgumentParser:
 
             if hasattr(module, "COMMANDS"):
                 add_commands(sub, module.COMMANDS, "WHAT", "what")
-            elif hasattr(module, "Options"):
-                add_command(sub, module.Options, module.run)
             else:
-                module.add(sub)
-                sub.set_defaults(run=module.run)
+                add_command(sub, module.Options, module.run)
     return top
 
 

@@ -208,6 +208,7 @@ def _play(
     keep: Callable[[str, str, Sequence[Episode]], None],
 ) -> tuple[list[Row], dict[str, tuple[int, int]]]:
     """The rows of agents without training, and what a scripted listener makes of the routes that each was told."""
+    from agents.language_models.checking import understood
     from embodied.evaluation.evaluate import LOOKING, evaluate
 
     looks = bool({LLM, *LOOKING.get(args.kind, {})} & set(names)) or args.kind == "ask" or args.assistant != TEMPLATE
@@ -222,7 +223,7 @@ def _play(
 
         def kept(name: str, episodes: Sequence[Episode], split: SplitData = split) -> None:
             keep(split.name, name, episodes)
-            if looks and (routes := _heard(episodes, split.worlds))[1]:
+            if looks and (routes := understood(episodes, _seen(split.worlds)))[1]:
                 heard[name] = routes
 
         worlds = _seen(split.worlds) if looks else None
@@ -312,13 +313,6 @@ def _model_agent(args: Options, split: SplitData, client: Any) -> Agent:
         return LanguageModelAgent(client, Teller(prompt=prompt))
     drawn = {n: w for n, w in split.worlds.items() if isinstance(w, World)}
     return LanguageModelAgent(client, Teller(None, PanoramaStore(drawn), args.sees, prompt))
-
-
-def _heard(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> tuple[int, int]:
-    """With how many routes that were told a scripted listener arrives, and how many were told."""
-    from agents.language_models.checking import understood
-
-    return understood(episodes, _seen(worlds))
 
 
 def _seen(worlds: Mapping[str, Place]) -> Mapping[str, SeenPlace]:

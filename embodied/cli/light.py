@@ -13,7 +13,7 @@ import dataclasses
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from assets.cache import write_json
 from embodied.cli.common import Furnished, Printed, catalogue_of, show
@@ -117,15 +117,8 @@ def with_sky(
     season: str | None = None,
 ) -> House:
     """`house` at another hour, in other weather or surroundings, with its lamps on or off; None keeps what is."""
-    sky = house.sky
-    if time is not None:
-        sky = dataclasses.replace(sky, hour=time)
-    if weather is not None:
-        sky = dataclasses.replace(sky, weather=weather)
-    if landscape is not None:
-        sky = dataclasses.replace(sky, landscape=landscape)
-    if season is not None:
-        sky = dataclasses.replace(sky, season=season)
+    given: dict[str, Any] = {"hour": time, "weather": weather, "landscape": landscape, "season": season}
+    sky = dataclasses.replace(house.sky, **{name: value for name, value in given.items() if value is not None})
     lights = house.lights
     if lamps is not None:
         lights = tuple(dataclasses.replace(light, on=lamps == "on") for light in lights)

@@ -27,7 +27,7 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariRules
 from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.house.house import House
-from embodied.interface import Assistant, Episode, FindObject, Language, Place, Route, Task
+from embodied.interface import Assistant, Episode, FindObject, Place, Route, Task
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import PeoplesWords, Said
 from embodied.navigation.graph import NavGraph, from_matterport
@@ -247,7 +247,6 @@ class Dataset:
         name: str,
         *,
         houses: int | None = None,
-        language: Language | None = None,
         worlds: Mapping[str, Place] | None = None,
         hari: HariRules = AS_PRINTED,
         vnla: str = AS_PUBLISHED,
@@ -257,7 +256,6 @@ class Dataset:
 
         Args:
           houses: only its first so many houses; all if None.
-          language: of VNLA's advisor; people's words where the data set holds some, else plain, if None.
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
           hari: variants of HARI.
           vnla: one of embodied.envs.vnla.RULES; tasks get the time that it takes.
@@ -273,7 +271,7 @@ class Dataset:
             self.kind,
             places,
             wording=ANNA_SPLIT.get(name, ""),
-            language=language or (PeoplesWords(said, PlainLanguage()) if said else None),
+            language=PeoplesWords(said, PlainLanguage()) if said else None,
             routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
             describer=self.describer(hari.kept) if self.kind == "hari" else None,
             hari=hari,

@@ -138,8 +138,7 @@ class HttpAgent:
 
 def observed(o: Observation) -> dict[str, object]:
     """An observation as JSON, without anything that names the place."""
-    c, _seen = o.candidates, o.detections
-    zip(c.bearing, c.slope, strict=True)
+    c = o.candidates
     return {
         "instruction": o.instruction,
         "time": o.time,

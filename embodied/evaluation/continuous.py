@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from embodied.envs.continuous import Excursion, Move, Walk
+from embodied.evaluation.metrics import warping
 
 WARPING = 3.0
 """Metres that nDTW is normalised by (Magalhaes et al. 2019)."""
@@ -61,7 +62,8 @@ def ndtw(walk: Walk) -> float:
     reference = expert_path(walk.excursion)
     after = walk.positions[1:] if len(walk.actions) else walk.positions
     kept = np.concatenate([[True], (np.diff(after, axis=0) != 0).any(1)])
-    return float(np.exp(-dtw(after[kept], reference) / (len(reference) * WARPING)))
+    metres = np.linalg.norm(after[kept][:, None] - reference[None], axis=2)
+    return float(np.exp(-warping(metres) / (len(reference) * WARPING)))
 
 
 def sdtw(walk: Walk) -> float:
@@ -105,18 +107,6 @@ def judged(walk: Walk) -> dict[str, float]:
 def expert_path(excursion: Excursion) -> np.ndarray:
     """(m, 3) metres that nDTW compares with; (0, 3) without."""
     return np.array(excursion.expert or excursion.reference, float).reshape(-1, 3)
-
-
-def dtw(path: np.ndarray, reference: np.ndarray) -> float:
-    """Dynamic time warping cost between (n, 3) and (m, 3) points, metres."""
-    near = np.linalg.norm(path[:, None] - reference[None], axis=2)
-    before = np.concatenate([[0.0], np.full(len(reference), np.inf)])
-    for row in near:
-        now = np.full(len(reference) + 1, np.inf)
-        for j, d in enumerate(row, 1):
-            now[j] = d + min(before[j], now[j - 1], before[j - 1])
-        before = now
-    return float(before[-1])
 
 
 def _share(shortest: float, walked: float) -> float:

@@ -51,8 +51,7 @@ AGENTS: Mapping[str, Mapping[str, Callable[[], Agent]]] = {
     "hari": {"random walk": RandomWalk, "shortest": Shortest, "half-way sub-goals": HalfwaySkyline},
 }
 """Agents without learning, by kind of task. In HANNA's 'no ask', 'random ask' and 'ask every 5' the
-teacher navigates, so they show what asking by that rule costs; who learns to navigate brings an own
-policy to the same rules (embodied.policies.baselines.Asking)."""
+teacher navigates, so they show what asking by that rule costs."""
 EXPERTS = {"hanna": "perfect interpretation", "vnla": "shortest, random", "hari": "half-way sub-goals"}
 """Who shows how a task is done, by its kind: they ask where help can be had; 'shortest' is that of the others."""
 LOOKING: Mapping[str, Mapping[str, Callable[[Mapping[str, SeenPlace]], Agent]]] = {

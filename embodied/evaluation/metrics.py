@@ -140,19 +140,19 @@ def request_repeats(episode: Episode, graph: NavGraph) -> tuple[int, int]:
     return repeats, len(seen) + repeats
 
 
-def dtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph) -> float:
-    """Dynamic time warping cost between two node sequences, metres (Magalhaes et al. 2019)."""
-    cost = np.full((len(path) + 1, len(reference) + 1), np.inf)
+def warping(distances: np.ndarray) -> float:
+    """Dynamic time warping cost of two paths with (n, m) metres between their points (Magalhaes et al. 2019)."""
+    cost = np.pad(np.asarray(distances, float), ((1, 0), (1, 0)), constant_values=np.inf)
     cost[0, 0] = 0.0
-    for i, a in enumerate(path, 1):
-        for j, b in enumerate(reference, 1):
-            cost[i, j] = graph.distance[a, b] + min(cost[i - 1, j], cost[i, j - 1], cost[i - 1, j - 1])
+    for i, j in np.ndindex(distances.shape):
+        cost[i + 1, j + 1] += min(cost[i, j + 1], cost[i + 1, j], cost[i, j])
     return float(cost[-1, -1])
 
 
 def ndtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
     """exp(-DTW / (|R| radius)), 1 for the reference itself (docs/sources.md, S7)."""
-    return float(np.exp(-dtw(path, reference, graph) / (len(reference) * radius)))
+    metres = np.asarray(graph.distance)[np.ix_(path, reference)]
+    return float(np.exp(-warping(metres) / (len(reference) * radius)))
 
 
 def sdtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -40,13 +41,8 @@ def rollout(
       player: who acts; `agent` is its name in the episodes.
     """
     envs: list[HelpEnv] = []
-    group: list[tuple[int, Task]] = []
-    for numbered in enumerate(tasks):
-        group.append(numbered)
-        if len(group) == batch:
-            yield from _play(make_env, envs, player, group, seed, agent)
-            group = []
-    if group:
+    numbered = enumerate(tasks)
+    while group := list(itertools.islice(numbered, batch)):
         yield from _play(make_env, envs, player, group, seed, agent)
 
 

@@ -16,6 +16,7 @@ that the shipped encoder finds in the same pictures. An oracle is called an orac
 from __future__ import annotations
 
 import functools
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -320,8 +321,8 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     sheet.paste(plan, (view.width, 0))
     pen = ImageDraw.Draw(sheet)
     who = "assistant" if o.mode.value == "sub" else "task"
-    words = _wrapped(f"{who}: {prose(o.instruction)}", sheet.width // 9)
-    pen.text((10, VIEW[0] + 8), words, font=font(16), fill="black")
+    lines = textwrap.wrap(f"{who}: {prose(o.instruction)}", sheet.width // 9)[:2]
+    pen.text((10, VIEW[0] + 8), "\n".join(lines), font=font(16), fill="black")
     return np.asarray(sheet)
 
 
@@ -331,16 +332,6 @@ def _view(world: Place, pose: Pose) -> Image.Image:
         ImageDraw.Draw(blank).text((20, 20), "no pictures of this house", font=font(18), fill="black")
         return blank
     return Image.fromarray(world.panorama(pose.node).view_rgb(pose.yaw, pose.pitch, VIEW_ANGLE, size=VIEW))
-
-
-def _wrapped(text: str, width: int) -> str:
-    lines, line = [], ""
-    for word in text.split():
-        if len(line) + len(word) + 1 > width:
-            lines.append(line)
-            line = ""
-        line = f"{line} {word}".strip()
-    return "\n".join([*lines, line][:2])
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,30 +39,6 @@ from embodied.language.templates import WORDS
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
 """Smallest angles called 'slightly', a turn, and turning around."""
-PRIVATE = frozenset(
-    {
-        "bedroom",
-        "main_bedroom",
-        "kids_room",
-        "guest_room",
-        "bathroom",
-        "toilet",
-        "closet",
-        "study",
-        "laundry_room",
-        "pantry",
-        "garage",
-        "gym",
-        "library",
-        "playroom",
-        "workshop",
-        "kitchen",
-        "dining_room",
-        "sun_room",
-        "living_room",
-        "family_room",
-    }
-)
 
 
 @dataclass(frozen=True)
@@ -205,7 +181,7 @@ def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
     phrases = []
     if len(leg.nodes) > 2 and telling.chance(0.6 * telling.speaker.landmarks):
         phrases = _passing(telling, leg.nodes[:-1])
-    if first and here in PRIVATE and there in PASSAGES and telling.chance(0.7):
+    if first and here not in PASSAGES and there in PASSAGES and telling.chance(0.7):
         return [*phrases, Phrase(Exit(here))]
     return [*phrases, Phrase(Enter(there))]
 

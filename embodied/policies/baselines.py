@@ -24,7 +24,6 @@ from embodied.interface import (
     Move,
     Observation,
     Observations,
-    Policy,
     PrivilegedPolicy,
     Situation,
     Situations,
@@ -95,20 +94,6 @@ def ask_every_5(observation: Observation, last_asked: int, *, rng: np.random.Gen
     return observation.time - last_asked >= 5
 
 
-class Asking:
-    """A navigation policy with an asking rule in front of it."""
-
-    def __init__(self, navigation: Policy, rule: AskRule) -> None:
-        self._navigation, self._rule = navigation, rule
-
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
-        last, inner = memory or ([-1] * len(observations), None)
-        actions, inner = self._navigation.act(observations, inner, rngs=rngs)
-        return _with_requests(self._rule, observations, actions, last, rngs), (last, inner)
-
-
 class PrivilegedAsking:
     """A privileged navigation policy with an asking rule in front of it."""
 
@@ -120,17 +105,10 @@ class PrivilegedAsking:
     ) -> tuple[Actions, Any]:
         last, inner = memory or ([-1] * len(observations), None)
         actions, inner = self._navigation.act_privileged(observations, situations, inner, rngs=rngs)
-        return _with_requests(self._rule, observations, actions, last, rngs), (last, inner)
-
-
-def _with_requests(
-    rule: AskRule, observations: Observations, actions: Actions, last: list[int], rngs: Sequence[np.random.Generator]
-) -> Actions:
-    """`actions` with a request wherever the rule wants one; notes in `last` when each episode asked last."""
-    for i, o in enumerate(observations):
-        if o is not None and o.can_ask and rule(o, last[i], rng=rngs[i]):
-            actions[i], last[i] = Ask(o.can_ask[0]), o.time
-    return actions
+        for i, o in enumerate(observations):
+            if o is not None and o.can_ask and self._rule(o, last[i], rng=rngs[i]):
+                actions[i], last[i] = Ask(o.can_ask[0]), o.time
+        return actions, (last, inner)
 
 
 @dataclass

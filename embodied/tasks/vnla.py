@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,26 +69,21 @@ def vnla_task(
     *,
     seed: int,
     language: Language,
-    limits: Mapping[tuple[str, str], int] | None = None,
     config: VnlaConfig = VnlaConfig(),
 ) -> Task:
     """Task `index` of the pool: a pure function of its arguments.
 
-    Its time limit is the teacher's own length in training (limits None), else what `time_limits`
-    learned for its rooms, but never less than the teacher needs: the program may set tasks that
-    cannot be finished, here none are.
+    Its time limit is the teacher's own length, as in training; in evaluation, `Dataset` raises it to what `time_limits`
+    learned for its rooms.
 
     Raises:
       ValueError: the pool has no such task.
     """
     goal, start, _ = draw(pool, index, seed=seed, kind="vnla")
     horizon = plan.count(start, goal.goal_nodes)
-    if limits is not None:
-        key = room_kind(world, start.node), goal.room_kind or goal.object_class
-        horizon = max(horizon, limits.get(key, config.most_actions))
     budget = config.help_ratio * horizon / config.help_steps
-    mine = TaskLimits(config.radius, horizon, budget)
-    return task_of_pair("vnla", pool, index, seed=seed, language=language, limits=mine)
+    limits = TaskLimits(config.radius, horizon, budget)
+    return task_of_pair("vnla", pool, index, seed=seed, language=language, limits=limits)
 
 
 def room_kind(world: Place, node: int) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,13 +45,12 @@ def base37_entropy(probabilities: np.ndarray, candidates: Candidates) -> float:
 class HannaTeacher:
     """Labels finished episodes: reference actions, help requests with their reasons, mistakes.
 
-    The default rule for `lost` is the authors' program's, because the text's would teach an agent
-    to ask for help when it has arrived. `uncertain_wrong` follows the text: at steps where the
+    The rule for being lost is the authors' program's, because the text's would teach an agent to ask for help when it
+    has arrived. `uncertain_wrong` follows the text: at steps where the
     agent asked, the program has no reference action and calls every prediction wrong (docs/sources.md, S20).
     """
 
-    def __init__(self, lost: Callable[[Sequence[float]], list[bool]] = lost_as_programmed) -> None:
-        self._lost = lost
+    def __init__(self) -> None:
         self._moves = PanoramicMoves()
 
     def label(self, situation: Situation) -> Label:
@@ -60,7 +59,7 @@ class HannaTeacher:
 
     def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         graph, steps = world.graph, episode.steps
-        lost = [x for segment in segments(steps) for x in self._lost_in(segment, graph)]
+        lost = [x for segment in segments(steps) for x in _lost_in(segment, graph)]
         asked_at: set[int] = set()
         mistakes: dict[tuple[int, str], dict[int, None]] = {}
         labels = []
@@ -82,14 +81,6 @@ class HannaTeacher:
                 past[_chosen(step)] = None
         return tuple(labels)
 
-    def _lost_in(self, segment: Sequence[Step], graph: NavGraph) -> list[bool]:
-        nodes = [s.pose.node for s in segment]
-        if isinstance(segment[-1].action, Move):  # cut short: where it ended counts too
-            nodes.append(segment[-1].next_pose.node)
-        targets = segment[0].targets
-        distances = [float(graph.distance[v, nearest(graph, v, targets)]) for v in nodes]
-        return self._lost(distances)[: len(segment)]
-
     def _uncertain_wrong(self, step: Step, reference: Move | Stop, world: Place) -> bool:
         thought = step.action.thought
         if thought is None or thought.moves is None:
@@ -108,6 +99,15 @@ def segments(steps: Sequence[Step]) -> list[list[Step]]:
         if not isinstance(step.action, Move):
             pieces.append([])
     return [p for p in pieces if p]
+
+
+def _lost_in(segment: Sequence[Step], graph: NavGraph) -> list[bool]:
+    nodes = [s.pose.node for s in segment]
+    if isinstance(segment[-1].action, Move):  # cut short: where it ended counts too
+        nodes.append(segment[-1].next_pose.node)
+    targets = segment[0].targets
+    distances = [float(graph.distance[v, nearest(graph, v, targets)]) for v in nodes]
+    return lost_as_programmed(distances)[: len(segment)]
 
 
 def _chosen(step: Step) -> int:
