@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import datetime as dt
 import functools
 import itertools
 import json
 import math
 import os
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +23,7 @@ from agents.common import imitation
 from agents.common.checkpoint import CheckpointError, restore
 from agents.common.choosing import choose_at, choose_greedily, choose_sampled
 from agents.common.imitation import REPORTED, SUMMED
+from agents.common.playing import play_with_memory
 from agents.common.session import (
     Clock,
     DivergedError,
@@ -37,10 +36,10 @@ from agents.common.session import (
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
 from agents.hanna.asking import RULES, ask_above
-from agents.hanna.collect import collect, imitation_loss
+from agents.hanna.collect import imitation_loss, labelled
 from agents.hanna.losses import IGNORE, curiosity, help_loss, navigation_loss, negative_log_likelihood, reason_loss
 from agents.hanna.policy import for_training
-from agents.hanna.training import HannaLearner, train_step
+from agents.hanna.training import HannaLearner
 from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Split
@@ -120,6 +119,12 @@ def run(folder, config=TINY, split=None, **options):
     learner = HannaLearner(agent, split, HannaTeacher())
     progress = imitation.train(learner, split, folder, identity(agent), note=lambda line: None, **options)
     return agent, progress
+
+
+def collected(split, player, tasks):
+    """Episodes that a player in training plays, and what the teacher says of them."""
+    episodes, memory, _ = play_with_memory(split.make_env, player, tasks, seed=0)
+    return episodes, labelled(episodes, memory.moments, HannaTeacher(), split.worlds)
 
 
 # Losses ------------------------------------------------------------------------------------------
@@ -314,7 +319,7 @@ def test_in_guided_episodes_every5_asks_and_in_the_others_the_learner():
     tasks = [dataclasses.replace(t, horizon=20) for t in (*split.tasks, *split.tasks, *split.tasks)]
     half = round(len(tasks) / 2)
     learner = for_training(agent_for(split).policy(split.bank), RULES["never"][0], guided_asking=0.5)
-    episodes = collect(split.make_env, learner, tasks, HannaTeacher(), split.worlds, seed=0).episodes
+    episodes, _ = collected(split, learner, tasks)
     asked = [[t for t, s in enumerate(e.steps) if isinstance(s.action, Ask)] for e in episodes]
     assert sum(map(len, asked[:half])) > 0 and not any(asked[half:])
     assert all(first >= 4 for first, *_ in filter(None, asked)) and all(
@@ -328,12 +333,12 @@ def test_labels_line_up_with_what_the_networks_said():
     agent = agent_for(split)
     tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:5]]
     teacher = HannaTeacher()
-    experience = collect(split.make_env, for_training(agent.policy(split.bank)), tasks, teacher, split.worlds, seed=0)
-    labels = [teacher.relabel(e, split.worlds[e.task.world]) for e in experience.episodes]
-    rows = [(t, i) for t in range(8) for i, e in enumerate(experience.episodes) if t < len(e.steps)]
+    episodes, experience = collected(split, for_training(agent.policy(split.bank)), tasks)
+    labels = [teacher.relabel(e, split.worlds[e.task.world]) for e in episodes]
+    rows = [(t, i) for t in range(8) for i, e in enumerate(episodes) if t < len(e.steps)]
     assert len(rows) == len(experience.targets.moves)
     for row, (t, i) in enumerate(rows):
-        step, label = experience.episodes[i].steps[t], labels[i][t]
+        step, label = episodes[i].steps[t], labels[i][t]
         expected = IGNORE if label.move is None else 0 if isinstance(label.move, Stop) else label.move.candidate + 1
         assert experience.targets.moves[row] == expected
         assert experience.targets.asks[row] == (IGNORE if label.ask is None else int(label.ask))
@@ -357,7 +362,7 @@ def test_it_overfits_one_batch(model):
     tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:8]]
     losses, rights = [], []
     for _ in range(40):
-        played = collect(split.make_env, learner, tasks, HannaTeacher(), split.worlds, seed=0)
+        _, played = collected(split, learner, tasks)
         navigation, asking = imitation_loss(played.said, played.targets, 0.0, len(tasks))
         optimizer.zero_grad()
         (navigation + asking).backward()
@@ -543,10 +548,9 @@ def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
     rates = [scheduled_rate(1e-3, u, 100, 0.4) for u in range(100)]
     assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
     assert scheduled_rate(1e-3, 99, 100, 0.0) == 1e-3
-    agent, split = agent_for(setting(), config), setting()
-    optimizer = torch.optim.Adam(agent.network.parameters(), 1.0)
-    train_step(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 99, Clock())
-    assert optimizer.param_groups[0]["lr"] == rates[-1]
+    learner = HannaLearner(agent_for(setting(), config), setting(), HannaTeacher())
+    learner.learn(99, Clock())
+    assert learner.optimizer.param_groups[0]["lr"] == rates[-1]
 
 
 def test_table_d1_is_the_default():
@@ -559,33 +563,23 @@ def test_table_d1_is_the_default():
 
 @pytest.mark.slow
 def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
-    here = Path(__file__).parent
-    code = (
-        "import sys, dataclasses; sys.path.insert(0, sys.argv[2])\n"
-        "import test_hanna_learner as t; from pathlib import Path\n"
-        "config = dataclasses.replace(t.TINY, iterations=10**6, validate_every=10**6)\n"
-        "split = t.setting(); agent = t.agent_for(split, config)\n"
-        "note = lambda line: print(line, flush=True)\n"
-        "learner = t.HannaLearner(agent, split, t.HannaTeacher())\n"
-        "t.imitation.train(learner, split, Path(sys.argv[1]), t.identity(agent), note=note)\n"
-    )
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(here.parent)}
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path), str(here)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment,
-    )
-    process.stdout.readline()  # what it learns from
-    assert process.stdout.readline().startswith("20/")
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert "KeyboardInterrupt" in err and "goes on from there" in out, (out, err)
-    update = int(out.split("stopped after update ")[1].split(";")[0])
-    saved = torch.load(tmp_path / "checkpoint.pt", weights_only=True)
-    assert saved["progress"]["update"] == update >= 20
-    assert time.time() - (tmp_path / "checkpoint.pt").stat().st_mtime < 60
+    config, said = dataclasses.replace(TINY, iterations=10**6, validate_every=10**6), []
+
+    def note(line: str) -> None:
+        said.append(line)
+        if line.startswith("20/"):
+            signal.raise_signal(signal.SIGINT)
+
+    split = setting()
+    agent = agent_for(split, config)
+    with pytest.raises(KeyboardInterrupt):
+        imitation.train(HannaLearner(agent, split, HannaTeacher()), split, tmp_path, identity(agent), note=note)
+    assert said[-1] == "stopped after update 20; the same command goes on from there"
+    assert torch.load(tmp_path / "checkpoint.pt", weights_only=True)["progress"]["update"] == 20
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    agent = agent_for(split, dataclasses.replace(config, iterations=21))
+    imitation.train(HannaLearner(agent, split, HannaTeacher()), split, tmp_path, identity(agent), note=note)
+    assert "continuing after update 20" in said and said[-1].startswith("21/21")
 
 
 def test_success_in_the_progress_line_is_the_judges():
@@ -600,24 +594,28 @@ def test_success_in_the_progress_line_is_the_judges():
 
 def gradients_of_a_share(rank: int, folder: str) -> None:
     """One of two processes: its share of one update, and the gradient that it then has."""
-    dist.init_process_group("gloo", init_method=f"file://{folder}/meet", rank=rank, world_size=2)
-    save_gradients(Path(folder) / f"{rank}.pt")
-    dist.destroy_process_group()
+    patience = dt.timedelta(minutes=3)
+    dist.init_process_group("gloo", f"file://{folder}/meet", patience, world_size=2, rank=rank)
+    try:
+        save_gradients(Path(folder) / f"{rank}.pt")
+    finally:
+        dist.destroy_process_group()
 
 
 def save_gradients(path: Path) -> None:
     torch.set_num_threads(1)
     split = setting()
-    agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0))
-    optimizer = torch.optim.SGD(agent.network.parameters(), 0.0)
-    numbers = train_step(agent, optimizer, for_training(agent.policy(split.bank)), split, HannaTeacher(), 0, Clock())
+    agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0, environment_dropout=0.0, guided_asking=0.0))
+    numbers = HannaLearner(agent, split, HannaTeacher()).learn(0, Clock())
     torch.save([p.grad for p in agent.network.parameters()], path)
     path.with_suffix(".json").write_text(json.dumps(numbers))
 
 
 @pytest.mark.slow
 def test_two_processes_learn_what_one_would(tmp_path):
-    torch.multiprocessing.spawn(gradients_of_a_share, (str(tmp_path),), nprocs=2)
+    other = torch.multiprocessing.spawn(gradients_of_a_share, (str(tmp_path),), nprocs=1, join=False)
+    gradients_of_a_share(1, str(tmp_path))
+    other.join()
     save_gradients(tmp_path / "alone.pt")
     alone, first, second = (torch.load(tmp_path / f"{n}.pt", weights_only=True) for n in ("alone", "0", "1"))
     for a, b, c in zip(alone, first, second, strict=True):

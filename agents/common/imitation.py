@@ -1,7 +1,7 @@
 """The training loop of imitation learners: play, label, update; validate; keep the best (agents.common.session).
 
 for update in session:
-    learner.learn(update)           # play tasks, have them labelled, take a gradient step (see `train_step`)
+    learner.learn(update)           # play tasks, have them labelled, take a gradient step
     every so often: validate        # as in evaluation; keep the agent if it is as good as the best
 """
 
@@ -10,36 +10,50 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, TypedDict, TypeVar, Unpack
+from typing import Any, ClassVar, TypedDict, Unpack
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from agents.common import parallel
-from agents.common.playing import TaskSet
+from agents.common.playing import TaskSet, play_with_memory
 from agents.common.session import (
     Clock,
     Note,
     Progress,
     Session,
     descend,
+    episode_seed,
     scheduled_rate,
     seeded_dropout,
     set_learning_rate,
+    tasks_of_update,
 )
-from agents.common.settings import MAY_CHANGE, ImitationSettings
+from agents.common.settings import MAY_CHANGE
 from embodied.errors import UnableError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
-from embodied.interface import Agent, Ask, Episode, Task
+from embodied.interface import Agent, Ask, Episode, Place, Task
+from embodied.seeds import stream
 
-X = TypeVar("X")
 OnValidation = Callable[[int, Sequence[Episode]], None]
 
 
+@dataclass(frozen=True, eq=False)
+class BatchLoss:
+    """The losses of one batch of episodes, and what else is reported."""
+
+    losses: tuple[Tensor, Tensor]
+    """Of navigation and of asking, summed over steps and averaged over episodes."""
+    loss: Tensor
+    """What the gradient is taken of: their sum, or navigation's alone where asking is not learned."""
+    numbers: Mapping[str, float]
+    """What is reported besides the losses and the gradient."""
+
+
 class Learner:
-    """An agent in training; who derives from it says `learn`."""
+    """An agent in training; who derives from it says `player` and `loss_of`, or `learn` as a whole."""
 
     optimizer_kind: ClassVar[type[torch.optim.Adam]] = torch.optim.Adam
 
@@ -55,17 +69,58 @@ class Learner:
             agent.network.parameters(), self.config.learning_rate, weight_decay=self.config.weight_decay
         )
 
-    def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
-        """One update; the numbers to report, those of REPORTED."""
+    def player(self, update: int, bank: Any) -> Agent:
+        """Who plays the batch of an update, with the features that it is shown."""
         raise NotImplementedError
+
+    def experience(self, episodes: Sequence[Episode], memory: Any) -> Any:
+        """What is learned from, of finished episodes and the player's last memory: its moments, where it had labels."""
+        return memory.moments
+
+    def loss_of(self, episodes: Sequence[Episode], experience: Any) -> BatchLoss:
+        """The losses of a batch, and what is reported of it."""
+        raise NotImplementedError
+
+    def training_task(self, task: Task) -> Task:
+        """A task as it is in training, with its horizon."""
+        return task
+
+    def evaluation_task(self, task: Task) -> Task:
+        """A task as it is in evaluation, with its horizon."""
+        return task
 
     def evaluated_agent(self, split: Any) -> Agent:
         """The agent as it is evaluated, with the features of `split`."""
         return self.agent.policy(split.bank)
 
-    def evaluation_task(self, task: Task) -> Task:
-        """A task as it is in evaluation, with its horizon."""
-        return task
+    def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
+        """One update: play a batch, compute its loss, take a gradient step; the numbers to report, those of REPORTED.
+
+        Raises:
+          DivergedError: the loss or a gradient is not finite (weights are as before).
+          UnableError: memory ran out.
+        """
+        config, training = self.config, self.training
+        chosen = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
+        tasks, seed = [self.training_task(t) for t in chosen], episode_seed(config.seed, update)
+        player = self.player(update, training.bank.relit(stream(config.seed, "lightings", update)))
+        try:
+            with seeded_dropout(config.seed + parallel.rank(), update):
+                self.network.train()
+                with clock.on("environment"):
+                    episodes, memory, thinking = play_with_memory(training.make_env, player, tasks, seed=seed)
+                    experience = self.experience(episodes, memory)
+                clock.move(thinking, "environment", "network")
+                with clock.on("backward"):
+                    batch_loss = self.loss_of(episodes, experience)
+                    rate = scheduled_rate(config.learning_rate, update, config.iterations, config.cooldown)
+                    set_learning_rate(self.optimizer, rate)
+                    norm = descend(batch_loss.loss, self.optimizer, f"update {update}")
+        except torch.OutOfMemoryError as e:
+            raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
+        losses = [float(x.detach()) for x in batch_loss.losses]
+        numbers = {"loss navigation": losses[0], "loss asking": losses[1], "gradient": norm, **batch_loss.numbers}
+        return parallel.reduce_metrics(numbers, REPORTED, SUMMED, batch_loss.loss.device)
 
 
 class Options(TypedDict, total=False):
@@ -124,56 +179,6 @@ def train(
     return session.progress
 
 
-@dataclass(frozen=True, eq=False)
-class BatchLoss:
-    """The losses of one batch of episodes, and what else is reported."""
-
-    losses: tuple[Tensor, Tensor]
-    """Of navigation and of asking, summed over steps and averaged over episodes; for the backward pass."""
-    loss: Tensor
-    """What the gradient is taken of: their sum, or navigation's alone where asking is not learned."""
-    numbers: Mapping[str, float]
-    """What is reported besides the losses and the gradient."""
-
-
-def train_step(
-    network: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    config: ImitationSettings,
-    update: int,
-    clock: Clock,
-    played: Callable[[], tuple[X, float]],
-    loss_of: Callable[[X], BatchLoss],
-) -> dict[str, float]:
-    """One update: play a batch, compute its loss, take a gradient step; returns the numbers to report.
-
-    Args:
-      played: plays the batch; what came of it, and the seconds of it that the policy took.
-      loss_of: its losses.
-
-    Raises:
-      DivergedError: the loss or a gradient is not finite (weights are as before).
-      UnableError: memory ran out.
-    """
-    try:
-        with seeded_dropout(config.seed + parallel.rank(), update):
-            network.train()
-            with clock.on("environment"):
-                experience, thinking = played()
-            clock.move(thinking, "environment", "network")
-            with clock.on("backward"):
-                batch_loss = loss_of(experience)
-                set_learning_rate(
-                    optimizer, scheduled_rate(config.learning_rate, update, config.iterations, config.cooldown)
-                )
-                norm = descend(batch_loss.loss, optimizer, f"update {update}")
-    except torch.OutOfMemoryError as e:
-        raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
-    losses = [float(x.detach()) for x in batch_loss.losses]
-    numbers = {"loss navigation": losses[0], "loss asking": losses[1], "gradient": norm, **batch_loss.numbers}
-    return parallel.reduce_metrics(numbers, REPORTED, SUMMED, batch_loss.loss.device)
-
-
 REPORTED = (
     "loss navigation",
     "loss asking",
@@ -188,6 +193,27 @@ REPORTED = (
 """What is reported of an update; the last two only where help could be asked for."""
 SUMMED: Collection[str] = ("loss navigation", "loss asking", "steps")
 """Those that are sums over the batch, of which every process has a share."""
+
+
+def played(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> dict[str, float]:
+    """What is reported of the episodes of a batch."""
+    success = sum(metrics.success(e, worlds[e.task.world].graph) for e in episodes) / len(episodes)
+    return {"steps": float(sum(len(e.steps) for e in episodes)), "success": success}
+
+
+def asked(episodes: Sequence[Episode], logits: Tensor, labels: Tensor) -> dict[str, float]:
+    """What is reported of asking: requests of an episode and, of the decisions with a label, how many should be to ask
+    and how many are as they should be.
+
+    Args:
+      logits: (m, 2) of not asking and of asking.
+      labels: (m,) int64.
+    """
+    numbers = {"requests": sum(e.requests for e in episodes) / len(episodes)}
+    if len(labels):
+        numbers["should ask"] = float(labels.float().mean())
+        numbers["right asks"] = float((logits.argmax(-1) == labels).float().mean())
+    return numbers
 
 
 def validate(learner: Learner, split: TaskSet, session: Session) -> Sequence[Episode]:

@@ -146,8 +146,7 @@ class FindLearner(imitation.Learner):
         policy = Watched(dataclasses.replace(self.agent.policy(split.bank), choose=choose_sampled))
         tasks = tasks_of_update(split.tasks, update, c.batch, c.seed)
         episodes, searches, _ = play_with_memory(split.make_env, policy, tasks, seed=episode_seed(c.seed, update))
-        success = sum(metrics.success(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
-        return list(searches.values()), {"success": success, "steps": float(sum(len(e.steps) for e in episodes))}
+        return list(searches.values()), imitation.played(episodes, split.worlds)
 
 
 def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:

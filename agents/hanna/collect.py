@@ -1,4 +1,4 @@
-"""Playing training episodes and turning what the teacher says of them into tensors.
+"""What the teacher says of training episodes, as tensors.
 
 The retrospective mode of 4.2.3: the learner acts alone until its episodes end, sampling from its
 own policies; then the teacher, who can now see each step's future, labels all steps at once. What
@@ -7,7 +7,7 @@ the networks said while acting is kept with its gradients, so each step is compu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,11 +16,9 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.losses import IGNORE
-from agents.common.playing import play_with_memory
 from agents.hanna.losses import help_loss, navigation_loss
-from agents.hanna.policy import HannaPolicy, Moment
-from embodied.envs.base import HelpEnv
-from embodied.interface import Episode, Label, Move, Place, Stop, Task, Teacher
+from agents.hanna.policy import Moment
+from embodied.interface import Episode, Label, Move, Place, Stop, Teacher
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,27 +51,16 @@ class Said:
 class Experience:
     """A batch of finished episodes, ready to be learned from."""
 
-    episodes: tuple[Episode, ...]
     said: Said
     targets: Targets
-    thinking: float
-    """Seconds of playing that the policy took; the environment and the teacher took the others."""
 
 
-def collect(
-    make_env: Callable[[], HelpEnv],
-    policy: HannaPolicy,
-    tasks: Sequence[Task],
-    teacher: Teacher,
-    worlds: Mapping[str, Place],
-    *,
-    seed: int,
+def labelled(
+    episodes: Sequence[Episode], moments: Sequence[Moment], teacher: Teacher, worlds: Mapping[str, Place]
 ) -> Experience:
-    """Play `tasks` side by side with a policy that keeps its moments, and have them labelled."""
-    episodes, memory, thinking = play_with_memory(make_env, policy, tasks, seed=seed)
+    """What the networks said in some episodes, beside what the teacher says of them."""
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
-    moments = memory.moments
-    return Experience(episodes, join(moments), targets(moments, labels), thinking)
+    return Experience(join(moments), targets(moments, labels))
 
 
 def join(moments: Sequence[Moment]) -> Said:

@@ -8,22 +8,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common import imitation, parallel
+from agents.common import imitation
 from agents.common.choosing import choose_sampled
 from agents.common.losses import IGNORE, negative_log_likelihood
-from agents.common.playing import play_with_memory
-from agents.common.session import Clock, episode_seed, tasks_of_update
+from agents.vision.bank import FeatureBank
 from agents.vln.config import FollowerSettings
 from agents.vln.policy import SupervisedVln, VlnMoment
-from embodied.evaluation import metrics
-from embodied.interface import Episode, Place
-from embodied.seeds import stream
+from embodied.interface import Agent, Episode, Place, Task
 
 LONGEST = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
@@ -34,26 +30,20 @@ class VlnLearner(imitation.Learner):
 
     optimizer_kind = torch.optim.AdamW
 
-    def learn(self, update: int, clock: Clock) -> dict[str, float]:
-        config, training = self.config, self.training
-        chosen = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
-        tasks = [dataclasses.replace(t, horizon=min(t.horizon, LONGEST)) for t in chosen]
-        policy = self.agent.policy(training.bank.relit(stream(config.seed, "lightings", update)))
-        policy = dataclasses.replace(policy, choose=choose_sampled, environment_dropout=config.environment_dropout)
-        share = teacher_share(config, update)
-        player = SupervisedVln(policy, lambda _, rng: bool(rng.random() < share))
+    def training_task(self, task: Task) -> Task:
+        return dataclasses.replace(task, horizon=min(task.horizon, LONGEST))
 
-        def played() -> tuple[VlnExperience, float]:
-            seed = episode_seed(config.seed, update)
-            episodes, memory, seconds = play_with_memory(training.make_env, player, tasks, seed=seed)
-            return VlnExperience(episodes, memory.moments), seconds
+    def player(self, update: int, bank: FeatureBank) -> Agent:
+        dropout, share = self.config.environment_dropout, teacher_share(self.config, update)
+        policy = dataclasses.replace(self.agent.policy(bank), choose=choose_sampled, environment_dropout=dropout)
+        return SupervisedVln(policy, lambda _, rng: bool(rng.random() < share))
 
-        def loss_of(experience: VlnExperience) -> imitation.BatchLoss:
-            moves, left, rooms = losses_of(experience.moments, config.batch)
-            loss = moves + config.progress_weight * left + config.room_weight * rooms
-            return imitation.BatchLoss((moves, torch.zeros(())), loss, numbers_of(experience, training.worlds))
-
-        return imitation.train_step(self.network, self.optimizer, config, update, clock, played, loss_of)
+    def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VlnMoment]) -> imitation.BatchLoss:
+        c = self.config
+        moves, left, rooms = losses_of(experience, c.batch)
+        loss = moves + c.progress_weight * left + c.room_weight * rooms
+        numbers = numbers_of(episodes, experience, self.training.worlds)
+        return imitation.BatchLoss((moves, torch.zeros(())), loss, numbers)
 
 
 def teacher_share(config: FollowerSettings, update: int) -> float:
@@ -61,14 +51,6 @@ def teacher_share(config: FollowerSettings, update: int) -> float:
     if config.forcing == "dagger":
         return max(config.least_teacher, 1.0 - 2.0 * update / config.iterations)
     return float(config.forcing == "teacher")
-
-
-@dataclass(frozen=True, eq=False)
-class VlnExperience:
-    """A batch of finished episodes, ready to be learned from."""
-
-    episodes: tuple[Episode, ...]
-    moments: tuple[VlnMoment, ...]
 
 
 def losses_of(moments: Sequence[VlnMoment], episodes: int) -> tuple[Tensor, Tensor, Tensor]:
@@ -85,15 +67,15 @@ def _rooms(m: VlnMoment) -> Tensor:
     return (lost.sum(1) / (m.rooms != IGNORE).sum(1)).sum()
 
 
-def numbers_of(experience: VlnExperience, worlds: Mapping[str, Place]) -> dict[str, float]:
+def numbers_of(
+    episodes: Sequence[Episode], moments: Sequence[VlnMoment], worlds: Mapping[str, Place]
+) -> dict[str, float]:
     """What a researcher wants to know about one update, besides its losses."""
-    episodes, moments = experience.episodes, experience.moments
     right = torch.cat([m.said.moves.argmax(-1) == m.moves for m in moments])
     known = torch.cat([m.rooms.flatten() for m in moments])
     guessed = torch.cat([m.said.rooms.argmax(-1).flatten() for m in moments])
     return {
         "right moves": float(right.float().mean()),
         "right rooms": float((guessed == known)[known != IGNORE].float().mean()),
-        "steps": float(sum(len(e.steps) for e in episodes)),
-        "success": sum(metrics.success(e, worlds[e.task.world].graph) for e in episodes) / len(episodes),
+        **imitation.played(episodes, worlds),
     }

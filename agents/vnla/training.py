@@ -9,23 +9,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from agents.common import imitation, parallel
+from agents.common import imitation
 from agents.common.losses import negative_log_likelihood
-from agents.common.playing import play_with_memory
-from agents.common.session import Clock, episode_seed, tasks_of_update
+from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Split
 from agents.vnla.agent import VnlaAgent, rules_of
 from agents.vnla.config import TRAINED_UNDER
 from agents.vnla.policy import VnlaMoment, for_training
 from embodied.envs.vnla import teacher_of
-from embodied.evaluation import metrics
 from embodied.interface import Agent, Episode, Place
-from embodied.seeds import stream
 
 
 class VnlaLearner(imitation.Learner):
@@ -37,34 +33,16 @@ class VnlaLearner(imitation.Learner):
         teacher = teacher_of(TRAINED_UNDER[config.rules], rules_of(config))
         self._player = for_training(agent.policy(training.bank), teacher, config.environment_dropout)
 
-    def learn(self, update: int, clock: Clock) -> dict[str, float]:
-        config, training = self.config, self.training
-        tasks = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
-        bank = training.bank.relit(stream(config.seed, "lightings", update))
-        player = dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=bank))
+    def player(self, update: int, bank: FeatureBank) -> Agent:
+        return dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=bank))
 
-        def played() -> tuple[VnlaExperience, float]:
-            seed = episode_seed(config.seed, update)
-            episodes, memory, seconds = play_with_memory(training.make_env, player, tasks, seed=seed)
-            return VnlaExperience(episodes, memory.moments), seconds
-
-        def loss_of(experience: VnlaExperience) -> imitation.BatchLoss:
-            losses = losses_of(experience.moments, config.batch)
-            loss = losses[0] + losses[1] if config.asker == "learned" else losses[0]
-            return imitation.BatchLoss(losses, loss, numbers_of(experience, training.worlds))
-
-        return imitation.train_step(self.network, self.optimizer, config, update, clock, played, loss_of)
+    def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VnlaMoment]) -> imitation.BatchLoss:
+        losses = losses_of(experience, self.config.batch)
+        loss = losses[0] + losses[1] if self.config.asker == "learned" else losses[0]
+        return imitation.BatchLoss(losses, loss, numbers_of(episodes, experience, self.training.worlds))
 
     def evaluated_agent(self, split: Split) -> Agent:
         return self.agent.player(split.bank)
-
-
-@dataclass(frozen=True, eq=False)
-class VnlaExperience:
-    """A batch of finished episodes, ready to be learned from."""
-
-    episodes: tuple[Episode, ...]
-    moments: tuple[VnlaMoment, ...]
 
 
 def losses_of(moments: Sequence[VnlaMoment], episodes: int) -> tuple[Tensor, Tensor]:
@@ -75,18 +53,14 @@ def losses_of(moments: Sequence[VnlaMoment], episodes: int) -> tuple[Tensor, Ten
     return navigation, negative_log_likelihood(asks, wished).sum() / episodes
 
 
-def numbers_of(experience: VnlaExperience, worlds: Mapping[str, Place]) -> dict[str, float]:
+def numbers_of(
+    episodes: Sequence[Episode], moments: Sequence[VnlaMoment], worlds: Mapping[str, Place]
+) -> dict[str, float]:
     """What a researcher wants to know about one update, besides its losses."""
-    episodes, moments = experience.episodes, experience.moments
-    moves, wanted = torch.cat([m.moves for m in moments]), torch.cat([m.move_labels for m in moments])
+    right = torch.cat([m.moves.argmax(-1) == m.move_labels for m in moments])
     asks, wished = torch.cat([m.asks for m in moments]), torch.cat([m.ask_labels for m in moments])
-    numbers = {
-        "right moves": float((moves.argmax(-1) == wanted).float().mean()),
-        "steps": float(sum(len(e.steps) for e in episodes)),
-        "success": sum(metrics.success(e, worlds[e.task.world].graph) for e in episodes) / len(episodes),
-        "requests": sum(e.requests for e in episodes) / len(episodes),
+    return {
+        "right moves": float(right.float().mean()),
+        **imitation.played(episodes, worlds),
+        **imitation.asked(episodes, asks, wished),
     }
-    if len(wished):
-        numbers["should ask"] = float(wished.float().mean())
-        numbers["right asks"] = float((asks.argmax(-1) == wished).float().mean())
-    return numbers
