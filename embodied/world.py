@@ -306,7 +306,7 @@ class World:
         path = self.cache / "sightings" / f"{digest(self._origin, code)[:32]}.npz"
         table = load_table(path)
         if table is None:
-            with Renderer(self.house, self.catalogue, size=FACE) as renderer:
+            with Renderer(self.house, self.catalogue, size=FACE, colours=False) as renderer:
                 table = sightings_table(
                     [renderer.seen(p, FACE) for p in self.graph.positions], len(self.house.placements)
                 )

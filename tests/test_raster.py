@@ -54,6 +54,17 @@ def mujocos(house, lit):
             yield r
 
 
+@gl_test
+def test_a_house_without_colours_shows_the_depth_and_ids_that_mujoco_draws(house):
+    with Renderer(house, HandCatalogue(), size=64, colours=False) as bare, Renderer(house, HandCatalogue()) as whole:
+        if not isinstance(bare._drawing, raster.Raster):
+            pytest.skip("a GPU draws here")
+        (depths, ids), (depths_there, ids_there) = bare.seen(EYE), whole.seen(EYE)
+    same = ids == ids_there
+    assert same.mean() > 0.999
+    np.testing.assert_allclose(depths[same], depths_there[same], rtol=1e-4)
+
+
 def decibels(a: np.ndarray, b: np.ndarray) -> float:
     return float(10 * np.log10(255**2 / max(np.mean((a.astype(float) - b) ** 2), 1e-9)))
 

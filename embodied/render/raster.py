@@ -49,13 +49,20 @@ class Raster:
     """Owns the triangles and the pages of a house until `close`. Its methods are called within gl.drawing()."""
 
     def __init__(
-        self, meshes: Sequence[LitMesh], ids: np.ndarray, pages: Sequence[np.ndarray], planes: tuple[float, float]
+        self,
+        meshes: Sequence[LitMesh],
+        ids: np.ndarray,
+        pages: Sequence[np.ndarray],
+        planes: tuple[float, float],
+        *,
+        copied: bool = True,
     ) -> None:
         """
         Args:
           ids: (meshes,) of their owners, below 65536.
           pages: (h, w, 3) uint8 each.
           planes: nothing nearer or farther is drawn, metres.
+          copied: whether things get coarser copies; without, all is drawn whole.
         """
         self._planes = planes
         self._is_clear = np.array([m.alpha < 1 for m in meshes])
@@ -68,7 +75,7 @@ class Raster:
         place_of = [dict(zip(some, p, strict=True)) for some, p in zip(used, places, strict=True)]
         self._buffers = [int(b) for b in GL.glGenBuffers(2)]
         self._array = int(GL.glGenVertexArrays(1))
-        corners, triangles, self._starts, self._counts = _arranged(meshes, ids, pages, place_of)
+        corners, triangles, self._starts, self._counts = _arranged(meshes, ids, pages, place_of, copied)
         _upload_corners(self._array, self._buffers, corners)
         self._triangles = triangles.astype(np.uint32)
         self._facing = _facing(corners["xyz"], triangles)
@@ -152,7 +159,7 @@ class Raster:
         near = (self.middles[chosen] - np.array(camera.position)) @ forward - self.reaches[chosen] @ np.abs(forward)
         widest = COARSE * 2 * math.tan(camera.vfov / 2) / size[0] * np.maximum(near, 0)
         counts = self._counts[:, chosen]
-        fits = (CELLS[:, None] <= widest) & (counts > 0)
+        fits = (CELLS[: len(counts), None] <= widest) & (counts > 0)
         level = len(fits) - 1 - fits[::-1].argmax(0)
         return np.stack([self._starts[level, chosen], counts[level, np.arange(len(chosen))]], axis=1)
 
@@ -274,6 +281,7 @@ def _arranged(
     ids: np.ndarray,
     pages: Sequence[np.ndarray],
     place_of: Sequence[Mapping[int, np.ndarray]],
+    copied: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(n,) CORNER and (m, 3) triangles of all meshes and of coarser copies of the things among them; and where those
     of each mesh begin and how many they are, (CELLS, meshes) each."""
@@ -288,7 +296,7 @@ def _arranged(
     triangles = np.concatenate([m.faces + at for m, at in zip(meshes, first, strict=True)])
     whole = coarser.Corners(corners["xyz"], corners["at"], number, triangles)
     things = np.array([m.kind == "object" for m in meshes])
-    copies = coarser.copies(whole, len(meshes), things)
+    copies = coarser.copies(whole, len(meshes), things) if copied else []
     more = [corners[first[c.mesh]] for c in copies]
     for copy, part in zip(copies, more, strict=True):
         part["xyz"], part["at"] = copy.xyz, copy.uv
