@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import functools
 import shutil
@@ -92,3 +93,9 @@ def noise_features(data):
         path = feature_path(data.folder / "features", encoder.digest, name, pictures)
         save_features(path, noise, encoder, place.house.digest, pictures)
     return encoder
+
+
+def metrics_of(folder):
+    """(update, metric, value) of all that a run's metrics.csv holds."""
+    with open(folder / "metrics.csv", newline="") as f:
+        return [(int(row["update"]), row["metric"], float(row["value"])) for row in csv.DictReader(f)]

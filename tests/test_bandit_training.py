@@ -16,14 +16,15 @@ from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import CorpusError, Pair, Sizes
 from agents.bandit.network import Critic, EncoderDecoder, Translator, begin
 from agents.bandit.ratings import Rater
-from agents.bandit.store import load_translator
+from agents.bandit.store import REMEDY, BanditAbout, load_network
 from agents.bandit.study import BanditStudy
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, greedy, padded, perplexity
-from agents.bandit.words import END_NUMBER, PAD_NUMBER, build_words
 from agents.common.checkpoint import CheckpointError, read_checkpoint
 from agents.common.decoding import sampled_choice
 from agents.common.session import Session
+from agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
+from agents.common.weights import load_weights
 from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.errors import UnableError
@@ -205,9 +206,9 @@ def test_without_apt_the_packages_are_asked_for(tmp_path, monkeypatch):
 
 
 def test_words_are_numbered_by_frequency_and_come_back():
-    lexicon = build_words([["b", "a", "b"], ["c", "a", "b"]], 5)
-    assert lexicon.vocabulary.words[3:] == ("b", "a")
-    assert lexicon.encode(["a", "c", "b"]) == [4, 1, 3, END_NUMBER]
+    lexicon = most_frequent("babcab", most=5)
+    assert lexicon.words[3:] == ("b", "a")
+    assert lexicon.sentence(["a", "c", "b"]) == [4, 1, 3, END_NUMBER]
     assert lexicon.decode([4, 3, END_NUMBER, 4]) == ("a", "b")
 
 
@@ -304,11 +305,13 @@ def test_every_sentence_is_in_one_batch():
 
 def test_pretraining_learns_to_translate(data, trained):
     m = material(data, TOY)
-    translator, lexicons, config = load_translator(trained / "pretrain" / "full.safetensors")
-    assert config == TOY
-    weak = load_translator(trained / "pretrain" / "weak.safetensors")[0]
+    translator, weak = m.translator(), m.translator()
+    for network, name in ((translator, "full"), (weak, "weak")):
+        load_network(network, trained / "pretrain" / f"{name}.safetensors")
+    about = load_weights(trained / "pretrain" / "full.safetensors", "bandit", BanditAbout, REMEDY)[1]
+    assert about.config == TOY and about.target == m.lexicons[1].words
     assert perplexity(translator, m.splits["dev"]) < 0.7 * perplexity(weak, m.splits["dev"])
-    said = greedy(translator, m.splits["dev"], lexicons[1], 8)
+    said = greedy(translator, m.splits["dev"], m.lexicons[1], 8)
     assert np.mean([s[0] == r[0] for s, r in zip(said, m.splits["dev"].references, strict=True)]) > 0.5
 
 

@@ -27,14 +27,13 @@ from hand_data import built
 
 from agents.bandit.config import BanditConfig
 from agents.bandit.network import Translator
-from agents.bandit.store import load_translator, save_network
+from agents.bandit.store import REMEDY, BanditAbout, load_network, save_network
 from agents.bandit.training import NumberedCorpus
-from agents.bandit.words import END, PAD, UNKNOWN, Vocabulary, Words
 from agents.common.checkpoint import restore
 from agents.common.session import Session
 from agents.common.tensor_file import save_tensors
-from agents.common.vocabulary import build_vocabulary
-from agents.common.weights import FORMAT
+from agents.common.vocabulary import END, PAD, UNKNOWN, Vocabulary, build_vocabulary
+from agents.common.weights import FORMAT, load_weights
 from agents.hanna.agent import HannaAbout, HannaAgent
 from agents.hanna.training_config import SCALES
 from agents.hari import agent as hari
@@ -118,7 +117,7 @@ def kinds(tmp_path_factory) -> dict[str, Kind]:
         "episodes": Kind(folder / "episodes.jsonl", lambda p: [to_json(e) for e in load_lines(p, Episode)], False),
         "agent": Kind(folder / "agent.safetensors", lambda p: _weights(HannaAgent.load(p).network), True),
         "hari agent": Kind(folder / "hari.safetensors", lambda p: _weights(hari.load_agent(p).actor), True),
-        "translator": Kind(folder / "translator.safetensors", lambda p: _weights(load_translator(p)[0]), True),
+        "translator": Kind(folder / "translator.safetensors", lambda p: _weights(_translator(p)), True),
         "features": Kind(folder / "features.safetensors", lambda p: load_features(p)[0].tolist(), True),
         "checkpoint": Kind(folder / "checkpoint.pt", _resumed, True),
         "panoramas": Kind(folder / "a.pano", _pictures, True),
@@ -177,9 +176,15 @@ def _write_others(folder: Path) -> None:
     execution, intention = ExecutionConfig(hidden_size=8, heads=2), IntentionConfig(hidden_size=8)
     executor = hari.new_executor(execution, FeatureWords(("action/go", "action/stop", "room/hall")))
     hari.save_agent(hari.HariAgent(executor, hari.new_heads(intention, 8)[0], intention), folder / "hari.safetensors")
-    words = Words(Vocabulary((PAD, UNKNOWN, END, "door")))
+    words = Vocabulary((PAD, UNKNOWN, END, "door"))
     material = NumberedCorpus(BanditConfig(hidden_size=8), {}, (words, words), "", "")
     save_network(Translator(4, 4, 8), material.config, material.lexicons, folder / "translator.safetensors", {})
+
+
+def _translator(path: Path) -> Translator:
+    translator = Translator(4, 4, 8)
+    load_network(translator, path)
+    return translator
 
 
 def _weights(network: torch.nn.Module) -> list[float]:
@@ -361,6 +366,10 @@ def test_what_is_no_such_file_at_all_is_refused(name, body, kinds):
         kind.path.write_bytes(before)
 
 
+def _bandit(path: Path) -> object:
+    return load_weights(path, "bandit", BanditAbout, REMEDY)[1]
+
+
 BESIDE = [
     (hari.load_agent, "hari", "{}", "missing fields"),
     (hari.load_agent, "hari", "{", "as JSON"),
@@ -369,10 +378,10 @@ BESIDE = [
     (hari.load_agent, "hari", '{"names": [], "execution": {"heads": 0}}', "at least 1"),
     (hari.load_agent, "hari", '{"names": [], "execution": {}}', "execution policy alone"),
     (hari.load_agent, "vnla", "{}", "holds 'vnla', 'hari' is wanted"),
-    (load_translator, "bandit", '{"config": {}}', "missing fields"),
-    (load_translator, "bandit", '{"config": [], "source": [], "target": []}', "should be an object"),
-    (load_translator, "bandit", '{"config": {"batch": 0}, "source": [], "target": []}', "at least 1"),
-    (load_translator, "bandit", '{"config": {}, "source": [1], "target": []}', r"source\[0\] should be"),
+    (_bandit, "bandit", '{"config": {}}', "missing fields"),
+    (_bandit, "bandit", '{"config": [], "source": [], "target": []}', "should be an object"),
+    (_bandit, "bandit", '{"config": {"batch": 0}, "source": [], "target": []}', "at least 1"),
+    (_bandit, "bandit", '{"config": {}, "source": [1], "target": []}', r"source\[0\] should be"),
     (load_student, "regex", '{"config": {"stages": 3}, "words": []}', "unknown fields"),
     (config_of, "nav", '{"config": {}}', "missing fields"),
 ]
@@ -386,7 +395,7 @@ def test_weights_beside_settings_that_cannot_be_are_refused(read, kind, about, m
         read(tmp_path / "a.safetensors")
 
 
-@pytest.mark.parametrize("read", [hari.load_agent, HannaAgent.load, load_translator])
+@pytest.mark.parametrize("read", [hari.load_agent, HannaAgent.load, _bandit])
 def test_weights_that_are_not_there_say_how_they_are_made(read, tmp_path):
     with pytest.raises(FileNotFoundError, match=r"none\.safetensors does not exist; name another file, or .*train"):
         read(tmp_path / "none.safetensors")

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import torch
 import torch.distributed as dist
+from hand_data import metrics_of
 from hand_worlds import grid_world
 
 from agents.common import imitation
@@ -24,15 +25,7 @@ from agents.common.checkpoint import CheckpointError, restore
 from agents.common.choosing import choose_at, choose_greedily, choose_sampled
 from agents.common.imitation import REPORTED, SUMMED
 from agents.common.playing import play_with_memory
-from agents.common.session import (
-    Clock,
-    DivergedError,
-    Session,
-    metrics_of,
-    scheduled_rate,
-    tasks_of_update,
-    within_standard_error,
-)
+from agents.common.session import Clock, DivergedError, Session, scheduled_rate, tasks_of_update, within_standard_error
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
 from agents.hanna.asking import RULES, ask_above
@@ -263,7 +256,7 @@ def test_actions_are_described_by_the_view_they_lie_in_and_stop_by_nothing():
     task = split.tasks[0]
     seen = split.make_env().reset(task)
     percept = policy.percept([seen], policy.start((0,)))
-    assert torch.equal(percept.actions[0, 0], torch.zeros(policy.network.config.action_size))
+    assert torch.equal(percept.actions[0, 0], torch.zeros(policy.network.action_size))
     first = split.bank.features(seen.sight)[seen.candidates.view[0]]
     assert np.allclose(percept.actions[0, 1, : split.bank.size], first)
     assert percept.actions[0, 1, split.bank.size] == pytest.approx(math.sin(seen.candidates.bearing[0]), abs=1e-6)

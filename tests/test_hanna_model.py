@@ -10,7 +10,6 @@ import pytest
 import torch
 
 from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, sim_attend, sinusoid
-from agents.hanna.config import HannaSizes
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.percept import (
@@ -19,22 +18,15 @@ from agents.hanna.percept import (
     SLOTS,
     START,
     Percept,
+    action_size,
     orientation,
     slot_distribution,
     target_similarity,
 )
+from agents.hanna.training_config import TrainingConfig
 
-SMALL = HannaSizes(
-    words=12,
-    feature_size=6,
-    hidden_size=16,
-    navigation_embedding=8,
-    ask_embedding=4,
-    self_heads=2,
-    text_heads=2,
-    dropout=0.0,
-    orientation_copies=2,
-)
+WORDS, FEATURES = 12, 6
+SMALL = TrainingConfig(hidden_size=16, navigation_embedding=8, ask_embedding=4, self_heads=2, text_heads=2, dropout=0.0)
 
 
 def percepts(steps: int, agents: int, *, seed: int, actions: int = 4, words: int = 5) -> list[Percept]:
@@ -43,7 +35,7 @@ def percepts(steps: int, agents: int, *, seed: int, actions: int = 4, words: int
     normal = lambda *shape: torch.from_numpy(rng.normal(size=shape).astype(np.float32))
     out = []
     for t in range(steps):
-        embedded = normal(agents, actions, SMALL.action_size)
+        embedded = normal(agents, actions, action_size(FEATURES))
         embedded[:, 0] = 0
         slots = torch.from_numpy(rng.integers(0, 36, (agents, actions)))
         slots[:, 0] = SLOTS - 1
@@ -56,7 +48,7 @@ def percepts(steps: int, agents: int, *, seed: int, actions: int = 4, words: int
                 actions=embedded,
                 action_mask=torch.ones(agents, actions, dtype=torch.bool),
                 action_slots=slots,
-                previous_action=normal(agents, SMALL.action_size),
+                previous_action=normal(agents, action_size(FEATURES)),
                 previous_ask=torch.from_numpy(rng.integers(0, 2, agents)) if t else torch.full((agents,), START),
             )
         )
@@ -74,7 +66,7 @@ def play(network, steps: list[Percept]) -> list:
 
 def network(kind=HannaNetwork, **changes):
     torch.manual_seed(0)
-    return kind(dataclasses.replace(SMALL, **changes)).eval()
+    return kind(dataclasses.replace(SMALL, **changes), WORDS, FEATURES).eval()
 
 
 def set_identity(*layers: torch.nn.Linear) -> None:
@@ -202,7 +194,7 @@ def test_padding_of_words_and_actions_is_never_looked_at(kind):
                 p,
                 tokens=torch.cat([p.tokens, torch.zeros(2, 4, dtype=torch.long)], 1),
                 action_mask=mask,
-                actions=torch.cat([p.actions, 100 * torch.ones(2, 3, SMALL.action_size)], 1),
+                actions=torch.cat([p.actions, 100 * torch.ones(2, 3, action_size(FEATURES))], 1),
                 action_slots=torch.cat([p.action_slots, torch.zeros(2, 3, dtype=torch.long)], 1),
             )
         )
@@ -281,7 +273,7 @@ def test_the_gate_subtracts_what_was_thought_in_the_same_situation():
 
 
 def test_the_paper_sized_model_has_about_the_fifteen_million_parameters_of_table_4_6():
-    net = HannaNetwork(HannaSizes(words=2332))
+    net = HannaNetwork(TrainingConfig(), 2332, 2048)
     assert sum(p.numel() for p in net.parameters()) == pytest.approx(15.5e6, rel=0.05)
 
 

@@ -9,9 +9,8 @@ import json
 import numpy as np
 import pytest
 import torch
-from hand_data import build
+from hand_data import build, metrics_of
 
-from agents.common.session import metrics_of
 from agents.common.shipped import SHIPPED_AGENT, WEIGHTS
 from agents.common.weights import origin_of, weights_digest
 from agents.hanna.agent import HannaAbout, HannaAgent

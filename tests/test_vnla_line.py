@@ -6,9 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from hand_data import built
+from hand_data import built, metrics_of
 
-from agents.common.session import metrics_of
 from agents.vision.config import drawing
 from agents.vision.encoder import random_encoder
 from agents.vision.features import feature_path, save_features

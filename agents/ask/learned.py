@@ -17,10 +17,9 @@ from torch import nn
 
 from agents.ask.config import AskerConfig
 from agents.ask.foresight import CHOICES, Choice, Foresight, carried_out, possible, thinks
-from agents.common.weights import load_weights, save_weights
+from agents.common.weights import load_weights
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import play
-from embodied.identity import Identity
 from embodied.interface import Actions, Detection, Intention, Observation, Observations, Situations, Task
 from embodied.policies.ask import LIKELY, REACH, Mind, reached
 
@@ -145,10 +144,6 @@ def train(
         net = fit((np.concatenate([x for x, _ in found]), np.concatenate([v for _, v in found])), config)
         note(f"round {number + 1} of {len(rounds)}: {sum(len(x) for x, _ in found)} decisions")
     return net
-
-
-def save_asker(path: Path, net: nn.Sequential, config: AskerConfig, identity: Identity | None = None) -> None:
-    save_weights(path, "asker", net.state_dict(), config, identity)
 
 
 def load_asker(path: Path) -> nn.Sequential:

@@ -11,8 +11,9 @@ from typing import Any
 
 from agents.ask.config import AskerConfig, AskEvaluation
 from agents.ask.foresight import Foresight
-from agents.ask.learned import Decisions, LearnedAsker, load_asker, save_asker, shown, train
+from agents.ask.learned import Decisions, LearnedAsker, load_asker, shown, train
 from agents.common.session import Note
+from agents.common.weights import save_weights
 from agents.studies.engine import Measured, StudyLearner
 from agents.studies.tables import Figure, StudyRow, StudyTable
 from assets.catalogue import load_catalogue
@@ -123,7 +124,8 @@ class AskStudy(StudyLearner):
         config = dataclasses.replace(self.config, seed=seed)
         first, rounds, make_env = lessons(config.houses, config.tasks, config.rounds, config.round_tasks, self.cache)
         net = train(make_env, first, rounds, config, note)
-        save_asker(home / "best.safetensors", net, config, self.trained(train_, seed, folder))
+        identity = self.trained(train_, seed, folder)
+        save_weights(home / "best.safetensors", "asker", net.state_dict(), config, identity)
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:

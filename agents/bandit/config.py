@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, POSITIVE, RunSettings, require
+from agents.common.settings import AT_LEAST_ONE, POSITIVE, Limit, RunSettings, require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +42,8 @@ class BanditConfig(RunSettings):
         super().__post_init__()
         require(self, AT_LEAST_ONE, "hidden_size", "longest", "pretraining_passes", "critic_passes", "decay_from")
         require(self, POSITIVE, "pretraining_rate", "bandit_rate", "clip")
-        for name in ("source_words", "target_words"):
-            if getattr(self, name) < 4:
-                raise ValueError(
-                    f"{name} must be at least 4, got {getattr(self, name)}: for padding, unknown words and the end"
-                )
+        least = Limit(lambda x: x >= 4, "at least 4, for padding, unknown words and the end")
+        require(self, least, "source_words", "target_words")
         if not self.bandit_set.startswith("bandit"):
             raise ValueError(f"bandit_set must be a split whose name begins with 'bandit', got {self.bandit_set!r}")
 

@@ -12,7 +12,8 @@ from typing import TypeVar
 import torch
 from torch import Tensor, nn
 
-from agents.bandit.words import END_NUMBER, PAD_NUMBER
+from agents.common.rows import Rows
+from agents.common.vocabulary import END_NUMBER, PAD_NUMBER
 
 Network = TypeVar("Network", bound=nn.Module)
 SPAN = 0.1
@@ -20,7 +21,7 @@ SPAN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class EncodedSentences:
+class EncodedSentences(Rows):
     """B source sentences, read."""
 
     states: Tensor
@@ -30,12 +31,9 @@ class EncodedSentences:
     mask: Tensor
     """(B, S) bool, False on padding."""
 
-    def select(self, rows: Tensor | slice) -> EncodedSentences:
-        return EncodedSentences(self.states[rows], self.keys[rows], self.mask[rows])
-
 
 @dataclass(frozen=True, eq=False)
-class Decoding:
+class Decoding(Rows):
     """What the decoder carries from word to word."""
 
     hidden: Tensor
@@ -43,9 +41,6 @@ class Decoding:
     """(B, h) of its LSTM; hidden is tilde h^dec."""
     output: Tensor
     """(B, h) h^dec, fed into the next step."""
-
-    def select(self, rows: Tensor | slice) -> Decoding:
-        return Decoding(self.hidden[rows], self.cell[rows], self.output[rows])
 
 
 class EncoderDecoder(nn.Module):

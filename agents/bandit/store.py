@@ -8,8 +8,6 @@ from pathlib import Path
 from torch import nn
 
 from agents.bandit.config import BanditConfig
-from agents.bandit.network import Translator
-from agents.bandit.words import Words
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
 from agents.common.weights import load_weights, save_weights
@@ -29,10 +27,10 @@ class BanditAbout:
 
 
 def save_network(
-    network: nn.Module, config: BanditConfig, lexicons: tuple[Words, Words], path: Path, identity: Identity
+    network: nn.Module, config: BanditConfig, lexicons: tuple[Vocabulary, Vocabulary], path: Path, identity: Identity
 ) -> None:
     """Write weights, settings, words and what they were trained with, atomically."""
-    source, target = (x.vocabulary.words for x in lexicons)
+    source, target = (x.words for x in lexicons)
     save_weights(path, "bandit", network.state_dict(), BanditAbout(config, source, target), identity)
 
 
@@ -43,16 +41,3 @@ def load_network(network: nn.Module, path: Path) -> None:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
     load_into(network, load_weights(path, "bandit", BanditAbout, REMEDY)[0], path)
-
-
-def load_translator(path: Path) -> tuple[Translator, tuple[Words, Words], BanditConfig]:
-    """A trained translator with its words and settings.
-
-    Raises:
-      FileNotFoundError, ValueError: missing, damaged or of another format.
-    """
-    tensors, told = load_weights(path, "bandit", BanditAbout, REMEDY)
-    source, target = (Words(Vocabulary(words)) for words in (told.source, told.target))
-    translator = Translator(len(source), len(target), told.config.hidden_size)
-    load_into(translator, tensors, path)
-    return translator, (source, target), told.config

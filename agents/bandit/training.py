@@ -27,11 +27,11 @@ from agents.bandit.network import Critic, Translator, begin
 from agents.bandit.ratings import CLEAN, Rater
 from agents.bandit.store import load_network, save_network
 from agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
-from agents.bandit.words import Words, build_words
 from agents.common.actor_critic import Decisions, actor_loss, critic_loss
 from agents.common.checkpoint import Stateful
 from agents.common.decoding import sampled_choice
 from agents.common.session import Note, Session, descend
+from agents.common.vocabulary import Vocabulary, most_frequent
 from agents.common.weights import weights_digest
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
@@ -41,7 +41,6 @@ History = Sequence[Mapping[str, float]]
 Finish = Callable[[int, Mapping[str, float], History], Mapping[str, float]]
 LEARNERS = ("reference", "supervised", "a2c")
 """'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
-REFERENCES = ("full", "weak")
 _PRETRAINING = (
     "hidden_size",
     "source_words",
@@ -63,7 +62,7 @@ class NumberedCorpus:
 
     config: BanditConfig
     splits: Mapping[str, Numbered]
-    lexicons: tuple[Words, Words]
+    lexicons: tuple[Vocabulary, Vocabulary]
     digest: str
     """Of the sets for pre-training and judging."""
     bandit_digest: str
@@ -96,8 +95,8 @@ def material(folder: Path, config: BanditConfig) -> NumberedCorpus:
     """
     names = ("supervised", "dev", "test")
     corpus = load(folder, (*names, config.bandit_set), longest=config.longest)
-    source = build_words([a for a, _ in corpus["supervised"]], config.source_words)
-    target = build_words([b for _, b in corpus["supervised"]], config.target_words)
+    source = most_frequent((w for a, _ in corpus["supervised"] for w in a), most=config.source_words)
+    target = most_frequent((w for _, b in corpus["supervised"] for w in b), most=config.target_words)
     splits = {name: numbered(pairs, source, target) for name, pairs in corpus.items()}
     return NumberedCorpus(
         config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,))

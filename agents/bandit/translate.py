@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from agents.bandit.network import Translator
-from agents.bandit.words import END_NUMBER, PAD_NUMBER, Words
 from agents.common.decoding import Choice, greedy_choice
+from agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 
 POOL = 20
 """Batches that are sorted by length together."""
@@ -31,10 +31,10 @@ class Numbered:
         return len(self.source)
 
 
-def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Words, target: Words) -> Numbered:
+def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Vocabulary, target: Vocabulary) -> Numbered:
     """`pairs` in the numbers of two lexicons."""
     return Numbered(
-        [source.encode(a) for a, _ in pairs], [target.encode(b) for _, b in pairs], [tuple(b) for _, b in pairs]
+        [source.sentence(a) for a, _ in pairs], [target.sentence(b) for _, b in pairs], [tuple(b) for _, b in pairs]
     )
 
 
@@ -86,7 +86,7 @@ def decode(translator: Translator, source: Tensor, choose: Choice, longest: int)
 
 
 def greedy(
-    translator: Translator, data: Numbered, lexicon: Words, longest: int, batch: int = 128
+    translator: Translator, data: Numbered, lexicon: Vocabulary, longest: int, batch: int = 128
 ) -> list[tuple[str, ...]]:
     """The words of all sentences' likeliest translations (A.6), in their order."""
     found: list[tuple[str, ...]] = [()] * len(data)

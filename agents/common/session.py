@@ -279,26 +279,6 @@ class Session:
                 writer.writerow([at, round(self.progress.seconds / 60, 2), f"{kind}/{name}", repr(float(value))])
 
 
-def metrics_of(folder: Path) -> list[tuple[int, str, float]]:
-    """(update, metric, value) of all that a run's metrics.csv holds; nothing if it has not begun.
-
-    Raises:
-      ValueError: a line is damaged; names the file and the line.
-    """
-    path = Path(folder) / METRICS
-    if not path.exists():
-        return []
-    found = []
-    for number, line in enumerate(_lines(path)):
-        try:
-            if number:
-                update, _, metric, value = line
-                found.append((int(update), metric, float(value)))
-        except ValueError as e:
-            raise ValueError(f"{path}:{number + 1}: expected {', '.join(HEADS)}; delete that line") from e
-    return found
-
-
 def _lines(path: Path) -> list[list[str]]:
     """The lines of a CSV file; raises ValueError, with its name, where there are none to be told apart."""
     try:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import collections
 import functools
+import itertools
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 PAD, UNKNOWN, END = "<PAD>", "<UNK>", "<EOS>"
-"""The first three words of every vocabulary; padding is number 0."""
+"""The first three words of every vocabulary."""
+PAD_NUMBER, UNKNOWN_NUMBER, END_NUMBER = 0, 1, 2
+REMEMBERED = 200_000
+"""Texts whose numbers a vocabulary remembers: the same ones come again and again."""
 
 _TOKEN = re.compile(r"[a-z]+(?:'[a-z]+)?|[0-9]+|[^\sa-z0-9]")
 
@@ -41,18 +45,46 @@ class Vocabulary:
 
     def number(self, word: str) -> int:
         """The number of a word, that of UNKNOWN where there is none."""
-        return self.number_of.get(word, 1)
+        return self.number_of.get(word, UNKNOWN_NUMBER)
 
     def encode(self, text: str, length: int) -> np.ndarray:
-        """(length,) int64 numbers of the words, then END if it fits, then padding."""
-        numbers = [self.number(word) for word in tokenize(text)[:length]]
-        if len(numbers) < length:
-            numbers.append(2)
-        return np.array(numbers + [0] * (length - len(numbers)), dtype=np.int64)
+        """(length,) int64 numbers of the words, then END if it fits, then padding; not to be changed."""
+        found = self._encoded.get((text, length))
+        if found is None:
+            if len(self._encoded) >= REMEMBERED:
+                self._encoded.clear()
+            numbers = self.sentence(tokenize(text))[:length]
+            padding = [PAD_NUMBER] * (length - len(numbers))
+            found = self._encoded[text, length] = np.array(numbers + padding, dtype=np.int64)
+        return found
+
+    def sentence(self, words: Iterable[str]) -> list[int]:
+        """Numbers of words, END last."""
+        return [*map(self.number, words), END_NUMBER]
+
+    def batch(self, texts: Sequence[str], length: int) -> np.ndarray:
+        """(B, L) int64 of several texts as `encode` gives them, no longer than the longest of them."""
+        rows = np.stack([self.encode(text, length) for text in texts])
+        return rows[:, : int((rows != PAD_NUMBER).sum(1).max())]
+
+    def decode(self, numbers: Iterable[int]) -> tuple[str, ...]:
+        """Words of the numbers before the first END, without padding."""
+        before = itertools.takewhile(lambda n: n != END_NUMBER, numbers)
+        return tuple(self.words[n] for n in before if n != PAD_NUMBER)
+
+    @functools.cached_property
+    def _encoded(self) -> dict[tuple[str, int], np.ndarray]:
+        return {}
 
 
 def build_vocabulary(texts: Iterable[str], least: int = 1) -> Vocabulary:
     """The vocabulary of `texts`: words seen at least `least` times, most frequent first, ties by alphabet."""
-    count = collections.Counter(word for text in texts for word in tokenize(text))
+    return most_frequent((word for text in texts for word in tokenize(text)), least=least)
+
+
+def most_frequent(words: Iterable[str], least: int = 1, most: int | None = None) -> Vocabulary:
+    """The vocabulary of words seen at least `least` times, at most `most` numbers; most frequent first, ties by
+    alphabet."""
+    count = collections.Counter(words)
     frequent = sorted((w for w, n in count.items() if n >= least), key=lambda w: (-count[w], w))
-    return Vocabulary((PAD, UNKNOWN, END, *frequent))
+    return Vocabulary((PAD, UNKNOWN, END, *frequent)[:most])

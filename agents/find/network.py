@@ -5,8 +5,6 @@ N places, A ways of the one that has most, D size of a view's features, h hidden
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 import torch
 import torch.nn.functional as F
@@ -32,22 +30,6 @@ def _around() -> Tensor:
 AROUND = _around()
 
 
-class Scorer(Protocol):
-    """Whoever thinks something of places; an nn.Module."""
-
-    price: nn.Linear
-    """FACTS to 1: what an option costs or gains apart from what its place looks like."""
-
-    def __call__(self, seen: Tensor, request: Tensor, views: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits of the ways (N, A), and of stopping (N,).
-
-        Args:
-          seen: (N, 36, D) features.
-          request: (N, L) int64 words; 0 is padding.
-          views: (N, A) int64 view of each way.
-        """
-
-
 READ = ("visible", "within reach", "leads there")
 """What is read of each view for each class of things: whether one can be seen in it; whether one is there at which to
 stop; and whether the way in that view is the shortest to one."""
@@ -62,6 +44,8 @@ class SeekNetwork(nn.Module):
     """
 
     requests: Tensor
+    price: nn.Linear
+    """FACTS to 1: what an option costs or gains apart from what its place looks like."""
 
     def __init__(self, features: int, requests: Tensor, size: int, dropout: float) -> None:
         """Args:
@@ -104,7 +88,13 @@ class SeekNetwork(nn.Module):
         return read * same.any(1)[:, None, None], kind, look
 
     def forward(self, seen: Tensor, request: Tensor, views: Tensor) -> tuple[Tensor, Tensor]:
-        """As Scorer."""
+        """Logits of the ways (N, A), and of stopping (N,).
+
+        Args:
+          seen: (N, 36, D) features.
+          request: (N, L) int64 words; 0 is padding.
+          views: (N, A) int64 view of each way.
+        """
         read, kind, look = (x.detach() for x in self.wanted(seen, request))  # decisions teach no reading
         views_of = torch.cat([read / 4, self.other(look)], -1)  # (N, 36, one)
         whole = torch.cat([views_of.amax(1), views_of.mean(1), self.kinds(kind)], -1)
@@ -131,7 +121,7 @@ class Explorer(SeekNetwork):
         self.bar.fill_(bar)
 
     def forward(self, seen: Tensor, request: Tensor, views: Tensor) -> tuple[Tensor, Tensor]:
-        """As Scorer."""
+        """As SeekNetwork."""
         read = self.wanted(seen, request)[0]
         near = read[torch.arange(len(seen))[:, None, None], AROUND[views], 0].amax(2)
         found = read[..., 1].amax(1) > self.bar

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from agents.common.choosing import Chooser, choose_greedily
 from agents.common.vocabulary import Vocabulary
-from agents.find.network import Scorer
+from agents.find.network import SeekNetwork
 from agents.find.way_map import WayMap, directions
 from agents.vision.bank import FeatureBank
 from embodied.interface import Action, Move, Observation, Situation, Stop
@@ -88,7 +88,7 @@ def facts(options: np.ndarray, steps: np.ndarray, time: int) -> np.ndarray:
 class FindPolicy:
     """A trained (or training) agent that finds things."""
 
-    scorer: Scorer
+    scorer: SeekNetwork
     vocabulary: Vocabulary
     bank: FeatureBank
     """What the network sees."""
@@ -221,7 +221,7 @@ def padded(rows: Sequence[np.ndarray]) -> Tensor:
     return torch.nn.utils.rnn.pad_sequence([torch.from_numpy(np.asarray(r, dtype=np.int64)) for r in rows], True)
 
 
-def imitation_loss(scorer: Scorer, searches: Sequence[Search]) -> tuple[Tensor, Tensor]:
+def imitation_loss(scorer: SeekNetwork, searches: Sequence[Search]) -> tuple[Tensor, Tensor]:
     """What is to be descended, and the share of decisions that the teacher would take too.
 
     The loss is the cross-entropy of all decisions with what the teacher wants, and, since decisions alone teach slowly,

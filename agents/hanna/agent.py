@@ -12,13 +12,17 @@ from agents.common.sighted import About, SightedAgent
 from agents.common.weights import check_features
 from agents.common.word_vectors import take_weights as take_into
 from agents.hanna.asking import RULES, ask_patiently
-from agents.hanna.config import HannaSizes
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.vision.bank import FeatureBank
 
+SIZES = (
+    *("model", "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads", "dropout"),
+    *("reset_inter_task", "predict_reasons", "similarity_attention"),
+)
+"""Settings of which the networks are made."""
 NETWORKS: Mapping[str, type[HannaNetwork] | type[LstmNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 
 
@@ -26,11 +30,6 @@ NETWORKS: Mapping[str, type[HannaNetwork] | type[LstmNetwork]] = {"hanna": Hanna
 class HannaAbout(About):
     config: TrainingConfig
     evaluation: HannaEvaluation = HannaEvaluation()
-
-    @property
-    def sizes(self) -> HannaSizes:
-        """Of its networks."""
-        return self.config.network_config(len(self.words), self.feature_size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,7 @@ class HannaAgent(SightedAgent):
 
     @staticmethod
     def network_of(about: HannaAbout) -> HannaNetwork | LstmNetwork:
-        return NETWORKS[about.config.model](about.sizes)
+        return NETWORKS[about.config.model](about.config, len(about.words), about.feature_size)
 
     def policy(self, bank: FeatureBank) -> HannaPolicy:
         check_features(bank.digest, self.about.encoder)
@@ -74,15 +73,16 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
     Raises:
       ValueError: their networks differ, or the features that they know.
     """
-    mine, its = agent.about, other.about
-    if _kind(mine) != _kind(its) or its.config.word_vectors not in (LEARNED_WORDS, mine.config.word_vectors):
-        raise ValueError(
-            f"{source} cannot be begun with: it is a {its.config.model!r} of {its.sizes} on encoder "
-            f"{its.encoder[:12]}, this run a {mine.config.model!r} of {mine.sizes} on encoder "
-            f"{mine.encoder[:12]}; give this run its settings"
-        )
+    mine, its = _kind(agent.about), _kind(other.about)
+    vectors = agent.config.word_vectors, other.config.word_vectors
+    differ = [f"{k} {its[k]} -> {v}" for k, v in mine.items() if v != its[k]]
+    if differ or vectors[1] not in (LEARNED_WORDS, vectors[0]):
+        changed = ", ".join(differ or [f"word_vectors {vectors[1]} -> {vectors[0]}"])
+        raise ValueError(f"{source} cannot be begun with: {changed}; give this run its settings")
     take_into(agent.network, other.network.state_dict())
 
 
-def _kind(about: HannaAbout) -> tuple[str, str, HannaSizes]:
-    return about.encoder, about.config.model, about.sizes
+def _kind(about: HannaAbout) -> dict[str, object]:
+    """What must be alike in agents that share weights."""
+    sizes = {name: getattr(about.config, name) for name in SIZES}
+    return {"encoder": about.encoder[:12], "words": len(about.words), **sizes}

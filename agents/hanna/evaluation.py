@@ -16,7 +16,6 @@ from torch import nn
 from agents.common.choosing import choose_at
 from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES, ask_every
-from agents.hanna.config import HannaSizes
 from agents.hanna.network import Scores
 from agents.hanna.percept import Percept, slot_distribution
 from agents.hanna.policy import HannaPolicy, PerfectInterpretation
@@ -71,7 +70,7 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent
         "learned, no ask": dataclasses.replace(learned, ask_rule=RULES["never"][1]),
         "learned, random ask": dataclasses.replace(learned, ask_rule=RULES["random"][1]),
         "learned, ask every 5": dataclasses.replace(learned, ask_rule=RULES["every5"][1]),
-        "learned, target image only": dataclasses.replace(learned, read_assistance=False, _encoded={}),
+        "learned, target image only": dataclasses.replace(learned, read_assistance=False),
         "learned, perfect interpretation": PerfectInterpretation(learned),
     }
 
@@ -97,9 +96,9 @@ UNWILLING = 20.0
 class Uniform(nn.Module):
     """A network that has learned nothing: all moves are equally likely, and it does not stop by itself."""
 
-    def __init__(self, config: HannaSizes) -> None:
+    def __init__(self, action_size: int) -> None:
         super().__init__()
-        self.config = config
+        self.action_size = action_size
         self.nothing = nn.Parameter(torch.zeros(0))
 
     def start(self, batch: int, length: int) -> tuple[Forgetting, Forgetting]:
@@ -127,7 +126,7 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """
     learned, blind = agent.policy(bank), agent.policy(bank.blind())
     every5 = RULES["every5"][1]
-    nothing: Any = Uniform(learned.network.config)
+    nothing: Any = Uniform(learned.network.action_size)
     rules = dataclasses.replace(learned, network=nothing, ask_rule=every5)
     return {
         "blind": blind,

@@ -6,21 +6,21 @@ reset within an episode.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
+from agents.common.rows import Rows
 from agents.common.word_vectors import WordEmbedding
 from agents.hanna.attention import DotAttend
-from agents.hanna.config import HannaSizes
 from agents.hanna.network import Scores
-from agents.hanna.percept import SLOTS, VIEWS, Percept, slot_distribution, target_similarity
+from agents.hanna.percept import SLOTS, VIEWS, Percept, action_size, slot_distribution, target_similarity
+from agents.hanna.training_config import TrainingConfig
 
 
 @dataclass(frozen=True, eq=False)
-class LstmMemory:
+class LstmMemory(Rows):
     """What one decoder carries from step to step, for B agents."""
 
     text: Tensor
@@ -30,19 +30,17 @@ class LstmMemory:
     cell: Tensor
     """(B, h)."""
 
-    def select(self, rows: Tensor) -> LstmMemory:
-        """The memory of some agents, in the order of `rows` (k,)."""
-        return LstmMemory(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
-
 
 class LstmStateNetwork(nn.Module):
     """Text LSTM, decoder LSTM, attention over words, current view and target view."""
 
-    def __init__(self, config: HannaSizes, previous_size: int, extra_size: int) -> None:
+    def __init__(
+        self, config: TrainingConfig, words: int, feature_size: int, previous_size: int, extra_size: int
+    ) -> None:
         super().__init__()
-        h, d = config.hidden_size, config.feature_size
+        h, d = config.hidden_size, feature_size
         self.hidden_size = h
-        self.embedding = WordEmbedding(config.words, h)
+        self.embedding = WordEmbedding(words, h)
         self.text_lstm = nn.LSTM(h, h, batch_first=True)
         self.scene_attend = DotAttend(h, d, h)
         self.decoder = nn.LSTMCell(previous_size + d + VIEWS + extra_size, h)
@@ -88,14 +86,13 @@ def _attend_words(attend: DotAttend, query: Tensor, text: Tensor, mask: Tensor) 
 class LstmNetwork(nn.Module):
     """Navigation and help-request decoders of the baseline."""
 
-    def __init__(self, config: HannaSizes) -> None:
+    def __init__(self, config: TrainingConfig, words: int, feature_size: int) -> None:
         super().__init__()
-        self.config = config
-        h = config.hidden_size
-        self.navigation = LstmStateNetwork(config, config.action_size, 0)
-        self.action_in = nn.Linear(config.action_size, h)
+        h, self.action_size = config.hidden_size, action_size(feature_size)
+        self.navigation = LstmStateNetwork(config, words, feature_size, self.action_size, 0)
+        self.action_in = nn.Linear(self.action_size, h)
         self.action_out = nn.Linear(h, 1)
-        self.help = LstmStateNetwork(config, config.ask_embedding, SLOTS)
+        self.help = LstmStateNetwork(config, words, feature_size, config.ask_embedding, SLOTS)
         self.ask_embedding = nn.Embedding(3, config.ask_embedding)
         self.ask_out = nn.Linear(h, 2)
 

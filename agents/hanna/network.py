@@ -20,16 +20,17 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.common.rows import Rows
 from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, TextEncoder, sim_attend
-from agents.hanna.config import HannaSizes
-from agents.hanna.percept import REQUEST, SLOTS, VIEWS, Percept, slot_distribution, target_similarity
+from agents.hanna.percept import REQUEST, SLOTS, VIEWS, Percept, action_size, slot_distribution, target_similarity
+from agents.hanna.training_config import TrainingConfig
 
 SHORT = 12
 """Words up to which an instruction is encoded with the short ones."""
 
 
 @dataclass(frozen=True, eq=False)
-class NetworkMemory:
+class NetworkMemory(Rows):
     """What one network carries from step to step, for B agents. Keys and values are projected."""
 
     text_keys: Tensor
@@ -55,10 +56,6 @@ class NetworkMemory:
     similar_mask: Tensor
     """(B, n - 1) bool, which entries but the newest SIMATTEND may consider."""
 
-    def select(self, rows: Tensor) -> NetworkMemory:
-        """The memory of some agents, in the order of `rows` (k,)."""
-        return NetworkMemory(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
-
 
 @dataclass(frozen=True, eq=False)
 class Scores:
@@ -77,12 +74,14 @@ class Scores:
 class StateNetwork(nn.Module):
     """Text-encoding, inter-task and intra-task components: everything but the last layer."""
 
-    def __init__(self, config: HannaSizes, previous_size: int, extra_size: int) -> None:
+    def __init__(
+        self, config: TrainingConfig, words: int, feature_size: int, previous_size: int, extra_size: int
+    ) -> None:
         """`previous_size` is that of a_{t-1}, `extra_size` that of P^nav (37) or 0."""
         super().__init__()
-        c, h, d = config, config.hidden_size, config.feature_size
+        c, h, d = config, config.hidden_size, feature_size
         self.config = config
-        self.text_encoder = TextEncoder(c.words, h, c.self_heads, c.dropout)
+        self.text_encoder = TextEncoder(words, h, c.self_heads, c.dropout)
         self.local_time = IncTime(h, h)
         self.global_time = IncTime(2 * h, h)
         self.scene_attend = DotAttend(h, d, h)
@@ -213,14 +212,19 @@ class StateNetwork(nn.Module):
 class HannaNetwork(nn.Module):
     """Navigation policy and help-request policy: two networks that share nothing."""
 
-    def __init__(self, config: HannaSizes) -> None:
+    def __init__(self, config: TrainingConfig, words: int, feature_size: int) -> None:
+        """
+        Args:
+          words: vocabulary size; word 0 is padding.
+          feature_size: D, what the visual encoder gives per view.
+        """
         super().__init__()
-        self.config = config
+        self.config, self.action_size = config, action_size(feature_size)
         h, e = config.hidden_size, config.navigation_embedding
-        self.navigation = StateNetwork(config, config.action_size, 0)
+        self.navigation = StateNetwork(config, words, feature_size, self.action_size, 0)
         self.action_out = nn.Linear(h, e)
-        self.action_in = nn.Linear(config.action_size, e)
-        self.help = StateNetwork(config, config.ask_embedding, SLOTS)
+        self.action_in = nn.Linear(self.action_size, e)
+        self.help = StateNetwork(config, words, feature_size, config.ask_embedding, SLOTS)
         self.ask_embedding = nn.Embedding(3, config.ask_embedding)
         if config.predict_reasons:
             self.reason_out = nn.Linear(h, 3)

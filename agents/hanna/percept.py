@@ -6,23 +6,26 @@ level, 30 degrees up; column k % 12 turns clockwise in steps of 30 degrees.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from agents.common.rows import Rows
+
 VIEWS = 36
 HEADINGS = 12
 SLOTS = VIEWS + 1
 """Static places of the navigation distribution: one per view relative to the agent, and stop (last)."""
+COPIES = 32
+"""How often each of the four orientation features is repeated."""
 DO_NOTHING, REQUEST, START = 0, 1, 2
 """Help-request actions; START stands for 'no step before this one'."""
 
 
 @dataclass(frozen=True, eq=False)
-class Percept:
+class Percept(Rows):
     """Inputs of one step for B agents; A is the largest number of navigation actions among them."""
 
     tokens: Tensor
@@ -44,9 +47,10 @@ class Percept:
     previous_ask: Tensor
     """(B,) int64: DO_NOTHING, REQUEST or START."""
 
-    def select(self, rows: Tensor) -> Percept:
-        """The percept of some agents, in the order of `rows` (k,)."""
-        return Percept(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
+
+def action_size(feature_size: int) -> int:
+    """E, length of a navigation action's embedding (D.1)."""
+    return feature_size + 4 * COPIES
 
 
 def target_similarity(current: Tensor, target: Tensor) -> Tensor:

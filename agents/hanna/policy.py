@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from agents.common.vocabulary import Vocabulary
 from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
-from agents.hanna.percept import DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
+from agents.hanna.percept import COPIES, DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
 from agents.hanna.trail import Trail, weigh, weigh_by_image
 from agents.vision.bank import FeatureBank
 from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
@@ -99,7 +99,6 @@ class HannaPolicy:
     """How it looks for what the image shows; see hanna.trail.weigh_by_image."""
     keep_moments: bool = False
     """Keep Scores, with their gradients, in memory: for training."""
-    _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def act(
         self,
@@ -187,7 +186,7 @@ class HannaPolicy:
         return HannaMemory(
             positions,
             self.network.start(k, self.instruction_length),
-            torch.zeros(k, self.network.config.action_size, device=device),
+            torch.zeros(k, self.network.action_size, device=device),
             torch.full((k,), START, device=device),
             (-1,) * k,
             F.dropout(ones, share) if share else None,
@@ -196,7 +195,7 @@ class HannaPolicy:
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
         """The tensors of one step, from observations of running episodes and their memory."""
-        config, k = self.network.config, len(observations)
+        k = len(observations)
         most = 1 + max(len(o.candidates) for o in observations)
         angles = np.zeros((2, k, most), dtype=np.float32)  # bearing and slope
         views = np.zeros((k, most), dtype=np.int64)
@@ -218,7 +217,7 @@ class HannaPolicy:
             current, target = current * memory.channels[:, None], target * memory.channels[:, None]
         rows = torch.arange(k, device=device)[:, None]
         looks = current[rows, send(views)]  # (k, A, D)
-        facing = orientation(send(angles[0]), send(angles[1]), config.orientation_copies)  # docs/sources.md, S27
+        facing = orientation(send(angles[0]), send(angles[1]), COPIES)  # docs/sources.md, S27
         exists = torch.arange(most, device=device)[:, None] > 0  # stop and padding are zero vectors
         actions = torch.cat([looks, facing], -1) * (exists & send(mask)[..., None])
         if self.turn_to_agent:
@@ -240,9 +239,7 @@ class HannaPolicy:
     def encode(self, observation: Observation) -> np.ndarray:
         """(L,) int64 numbers of the instruction's words."""
         text = observation.instruction if self.read_assistance or observation.mode is Mode.MAIN else ""
-        if text not in self._encoded:
-            self._encoded[text] = self.vocabulary.encode(text, self.instruction_length)
-        return self._encoded[text]
+        return self.vocabulary.encode(text, self.instruction_length)
 
 
 def thought_of(

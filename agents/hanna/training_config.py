@@ -7,7 +7,6 @@ success radius with the task (embodied.tasks.hanna).
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 from agents.common.settings import (
@@ -24,7 +23,6 @@ from agents.common.settings import (
     require_word,
 )
 from agents.hanna.asking import RULES
-from agents.hanna.config import HannaSizes
 
 MODELS = ("hanna", "lstm")
 
@@ -89,11 +87,6 @@ class TrainingConfig(ImitationSettings):
         require(self, POSITIVE, "ask_price")
         require(self, NOT_ALL, "dropout", "curiosity_floor")
         require(self, SHARE, "guided_asking")
-
-    def network_config(self, words: int, feature_size: int) -> HannaSizes:
-        """The sizes of the networks for a vocabulary and an encoder."""
-        shared = {f.name for f in dataclasses.fields(HannaSizes)} & {f.name for f in dataclasses.fields(self)}
-        return HannaSizes(words=words, feature_size=feature_size, **{name: getattr(self, name) for name in shared})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,11 +16,21 @@ from torch import Tensor
 from agents.hari.agent import Executor, HariAgent
 from agents.hari.networks import INTENTIONS, Encoded, RecurrentHead, shown_probabilities
 from agents.hari.words import collate, percept_of_rows
-from embodied.interface import Action, Ask, Description, Intention, Move, Observation, Situation, Stop, Thought
+from embodied.interface import (
+    Action,
+    Actions,
+    Ask,
+    Description,
+    Intention,
+    Move,
+    Observation,
+    Observations,
+    Situations,
+    Stop,
+    Thought,
+)
 from embodied.teachers.shortest import shortest_action
 
-Observations = Sequence[Observation | None]
-Actions = list[Action | None]
 DO, DONE = INTENTIONS.index("do"), INTENTIONS.index("done")
 ASKS = {name: INTENTIONS.index(name) for name in ("cur", "goal", "sub")}
 
@@ -249,7 +259,7 @@ class PerfectOnSubgoals(HariPolicy):
     def act_privileged(
         self,
         observations: Observations,
-        situations: Sequence[Situation | None],
+        situations: Situations,
         memory: Mind | None,
         *,
         rngs: Sequence[np.random.Generator],

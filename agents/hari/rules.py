@@ -4,25 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from agents.hari.agent import Executor
 from agents.hari.networks import INTENTIONS
-from agents.hari.policy import (
-    ASKS,
-    DO,
-    DONE,
-    Actions,
-    Belief,
-    Observations,
-    Reader,
-    action_of,
-    available,
-    carry,
-    consider,
-)
+from agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider
+from embodied.interface import Actions, Observations
 
 CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]
 
@@ -43,27 +31,26 @@ class RuleMoment:
     """(5,) what this episode may take of each, drawn at its beginning."""
 
 
-class Rule(Protocol):
+class Rule:
+    """Chooses intentions; without a budget of its own an episode may take as many as it likes."""
+
     def budget(self, rng: np.random.Generator) -> np.ndarray:
         """(5,) the most that an episode may take of each intention."""
-        ...
+        return np.full(len(INTENTIONS), np.inf)
 
     def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
         """The next intention, an index into INTENTIONS."""
-        ...
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
-class AskFirst:
+class AskFirst(Rule):
     """Asks what it always asks, then does, and is done when the execution policy is."""
 
     goal: bool = False
     """Ask GOAL once, at the beginning."""
     state: bool = False
     """Ask CUR before every move."""
-
-    def budget(self, rng: np.random.Generator) -> np.ndarray:
-        return np.full(len(INTENTIONS), np.inf)
 
     def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
         if self.goal and not moment.taken[GOAL]:
@@ -74,7 +61,7 @@ class AskFirst:
 
 
 @dataclass(frozen=True)
-class RandomWithBudgets:
+class RandomWithBudgets(Rule):
     """ "Random + rules" of Table 4.7: GOAL first, then at random among what its budgets leave.
 
     An episode may take at most floor(X_a) + Bernoulli(X_a - floor(X_a)) intentions of kind a, where
@@ -87,7 +74,7 @@ class RandomWithBudgets:
     """X_a of 'cur', 'goal', 'sub' and 'do'."""
 
     def budget(self, rng: np.random.Generator) -> np.ndarray:
-        budget = np.full(len(INTENTIONS), np.inf)
+        budget = super().budget(rng)
         for k, name in enumerate(INTENTIONS[:DONE]):
             whole = np.floor(self.means[name])
             budget[k] = whole + (rng.random() < self.means[name] - whole)
@@ -105,11 +92,8 @@ class RandomWithBudgets:
 
 
 @dataclass(frozen=True)
-class AlwaysSub:
+class AlwaysSub(Rule):
     """Asks SUB whenever it may, does, and is done when the execution policy is; not in the dissertation."""
-
-    def budget(self, rng: np.random.Generator) -> np.ndarray:
-        return np.full(len(INTENTIONS), np.inf)
 
     def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
         if moment.would_stop:

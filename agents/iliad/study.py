@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from agents.common.checkpoint import read_checkpoint
 from agents.common.session import Note
@@ -83,38 +83,9 @@ TABLES: Mapping[str, StudyTable] = {
 }
 
 
-class StudyWorld(Hashable, Protocol):
-    """What the study needs of REGEX and of NAV; small, so that it can be sent to other processes."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def updates(self) -> int:
-        """Of the dissertation: after how many of them lambda is annealed is scaled to other numbers of updates
-        (docs/sources.md, S99)."""
-
-    def source(self) -> Mapping[str, object]:
-        """What its data come from, as part of an identity."""
-
-    def prepare(self, folder: Path, note: Note) -> Any:
-        """Data and teacher, made into `folder` unless they are there."""
-
-    def begin(self, grounds: Any, seed: int, folder: Path, note: Note) -> None:
-        """Make what all students of a seed begin with."""
-
-    def learn(self, grounds: Any, learner: LearnerConfig, home: Path, begun: Path, note: Note) -> None:
-        """Train a student, or go on."""
-
-    def judge(self, grounds: Any, best: Path, split: str) -> Samples:
-        """Which requests of a split a trained student fulfils."""
-
-    def about(self) -> str:
-        """Data, networks and teacher in words."""
-
-
 @dataclass(frozen=True)
 class RegexStudyWorld:
-    """REGEX."""
+    """What the study needs of REGEX; small, so that it can be sent to other processes."""
 
     config: RegexConfig
     words: Path | None = None
@@ -122,25 +93,33 @@ class RegexStudyWorld:
 
     name = "regex"
     updates = 30_000
+    """Of the dissertation: after how many of them lambda is annealed is scaled to other numbers of updates
+    (docs/sources.md, S99)."""
 
     def source(self) -> Mapping[str, object]:
+        """What its data come from, as part of an identity."""
         own = {"words": self.words, "templates": self.templates}
         return {"teacher": self.config, **{k: digest(path) for k, path in own.items() if path}}
 
     def prepare(self, folder: Path, note: Note) -> regex.Grounds:
+        """Data and teacher, made into `folder` unless they are there."""
         return regex.prepare(self.config, folder, words=self.words, templates=self.templates, note=note)
 
     def begin(self, grounds: regex.Grounds, seed: int, folder: Path, note: Note) -> None:
+        """Make what all students of a seed begin with."""
         regex.problem_of(grounds, seed, folder, note=note)
 
     def learn(self, grounds: regex.Grounds, learner: LearnerConfig, home: Path, begun: Path, note: Note) -> None:
+        """Train a student, or go on."""
         regex.learn(grounds, learner, home, begun, note=note)
 
     def judge(self, grounds: regex.Grounds, best: Path, split: str) -> Samples:
+        """Which requests of a split a trained student fulfils."""
         good = successes(RegexWorld(), regex.load_student(best)[0], grounds.data.splits[split])
         return Samples(tuple(map(float, good)), share=True)
 
     def about(self) -> str:
+        """Data, networks and teacher in words."""
         c = self.config
         return (
             f"{c.items:,} data points with three requests each, {c.held_out_items:,} for validation and for test, in "
@@ -151,7 +130,7 @@ class RegexStudyWorld:
 
 @dataclass(frozen=True)
 class NavStudyWorld:
-    """NAV."""
+    """What the study needs of NAV, as RegexStudyWorld."""
 
     config: NavConfig
     houses: nav.NavSource
@@ -194,6 +173,9 @@ class NavStudyWorld:
             f"Paths of {data.digest[:16]} and {c.more_paths} more a house, {len(data.names('train'))} training houses; "
             f"hidden size {c.hidden_size}; teacher: {c.teacher}."
         )
+
+
+StudyWorld = RegexStudyWorld | NavStudyWorld
 
 
 @dataclass(frozen=True)

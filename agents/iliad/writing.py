@@ -12,12 +12,13 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.decoding import Choice
+from agents.common.rows import Rows
 
 PAD = 0
 
 
 @dataclass(frozen=True, eq=False)
-class Remembered:
+class Remembered(Rows):
     """What is attended to: B rows of S vectors."""
 
     values: Tensor
@@ -26,9 +27,6 @@ class Remembered:
     """(B, S, h)."""
     mask: Tensor
     """(B, S) bool, False on padding."""
-
-    def select(self, rows: Tensor) -> Remembered:
-        return Remembered(self.values[rows], self.keys[rows], self.mask[rows])
 
 
 class Attention(nn.Module):

@@ -138,7 +138,7 @@ class Client:
             with self._gate:
                 said = self._send(request)
             kept = self.cache.put(key, json.dumps(_without_pictures(request), sort_keys=True), to_json(said))
-        return understood(_read(kept), schema)
+        return understood(from_json(_Kept, kept), schema)
 
     def ask_all(self, asked: Sequence[tuple[Sequence[Message], Mapping[str, Any]]]) -> list[Answer]:
         """Several at a time, in order."""
@@ -278,11 +278,12 @@ def _said(body: bytes | None) -> _Kept:
     used = whole.get("usage") if isinstance(whole, dict) else None
     tokens = [_count(used, "prompt_tokens"), _count(used, "completion_tokens")]
     try:
-        message = whole["choices"][0]["message"]  # type: ignore[index]
+        choice: Any = whole["choices"][0]  # type: ignore[index]
+        message, ended = choice["message"], choice.get("finish_reason")
         text, calls, refusal = message.get("content"), message.get("tool_calls"), message.get("refusal")
     except (KeyError, IndexError, TypeError, AttributeError):
         return _Kept("", "the response is no chat completion", False, *tokens)
-    if refusal or _choice(whole).get("finish_reason") == "content_filter":
+    if refusal or ended == "content_filter":
         return _Kept(str(refusal or "")[:MOST_TEXT], "", True, *tokens)
     if calls:
         text = _called(calls)
@@ -296,10 +297,6 @@ def _said(body: bytes | None) -> _Kept:
 def _seconds(text: str | None) -> float:
     """What a server asks to be waited for; 0 where it does not say so in seconds."""
     return float(text) if text and text.isdigit() and len(text) < 6 else 0.0
-
-
-def _choice(whole: Any) -> Mapping[str, Any]:
-    return whole["choices"][0]
 
 
 def _called(calls: Any) -> str | None:
@@ -360,10 +357,6 @@ def _cut_short(response: Any, seconds: float) -> None:
         whole = response.stream
         response.stream = _httpx().ByteStream(_body(whole, time.monotonic() + seconds) or b"")
         whole.close()
-
-
-def _read(kept: str) -> _Kept:
-    return from_json(_Kept, kept)
 
 
 def _without_pictures(value: Any) -> Any:

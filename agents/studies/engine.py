@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -128,7 +129,7 @@ def run_study(
     refuse_unknown(rows or (), {r.label for t in tables.values() for r in t.rows}, "rows of these tables")
     jobs: dict[str, _Job] = {}
     for table in tables.values():
-        for row, split in _judgings(table, rows):
+        for row, split in itertools.product(_rows_of(table, rows), table.splits):
             for seed in learner.seeds(row):
                 job = jobs.setdefault(digest(row.train, seed), _Job(row, seed))
                 job.judgings[digest(row.judge, split)] = (row, split)
@@ -193,10 +194,6 @@ def _rows_of(table: StudyTable, wanted: Sequence[str] | None) -> list[StudyRow]:
     found = [r for r in table.rows if wanted is None or r.label in wanted]
     pairs = [r for pair in table.compared for r in pair] if wanted is None else []
     return [*found, *(r.minus for r in found if r.minus is not None), *pairs]
-
-
-def _judgings(table: StudyTable, wanted: Sequence[str] | None) -> Iterator[tuple[StudyRow, str]]:
-    return ((row, split) for row in _rows_of(table, wanted) for split in table.splits)
 
 
 def _in_parallel(work: Callable[[Any], str], items: Sequence[Any], workers: int, note: Note) -> None:

@@ -38,16 +38,12 @@ class FeatureBank:
 
     def to(self, device: torch.device | str) -> FeatureBank:
         """The bank on another device; this one stays."""
-        other = object.__new__(FeatureBank)
-        other.__dict__.update(self.__dict__, _table=self._table.to(device))
-        return other
+        return self._with(_table=self._table.to(device))
 
     def relit(self, rng: np.random.Generator) -> FeatureBank:
         """The bank that shows every world in one of its lightings, drawn evenly; this one goes on as it is."""
         drawn = rng.integers(self.lightings, size=len(self._rows.spans)).tolist()
-        other = object.__new__(FeatureBank)
-        other.__dict__.update(self.__dict__, _lighting=dict(zip(self._rows.spans, drawn, strict=True)))
-        return other
+        return self._with(_lighting=dict(zip(self._rows.spans, drawn, strict=True)))
 
     def showing(self, pictures: Mapping[str, np.ndarray]) -> FeatureBank:
         """The bank with other features for pictures (embodied.interface.is_picture): of the same worlds, taken at
@@ -55,15 +51,11 @@ class FeatureBank:
         if SightRows(pictures).spans != self._rows.spans or SightRows(pictures).size != self._rows.size:
             raise ValueError("pictures must be of the same worlds, with as many nodes and features")
         table = torch.from_numpy(self._rows.filled(pictures)).to(self._table.device)
-        other = object.__new__(FeatureBank)
-        other.__dict__.update(self.__dict__, _table=torch.cat([self._table, table]), _shown=len(self._table))
-        return other
+        return self._with(_table=torch.cat([self._table, table]), _shown=len(self._table))
 
     def blind(self) -> FeatureBank:
         """The bank in which everything is black: all features are zero."""
-        other = object.__new__(FeatureBank)
-        other.__dict__.update(self.__dict__, _table=torch.zeros_like(self._table))
-        return other
+        return self._with(_table=torch.zeros_like(self._table))
 
     def features(self, sight: Sight) -> np.ndarray:
         """(36, D) float32, in absolute order."""
@@ -79,6 +71,11 @@ class FeatureBank:
         """(n, D) features of one view of each sight."""
         rows = torch.tensor([self._row(s) for s in sights], device=self._table.device)
         return self._table[rows, torch.tensor(views, device=self._table.device)]
+
+    def _with(self, **changed: object) -> FeatureBank:
+        other = object.__new__(FeatureBank)
+        other.__dict__.update(self.__dict__, **changed)
+        return other
 
     def _row(self, sight: Sight) -> int:
         row = self._rows.row(sight)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, require
 from embodied.render.photograph import check_camera
 from embodied.render.pictures import PictureSettings
 
@@ -89,13 +89,6 @@ class VisionConfig:
             raise ValueError("cameras must name at least one kind of camera; 'ideal' leaves the strips as drawn")
         for name in self.cameras:
             check_camera(name)
-        for name, least in (("training_houses", 0), ("epochs", 1), ("batch", 1), ("least_views", 1)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
-        if not 0 <= self.shade < math.inf:
-            raise ValueError(f"shade must not be negative, got {self.shade}")
-        if not 0 < self.learning_rate < math.inf or not 0 <= self.weight_decay < math.inf:
-            raise ValueError(
-                f"learning_rate must be positive and weight_decay not negative, got {self.learning_rate} and "
-                f"{self.weight_decay}"
-            )
+        require(self, AT_LEAST_ONE, "epochs", "batch", "least_views")
+        require(self, NOT_NEGATIVE, "training_houses", "shade", "weight_decay")
+        require(self, POSITIVE, "learning_rate")

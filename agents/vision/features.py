@@ -18,6 +18,7 @@ from agents.vision.bank import FeatureBank
 from agents.vision.config import PLAIN, drawing, lit_name
 from agents.vision.encoder import Encoder
 from agents.vision.strip import HEIGHT, VFOV
+from embodied.house.house import House
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
 from embodied.light import lightings_of
 from embodied.render.panorama import Panorama
@@ -117,6 +118,15 @@ def load_features(
         if expected is not None and about[name] != expected:
             raise ValueError(f"{path}: made from {name} {about[name][:12]}, expected {expected[:12]}; {remedy}")
     return features.numpy(), about.get("speaks", about["encoder"])
+
+
+def has_features(path: Path, encoder: Encoder, house: House, pictures: PictureSettings) -> bool:
+    """Whether a file holds the features of a house by this encoder; False: missing, damaged, or of another house."""
+    try:
+        load_features(path, encoder=encoder.digest, source=house.digest, pictures=pictures)
+        return True
+    except (FileNotFoundError, ValueError):
+        return False
 
 
 def _command(pictures: PictureSettings | None, lights: int = 1) -> str:

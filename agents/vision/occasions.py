@@ -22,6 +22,7 @@ from agents.vision.features import (
     VIEW_SIZE,
     encode_panoramas,
     feature_path,
+    has_features,
     load_features,
     margin,
     save_features,
@@ -105,7 +106,7 @@ def make_shown(
     made = []
     for at in sorted(set(occasions), key=lambda o: (o.lighting, o.day)):
         house, path = house_at(data, name, at, cache), shown_path(data, name, at, encoder.digest, pictures)
-        if _there(path, encoder, house, pictures):
+        if has_features(path, encoder, house, pictures):
             continue
         with open_world(house, load_catalogue(cache), cache, pictures, graph=data.place(name).graph) as world:
             world.render_all()  # kept: several occasions show the same pictures
@@ -181,11 +182,3 @@ def showing(
         path, source = shown_path(data, name, occasion, encoder, pictures), digest_at(data, name, occasion, cache)
         shown[name], _ = load_features(path, encoder=encoder, source=source, pictures=pictures)
     return bank.showing(shown)
-
-
-def _there(path: Path, encoder: Encoder, house: House, pictures: PictureSettings) -> bool:
-    try:
-        load_features(path, encoder=encoder.digest, source=house.digest, pictures=pictures)
-        return True
-    except (FileNotFoundError, ValueError):
-        return False

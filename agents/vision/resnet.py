@@ -7,7 +7,7 @@ with narrower stages, one block each, and without the last halving of resolution
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import torch
@@ -150,21 +150,9 @@ def load_torchvision(name: str, weights: Mapping[str, Tensor]) -> ResNet:
         raise ValueError(f"unknown network {name!r}; known are {sorted(ARCHITECTURES)}")
     network = ResNet(ARCHITECTURES[name])
     body = {k: v for k, v in weights.items() if not k.startswith("fc.")}
-    _check_names(name, network.state_dict(), body)
-    network.load_state_dict(body)
+    try:
+        network.load_state_dict(body)
+    except RuntimeError as e:
+        what = " ".join(str(e).split())
+        raise ValueError(f"these are not the weights of {name} ({what:.200}); name the network they belong to") from e
     return network.eval()
-
-
-def _check_names(name: str, expected: Mapping[str, Tensor], got: Mapping[str, Tensor]) -> None:
-    missing = sorted(set(expected) - set(got))
-    unknown = sorted(set(got) - set(expected))
-    wrong = [k for k in expected if k in got and expected[k].shape != got[k].shape]
-    if missing or unknown or wrong:
-        raise ValueError(
-            f"these are not the weights of {name}: {len(missing)} missing ({_some(missing)}), {len(unknown)} unknown "
-            f"({_some(unknown)}), {len(wrong)} of another shape ({_some(wrong)}); name the network they belong to"
-        )
-
-
-def _some(names: Sequence[str]) -> str:
-    return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "") if names else "none"

@@ -15,7 +15,7 @@ from agents.common.session import Note
 from agents.vision.config import VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
-from agents.vision.features import encode_panoramas, feature_path, load_features, save_features
+from agents.vision.features import encode_panoramas, feature_path, has_features, save_features
 from agents.vision.labels import HouseStrips
 from agents.vision.occasions import Occasion, make_shown
 from agents.vision.probe import read
@@ -24,7 +24,6 @@ from agents.vision.training import DistillationTarget, aligned, save_training, t
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
-from embodied.house.house import House
 from embodied.light import lightings_of
 from embodied.locks import locked
 from embodied.render.pictures import PictureSettings
@@ -151,7 +150,10 @@ def make_features(
     missing = [
         (n, pictures)
         for n, pictures in wanted.items()
-        if not all(_has_features(data, n, k, lit, encoder, pictures) for k, lit in enumerate(houses[n]))
+        if not all(
+            has_features(_path_of(data, n, k, encoder, pictures), encoder, lit, pictures)
+            for k, lit in enumerate(houses[n])
+        )
     ]
 
     def watch(lines: Iterable[str], total: int) -> Iterable[str]:
@@ -174,16 +176,8 @@ def _ways(pictures: Iterable[PictureSettings]) -> str:
     return "pictures: " + ", ".join(f"{n} {way}" for way, n in sorted(count.items()))
 
 
-def _has_features(
-    data: Dataset, name: str, lighting: int, house: House, encoder: Encoder, pictures: PictureSettings
-) -> bool:
-    """False: missing, damaged, or of another house."""
-    path = feature_path(data.folder / "features", encoder.digest, lit_name(name, lighting), pictures)
-    try:
-        load_features(path, encoder=encoder.digest, source=house.digest, pictures=pictures)
-        return True
-    except (FileNotFoundError, ValueError):
-        return False
+def _path_of(data: Dataset, name: str, lighting: int, encoder: Encoder, pictures: PictureSettings) -> Path:
+    return feature_path(data.folder / "features", encoder.digest, lit_name(name, lighting), pictures)
 
 
 def _make_features(
@@ -193,13 +187,13 @@ def _make_features(
     use_threads(threads)
     (name, pictures), data, nodes = unit, Dataset(folder), 0
     for k, lit in enumerate(baked_lightings(data, name, lights, cache, pictures)):
-        if _has_features(data, name, k, lit, encoder, pictures):
+        path = _path_of(data, name, k, encoder, pictures)
+        if has_features(path, encoder, lit, pictures):
             continue
         with drawn_world(data, name, cache, pictures, lit) as world:
             if pictures.traced:
                 world.render_all()  # kept for the next encoder: they cost minutes a house
             panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
-            path = feature_path(data.folder / "features", encoder.digest, lit_name(name, k), pictures)
             save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
             nodes += len(world.graph.positions)
     return f"{name}: {nodes} nodes, {pictures.kind} pictures of {pictures.size} pixels"

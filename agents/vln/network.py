@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from agents.common.rows import Rows
 from agents.common.word_vectors import WordEmbedding
 from agents.hanna.attention import DotAttend
 from agents.vln.config import FollowerSettings
@@ -36,7 +37,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class Heard(Rows):
     """The instructions of B agents, read, and what they remember of the way."""
 
     words: Tensor
@@ -50,10 +51,6 @@ class Heard:
     """(B, h) the words attended to, and the hidden state, as one."""
     taken: Tensor
     """(B, h) the last action as it was seen; zero at first."""
-
-    def select(self, rows: Tensor) -> Heard:
-        """Those of some agents, in the order of `rows` (k,)."""
-        return Heard(**{f.name: getattr(self, f.name)[rows] for f in dataclasses.fields(self)})
 
 
 @dataclass(frozen=True, eq=False)

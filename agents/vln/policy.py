@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -87,7 +87,6 @@ class VlnPolicy:
     """Whether the instruction is empty to it."""
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all (Tan et al. 2019). For training."""
-    _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def act(
         self, observations: Observations, memory: VlnMemory | None, *, rngs: Sequence[np.random.Generator]
@@ -141,8 +140,8 @@ class VlnPolicy:
         self, positions: tuple[int, ...], seen: Sequence[Observation], situations: Situations | None
     ) -> VlnMemory:
         device = self.network.left.weight.device
-        rows = torch.from_numpy(np.stack([self._encode(o.instruction) for o in seen]))
-        words = rows[:, : int((rows != 0).sum(1).max())].to(device)
+        texts = ["" if self.wordless else o.instruction for o in seen]
+        words = torch.from_numpy(self.vocabulary.batch(texts, self.instruction_length)).to(device)
         share, channels = self.environment_dropout, None
         if share:
             channels = F.dropout(torch.ones(len(seen), self.bank.size), share)
@@ -151,11 +150,6 @@ class VlnPolicy:
                 if s and SPOKEN in s.task.id:
                     channels[row] = channels_of(s.task.id, self.bank.size, share)
         return VlnMemory(positions, self.network.begin(words), None if channels is None else channels.to(device))
-
-    def _encode(self, text: str) -> np.ndarray:
-        if text not in self._encoded:
-            self._encoded[text] = self.vocabulary.encode("" if self.wordless else text, self.instruction_length)
-        return self._encoded[text]
 
     def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> Seen:
         views = self.bank.gather([o.sight for o in seen])  # (k, 36, D)

@@ -15,6 +15,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
+from agents.common.rows import Rows
 from agents.common.word_vectors import WordEmbedding
 from agents.vnla.config import VnlaSettings
 from embodied.action_spaces import WORDS
@@ -30,7 +31,7 @@ MOST_LEFT = 9
 
 
 @dataclass(frozen=True, eq=False)
-class ReadText:
+class ReadText(Rows):
     """The text that B agents have before them, and how much each word was attended to."""
 
     words: Tensor
@@ -41,10 +42,6 @@ class ReadText:
     """(B, L) bool, which of them are words."""
     coverage: Tensor
     """(B, L, c)."""
-
-    def select(self, rows: Tensor) -> ReadText:
-        """The texts of some agents, in the order of `rows` (k,)."""
-        return self._each(lambda mine, _: mine[rows], self)
 
     def put(self, rows: Tensor, other: ReadText) -> ReadText:
         """The texts with those of `rows` (k,), ascending, replaced; as long as the longest of both."""
@@ -66,14 +63,11 @@ class ReadText:
 
 
 @dataclass(frozen=True, eq=False)
-class DecoderState:
+class DecoderState(Rows):
     """Hidden and cell state of the decoder, (B, h) each."""
 
     hidden: Tensor
     cell: Tensor
-
-    def select(self, rows: Tensor) -> DecoderState:
-        return DecoderState(self.hidden[rows], self.cell[rows])
 
     def where(self, rows: Tensor, other: DecoderState) -> DecoderState:
         """This state where `rows` (B,) is true, else the other."""
@@ -82,7 +76,7 @@ class DecoderState:
 
 
 @dataclass(frozen=True, eq=False)
-class VnlaPercept:
+class VnlaPercept(Rows):
     """Inputs of one pass for B agents."""
 
     view: Tensor

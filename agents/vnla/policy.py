@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -120,7 +120,6 @@ class VnlaPolicy:
     instruction_length: int = 50
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all. For training."""
-    _encoded: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def act(
         self, observations: Observations, memory: VnlaMemory | None, *, rngs: Sequence[np.random.Generator]
@@ -207,10 +206,8 @@ class VnlaPolicy:
 
     def encode(self, text: str) -> np.ndarray:
         """(L,) int64 numbers of the words, the last one first, then the end, then padding, as in the program."""
-        if text not in self._encoded:
-            words = tokenize(text)[: self.instruction_length - 1]
-            self._encoded[text] = self.vocabulary.encode(" ".join(words[::-1]), self.instruction_length)
-        return self._encoded[text]
+        words = tokenize(text)[: self.instruction_length - 1]
+        return self.vocabulary.encode(" ".join(words[::-1]), self.instruction_length)
 
     def _listen(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaMemory:
         """Read the texts that are new, and notice what was carried out: an advisor may have acted in its place."""
@@ -248,7 +245,7 @@ class VnlaPolicy:
         state, text = memory.state, memory.text
         if len(rows) < len(memory.positions):
             index = torch.tensor(rows, device=percept.view.device)
-            percept, state, text = _rows(percept, index), state.select(index), text.select(index)
+            percept, state, text = percept.select(index), state.select(index), text.select(index)
         moves, asks = self.network.consider(percept, state, text)
         chances, help_ = moves.cpu().numpy(), asks.detach().softmax(-1)[:, ASK].tolist()
         thoughts = {
@@ -335,10 +332,6 @@ def move_index(action: Move | Stop) -> int:
 
 def _taken(index: int, thought: Thought) -> Action:
     return Stop(thought) if index == STOP else Move(index, thought)
-
-
-def _rows(percept: VnlaPercept, index: Tensor) -> VnlaPercept:
-    return VnlaPercept(**{f.name: getattr(percept, f.name)[index] for f in dataclasses.fields(percept)})
 
 
 def _after(memory: VnlaMemory, seen: Sequence[Observation], asking: set[int]) -> VnlaMemory:

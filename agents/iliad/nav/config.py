@@ -69,12 +69,10 @@ class NavConfig:
     """Random seed of the further paths and of the teacher, which all students share."""
 
     def __post_init__(self) -> None:
-        if self.teacher not in TEACHERS:
-            raise ValueError(f"teacher must be one of {TEACHERS}, got {self.teacher!r}")
+        require_word(self, "teacher", TEACHERS)
+        require_word(self, "pragmatics", PRAGMATICS)
         require_word(self, "speakers", SPEAKERS)
         require_word(self, "word_vectors", WORD_VECTORS)
-        if self.pragmatics not in PRAGMATICS:
-            raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
         require(self, AT_LEAST_ONE, "hidden_size", "heads", "candidates")
         require(self, AT_LEAST_ONE, "executor_iterations", "describer_iterations", "teacher_batch")
         require(self, NOT_NEGATIVE, "more_paths", "progress_weight", "room_weight")

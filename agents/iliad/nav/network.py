@@ -9,11 +9,9 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.decoding import Choice
+from agents.common.vocabulary import END_NUMBER
 from agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from agents.iliad.writing import Bridge, Remembered, Writer, before, write
-
-WORD_END = 2
-"""Of a request's words (agents.common.vocabulary)."""
 
 
 class WalkDescriber(nn.Module):
@@ -39,7 +37,7 @@ class WalkDescriber(nn.Module):
     def forward(self, views: Tensor, actions: Tensor, mask: Tensor, written: Tensor) -> Tensor:
         """Logits (B, W, V) before each of the given words (B, W)."""
         state, memories = self.read(views, actions, mask)
-        return self.writer(before(written, WORD_END), state, memories)[0]
+        return self.writer(before(written, END_NUMBER), state, memories)[0]
 
     @torch.no_grad()
     def write(
@@ -50,4 +48,4 @@ class WalkDescriber(nn.Module):
         if copies > 1:
             rows = torch.arange(len(mask)).repeat_interleave(copies)
             hidden, cell, memories = hidden[:, rows], cell[:, rows], [m.select(rows) for m in memories]
-        return write(self.writer, (hidden, cell), memories, choose, longest, WORD_END)
+        return write(self.writer, (hidden, cell), memories, choose, longest, END_NUMBER)

@@ -59,7 +59,6 @@ class NavEyes:
         object.__setattr__(self, "_moves", PanoramicMoves())
         object.__setattr__(self, "_directions", orientation(yaws, pitches, COPIES))  # (turns, 36, 4 COPIES)
         object.__setattr__(self, "_ways", {})
-        object.__setattr__(self, "_words", {})
 
     def blind(self) -> NavEyes:
         """In the same houses, seeing nothing."""
@@ -72,14 +71,7 @@ class NavEyes:
 
     def words(self, requests: Sequence[str]) -> Tensor:
         """(B, longest) int64, padded."""
-        known: dict[str, Tensor] = self._words  # type: ignore[attr-defined]
-        if len(known) > 100_000:
-            known.clear()
-        for request in requests:
-            if request not in known:
-                row = torch.from_numpy(self.vocabulary.encode(request, LONGEST_REQUEST))
-                known[request] = row[: max(1, int((row != 0).sum()))]
-        return nn.utils.rnn.pad_sequence([known[r] for r in requests], batch_first=True)
+        return torch.from_numpy(self.vocabulary.batch(requests, LONGEST_REQUEST))
 
     def ways(self, world: str, pose: Pose) -> Ways:
         """What can be done there."""

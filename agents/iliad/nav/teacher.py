@@ -11,9 +11,9 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.decoding import greedy_choice, sampled_choice
-from agents.common.vocabulary import PAD, Vocabulary
+from agents.common.vocabulary import Vocabulary
 from agents.iliad.describing import DescribingNetworks
-from agents.iliad.nav.network import WORD_END, WalkDescriber
+from agents.iliad.nav.network import WalkDescriber
 from agents.iliad.nav.student import NavEyes, NavStudent, Track
 from agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
 from agents.iliad.protocol import NOTHING
@@ -59,11 +59,7 @@ def walked(
 
 def said(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
     """Descriptions of (B, T) words, up to each end."""
-    found = []
-    for row in numbers.tolist():
-        end = row.index(WORD_END) if WORD_END in row else len(row)
-        found.append(" ".join(vocabulary.words[n] for n in row[:end] if vocabulary.words[n] != PAD))
-    return found
+    return [" ".join(vocabulary.decode(row)) for row in numbers.tolist()]
 
 
 class LearnedNavTeacher(DescribingNetworks[Trip, NavWalk]):

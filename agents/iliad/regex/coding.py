@@ -20,8 +20,6 @@ GAP = CHARACTERS
 """In the columns of a change: no letter here."""
 LONGEST_REQUEST = 32
 """Words of a request that are read."""
-WORD_END = 2
-"""Of a request's words (agents.common.vocabulary); 0 is padding."""
 _NUMBERS = np.zeros(256, dtype=np.int64)
 _NUMBERS[np.frombuffer(ALPHABET.encode(), np.uint8)] = np.arange(2, CHARACTERS)
 _TEXT = np.array(["", "", *ALPHABET])
@@ -45,37 +43,17 @@ def texts(numbers: Tensor) -> list[str]:
 
 @dataclass(frozen=True)
 class Requests:
-    """Requests as numbers, remembered: the same ones come again and again."""
+    """Requests as numbers."""
 
     vocabulary: Vocabulary
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_known", {})
-
     def __call__(self, requests: Sequence[str]) -> Tensor:
         """(B, longest) int64 words, each with its END if it fits, padded."""
-        rows = [self._row(r) for r in requests]
-        out = np.zeros((len(rows), max(map(len, rows))), dtype=np.int64)
-        for k, row in enumerate(rows):
-            out[k, : len(row)] = row
-        return torch.from_numpy(out)
+        return torch.from_numpy(self.vocabulary.batch(requests, LONGEST_REQUEST))
 
     def say(self, numbers: Tensor) -> list[str]:
         """Requests of (B, T) words, up to each END."""
-        words, found = self.vocabulary.words, []
-        for row in numbers.tolist():
-            end = row.index(WORD_END) if WORD_END in row else len(row)
-            found.append(" ".join(words[n] for n in row[:end] if n))
-        return found
-
-    def _row(self, request: str) -> np.ndarray:
-        known: dict[str, np.ndarray] = self._known  # type: ignore[attr-defined]
-        if request not in known:
-            if len(known) > 200_000:
-                known.clear()
-            row = self.vocabulary.encode(request, LONGEST_REQUEST)
-            known[request] = row[: int((row != 0).sum())]
-        return known[request]
+        return [" ".join(self.vocabulary.decode(row)) for row in numbers.tolist()]
 
 
 def request_words(requests: Iterable[str]) -> Requests:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, Limit, require, require_word
 from agents.iliad.config import LearnerConfig
 
 TEACHERS = ("learned", "grammar")
@@ -56,27 +57,15 @@ class RegexConfig:
     """Random seed of data and teacher, which all students share."""
 
     def __post_init__(self) -> None:
-        if self.teacher not in TEACHERS:
-            raise ValueError(f"teacher must be one of {TEACHERS}, got {self.teacher!r}")
-        if self.marginal not in MARGINALS or self.unlabeled < 1:
-            raise ValueError(
-                f"marginal must be one of {MARGINALS} and unlabeled at least 1, got {self.marginal!r}, {self.unlabeled}"
-            )
-        if self.pragmatics not in PRAGMATICS:
-            raise ValueError(f"pragmatics must be one of {PRAGMATICS}, got {self.pragmatics!r}")
-        if not self.teacher_rate > 0:
-            raise ValueError(f"teacher_rate must be above 0, got {self.teacher_rate}")
-        for name in ("items", "held_out_items", "examples", "hidden_size", "word_size", "character_size"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        for name in ("executor_iterations", "describer_iterations", "teacher_batch"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, got {getattr(self, name)}")
-        if self.candidates < 1 or self.pretraining_iterations < 0 or self.vocabulary < 1000:
-            raise ValueError(
-                f"candidates {self.candidates} must be at least 1, pretraining_iterations "
-                f"{self.pretraining_iterations} not negative, vocabulary {self.vocabulary} not below 1000"
-            )
+        require_word(self, "teacher", TEACHERS)
+        require_word(self, "marginal", MARGINALS)
+        require_word(self, "pragmatics", PRAGMATICS)
+        require(self, POSITIVE, "teacher_rate")
+        require(self, AT_LEAST_ONE, "items", "held_out_items", "examples", "hidden_size", "word_size")
+        require(self, AT_LEAST_ONE, "character_size", "candidates", "unlabeled")
+        require(self, AT_LEAST_ONE, "executor_iterations", "describer_iterations", "teacher_batch")
+        require(self, NOT_NEGATIVE, "pretraining_iterations")
+        require(self, Limit(lambda x: x >= 1000, "at least 1000"), "vocabulary")
 
 
 REGEX_SCALES: dict[str, RegexConfig] = {

@@ -10,7 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.decoding import Choice
-from agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD, WORD_END
+from agents.common.vocabulary import END_NUMBER
+from agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD
 from agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
 
 
@@ -79,7 +80,7 @@ class ChangeDescriber(nn.Module):
     def forward(self, changed: Tensor, written: Tensor) -> Tensor:
         """Logits (B, T, V) before each of the given words (B, T)."""
         state, memories = self.read(changed)
-        return self.writer(before(written, WORD_END), state, memories)[0]
+        return self.writer(before(written, END_NUMBER), state, memories)[0]
 
     @torch.no_grad()
     def write(self, changed: Tensor, choose: Choice, longest: int, copies: int = 1) -> Tensor:
@@ -88,4 +89,4 @@ class ChangeDescriber(nn.Module):
         if copies > 1:
             rows = torch.arange(len(changed)).repeat_interleave(copies)
             hidden, cell, memories = hidden[:, rows], cell[:, rows], [m.select(rows) for m in memories]
-        return write(self.writer, (hidden, cell), memories, choose, longest, WORD_END)
+        return write(self.writer, (hidden, cell), memories, choose, longest, END_NUMBER)
