@@ -151,8 +151,8 @@ def test_reinforce_by_hand():
 
 def test_the_baseline_is_the_mean_of_all_rewards_this_batch_included():
     mean, student = RunningMean(3.0, 3), flat([0.25] * 4)
-    rewards = lambda tasks, executions: [0.0]
-    lesson = reinforce(Asked([Wish(0)], ["0"], stream(0, "r")), rewards, mean, student, 0.0)
+    reward = lambda task, execution: 0.0
+    lesson = reinforce(Asked([Wish(0)], ["0"], stream(0, "r")), reward, mean, student, 0.0)
     assert mean.value == pytest.approx(3 / 4)
     assert lesson.loss.item() == pytest.approx((0 - 3 / 4) * math.log(4))
 

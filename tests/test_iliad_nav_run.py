@@ -7,7 +7,7 @@ import json
 
 import pytest
 import torch
-from hand_data import build, noise_features, small_house
+from hand_data import built, noise_features, small_house
 
 from agents.common.checkpoint import CheckpointError
 from agents.common.word_vectors import Lexicon
@@ -40,10 +40,8 @@ silent = lambda line: None
 @pytest.fixture(scope="module")
 def source(tmp_path_factory) -> NavSource:
     """Grids of 16 nodes whose features are noise."""
-    folder = tmp_path_factory.mktemp("vln")
-    cache = tmp_path_factory.mktemp("cache")
-    encoder = noise_features(build(folder, cache, "vln", make_house=small_house))
-    return NavSource(folder, encoder.digest, None, cache)
+    data = built(tmp_path_factory.mktemp("vln") / "data", "vln", make_house=small_house)
+    return NavSource(data.folder, noise_features(data).digest, None, tmp_path_factory.mktemp("cache"))
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from torch import nn
 
 from agents.ask.config import AskerConfig
 from agents.ask.foresight import CHOICES, Choice, Foresight, carried_out, possible, thinks
-from agents.common.weights import load_weights
+from agents.common.weights import load_weights, seeded
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import play
 from embodied.interface import Actions, Detection, Intention, Observation, Observations, Situations, Task
@@ -70,8 +70,7 @@ def fit(decisions: Decisions, config: AskerConfig) -> nn.Sequential:
     can = ~torch.isnan(worth)
     worth = torch.where(can, worth, -torch.inf)
     lost = torch.where(can, worth.max(1, keepdim=True).values - worth, 0.0)
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
+    with seeded(config.seed):
         net = network(config.hidden_size)
         net(x[:1])
         optimizer = torch.optim.AdamW(net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)

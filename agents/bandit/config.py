@@ -1,4 +1,4 @@
-"""BanditConfig: sizes and hyperparameters of dissertation 3.1.5.2, in one record."""
+"""BanditConfig: sizes and hyperparameters of dissertation 3.1.5.2; Sizes: those of a corpus."""
 
 from __future__ import annotations
 
@@ -46,6 +46,28 @@ class BanditConfig(RunSettings):
         require(self, least, "source_words", "target_words")
         if not self.bandit_set.startswith("bandit"):
             raise ValueError(f"bandit_set must be a split whose name begins with 'bandit', got {self.bandit_set!r}")
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How many pairs each split of a corpus gets; the defaults are a thirteenth of the dissertation's (Table 3.1)."""
+
+    supervised: int = 14_000
+    """Pairs for supervised pre-training."""
+    bandit: int = 12_800
+    """Pairs of each set that is rated."""
+    dev: int = 1_000
+    """Least number of pairs for model selection."""
+    test: int = 2_000
+    """Least number of pairs for evaluation."""
+    overlap: float = 0.95
+    """Share of the set bandit_overlap that is in the supervised set (the dissertation: over 95 %)."""
+
+    def __post_init__(self) -> None:
+        if min(self.supervised, self.bandit, self.dev, self.test) < 1:
+            raise ValueError(f"every split needs at least one pair, got {self}")
+        if not 0 <= self.overlap <= 1:
+            raise ValueError(f"overlap must be in [0, 1], got {self.overlap}")
 
 
 SCALES: dict[str, BanditConfig] = {

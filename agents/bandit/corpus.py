@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.bandit.sizes import Sizes
+from agents.bandit.config import Sizes
 from assets.cache import digest, write_bytes, write_json
 from embodied.locks import locked
 from embodied.records import RecordError, from_plain, read_json

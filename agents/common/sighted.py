@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-import torch
 from torch import nn
 
 from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
-from agents.common.weights import half_precision, load_weights, save_weights
+from agents.common.weights import half_precision, load_weights, save_weights, seeded
 from agents.common.word_vectors import use_vectors, vocabulary_with
 from embodied.identity import Identity
 
@@ -64,8 +63,7 @@ class SightedAgent:
     @classmethod
     def new(cls, about: About) -> Self:
         """An untrained agent; its weights follow from the seed."""
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(about.config.seed)
+        with seeded(about.config.seed):
             network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors)
             use_vectors(network, vocabulary)
             return cls(about, network, vocabulary)

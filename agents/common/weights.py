@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
+import torch
 from torch import Tensor, nn
 
 from agents.common.tensor_file import checksum_of, load_tensors, save_tensors
@@ -60,6 +62,14 @@ def weights_digest(path: Path) -> str:
     """Of the weights in a file and of what is needed to use them; not of what they were trained with."""
     tensors, found = load_tensors(Path(path), (FORMAT,), "train it again")
     return checksum_of(tensors, {k: v for k, v in found.items() if k != "identity"})
+
+
+@contextmanager
+def seeded(seed: int) -> Iterator[None]:
+    """PyTorch's draws on the CPU, such as of first weights, follow from `seed` inside, and are as before outside."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        yield
 
 
 def half_precision(network: nn.Module) -> dict[str, Tensor]:

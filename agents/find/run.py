@@ -28,7 +28,7 @@ from agents.common.settings import EvaluationSettings
 from agents.common.sighted import About, SightedAgent
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.weights import check_features, load_weights, save_weights
+from agents.common.weights import check_features, load_weights, save_weights, seeded
 from agents.find.config import THINGS, FinderConfig
 from agents.find.network import READ, Explorer, SeekNetwork
 from agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
@@ -108,8 +108,7 @@ class Finder(SightedAgent):
 def new_finder(about: FinderAbout, requests: torch.Tensor) -> Finder:
     """An untrained agent; its weights follow from the seed. `requests`: as of SeekNetwork."""
     c, kind = about.config, {"network": SeekNetwork, "detector": Explorer}[about.config.agent]
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(c.seed)
+    with seeded(c.seed):
         network = kind(about.feature_size, requests, c.hidden_size, c.dropout)
         return Finder(about, network, Vocabulary(about.words))
 

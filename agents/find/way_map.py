@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from agents.hanna.recognition import SAME, matches
+from agents.hanna.trail import fewest_moves
 from embodied.geometry import wrap
 from embodied.interface import Observation
 
@@ -80,16 +80,8 @@ class WayMap:
 
     def reach(self) -> dict[int, tuple[int, int | None]]:
         """How many known moves lead from here to each spot, and along which way they begin."""
-        found: dict[int, tuple[int, int | None]] = {self.here: (0, None)}
-        queue = deque([self.here])
-        while queue:
-            spot = queue.popleft()
-            steps, first = found[spot]
-            for way, end in enumerate(self.spots[spot].leads):
-                if end is not None and end not in found:
-                    found[end] = steps + 1, way if first is None else first
-                    queue.append(end)
-        return found
+        known = lambda spot: ((way, end) for way, end in enumerate(self.spots[spot].leads) if end is not None)
+        return fewest_moves(self.here, known)
 
     def _known(self, panorama: np.ndarray, ways: np.ndarray) -> int | None:
         """The spot that looks the same, of those whose ways go in the same directions."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -96,19 +96,10 @@ class Trail:
 
     def ways(self) -> dict[int, tuple[int, int | None]]:
         """How many known moves lead from here to every place on the trail, and the view in which they begin."""
-        start, roads = self.place, dict[int, list[tuple[int, int]]]()
+        roads: dict[int, list[tuple[int, int]]] = {}
         for (origin, view), end in self.leads.items():
             roads.setdefault(origin, []).append((view, end))
-        found: dict[int, tuple[int, int | None]] = {start: (0, None)}
-        queue = deque([start])
-        while queue:
-            place = queue.popleft()
-            steps, first = found[place]
-            for view, end in roads.get(place, ()):
-                if end not in found:
-                    found[end] = steps + 1, view if first is None else first
-                    queue.append(end)
-        return found
+        return fewest_moves(self.place, lambda place: roads.get(place, ()))
 
     def untried(self, observation: Observation, back: float) -> int | None:
         """The view in which the way begins to the best of all ways that were not tried yet, by what was thought of them
@@ -124,6 +115,24 @@ class Trail:
                 if worth > best and (place, view) not in self.leads:
                     best, chosen = worth, view if first is None else first
         return chosen
+
+
+def fewest_moves(start: int, leads: Callable[[int], Iterable[tuple[int, int]]]) -> dict[int, tuple[int, int | None]]:
+    """How many known moves lead from `start` to every place that they lead to, and which way they begin.
+
+    Args:
+      leads: the ways that are known from a place, each with the place at its end.
+    """
+    found: dict[int, tuple[int, int | None]] = {start: (0, None)}
+    queue = deque([start])
+    while queue:
+        place = queue.popleft()
+        steps, first = found[place]
+        for way, end in leads(place):
+            if end not in found:
+                found[end] = steps + 1, way if first is None else first
+                queue.append(end)
+    return found
 
 
 def weigh(trail: Trail, observation: Observation, weights: np.ndarray, again: float) -> np.ndarray:

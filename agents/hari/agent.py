@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from agents.common.tensor_file import load_into
-from agents.common.weights import load_weights, save_weights
+from agents.common.weights import load_weights, save_weights, seeded
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.networks import INTENTIONS, ExecutionNetwork, RecurrentHead
 from agents.hari.words import FeatureWords
@@ -51,15 +51,13 @@ class HariAgent:
 
 def new_executor(config: ExecutionConfig, words: FeatureWords) -> Executor:
     """Random weights that follow from the seed."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
+    with seeded(config.seed):
         return Executor(ExecutionNetwork(config, len(words)), words, config)
 
 
 def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, RecurrentHead]:
     """Actor psi and critic V with random weights that follow from the seed."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
+    with seeded(config.seed):
         actor = RecurrentHead(belief, config.hidden_size, len(INTENTIONS), knows_stack=config.knows_stack)
         return actor, RecurrentHead(belief, config.hidden_size, 1, knows_stack=config.knows_stack)
 

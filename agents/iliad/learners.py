@@ -6,7 +6,7 @@ what they hear: a description, a demonstration, or a number.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic
 
@@ -117,11 +117,11 @@ def dagger(asked: Asked[Q], world: RequestWorld[Q, E], student: Student[Q, E]) -
 
 
 def reinforce(
-    asked: Asked[Q], rewards_of: RewardsOf[Q, E], mean: RunningMean, student: Student[Q, E], entropy: float
+    asked: Asked[Q], reward: Callable[[Q, E], float], mean: RunningMean, student: Student[Q, E], entropy: float
 ) -> IliadLesson[Q, E]:
     """REINFORCE against the mean of all rewards so far, those of this batch included."""
     done = student.sample(asked.tasks, asked.requests, rng=asked.rng)
-    rewards = rewards_of(asked.tasks, done)
+    rewards = [float(reward(q, e)) for q, e in zip(asked.tasks, done, strict=True)]
     mean.add(rewards)
     scores = student.scores(asked.tasks, asked.requests, done)
     return IliadLesson(reinforce_loss(scores, rewards, mean.value, entropy), done)
@@ -133,16 +133,6 @@ def reinforce_loss(scores: ExecutionScores, rewards: Sequence[float], baseline: 
     values = torch.full_like(scores.log_probabilities, baseline)
     rated = Decisions(scores.log_probabilities, values, returns, scores.mask)
     return actor_loss(rated) - entropy * (scores.entropies * scores.mask).sum() / len(returns)
-
-
-class RewardsOf(Generic[Q, E]):
-    """A reward of a world: success, or nearness."""
-
-    def __init__(self, world: RequestWorld[Q, E], binary: bool) -> None:
-        self._of = (lambda q, e: float(world.success(q, e))) if binary else world.reward
-
-    def __call__(self, tasks: Sequence[Q], executions: Sequence[E]) -> list[float]:
-        return [self._of(q, e) for q, e in zip(tasks, executions, strict=True)]
 
 
 @dataclass

@@ -21,7 +21,7 @@ from agents.common.session import (
     tasks_of_update,
 )
 from agents.iliad.config import LearnerConfig, mixing_at
-from agents.iliad.learners import Asked, IliadLesson, RewardsOf, RunningMean, adel, dagger, mixture, reinforce
+from agents.iliad.learners import Asked, IliadLesson, RunningMean, adel, dagger, mixture, reinforce
 from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
 from embodied.identity import Identity
 from embodied.seeds import stream
@@ -123,7 +123,6 @@ class _Learner(Generic[Q, E]):
         weights = [p for m in self.modules.values() for p in m.parameters()]
         self.optimizer = torch.optim.Adam(weights, config.rate, fused=True)
         self.mean = RunningMean()
-        self.rewards = RewardsOf(problem.world, config.learner == "binary")
 
     def restore(self, sums: Mapping[str, float]) -> None:
         """Go on counting rewards."""
@@ -155,7 +154,8 @@ class _Learner(Generic[Q, E]):
             return mixture(asked, p.teacher, p.marginal, p.student, mixing)
         if c.learner == "dagger":
             return dagger(asked, p.world, p.student)
-        return reinforce(asked, self.rewards, self.mean, p.student, c.entropy)
+        reward = p.world.success if c.learner == "binary" else p.world.reward
+        return reinforce(asked, reward, self.mean, p.student, c.entropy)
 
 
 def _found(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:

@@ -48,17 +48,12 @@ def question_of(s: Situation, question: Intention) -> str:
     return s.question if question is Intention.FREE else QUESTIONS.get(question, question.value)
 
 
-class ModelAssistant:
-    """Words the replies of another assistant by a language model; where its answer is none, the template stands."""
+class WordedAssistant:
+    """Says the replies of another assistant in other words; who derives from it says `worded`."""
 
-    def __init__(self, base: Assistant, client: Client, prompts: Path | None = None) -> None:
-        """
-        Args:
-          base: who knows the answer.
-          prompts: folder with an assistant.md of one's own.
-        """
-        self._base, self._client = base, client
-        self._prompt = read_prompt("assistant", NAMES, prompts)
+    def __init__(self, base: Assistant) -> None:
+        """`base`: who knows the answer."""
+        self._base = base
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         return self._base.intentions(situation)
@@ -67,7 +62,22 @@ class ModelAssistant:
         reply = self._base.answer(situation, question, rng=rng)
         if reply.text is None:  # HARI's descriptions are no words
             return reply
-        facts = facts_of(self._base, situation, reply, rng=rng)
+        return self.worded(reply, facts_of(self._base, situation, reply, rng=rng), situation, question)
+
+    def worded(self, reply: Reply, facts: tuple[str, ...], situation: Situation, question: Intention) -> Reply:
+        """The reply in other words, by the facts that whoever words it is told."""
+        raise NotImplementedError
+
+
+class ModelAssistant(WordedAssistant):
+    """Words the replies by a language model; where its answer is none, the template stands."""
+
+    def __init__(self, base: Assistant, client: Client, prompts: Path | None = None) -> None:
+        """`prompts`: folder with an assistant.md of one's own."""
+        super().__init__(base)
+        self._client, self._prompt = client, read_prompt("assistant", NAMES, prompts)
+
+    def worded(self, reply: Reply, facts: tuple[str, ...], situation: Situation, question: Intention) -> Reply:
         messages = self._prompt.messages(
             facts="\n".join(f"- {f}" for f in facts),
             question=question_of(situation, question),
@@ -78,26 +88,17 @@ class ModelAssistant:
         return dataclasses.replace(reply, text=text, usage=answer.usage(self._client.settings))
 
 
-class PersonAssistant:
-    """Somebody at the keyboard words the replies of another assistant."""
+class PersonAssistant(WordedAssistant):
+    """Somebody at the keyboard words the replies."""
 
     def __init__(self, base: Assistant, read: Callable[[str], str] = input) -> None:
-        """
-        Args:
-          base: who knows the answer.
-          read: shows a text and gives what was written; an empty line leaves the template's words.
-        """
-        self._base, self._read = base, read
+        """`read`: shows a text and gives what was written; an empty line leaves the template's words."""
+        super().__init__(base)
+        self._read = read
 
-    def intentions(self, situation: Situation) -> tuple[Intention, ...]:
-        return self._base.intentions(situation)
-
-    def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
-        reply = self._base.answer(situation, question, rng=rng)
-        if reply.text is None:
-            return reply
-        facts = "\n".join(f"  - {f}" for f in facts_of(self._base, situation, reply, rng=rng))
-        said = self._read(f"\nYou know:\n{facts}\nThe agent asks: {question_of(situation, question)}\n> ").strip()
+    def worded(self, reply: Reply, facts: tuple[str, ...], situation: Situation, question: Intention) -> Reply:
+        known = "\n".join(f"  - {f}" for f in facts)
+        said = self._read(f"\nYou know:\n{known}\nThe agent asks: {question_of(situation, question)}\n> ").strip()
         return dataclasses.replace(reply, text=said or reply.text)
 
 

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from agents.common.shipped import SHIPPED_ENCODER
 from agents.common.tensor_file import load_into, read_weights
-from agents.common.weights import load_weights, save_weights
+from agents.common.weights import load_weights, save_weights, seeded
 from agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
 from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from embodied.identity import Identity
@@ -142,8 +142,7 @@ def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
 
 def random_encoder(name: str = COMPACT, *, seed: int, sharing: str = "strip") -> Encoder:
     """An untrained encoder: the floor that training has to beat."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+    with seeded(seed):
         return Encoder(ResNet(ARCHITECTURES[name]).eval(), name, sharing)
 
 

@@ -13,6 +13,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
+from agents.common.weights import seeded
+
 
 @dataclass(frozen=True, eq=False)
 class LabelledFeatures:
@@ -109,8 +111,7 @@ def _fit(
     x: Tensor, goal: Tensor, loss: Callable[[Tensor, Tensor], Tensor], seed: int, steps: int, outputs: int | None = None
 ) -> Callable[[Tensor], Tensor]:
     """A linear reader trained with Adam on random batches of 4096 rows."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
+    with seeded(seed):
         reader = torch.nn.Linear(x.shape[1], outputs or goal.shape[1])
         optimizer = torch.optim.AdamW(reader.parameters(), 1e-2, weight_decay=1e-2)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, steps)

@@ -24,6 +24,7 @@ from torch import Tensor, nn
 from agents.common.checkpoint import Stateful
 from agents.common.session import Session, descend
 from agents.common.tensor_file import save_tensors
+from agents.common.weights import seeded
 from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
@@ -305,8 +306,7 @@ class _Training:
         updates: per epoch.
         """
         self.config, self._device, self._target = config, device, target
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(config.seed)
+        with seeded(config.seed):
             self.network = ResNet(ARCHITECTURES[COMPACT])
             self.heads = Heads(self.network.size, classes)
         if target is not None:

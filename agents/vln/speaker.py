@@ -20,7 +20,7 @@ from agents.common.decoding import sampled_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.weights import check_features, load_weights
+from agents.common.weights import check_features, load_weights, seeded
 from agents.iliad.nav.network import WalkDescriber
 from agents.iliad.nav.student import NavEyes
 from agents.iliad.nav.teacher import said, walked
@@ -78,8 +78,7 @@ class Speaker:
 def new_speaker(about: SpeakerAbout) -> Speaker:
     """An untrained speaker; its weights follow from the seed."""
     c = about.config
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(int(stream(c.seed, "speaker", "begin").integers(2**31)))
+    with seeded(int(stream(c.seed, "speaker", "begin").integers(2**31))):
         seen = about.feature_size + 4 * COPIES
         network = WalkDescriber(len(about.words), c.hidden_size, c.heads, seen, HORIZON)
     return Speaker(network, about)

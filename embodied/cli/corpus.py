@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from agents.bandit.sizes import Sizes
+from agents.bandit.config import Sizes
 from embodied.cli.common import Cached, note
 from embodied.cli.options import Count, InputPath, Option, OutputFolder, Settings, any_path
 

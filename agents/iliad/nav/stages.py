@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 from torch import Tensor, nn
 
 from agents.common.decoding import greedy_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
-from agents.common.weights import load_weights, save_weights
+from agents.common.weights import load_weights, save_weights, seeded
 from agents.common.word_vectors import use_vectors, vocabulary_with
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
@@ -50,7 +48,7 @@ class NavAbout:
 def new_follower(config: NavConfig, eyes: NavEyes, seed: int, name: str) -> FollowerNetwork:
     """An untrained follower, which is VLN's; its weights follow from seed and name."""
     c = FollowerSettings(hidden_size=config.hidden_size, dropout=config.dropout)
-    with _beginning(seed, name):
+    with seeded(_beginning(seed, name)):
         network = FollowerNetwork(c, len(eyes.vocabulary), eyes.bank.size)
         use_vectors(network, eyes.vocabulary)
         return network
@@ -58,16 +56,13 @@ def new_follower(config: NavConfig, eyes: NavEyes, seed: int, name: str) -> Foll
 
 def new_describer(config: NavConfig, eyes: NavEyes) -> WalkDescriber:
     """An untrained describer."""
-    with _beginning(config.data_seed, "describer"):
+    with seeded(_beginning(config.data_seed, "describer")):
         return WalkDescriber(len(eyes.vocabulary), config.hidden_size, config.heads, eyes.size, HORIZON)
 
 
-@contextmanager
-def _beginning(seed: int, name: str) -> Iterator[None]:
-    """PyTorch's own draws follow from (seed, name) inside, and are as before outside."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(int(stream(seed, "nav", "begin", name).integers(2**31)))
-        yield
+def _beginning(seed: int, name: str) -> int:
+    """Names the first weights of a network."""
+    return int(stream(seed, "nav", "begin", name).integers(2**31))
 
 
 def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note) -> NavStudent:

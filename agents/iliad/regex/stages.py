@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 from torch import Tensor, nn
 
 from agents.common.decoding import greedy_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary
-from agents.common.weights import load_weights, save_weights
+from agents.common.weights import load_weights, save_weights, seeded
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import Requests, changes, characters, texts
 from agents.iliad.regex.config import RegexConfig
@@ -44,8 +43,7 @@ class RegexAbout:
 
 def new_network(kind: Callable[..., Network], config: RegexConfig, requests: Requests, seed: int, name: str) -> Network:
     """An untrained speller or describer; its weights follow from seed and name."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(int(stream(seed, "regex", "begin", name).integers(2**31)))
+    with seeded(int(stream(seed, "regex", "begin", name).integers(2**31))):
         return kind(len(requests.vocabulary), config.hidden_size, config.word_size, config.character_size)
 
 
