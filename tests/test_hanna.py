@@ -14,14 +14,7 @@ from hand_worlds import grid_world, line_world
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna, AssistantError
-from embodied.assistants.route_system import (
-    RouteConfig,
-    ancestors,
-    build_routes,
-    sampled_paths,
-    spanning_parents,
-    spanning_paths,
-)
+from embodied.assistants.route_system import ancestors, build_routes, sampled_paths, spanning_parents, spanning_paths
 from embodied.envs.base import ActionError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -182,7 +175,7 @@ def test_help_does_not_depend_on_the_batch_around_it():
 
 def test_sampled_routes_are_shortest_paths_of_4_to_6_edges_without_repeats():
     world = grid_world(8)
-    paths = sampled_paths(world.graph, 50, rng=stream(0), config=RouteConfig())
+    paths = sampled_paths(world.graph, 50, rng=stream(0))
     hops = count_hops(world.graph.next_hop)
     assert len(set(paths)) == 50
     assert all(4 <= len(p) - 1 <= 6 and hops[p[0], p[-1]] == len(p) - 1 for p in paths)

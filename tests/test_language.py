@@ -10,7 +10,7 @@ import pytest
 
 from agents.common.more_paths import SaidBy
 from assets.catalogue import load_catalogue
-from embodied.assistants.route_system import RouteConfig, sampled_paths
+from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
@@ -52,7 +52,7 @@ def world(shared_cache):
 def spoken(world):
     """(text, path, yaw) of sampled routes."""
     rng, people = np.random.default_rng(0), People()
-    paths = sampled_paths(world.graph, PATHS, rng=rng, config=RouteConfig())
+    paths = sampled_paths(world.graph, PATHS, rng=rng)
     yaws = [float(rng.integers(12)) * np.pi / 6 for _ in paths]
     return [(people.route(world, p, y, rng=rng), p, y) for p, y in zip(paths, yaws)]
 

@@ -13,12 +13,12 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 from PIL import Image
 
-from embodied.datasets.vlnce import FORMATS, Shot, export_walks, frames, pixel_goal, pose_of, teach, wandering
-from embodied.envs.continuous import Aim, ContinuousEnv, Excursion, Move
+from embodied.datasets.vlnce import FORMATS, export_walks, frames, pixel_goal, pose_of, teach, wandering
+from embodied.envs.continuous import Aim, ContinuousEnv, Excursion, Lens, Move
 from embodied.world import open_world
 
 pytestmark = pytest.mark.gl
-SMALL = Shot(32, 48)
+SMALL = Lens(32, 48, 79.0)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def excursion(world) -> Excursion:
 def folders(world, tmp_path_factory):
     home = tmp_path_factory.mktemp("forms")
     for form in FORMATS:
-        export_walks(form, home / form, [excursion(world)], {world.name: world}, seed=0, shot=SMALL, depth=True)
+        export_walks(form, home / form, [excursion(world)], {world.name: world}, seed=0, lens=SMALL, depth=True)
     return home
 
 
@@ -122,10 +122,10 @@ def test_labels_of_a_walk_that_wanders_lead_back(world):
 
 
 def test_what_stands_before_a_goal_hides_it(taught):
-    k, shot = taught.labels.index(Move.FORWARD), Shot(48, 64)
+    k, lens = taught.labels.index(Move.FORWARD), Lens(48, 64, 79.0)
     pose = pose_of(taught, k, 30)
-    assert pixel_goal(taught, k, pose, np.full((48, 64), np.inf), shot)[1] > 0
-    assert pixel_goal(taught, k, pose, np.full((48, 64), 0.2), shot) == ((-1, -1), -1)
+    assert pixel_goal(taught, k, pose, np.full((48, 64), np.inf), lens)[1] > 0
+    assert pixel_goal(taught, k, pose, np.full((48, 64), 0.2), lens) == ((-1, -1), -1)
 
 
 def test_a_folder_with_files_and_wandering_poses_are_refused(world, tmp_path):

@@ -12,7 +12,7 @@ from typing import TypeVar
 from assets.cache import digest
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest
-from embodied.assistants.route_system import RouteConfig, sampled_paths, worded
+from embodied.assistants.route_system import sampled_paths, worded
 from embodied.datasets.store import Dataset
 from embodied.interface import TURNS, FollowRoute, Route, Task
 from embodied.language import People
@@ -33,7 +33,7 @@ def more_routes(
         known = {route.path for route in source.routes(name)}
         world = source.open_world(name, load_catalogue(cache), cache)
         rng = stream(seed, "nav", "more", name)
-        every = sampled_paths(world.graph, len(world.graph.positions) ** 2, rng=rng, config=RouteConfig())
+        every = sampled_paths(world.graph, len(world.graph.positions) ** 2, rng=rng)
         paths = [p for p in every if p not in known][:count]
         return worded(world, paths, ("train_seen",) * 3, seed=seed, language=People(novelty=novelty))
 

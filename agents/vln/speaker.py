@@ -33,7 +33,7 @@ from agents.vln.agent import VlnAgent
 from agents.vln.config import SpeakerSettings
 from agents.vln.network import COPIES
 from agents.vln.policy import SPOKEN, channels_of
-from embodied.assistants.route_system import RouteConfig, sampled_paths
+from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.store import SplitData
 from embodied.evaluation.metrics import without_repeats
 from embodied.evaluation.rollout import play
@@ -186,7 +186,7 @@ def spoken_tasks(speaker: Speaker, training: Split, dropout: float, *, seed: int
     eyes = speaker.eyes(dict(training.worlds), training.bank)
     for name, place in training.worlds.items():
         count, rng = sum(t.world == name for t in training.tasks), stream(seed, "spoken", name)
-        paths = sampled_paths(place.graph, count, rng=rng, config=RouteConfig())
+        paths = sampled_paths(place.graph, count, rng=rng)
         routes = [Route(f"{name}{SPOKEN}{k}", p, int(rng.integers(TURNS)), 0, "") for k, p in enumerate(paths)]
         unworded = [vln_task(name, r) for r in routes]
         trips = [Trip(name, t.start, _path(t), ("",)) for t in unworded]

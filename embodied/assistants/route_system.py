@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,20 +26,14 @@ WORDINGS: Mapping[str, tuple[str, ...]] = {
 every path is held out, which is what Table 4.2's 8,586 : 4,287 amounts to (docs/sources.md, S15)."""
 
 
-@dataclass(frozen=True)
-class RouteConfig:
-    """How routes are sampled; the defaults are those of Room-to-Room."""
-
-    routes_per_node: float = 211 / 125
-    """211 routes connect 125 locations per environment (4.2.2); a route is a path with one wording."""
-    fewest_edges: int = 4
-    most_edges: int = 6
-    shortest: float = 5.0
-    """Metres."""
+ROUTES_PER_NODE = 211 / 125
+"""211 routes connect 125 locations per environment (4.2.2); a route is a path with one wording."""
+FEWEST_EDGES, MOST_EDGES, SHORTEST = 4, 6, 5.0
+"""Of a sampled path, the last in metres, as in Room-to-Room."""
 
 
 def sampled_paths(
-    graph: NavGraph, count: int, *, rng: np.random.Generator, config: RouteConfig, starts: Collection[int] | None = None
+    graph: NavGraph, count: int, *, rng: np.random.Generator, starts: Collection[int] | None = None
 ) -> list[tuple[int, ...]]:
     """`count` different shortest paths of 4 to 6 edges between random nodes, as in Room-to-Room.
 
@@ -50,7 +43,7 @@ def sampled_paths(
       starts: where routes may begin: nodes at which somebody can be met. Where no path can, all may.
     """
     hops = graph.hops
-    fits = (hops >= config.fewest_edges) & (hops <= config.most_edges) & (np.asarray(graph.distance) >= config.shortest)
+    fits = (hops >= FEWEST_EDGES) & (hops <= MOST_EDGES) & (np.asarray(graph.distance) >= SHORTEST)
     if not fits.any():
         fits = hops == hops.max()
     if starts is not None:
@@ -95,24 +88,16 @@ def spanning_paths(graph: NavGraph) -> list[tuple[int, ...]]:
 
 
 def route_paths(
-    graph: NavGraph,
-    name: str,
-    *,
-    seed: int,
-    house_split: str,
-    config: RouteConfig = RouteConfig(),
-    starts: Collection[int] | None = None,
+    graph: NavGraph, name: str, *, seed: int, house_split: str, starts: Collection[int] | None = None
 ) -> list[tuple[int, ...]]:
     """The sampled paths of the house `name`: so many that each can be worded once per wording of its split."""
-    count = max(1, round(config.routes_per_node * len(graph.positions) / len(WORDINGS[house_split])))
-    return sampled_paths(graph, count, rng=stream(seed, "routes", name), config=config, starts=starts)
+    count = max(1, round(ROUTES_PER_NODE * len(graph.positions) / len(WORDINGS[house_split])))
+    return sampled_paths(graph, count, rng=stream(seed, "routes", name), starts=starts)
 
 
-def build_routes(
-    world: PlaceT, *, seed: int, language: Language[PlaceT], house_split: str, config: RouteConfig = RouteConfig()
-) -> tuple[Route, ...]:
+def build_routes(world: PlaceT, *, seed: int, language: Language[PlaceT], house_split: str) -> tuple[Route, ...]:
     """The sampled route system of one house, each path worded three times."""
-    paths = route_paths(world.graph, world.house.name, seed=seed, house_split=house_split, config=config)
+    paths = route_paths(world.graph, world.house.name, seed=seed, house_split=house_split)
     return worded(world, paths, WORDINGS[house_split], seed=seed, language=language)
 
 

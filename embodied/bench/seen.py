@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,14 +12,11 @@ from assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, measure, one_core, ratio
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
-from embodied.gym.env import HelpGymEnv, make
+from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import CameraSensor, PanoramaStore, Sensor, ViewSettings
-from embodied.gym.in_step import make_vec
-from embodied.gym.playground import flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain import PlainLanguage
-from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import World, open_world
@@ -29,12 +25,6 @@ FLAT = HouseConfig(area=(70.0, 110.0))
 """Where the agent walks."""
 STEPS = 200
 """Of one timed call."""
-ROUND = 20
-"""Of one timed call of a batch."""
-ROUNDS = 40
-"""Untimed calls before, in which every process decodes the panoramas that it meets."""
-BATCH = 64
-"""Environments of the vectorised line."""
 LINES = (
     ("rgb, 128 x 128", ("rgb",), ViewSettings(), 4000.0),
     ("rgb, depth and ids, 128 x 128", ("rgb", "depth", "ids"), ViewSettings(), 2000.0),
@@ -44,12 +34,10 @@ LINES = (
 
 
 def seen(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
-    """Random walks through one flat whose panoramas are in memory: on one core, and a batch that looks on all."""
-    with one_core():
-        house = generate_house(seed, FLAT, catalogue)
-        with open_world(house, catalogue, cache, pictures=kind) as world:
-            yield from _measures(world, seed)
-        yield from _batches(seed, cache, kind)
+    """Random walks through one flat whose panoramas are in memory."""
+    house = generate_house(seed, FLAT, catalogue)
+    with one_core(), open_world(house, catalogue, cache, pictures=kind) as world:
+        yield from _measures(world, seed)
 
 
 def _measures(world: World, seed: int) -> Iterator[Measure]:
@@ -66,49 +54,6 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
     naive = measure("the naive way: a picture drawn per step", lambda: _draw(plain, world, 40, seed), "1/s", per=40)
     yield naive
     yield ratio("resampled against drawn", resampled, naive)
-
-
-def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
-    """One environment against batches of them, all in the flat that `make` generates from `seed`."""
-    drawn = PictureSettings(kind=kind)
-    asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": drawn}
-    for world in flat_playground("find", seed, cache=cache, pictures=asked["pictures"], sees=("rgb",)).worlds.values():
-        assert isinstance(world, World), "generated, so it can be drawn"
-        with world:
-            world.render_all()
-    walk = _Alone(make("find", **asked))
-    alone = measure("steps of one environment, rgb, 128 x 128", walk, "1/s", per=STEPS, warm=ROUNDS)
-    yield alone
-    envs = make_vec("find", BATCH, **asked)
-    name = f"steps of {BATCH} environments in one process"
-    together = measure(name, _Together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
-    envs.close()
-    yield together
-    yield ratio(f"{name} against one", together, alone)
-
-
-class _Alone:
-    """Goes STEPS steps on: the first move there is, again and again."""
-
-    def __init__(self, env: HelpGymEnv) -> None:
-        self._env, self._seen = env, env.reset(seed=0)[0]
-
-    def __call__(self) -> None:
-        for _ in range(STEPS):
-            self._seen, _, terminated, truncated, _ = self._env.step(int(self._seen["action_mask"].argmax()))
-            if terminated or truncated:
-                self._seen, _ = self._env.reset()
-
-
-class _Together:
-    """The same in every slot, ROUND steps on."""
-
-    def __init__(self, envs: Any) -> None:
-        self._envs, self._seen = envs, envs.reset(seed=0)[0]
-
-    def __call__(self) -> None:
-        for _ in range(ROUND):
-            self._seen, *_ = self._envs.step(self._seen["action_mask"].argmax(1))
 
 
 def _env(world: World, tasks: list[Task], sensor: Sensor) -> HelpGymEnv:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from assets.catalogue import Catalogue
-from embodied.bench.timing import Measure, measure, ratio, share
+from embodied.bench.timing import Measure, measure, share
 from embodied.generate import HouseConfig, generate_house
-from embodied.house.house import House
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import Camera, face_cameras
 from embodied.render.classic import Renderer
@@ -37,7 +36,7 @@ def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
 
 
 def pictures(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
-    """Cube faces, panoramas and resampled views, and the naive way beside them."""
+    """Cube faces, panoramas and resampled views."""
     house = generate_house(seed, LARGE, catalogue)
     with open_world(house, catalogue, cache, size=256, pictures=kind) as world:
         renderer, eyes = world.renderer, world.graph.positions
@@ -68,31 +67,8 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterato
             unlit = _face(plain.renderer, cameras, "unlit", None)
         yield unlit
         yield share(f"{kind} cube face of unlit", face, unlit, aim=1.2)
-    naive = measure(
-        "the naive way: a new mujoco.Renderer per view, all rooms", naive_view(house, catalogue, eyes[0]), repeats=3
-    )
-    yield naive
-    yield ratio("naive view over our face", naive, face)
 
 
 def _face(renderer: Renderer, cameras: Sequence[Camera], kind: str, aim: float | None) -> Measure:
     name, draw = f"256x256 cube face, rgb, {kind}", lambda: [renderer.rgb(c, (256, 256)) for c in cameras]
     return measure(name, draw, per=len(cameras), repeats=5, aim=aim)
-
-
-def naive_view(house: House, catalogue: Catalogue, eye: np.ndarray) -> Callable[[], None]:
-    """One 256x256 view as MuJoCo's tutorials draw it."""
-    import mujoco
-
-    model = compile_scene(house, catalogue).model
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    camera = mujoco.MjvCamera()
-    camera.lookat, camera.distance, camera.azimuth, camera.elevation = eye + [1, 0, 0], 1.0, 0.0, 0.0
-
-    def draw() -> None:
-        with mujoco.Renderer(model, 256, 256, max_geom=4 * model.ngeom) as renderer:
-            renderer.update_scene(data, camera)
-            renderer.render()
-
-    return draw

@@ -17,6 +17,7 @@ needs changed. `python -m embodied.mattersim` then runs the programs without a c
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -287,7 +288,7 @@ def run_lerobot(args: LeRobotOptions) -> int:
 def run_walks(what: str, args: WalkOptions) -> int:
     from embodied.datasets.habitat import route_excursions
     from embodied.datasets.store import dataset_of
-    from embodied.datasets.vlnce import Shot, export_walks
+    from embodied.datasets.vlnce import export_walks
     from embodied.gym.continuous import PRESETS
     from embodied.gym.drive import data_worlds
     from embodied.locks import locked
@@ -295,7 +296,7 @@ def run_walks(what: str, args: WalkOptions) -> int:
     data = dataset_of(args.data, "vln")
     body, lens = PRESETS[WALKS[what]]
     width = args.width or lens.width
-    shot = Shot(2 * round(lens.height * width / lens.width / 2), width, lens.hfov)
+    lens = dataclasses.replace(lens, height=2 * round(lens.height * width / lens.width / 2), width=width)
     whole = what == "lerobot-vlnce"  # written under another name; the others are written file by file
     with contextlib.nullcontext() if whole else locked(args.out):
         worlds = data_worlds(args.data, args.split, args.cache, None)
@@ -307,7 +308,7 @@ def run_walks(what: str, args: WalkOptions) -> int:
             worlds,
             seed=data.config.seed,
             body=body,
-            shot=shot,
+            lens=lens,
             wander=args.wander,
             split=args.split,
             depth=args.depth,

@@ -13,14 +13,12 @@ from typing import TYPE_CHECKING, Annotated
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, show
 from embodied.cli.options import Count, CubeFace, HouseFolder, Option, drawn_as
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.policies.baselines import WITHOUT_LEARNING
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, PictureSettings
 
 if TYPE_CHECKING:
-    from embodied.interface import Agent
     from embodied.world import World
-
-AGENTS = ("shortest", "random", "forward10")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +27,7 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Folder that `embodied house` wrote (default: a house generated from --seed)."""
     seed: int = 0
     """Random seed of the house and its tasks."""
-    agent: Annotated[str, Option(words=AGENTS)] = "shortest"
+    agent: Annotated[str, Option(words=tuple(WITHOUT_LEARNING))] = "shortest"
     """The agent."""
     episodes: Count = 1
     """Play N tasks."""
@@ -69,7 +67,7 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> int:
         tasks = [find_task(pool, i, seed=args.seed, language=People()) for i in range(args.episodes)]
         episodes = play(
             lambda: HelpEnv({world.name: world}),
-            policy_of(args.agent),
+            WITHOUT_LEARNING[args.agent](),
             bar(tasks, "episodes", "episode"),
             seed=args.seed,
             agent=args.agent,
@@ -110,13 +108,6 @@ def world_of(args: Options) -> World:
         return open_folder(args.house, catalogue, args.cache, drawn)
     house = generate_house(args.seed, catalogue=catalogue)
     return open_world(house, catalogue, args.cache, drawn)
-
-
-def policy_of(name: str) -> Agent:
-    """The policy behind an --agent word."""
-    from embodied.policies.baselines import Forward10, RandomWalk, Shortest
-
-    return {"shortest": Shortest, "random": RandomWalk, "forward10": Forward10}[name]()
 
 
 def numbered(path: Path, number: int, total: int) -> Path:

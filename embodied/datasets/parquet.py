@@ -11,8 +11,9 @@ The column `record` holds the record as embodied.records writes it, so that noth
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,79 +23,77 @@ import pyarrow.parquet as pq
 
 from assets.cache import atomic_path, write_bytes
 from embodied.datasets.checks import DatasetError
-from embodied.interface import Ask, Episode, FindObject, FollowRoute, Move, Route, Task
+from embodied.interface import Ask, Episode, Move
 from embodied.records import load_lines, to_json
 
 if TYPE_CHECKING:
-    from embodied.datasets.store import Dataset, StoredPlace
+    from embodied.datasets.store import Dataset
 
 TEXT, WHOLE, REAL = pa.string(), pa.int32(), pa.float64()
 NODES = pa.list_(WHOLE)
-HOUSES = pa.schema(
-    [
-        ("name", TEXT),
-        ("digest", TEXT),
-        ("area_m2", REAL),
-        ("storeys", WHOLE),
-        ("rooms", pa.list_(TEXT)),
-        ("objects", pa.list_(TEXT)),
-        ("viewpoints", pa.list_(TEXT)),
-        ("room_of_viewpoint", pa.list_(TEXT)),
-        ("positions", pa.list_(pa.list_(REAL))),
-        ("edges", pa.list_(NODES)),
-        ("record", TEXT),
-    ]
-)
-TASKS = pa.schema(
-    [
-        ("id", TEXT),
-        ("kind", TEXT),
-        ("house", TEXT),
-        ("request", TEXT),
-        ("start_node", WHOLE),
-        ("start_turn", WHOLE),
-        ("start_tilt", WHOLE),
-        ("object_class", TEXT),
-        ("room_kind", TEXT),
-        ("placements", pa.list_(TEXT)),
-        ("route", TEXT),
-        ("path", NODES),
-        ("goal_nodes", NODES),
-        ("shortest_m", REAL),
-        ("radius", REAL),
-        ("horizon", WHOLE),
-        ("budget", REAL),
-        ("record", TEXT),
-    ]
-)
-ROUTES = pa.schema(
-    [
-        ("id", TEXT),
-        ("house", TEXT),
-        ("path", NODES),
-        ("turn", WHOLE),
-        ("tilt", WHOLE),
-        ("instruction", TEXT),
-        ("heard_in", TEXT),
-        ("record", TEXT),
-    ]
-)
-EPISODES = pa.schema(
-    [
-        ("task", TEXT),
-        ("house", TEXT),
-        ("agent", TEXT),
-        ("seed", pa.int64()),
-        ("ended", TEXT),
-        ("nodes", NODES),
-        ("actions", pa.list_(TEXT)),
-        ("instructions", pa.list_(TEXT)),
-        ("replies", pa.list_(TEXT)),
-        ("requests", WHOLE),
-        ("record", TEXT),
-    ]
-)
-SCHEMAS: Mapping[str, pa.Schema] = {"houses": HOUSES, "tasks": TASKS, "routes": ROUTES, "episodes": EPISODES}
+Columns = Mapping[str, tuple[pa.DataType, Callable[..., object]]]
+"""Name to type, and how a row's value is read."""
+HOUSES: Columns = {
+    "name": (TEXT, lambda p: p.house.name),
+    "digest": (TEXT, lambda p: p.house.digest),
+    "area_m2": (REAL, lambda p: round(float(p.house.area), 2)),
+    "storeys": (WHOLE, lambda p: len(p.house.storeys)),
+    "rooms": (pa.list_(TEXT), lambda p: [r.kind for r in p.house.rooms]),
+    "objects": (pa.list_(TEXT), lambda p: [x.object_class for x in p.house.placements]),
+    "viewpoints": (pa.list_(TEXT), lambda p: list(p.graph.ids)),
+    "room_of_viewpoint": (pa.list_(TEXT), lambda p: [p.house.room_by_id[r].kind for r in p.graph.room_of_node]),
+    "positions": (pa.list_(pa.list_(REAL)), lambda p: np.asarray(p.graph.positions).tolist()),
+    "edges": (pa.list_(NODES), lambda p: np.asarray(p.graph.edges).tolist()),
+    "record": (TEXT, lambda p: p.house.to_json()),
+}
+"""Of a place."""
+TASKS: Columns = {
+    "id": (TEXT, lambda t, p: t.id),
+    "kind": (TEXT, lambda t, p: t.kind),
+    "house": (TEXT, lambda t, p: t.world),
+    "request": (TEXT, lambda t, p: t.request),
+    "start_node": (WHOLE, lambda t, p: t.start.node),
+    "start_turn": (WHOLE, lambda t, p: t.start.turn),
+    "start_tilt": (WHOLE, lambda t, p: t.start.tilt),
+    "object_class": (TEXT, lambda t, p: getattr(t.goal, "object_class", None)),
+    "room_kind": (TEXT, lambda t, p: getattr(t.goal, "room_kind", None)),
+    "placements": (pa.list_(TEXT), lambda t, p: getattr(t.goal, "placements", None)),
+    "route": (TEXT, lambda t, p: getattr(t.goal, "route", None)),
+    "path": (NODES, lambda t, p: getattr(t.goal, "path", None)),
+    "goal_nodes": (NODES, lambda t, p: list(t.goal_nodes)),
+    "shortest_m": (REAL, lambda t, p: float(min(p.graph.distance[t.start.node, g] for g in t.goal_nodes))),
+    "radius": (REAL, lambda t, p: t.radius),
+    "horizon": (WHOLE, lambda t, p: t.horizon),
+    "budget": (REAL, lambda t, p: t.budget),
+    "record": (TEXT, lambda t, p: to_json(t)),
+}
+"""Of a task and its place; what its goal does not have is null."""
+ROUTES: Columns = {
+    "id": (TEXT, lambda r, house: r.id),
+    "house": (TEXT, lambda r, house: house),
+    "path": (NODES, lambda r, house: list(r.path)),
+    "turn": (WHOLE, lambda r, house: r.turn),
+    "tilt": (WHOLE, lambda r, house: r.tilt),
+    "instruction": (TEXT, lambda r, house: r.instruction),
+    "heard_in": (TEXT, lambda r, house: r.split),
+    "record": (TEXT, lambda r, house: to_json(r)),
+}
+"""Of a route and the name of its house."""
+EPISODES: Columns = {
+    "task": (TEXT, lambda e: e.task.id),
+    "house": (TEXT, lambda e: e.task.world),
+    "agent": (TEXT, lambda e: e.agent),
+    "seed": (pa.int64(), lambda e: e.seed),
+    "ended": (TEXT, lambda e: e.ended),
+    "nodes": (NODES, lambda e: list(e.nodes)),
+    "actions": (pa.list_(TEXT), lambda e: [_said(s.action) for s in e.steps]),
+    "instructions": (pa.list_(TEXT), lambda e: [s.instruction for s in e.steps]),
+    "replies": (pa.list_(TEXT), lambda e: [(s.reply.text or "") if s.reply else "" for s in e.steps]),
+    "requests": (WHOLE, lambda e: e.requests),
+    "record": (TEXT, lambda e: to_json(e)),
+}
+"""Of an episode."""
+TABLES: Mapping[str, Columns] = {"houses": HOUSES, "tasks": TASKS, "routes": ROUTES, "episodes": EPISODES}
 BATCH = 1000
 """Rows of a row group."""
 
@@ -119,109 +118,24 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
             pass
     for split in data.splits:
         names = data.names(split)
-        files += [
-            _write(folder / "houses" / f"{split}.parquet", HOUSES, (house_row(data.place(n)) for n in names)),
-            _write(
-                folder / "tasks" / f"{split}.parquet",
-                TASKS,
-                (task_row(t, data.place(t.world)) for t in data.tasks(split)),
-            ),
-        ]
+        files.append(_write(folder, "houses", split, ((data.place(n),) for n in names)))
+        files.append(_write(folder, "tasks", split, ((t, data.place(t.world)) for t in data.tasks(split))))
         if data.kind in ("hanna", "vln"):
-            files.append(
-                _write(
-                    folder / "routes" / f"{split}.parquet",
-                    ROUTES,
-                    (route_row(r, n) for n in names for r in data.routes(n)),
-                )
-            )
+            files.append(_write(folder, "routes", split, ((r, n) for n in names for r in data.routes(n))))
     for path, name in tables.items():
-        files.append(_write(folder / "episodes" / f"{name}.parquet", EPISODES, _played(data, path)))
+        files.append(_write(folder, "episodes", name, ((e,) for e in _played(data, path))))
     write_bytes(folder / "README.md", card(data, [f.relative_to(folder) for f in files]).encode())
     return [*files, folder / "README.md"]
 
 
-def house_row(place: StoredPlace) -> dict[str, object]:
-    house, graph = place.house, place.graph
-    return {
-        "name": house.name,
-        "digest": house.digest,
-        "area_m2": round(float(house.area), 2),
-        "storeys": len(house.storeys),
-        "rooms": [r.kind for r in house.rooms],
-        "objects": [p.object_class for p in house.placements],
-        "viewpoints": list(graph.ids),
-        "room_of_viewpoint": [house.room_by_id[r].kind for r in graph.room_of_node],
-        "positions": np.asarray(graph.positions).tolist(),
-        "edges": np.asarray(graph.edges).tolist(),
-        "record": house.to_json(),
-    }
-
-
-def task_row(task: Task, place: StoredPlace) -> dict[str, object]:
-    goal = task.goal
-    sought = (
-        {"object_class": goal.object_class, "room_kind": goal.room_kind, "placements": list(goal.placements)}
-        if (isinstance(goal, FindObject))
-        else {}
-    )
-    route = {"route": goal.route, "path": list(goal.path)} if isinstance(goal, FollowRoute) else {}
-    return {
-        "id": task.id,
-        "kind": task.kind,
-        "house": task.world,
-        "request": task.request,
-        "start_node": task.start.node,
-        "start_turn": task.start.turn,
-        "start_tilt": task.start.tilt,
-        **sought,
-        **route,
-        "goal_nodes": list(task.goal_nodes),
-        "shortest_m": float(min(place.graph.distance[task.start.node, g] for g in task.goal_nodes)),
-        "radius": task.radius,
-        "horizon": task.horizon,
-        "budget": task.budget,
-        "record": to_json(task),
-    }
-
-
-def route_row(route: Route, house: str) -> dict[str, object]:
-    return {
-        "id": route.id,
-        "house": house,
-        "path": list(route.path),
-        "turn": route.turn,
-        "tilt": route.tilt,
-        "instruction": route.instruction,
-        "heard_in": route.split,
-        "record": to_json(route),
-    }
-
-
-def episode_row(episode: Episode) -> dict[str, object]:
-    return {
-        "task": episode.task.id,
-        "house": episode.task.world,
-        "agent": episode.agent,
-        "seed": episode.seed,
-        "ended": episode.ended,
-        "nodes": list(episode.nodes),
-        "actions": [_said(s.action) for s in episode.steps],
-        "instructions": [s.instruction for s in episode.steps],
-        "replies": [(s.reply.text or "") if s.reply else "" for s in episode.steps],
-        "requests": episode.requests,
-        "record": to_json(episode),
-    }
-
-
-def _played(data: Dataset, path: Path) -> Iterator[dict[str, object]]:
-    """Rows of the episodes in a file, each of which was played in this data set."""
+def _played(data: Dataset, path: Path) -> Iterator[Episode]:
+    """The episodes in a file, each of which was played in this data set."""
     for number, episode in enumerate(load_lines(path, Episode), 1):
         try:
             data.place_of(episode)
         except DatasetError as e:
             raise DatasetError(f"{path}:{number}: {e}") from e
-        yield episode_row(episode)
+        yield episode
 
 
 def _said(action: object) -> str:
@@ -231,29 +145,22 @@ def _said(action: object) -> str:
     return f"ask {action.intention.value}" if isinstance(action, Ask) else "stop"
 
 
-def _write(path: Path, schema: pa.Schema, rows: Iterable[Mapping[str, object]]) -> Path:
+def _write(folder: Path, table: str, name: str, items: Iterable[tuple[object, ...]]) -> Path:
+    """A table of items, each given to the columns of its kind."""
+    path, columns = folder / table / f"{name}.parquet", TABLES[table]
     path.parent.mkdir(parents=True, exist_ok=True)
+    schema = pa.schema([(column, kind) for column, (kind, _) in columns.items()])
+    rows = ({column: read(*item) for column, (_, read) in columns.items()} for item in items)
     with atomic_path(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
-        for group in _groups(rows):
+        while group := list(itertools.islice(rows, BATCH)):
             writer.write_table(pa.Table.from_pylist(group, schema=schema))
     return path
-
-
-def _groups(rows: Iterable[Mapping[str, object]]) -> Iterator[list[Mapping[str, object]]]:
-    group: list[Mapping[str, object]] = []
-    for row in rows:
-        group.append(row)
-        if len(group) == BATCH:
-            yield group
-            group = []
-    if group:
-        yield group
 
 
 def card(data: Dataset, files: Sequence[Path]) -> str:
     """The card of the data set, with the front matter that Hugging Face reads."""
     text = (Path(__file__).parent / "readmes" / "card.md").read_text(encoding="utf-8")
-    tables = sorted({f.parts[0] for f in files}, key=list(SCHEMAS).index)
+    tables = sorted({f.parts[0] for f in files}, key=list(TABLES).index)
     configs = "\n".join(
         f"- config_name: {t}\n"
         + ("  default: true\n" if t == "tasks" else "")
@@ -261,7 +168,7 @@ def card(data: Dataset, files: Sequence[Path]) -> str:
         + "\n".join(f"  - split: {f.stem}\n    path: {f.as_posix()}" for f in files if f.parts[0] == t)
         for t in tables
     )
-    fields = "\n".join(f"| `{t}` | {', '.join(f'`{n}`' for n in SCHEMAS[t].names)} |" for t in tables)
+    fields = "\n".join(f"| `{t}` | {', '.join(f'`{n}`' for n in TABLES[t])} |" for t in tables)
     facts = {
         "CONFIGS": configs,
         "KIND": data.kind,

@@ -27,7 +27,18 @@ from PIL import Image
 from assets.cache import write_bytes, write_json
 from embodied.datasets.habitat import with_experts, write_vlnce
 from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
-from embodied.envs.continuous import POSITION, Body, ContinuousEnv, Excursion, Follower, Grounds, Move, Walk, own_way
+from embodied.envs.continuous import (
+    POSITION,
+    Body,
+    ContinuousEnv,
+    Excursion,
+    Follower,
+    Grounds,
+    Lens,
+    Move,
+    Walk,
+    own_way,
+)
 from embodied.locks import LOCK
 from embodied.render.camera import camera_at
 from embodied.seeds import stream
@@ -51,7 +62,7 @@ SETTINGS = {pitch: "{}cm_" + f"{pitch}deg" for pitch in PITCHES}
 HIDDEN = 0.15
 """A pixel goal is seen where nothing is nearer than it by more than this, metres."""
 NO_GOAL = (-1, -1)
-VLNCE = Body()
+VLNCE, LENS = Body(), Lens(480, 640, 79.0)
 STEPS = 4
 """Steps a second of LeRobot's data."""
 CARD = """$COUNT$ of continuous walks in generated, lit houses, written by `embodied export lerobot-vlnce`.
@@ -64,21 +75,6 @@ FPS = 10
 
 Chosen = Callable[[ContinuousEnv, int], int]
 """(the body, what the expert does here) -> what is done."""
-
-
-@dataclass(frozen=True)
-class Shot:
-    """How walks are photographed."""
-
-    height: int = 480
-    width: int = 640
-    hfov: float = 79.0
-    """Horizontal field of view, degrees."""
-
-    @property
-    def vfov(self) -> float:
-        """Radians."""
-        return 2 * math.atan(math.tan(math.radians(self.hfov) / 2) * self.height / self.width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,12 +116,12 @@ def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen
     return Taught(env.walk(), tuple(labels), world, env.body)
 
 
-def frames(taught: Taught, shot: Shot, down: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def frames(taught: Taught, lens: Lens, down: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """(h, w, 3) uint8 and (h, w) float32 metres along the optical axis, before each action, `down` degrees down."""
-    walk, size = taught.walk, (shot.height, shot.width)
+    walk, size = taught.walk, (lens.height, lens.width)
     for (x, y, z), yaw in zip(walk.positions[:-1], walk.yaws[:-1], strict=True):
         eye = (x, y, z + taught.body.eye)
-        view = taught.world.renderer.through(camera_at(eye, yaw, -math.radians(down), shot.vfov), size)
+        view = taught.world.renderer.through(camera_at(eye, yaw, -math.radians(down), lens.vfov), size)
         yield view.rgb, view.depth
 
 
@@ -137,7 +133,7 @@ def export_walks(
     *,
     seed: int,
     body: Body = VLNCE,
-    shot: Shot = Shot(),
+    lens: Lens = LENS,
     wander: float = 0.0,
     split: str = "train",
     depth: bool = False,
@@ -172,15 +168,15 @@ def export_walks(
         write_vlnce(folder, split, with_experts(episodes, worlds, ContinuousEnv(body, Grounds())))
     if form == "lerobot-vlnce":
         with whole_folder(folder) as draft:
-            return _lerobot(draft, taught, shot, depth)
+            return _lerobot(draft, taught, lens, depth)
     writers = {"vlnce": _samples, "streamvln": _streamvln, "uninavid": _uninavid, "internnav": _internnav}
-    return writers[form](folder, taught, shot)
+    return writers[form](folder, taught, lens)
 
 
-def _samples(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+def _samples(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
     lines: list[str] = []
     for t in walks:
-        for k, (rgb, _) in enumerate(frames(t, shot)):
+        for k, (rgb, _) in enumerate(frames(t, lens)):
             image = f"images/{t.key}/{k:03d}.jpg"
             _jpeg(folder / image, rgb)
             facts = {"episode": t.walk.excursion.id, "world": t.walk.excursion.world, "step": k, "image": image}
@@ -190,12 +186,12 @@ def _samples(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
     return len(lines)
 
 
-def _streamvln(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+def _streamvln(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
     """The action at a frame is the one that led there, -1 at first: the program shifts them by one and adds STOP."""
     rows, steps = [], 0
     for number, t in enumerate(walks):
         video = f"images/{t.key}"
-        for k, (rgb, _) in enumerate(frames(t, shot)):
+        for k, (rgb, _) in enumerate(frames(t, lens)):
             _jpeg(folder / video / "rgb" / f"{k:03d}.jpg", rgb)
         rows.append(
             {
@@ -210,10 +206,10 @@ def _streamvln(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
     return steps
 
 
-def _uninavid(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+def _uninavid(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
     rows, steps = [], 0
     for number, t in enumerate(walks):
-        seen = [rgb for rgb, _ in frames(t, shot)]
+        seen = [rgb for rgb, _ in frames(t, lens)]
         for k in range(0, len(t.labels), AHEAD):
             video = f"nav_videos/{number}_{k:03d}.mp4"
             write_film(folder / video, seen[: k + 1], FPS)
@@ -237,8 +233,8 @@ LEROBOT: Columns = {
 }
 
 
-def _lerobot(folder: Path, walks: Iterable[Taught], shot: Shot, with_depth: bool) -> int:
-    camera = RecordedCamera(shot.height, shot.width, shot.vfov)
+def _lerobot(folder: Path, walks: Iterable[Taught], lens: Lens, with_depth: bool) -> int:
+    camera = RecordedCamera(lens.height, lens.width, lens.vfov)
     writer = Writer(folder, camera, LEROBOT, key="observation.image", fps=STEPS, depth=with_depth)
     for t in walks:
         walk, n = t.walk, len(t.labels)
@@ -247,7 +243,7 @@ def _lerobot(folder: Path, walks: Iterable[Taught], shot: Shot, with_depth: bool
             "observation.state": np.stack([own_way(walk.excursion, p, y, math.radians(tilt)) for p, y, tilt in poses]),
             "action": np.eye(len(SCORES), dtype=np.float32)[list(t.labels)],
         }
-        rgb, depth = zip(*frames(t, shot), strict=True)
+        rgb, depth = zip(*frames(t, lens), strict=True)
         facts = {"embodied/task": walk.excursion.id, "embodied/house": walk.excursion.world, "embodied/agent": "expert"}
         reached = walk.stopped and bool(walk.distances[-1] < walk.excursion.radius)
         writer.add(rows, rgb, depth, [walk.excursion.instruction] * n, [""] * n, reached, facts)
@@ -257,29 +253,29 @@ def _lerobot(folder: Path, walks: Iterable[Taught], shot: Shot, with_depth: bool
 # InternData-N1 -----------------------------------------------------------------------------------
 
 
-def _internnav(folder: Path, walks: Iterable[Taught], shot: Shot) -> int:
+def _internnav(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
     houses: dict[str, list[dict[str, Any]]] = {}
     steps = 0
     for t in walks:
         known = houses.setdefault(t.walk.excursion.world, [])
-        known.append(_intern_episode(folder / t.walk.excursion.world, len(known), steps, t, shot))
+        known.append(_intern_episode(folder / t.walk.excursion.world, len(known), steps, t, lens))
         steps += len(t.labels)
     for name, episodes in houses.items():
-        _intern_meta(folder / name / "meta", episodes, shot)
+        _intern_meta(folder / name / "meta", episodes, lens)
     return steps
 
 
-def _intern_episode(home: Path, number: int, first: int, t: Taught, shot: Shot) -> dict[str, Any]:
+def _intern_episode(home: Path, number: int, first: int, t: Taught, lens: Lens) -> dict[str, Any]:
     n, columns = len(t.labels), {}
     for pitch, form in SETTINGS.items():
         setting = form.format(round(100 * t.body.eye))
         depths, where = [], home / "videos" / "chunk-000"
-        for k, (rgb, depth) in enumerate(frames(t, shot, pitch)):
+        for k, (rgb, depth) in enumerate(frames(t, lens, pitch)):
             _jpeg(where / f"observation.images.rgb.{setting}" / f"episode_{number:06d}_{k}.jpg", rgb)
             _png(where / f"observation.images.depth.{setting}" / f"episode_{number:06d}_{k}.png", depth)
             depths.append(depth)
         poses = [pose_of(t, k, pitch) for k in range(n)]
-        goals = [pixel_goal(t, k, poses[k], depths[k], shot) for k in range(n)]
+        goals = [pixel_goal(t, k, poses[k], depths[k], lens) for k in range(n)]
         columns[f"pose.{setting}"] = pa.array([p.tolist() for p in poses], pa.list_(pa.list_(pa.float32())))
         columns[f"goal.{setting}"] = pa.array([list(g[0]) for g in goals], pa.list_(pa.int32()))
         columns[f"relative_goal_frame_id.{setting}"] = pa.array([g[1] for g in goals], pa.int32())
@@ -300,7 +296,7 @@ def _intern_episode(home: Path, number: int, first: int, t: Taught, shot: Shot) 
     return {"episode_index": number, "tasks": [t.walk.excursion.instruction], "length": n, "columns": table.schema}
 
 
-def _intern_meta(meta: Path, episodes: list[dict[str, Any]], shot: Shot) -> None:
+def _intern_meta(meta: Path, episodes: list[dict[str, Any]], lens: Lens) -> None:
     schema = episodes[0].pop("columns")
     for e in episodes[1:]:
         e.pop("columns")
@@ -319,7 +315,7 @@ def _intern_meta(meta: Path, episodes: list[dict[str, Any]], shot: Shot) -> None
         if field.name.startswith("pose."):
             setting = field.name.removeprefix("pose.")
             for what, channels in (("rgb", 3), ("depth", 1)):
-                shape = [shot.height, shot.width, channels]
+                shape = [lens.height, lens.width, channels]
                 names = ["height", "width", "channel"]
                 features[f"observation.images.{what}.{setting}"] = {"dtype": "image", "shape": shape, "names": names}
     total = sum(e["length"] for e in episodes)
@@ -352,17 +348,17 @@ def pose_of(taught: Taught, k: int, down: int) -> np.ndarray:
     return pose
 
 
-def pixel_goal(taught: Taught, k: int, pose: np.ndarray, depth: np.ndarray, shot: Shot) -> tuple[tuple[int, int], int]:
+def pixel_goal(taught: Taught, k: int, pose: np.ndarray, depth: np.ndarray, lens: Lens) -> tuple[tuple[int, int], int]:
     """The farthest later position of the walk whose floor is seen: its (column, row), and how many frames ahead it is;
     (-1, -1) and -1 where none is seen."""
-    focal = shot.width / 2 / math.tan(math.radians(shot.hfov) / 2)
+    focal = lens.width / 2 / math.tan(math.radians(lens.hfov) / 2)
     later = taught.walk.positions[k + 1 : len(taught.labels)]
     for ahead in range(len(later), 0, -1):
         x, y, z = pose[:3, :3].T @ (later[ahead - 1] - pose[:3, 3])
         if z <= 0.1:
             continue
-        u, v = int(shot.width / 2 + focal * x / z), int(shot.height / 2 + focal * y / z)
-        if 0 <= u < shot.width and 0 <= v < shot.height and depth[v, u] > z - HIDDEN:
+        u, v = int(lens.width / 2 + focal * x / z), int(lens.height / 2 + focal * y / z)
+        if 0 <= u < lens.width and 0 <= v < lens.height and depth[v, u] > z - HIDDEN:
             return (u, v), ahead
     return NO_GOAL, -1
 

@@ -75,6 +75,26 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Lens:
+    """How the pictures that it sees are framed."""
+
+    height: int = 256
+    """Pixels."""
+    width: int = 256
+    hfov: float = 90.0
+    """Horizontal field of view, degrees."""
+
+    def __post_init__(self) -> None:
+        if not 0 < self.hfov < 180:
+            raise ValueError(f"hfov is {self.hfov} degrees; a picture needs more than 0 and less than 180")
+
+    @property
+    def vfov(self) -> float:
+        """Vertical field of view, radians."""
+        return 2 * math.atan(math.tan(math.radians(self.hfov) / 2) * self.height / self.width)
+
+
+@dataclass(frozen=True)
 class Aim:
     """One place that satisfies an episode."""
 

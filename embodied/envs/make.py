@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.advisor import Advisor
@@ -115,14 +115,23 @@ def assistant_of(named: Assistant | str | None) -> Assistant | None:
     """
     if not isinstance(named, str):
         return named
-    module, _, attribute = named.partition(":")
-    try:
-        found = getattr(importlib.import_module(module), attribute)()
-    except (ImportError, AttributeError, ValueError) as e:
-        raise ValueError(f"assistant should be 'module:Class' with an importable module, got {named!r} ({e})") from e
+    found = made_by_name(named)
     if not (hasattr(found, "intentions") and hasattr(found, "answer")):
         raise ValueError(f"{named!r} is no Assistant; it needs intentions() and answer() (embodied/interface.py)")
     return found
+
+
+def made_by_name(name: str) -> Any:
+    """What the class that 'module:Class' names makes, without arguments.
+
+    Raises:
+      ValueError: no such module or class.
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        return getattr(importlib.import_module(module), attribute)()
+    except (ImportError, AttributeError, TypeError, ValueError) as e:
+        raise ValueError(f"expected 'module:Class' with an importable module, got {name!r} ({e})") from e
 
 
 def refuse_rules(kind: str, vnla: str, hari: HariRules = AS_PRINTED) -> None:

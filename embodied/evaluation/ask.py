@@ -28,7 +28,7 @@ from embodied.interface import (
     Task,
 )
 from embodied.records import RecordError, parse, to_json
-from embodied.tasks.ask import AskConfig, Look, ask_pool, ask_tasks
+from embodied.tasks.ask import Look, ask_pool, ask_tasks
 
 MOST_BYTES = 100_000
 """Of an answer over HTTP; more is not read."""
@@ -66,7 +66,7 @@ def ask_split(
     """
     tasks: list[Task] = []
     for place in houses.values():
-        tasks += ask_tasks(ask_pool(place, look, seed=seed, unseen=unseen, config=AskConfig()), per_house, seed=seed)
+        tasks += ask_tasks(ask_pool(place, look, seed=seed, unseen=unseen), per_house, seed=seed)
     return tasks
 
 

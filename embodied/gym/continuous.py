@@ -11,7 +11,6 @@ camera. Episodes are the tasks of a `vln` data set, or objects of the houses of 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,13 +24,13 @@ from gymnasium import spaces
 from assets.cache import default_cache
 from embodied.datasets.habitat import object_excursions, read_objectnav, read_vlnce, route_excursions
 from embodied.datasets.store import Dataset
-from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Move, own_way
+from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Lens, Move, own_way
 from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import data_worlds, flat_worlds
-from embodied.gym.eyes import FAR
+from embodied.gym.eyes import LARGE, check_live, live_pixels, pixel_spaces
 from embodied.gym.playground import flat_playground
-from embodied.gym.spaces import LARGE, codes_of
+from embodied.gym.spaces import codes_of
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import checked_seed
@@ -49,29 +48,6 @@ OBJECTS = 100
 SEES = ("rgb", "depth")
 VIEW = (480, 640)
 """Height and width of what `render` shows, pixels."""
-
-
-@dataclass(frozen=True)
-class Lens:
-    """How pictures are framed."""
-
-    height: int = 256
-    """Pixels."""
-    width: int = 256
-    hfov: float = 90.0
-    """Horizontal field of view, degrees."""
-
-    def __post_init__(self) -> None:
-        if not (8 <= self.height <= 2048 and 8 <= self.width <= 2048 and 0 < self.hfov < 180):
-            raise ValueError(
-                f"a view of {self.height} x {self.width} pixels and {self.hfov} degrees; sides need 8 to 2048 pixels, "
-                "the angle more than 0 and less than 180"
-            )
-
-    @property
-    def vfov(self) -> float:
-        """Vertical field of view, radians."""
-        return 2 * math.atan(math.tan(math.radians(self.hfov) / 2) * self.height / self.width)
 
 
 PRESETS: dict[str, tuple[Body, Lens]] = {
@@ -101,8 +77,7 @@ class Course:
             raise ValueError(f"kind is {self.kind!r}; use one of {KINDS}")
         if not self.excursions:
             raise ValueError("there are no episodes to play; choose another split or file")
-        if any(name not in SEES for name in self.sees) or len(set(self.sees)) < len(self.sees):
-            raise ValueError(f"sees should be some of {SEES}, each once, got {self.sees!r}")
+        check_live(self.sees, SEES, self.lens.height, self.lens.width)
         if lost := sorted({e.world for e in self.excursions} - set(self.worlds)):
             raise ValueError(
                 f"episodes play in houses that are not here: {lost[:4]}; there are {sorted(self.worlds)[:4]}"
@@ -188,20 +163,9 @@ class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
 
     def pixels(self) -> dict[str, np.ndarray]:
         """rgb (h, w, 3) uint8 and depth (h, w) float32, metres along the optical axis."""
-        lens, sees = self.course.lens, self.course.sees
-        found: dict[str, np.ndarray] = {}
-        if not sees:
-            return found
-        renderer, size = self.course.world(self.play.excursion.world).renderer, (lens.height, lens.width)
+        lens, world = self.course.lens, self.course.world(self.play.excursion.world)
         camera = camera_at(self.play.eye, self.play.yaw, self.play.pitch, lens.vfov)
-        if "depth" not in sees:
-            return {"rgb": np.ascontiguousarray(renderer.rgb(camera, size))}
-        if "rgb" in sees:
-            view = renderer.through(camera, size)
-            found["rgb"], depth = np.ascontiguousarray(view.rgb), view.depth
-        else:
-            depth, _ = renderer.depth_and_ids(camera, size)
-        return found | {"depth": np.ascontiguousarray(np.minimum(depth, np.float32(FAR)))}
+        return live_pixels(world, camera, (lens.height, lens.width), self.course.sees)
 
     def gps(self) -> np.ndarray:
         """(2,) float32 metres ahead and to the left of the start, in the start's frame."""
@@ -244,12 +208,7 @@ class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
 
 
 def observation_space(course: Course) -> spaces.Dict:
-    shape = (course.lens.height, course.lens.width)
-    pixels: dict[str, spaces.Space[Any]] = {
-        "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
-        "depth": spaces.Box(0.0, FAR, shape, np.float32),
-    }
-    whole = {name: pixels[name] for name in course.sees}
+    whole: dict[str, spaces.Space[Any]] = {**pixel_spaces((course.lens.height, course.lens.width), course.sees)}
     whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
     if course.kind == "objectnav":
         whole["gps"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)

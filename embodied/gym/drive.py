@@ -22,9 +22,8 @@ from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
 from embodied.gym.driving import TEXT, DriveSettings, Driving
-from embodied.gym.eyes import FAR
+from embodied.gym.eyes import LARGE, pixel_spaces
 from embodied.gym.playground import AREA, pictures_of
-from embodied.gym.spaces import LARGE
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import checked_seed
 from embodied.world import World, open_world
@@ -87,13 +86,7 @@ class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
 
 def seen_space(s: DriveSettings) -> dict[str, spaces.Box]:
     """The spaces of what `Driving.look` returns."""
-    shape = (s.height, s.width)
-    pixels: dict[str, spaces.Box] = {
-        "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
-        "depth": spaces.Box(0.0, FAR, shape, np.float32),
-        "ids": spaces.Box(0, 2**31 - 1, shape, np.int32),
-    }
-    whole = {name: pixels[name] for name in s.sees}
+    whole = pixel_spaces((s.height, s.width), s.sees)
     whole["motion"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
     whole["touched"] = spaces.Box(0.0, 1.0, (1,), np.float32)
     if s.task == "reach":

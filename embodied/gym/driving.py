@@ -15,7 +15,7 @@ import numpy as np
 
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
-from embodied.gym.eyes import FAR, PIXELS
+from embodied.gym.eyes import PIXELS, check_live, live_pixels
 from embodied.gym.spaces import codes_of, word_number
 from embodied.language.plain import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
@@ -70,13 +70,9 @@ class DriveSettings:
     def __post_init__(self) -> None:
         if self.task not in TASKS:
             raise ValueError(f"task is {self.task!r}; use one of {TASKS}")
-        if any(name not in PIXELS for name in self.sees) or len(set(self.sees)) < len(self.sees):
-            raise ValueError(f"sees should be some of {PIXELS}, each once, got {self.sees!r}")
-        if not (8 <= self.height <= 2048 and 8 <= self.width <= 2048 and 0 < self.vfov < math.pi):
-            raise ValueError(
-                f"a view of {self.height} x {self.width} pixels and {self.vfov} radians; sides need 8 to 2048 pixels, "
-                "the angle more than 0 and less than pi"
-            )
+        check_live(self.sees, PIXELS, self.height, self.width)
+        if not 0 < self.vfov < math.pi:
+            raise ValueError(f"vfov is {self.vfov} radians; a picture needs more than 0 and less than pi")
         if not (self.control >= CONTROL and self.seconds >= self.control and 0 <= self.nearest < self.farthest):
             raise ValueError(
                 f"control is {self.control} s of {self.seconds} s, goals are {self.nearest} to {self.farthest} m away; "
@@ -225,7 +221,8 @@ class Driving:
 
     def look(self) -> dict[str, np.ndarray]:
         """What the body knows: pixels, its motion, whether it touches something, and its goal."""
-        return {**self._pixels(), **self.feel()}
+        s = self.settings
+        return {**live_pixels(self.world, self.camera(), (s.height, s.width), s.sees), **self.feel()}
 
     def feel(self) -> dict[str, np.ndarray]:
         """`look` with closed eyes."""
@@ -253,21 +250,6 @@ class Driving:
         """Free what draws; a later use opens it again."""
         for world in self.worlds.values():
             world.close()
-
-    def _pixels(self) -> dict[str, np.ndarray]:
-        sees, size = self.settings.sees, (self.settings.height, self.settings.width)
-        if not sees:
-            return {}
-        if sees == ("rgb",):
-            return {"rgb": np.ascontiguousarray(self.picture(*size))}
-        renderer, camera, whole = self.world.renderer, self.camera(), {}
-        if "rgb" in sees:
-            view = renderer.through(camera, size)
-            whole["rgb"], depth, whole["ids"] = view.rgb, view.depth, view.ids
-        else:
-            depth, whole["ids"] = renderer.depth_and_ids(camera, size)
-        whole["depth"] = np.minimum(depth, np.float32(FAR))
-        return {name: np.ascontiguousarray(whole[name]) for name in sees}
 
     def _facts(self, success: float) -> dict[str, float]:
         """SPL as (4.17), of metres (docs/sources.md, S125)."""

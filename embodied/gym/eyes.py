@@ -20,6 +20,7 @@ from gymnasium import spaces
 
 from embodied.errors import UnableError
 from embodied.interface import STEP, VIEWS, FeatureSource, Observation, Sight, Viewpoint, viewpoint
+from embodied.render.camera import Camera
 from embodied.render.panorama import VFOV36, Panorama, equirect_grid, grid36, perspective_grid
 from embodied.render.photograph import PhotoCamera, check_camera
 from embodied.world import World
@@ -30,7 +31,7 @@ PIXELS = SEES[:3]
 FRAMES = ("view", "views36", "equirect")
 """A perspective view straight ahead, the 36 views of the VLN literature, or all directions in one picture."""
 LARGE = 1e6
-"""Bound of features; Gymnasium wants one."""
+"""Bound of what has no natural one (features, times, word numbers); Gymnasium wants it finite."""
 FAR = 65.535
 """Depth where nothing is, and the largest there is, metres."""
 MEMORY = 512 * 2**20
@@ -53,6 +54,45 @@ class Sensor(Protocol):
         """What is seen, in two halves: now, in this thread, places are drawn or read where nobody has them; what is
         returned makes the arrays, one for each space, and may be called in any thread."""
         ...
+
+
+def pixel_spaces(shape: tuple[int, ...], sees: Sequence[str]) -> dict[str, spaces.Box]:
+    """Of pictures: rgb uint8 (*shape, 3); depth float32 metres, FAR where nothing is; ids int32, 0 where nothing is."""
+    kinds: dict[str, spaces.Box] = {
+        "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
+        "depth": spaces.Box(0.0, FAR, shape, np.float32),
+        "ids": spaces.Box(0, 2**31 - 1, shape, np.int32),
+    }
+    return {name: kinds[name] for name in sees}
+
+
+def live_pixels(world: World, camera: Camera, size: tuple[int, int], sees: Sequence[str]) -> Arrays:
+    """What a camera sees now, drawn for it: depth in metres along the optical axis.
+
+    Args:
+      size: height and width, pixels.
+      sees: some of PIXELS; of nothing, nothing is drawn.
+    """
+    if not sees:
+        return {}
+    if tuple(sees) == ("rgb",):
+        return {"rgb": np.ascontiguousarray(world.renderer.rgb(camera, size))}
+    whole: Arrays = {}
+    if "rgb" in sees:
+        view = world.renderer.through(camera, size)
+        whole["rgb"], depth, whole["ids"] = view.rgb, view.depth, view.ids
+    else:
+        depth, whole["ids"] = world.renderer.depth_and_ids(camera, size)
+    whole["depth"] = np.minimum(depth, np.float32(FAR))
+    return {name: np.ascontiguousarray(whole[name]) for name in sees}
+
+
+def check_live(sees: Sequence[str], known: Sequence[str], height: int, width: int) -> None:
+    """Raises ValueError for pixels that live pictures do not have, and for sides that they cannot have."""
+    if any(name not in known for name in sees) or len(set(sees)) < len(sees):
+        raise ValueError(f"sees should be some of {known}, each once, got {sees!r}")
+    if not (8 <= height <= 2048 and 8 <= width <= 2048):
+        raise ValueError(f"a view of {height} x {width} pixels; each side needs 8 to 2048")
 
 
 class NoSensor:
@@ -187,14 +227,7 @@ class CameraSensor:
         self._store, self._channels, self._view = store, tuple(channels), view
 
     def spaces(self) -> dict[str, spaces.Space]:
-        """rgb uint8 (..., 3); depth float32 metres, FAR where nothing is; ids int32, 0 where nothing is."""
-        shape = self._view.shape
-        kinds: dict[str, spaces.Space] = {
-            "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
-            "depth": spaces.Box(0.0, FAR, shape, np.float32),
-            "ids": spaces.Box(0, 2**31 - 1, shape, np.int32),
-        }
-        found = {name: kinds[name] for name in self._channels}
+        found: dict[str, spaces.Space] = {**pixel_spaces(self._view.shape, self._channels)}
         if "rgb" in self._channels:
             found["target_rgb"] = spaces.Box(0, 255, (self.TARGET, 2 * self.TARGET, 3), np.uint8)
         return found

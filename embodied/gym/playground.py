@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assets.cache import digest, write_bytes
+from assets.cache import atomic_path, digest
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest
 from assets.records import ROOM_KINDS
@@ -183,11 +182,6 @@ def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.nda
             return known
     features = semantic_features(world, classes, ROOM_KINDS)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(path, _npy(features))
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        np.save(file, features, allow_pickle=False)
     return features
-
-
-def _npy(array: np.ndarray) -> bytes:
-    out = io.BytesIO()
-    np.save(out, array, allow_pickle=False)
-    return out.getvalue()

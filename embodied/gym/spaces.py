@@ -15,7 +15,7 @@ from gymnasium import spaces
 from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
 from embodied.envs.base import ActionError
-from embodied.gym.eyes import Sensor
+from embodied.gym.eyes import LARGE, Sensor
 from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Feature, Intention, Mode, Move, Observation, Stop
 
 INTENTIONS = (Intention.HELP, Intention.CUR, Intention.GOAL, Intention.SUB)
@@ -27,8 +27,6 @@ OWN_WORDS = 4096
 """Numbers for object classes of people's own."""
 LONG, MANY = 100.0, 10.0
 """Steps and requests that are 1 in 'clock'."""
-LARGE = 1e6
-"""Bound of what has no natural one (features, times, word numbers); Gymnasium wants it finite."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ others see Observations only.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -69,6 +69,14 @@ class Shortest:
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Any]:
         return [None if s is None else self._label(s).move for s in situations], ()
+
+
+WITHOUT_LEARNING: Mapping[str, Callable[[], Agent]] = {
+    "shortest": Shortest,
+    "random": RandomWalk,
+    "forward10": Forward10,
+}
+"""Who plays any kind of task, by one word."""
 
 
 class AskRule(Protocol):

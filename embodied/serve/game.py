@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -13,6 +14,7 @@ from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.continuous import Grounds
 from embodied.envs.hanna import HannaEnv
+from embodied.envs.make import made_by_name
 from embodied.envs.vnla import VnlaEnv
 from embodied.interface import (
     Action,
@@ -32,22 +34,20 @@ from embodied.interface import (
     Thought,
     act,
 )
-from embodied.policies.baselines import Forward10, RandomWalk, Shortest
+from embodied.policies.baselines import WITHOUT_LEARNING
 from embodied.records import from_plain, parse, to_json
 from embodied.seeds import stream
 from embodied.serve.driving import ACTIONS, Drive
 from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, PERSON, Part
-from embodied.serve.talk import Follower, Overheard, PathSpeaker, Relay, TalkEnv, loaded
+from embodied.serve.talk import Follower, Overheard, PathSpeaker, Relay, TalkEnv
 from embodied.teachers.vnla import VnlaTeacher
 
 AgentMaker = Callable[[Mapping[str, Place]], Agent]
 AssistantMaker = Callable[[Assistant], Assistant]
 """Puts an assistant in the place of the simulated one, which it is given."""
 POLICIES: Mapping[str, AgentMaker] = {
-    "shortest": lambda places: Shortest(),
-    "random": lambda places: RandomWalk(),
-    "forward10": lambda places: Forward10(),
+    name: functools.partial(lambda make, places: make(), make) for name, make in WITHOUT_LEARNING.items()
 }
 OWN_RULES = {"hanna": HannaEnv, "vnla": VnlaEnv}
 """Kinds of task with a rule of play that their learned agents know."""
@@ -92,7 +92,7 @@ def set_table(
         raise ValueError(f"part {part.name!r}: the split {part.split!r} has no tasks")
     agent: Agent | None = None
     if part.agent != PERSON:
-        agent = agents[part.agent](split.worlds) if part.agent in agents else loaded(part.agent)
+        agent = agents[part.agent](split.worlds) if part.agent in agents else made_by_name(part.agent)
     moves, prices = PanoramicMoves(), {q.text: q.price for q in part.questions}
     own = OWN_RULES.get(data.kind)
     assistant: Any = None
@@ -100,7 +100,7 @@ def set_table(
         simulated = split.make_env().assistant or PathSpeaker()
         assistant = assistants.get(part.assistant, lambda base: base)(simulated)
     elif part.assistant not in (PERSON, "none"):
-        assistant = loaded(part.assistant)
+        assistant = made_by_name(part.assistant)
     simulated_help = part.assistant in ("simulated", *assistants)
     by_own_rule = own is not None and (simulated_help or part.agent not in (PERSON, *POLICIES))
     if by_own_rule and part.moves == "drive":

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from embodied.envs.base import ActionError
+from embodied.evaluation.metrics import strict_success
 from embodied.interface import Episode
 from embodied.serve.game import Game, Table
 from embodied.serve.store import Event
@@ -298,10 +299,8 @@ class Sessions:
 
 
 def found(game: Game) -> bool:
-    """Whether it ended within the task's radius of a goal."""
-    task, graph = game.task, game.situation.world.graph
-    at = game.env.pose.node
-    return game.env.ended == "stop" and min(graph.distance[at, g] for g in task.goal_nodes) <= task.radius + 1e-9
+    """Whether an episode ended with a stop within the task's radius of a goal."""
+    return strict_success(game.episode, game.situation.world.graph) > 0
 
 
 def _event(kind: str, now: float, **body: Any) -> Event:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -143,16 +142,3 @@ class Follower:
             if o is not None and o.can_ask and o.time - asked[i] >= self._every:
                 asked[i], actions[i] = o.time, Ask(question="Where do I go from here?")
         return actions, asked
-
-
-def loaded(name: str) -> Any:
-    """An object of the class that 'module:Class' names.
-
-    Raises:
-      ValueError: no such module or class.
-    """
-    module, _, attribute = name.partition(":")
-    try:
-        return getattr(importlib.import_module(module), attribute)()
-    except (ImportError, AttributeError, TypeError) as e:
-        raise ValueError(f"{name!r} should name a module and a class without arguments, 'module:Class' ({e})") from e
