@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,13 @@ def two_rooms() -> House:
     )
     rug = Placement("rug_1", "built/rug", "rug", "living_room_1", (2.5, 2.0, 0.0), 0.0, (2.0, 1.4, 0.012))
     return House(0, "two rooms", (Storey(0.0, 2.6),), (living, bedroom), openings, (rug,), ())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared_folder(tmp_path_factory) -> None:
+    """A folder that all workers of a test run may use, as `hand_data.built` does; named in the environment."""
+    own = tmp_path_factory.getbasetemp()
+    os.environ["EMBODIED_TESTS_SHARED"] = str(own.parent if "PYTEST_XDIST_WORKER" in os.environ else own)
 
 
 @pytest.fixture(scope="session")

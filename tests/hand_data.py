@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+import contextlib
 import csv
 import dataclasses
-import functools
+import itertools
+import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -13,6 +16,7 @@ import numpy as np
 from hand_worlds import grid_world, thing
 
 from embodied.datasets.build import DatasetConfig, build_dataset, units
+from embodied.datasets.matterport import in_matterport_order
 from embodied.datasets.store import Dataset
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
@@ -43,18 +47,17 @@ def build(folder, cache, kind="hanna", workers=1, size="tiny", make_house=hand_h
     return Dataset(folder)
 
 
-@functools.cache
-def _whole(kind, size, make_house, options):
-    folder = tempfile.TemporaryDirectory()
-    home = Path(folder.name)
-    build(home / "data", home / "cache", kind, size=size, make_house=make_house, **dict(options))
-    return folder
-
-
 def built(folder, kind="hanna", size="tiny", make_house=hand_house, **options):
-    """What `build` makes, copied into `folder` if this process has built it before."""
-    whole = _whole(kind, size, make_house, tuple(options.items()))
-    return Dataset(shutil.copytree(Path(whole.name, "data"), folder))
+    """What `build` makes, copied into `folder` if any worker of this test run has built it before."""
+    name = "_".join(map(str, (kind, size, make_house.__name__, *itertools.chain(*options.items()))))
+    whole = Path(os.environ["EMBODIED_TESTS_SHARED"], "built", name)
+    if not whole.exists():
+        whole.parent.mkdir(exist_ok=True)
+        home = Path(tempfile.mkdtemp(dir=whole.parent))
+        build(home / "data", home / "cache", kind, size=size, make_house=make_house, **options)
+        with contextlib.suppress(OSError):  # another worker was faster
+            (home / "data").rename(whole)
+    return Dataset(shutil.copytree(whole, folder))
 
 
 def content(folder):
@@ -99,3 +102,13 @@ def metrics_of(folder):
     """(update, metric, value) of all that a run's metrics.csv holds."""
     with open(folder / "metrics.csv", newline="") as f:
         return [(int(row["update"]), row["metric"], float(row["value"])) for row in csv.DictReader(f)]
+
+
+def read_features(path):
+    """(scan, viewpoint) -> (36, D) float32 in our order, from the feature file of Matterport3DSimulator."""
+    table = {}
+    for line in path.read_text(encoding="ascii").splitlines():
+        scan, viewpoint, _, _, _, code = line.split("\t")
+        features = np.frombuffer(base64.b64decode(code), dtype="<f4").reshape(36, -1)
+        table[scan, viewpoint] = in_matterport_order(features)
+    return table

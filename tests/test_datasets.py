@@ -122,8 +122,8 @@ def test_hari_holds_out_start_rooms_and_object_classes(tmp_path):
 
 
 def test_workers_do_not_change_a_byte(tmp_path):
-    for n in (1, 2):
-        build(tmp_path / str(n), tmp_path / "cache", workers=n)
+    built(tmp_path / "1")
+    build(tmp_path / "2", tmp_path / "cache", workers=2)
     assert content(tmp_path / "1") == content(tmp_path / "2")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
-from hand_data import build, built, small_house
+from hand_data import build, built, read_features, small_house
 from handmade import HandCatalogue, furnished
 
 from agents.common.shipped import SHIPPED_ENCODER
@@ -17,7 +17,6 @@ from agents.vision.encoder import load_encoder
 from agents.vision.features import feature_path, save_features
 from embodied import cli
 from embodied.datasets.folders import names_of
-from embodied.datasets.matterport import read_features
 from embodied.render.pictures import PictureSettings
 from embodied.world import open_world
 

@@ -393,12 +393,17 @@ def test_a_picture_of_another_size_than_its_file_says_is_refused(tmp_path):
 
 
 NAMELESS = """
-import pwd, sys
+import json, pwd, sys
 def nobody(*_):
     raise KeyError("getpwuid(): uid not found")
 pwd.getpwuid = pwd.getpwnam = nobody
 from embodied.cli import main
-sys.exit(main())
+for words in json.loads(sys.argv[1]):
+    try:
+        status = main(words)
+    except SystemExit as e:
+        status = e.code
+    print("status", status)
 """
 
 
@@ -406,9 +411,10 @@ sys.exit(main())
 def test_somebody_without_a_home_and_a_name_gets_help_and_tables(here, tmp_path):
     bare = {"PATH": os.environ["PATH"], "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     out = ["--data", str(here.folder), "--out", str(tmp_path / "out")]
-    for words in (["--help"], ["house", "--help"], ["export", "parquet", *out]):
-        done = subprocess.run([sys.executable, "-c", NAMELESS, *words], capture_output=True, text=True, env=bare)
-        assert done.returncode == 0 and done.stdout, done.stderr[-2000:]
+    orders = json.dumps([["--help"], ["house", "--help"], ["export", "parquet", *out]])
+    done = subprocess.run([sys.executable, "-c", NAMELESS, orders], capture_output=True, text=True, env=bare)
+    assert done.stdout.count("status 0\n") == 3 and done.stdout.count("usage: embodied") == 2, done.stderr[-2000:]
+    assert "README.md is its card\nstatus 0" in done.stdout
 
 
 def test_a_cache_where_nothing_can_be_written_is_named_with_what_to_do(capsys, tmp_path):

@@ -15,7 +15,7 @@ import cv2
 import networkx as nx
 import numpy as np
 import pytest
-from hand_data import built
+from hand_data import built, read_features
 
 from embodied import mattersim
 from embodied.datasets.folders import (
@@ -28,7 +28,7 @@ from embodied.datasets.folders import (
     split_sentence,
     subgoal_words,
 )
-from embodied.datasets.matterport import in_matterport_order, read_features, scan_name
+from embodied.datasets.matterport import in_matterport_order, scan_name
 from embodied.datasets.skyboxes import write_skybox
 from embodied.evaluation import metrics
 from embodied.evaluation.evaluate import agent

@@ -13,23 +13,19 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from conftest import two_rooms
 from hand_data import built
+from hand_pixels import pixels
 from hand_worlds import grid_world
-from handmade import HandCatalogue, furnished
 from test_gym import make
-from test_gym_pixels import NODES, ROOMS, tasks_in
 
 import embodied.gym.env
 from embodied.datasets.store import Dataset
-from embodied.envs.base import ActionError, HelpEnv
+from embodied.envs.base import ActionError
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import CameraSensor, NoSensor, PanoramaStore, ViewSettings
+from embodied.gym.eyes import NoSensor
 from embodied.gym.in_step import SharedSyncVectorEnv
 from embodied.gym.spaces import SpaceLayout, number
-from embodied.navigation.graph import graph_of
 from embodied.teachers.shortest import shortest_action
-from embodied.world import open_world
 
 STOP = SpaceLayout().candidates
 
@@ -186,14 +182,6 @@ def test_a_data_set_that_is_dropped_keeps_none_of_its_houses(tmp_path):
         assert [place() for place in places] == [None] * len(places)
 
 
-def pixels(cache: Path) -> HelpGymEnv:
-    """An environment that sees the panoramas of a small house, which `drawn` has drawn."""
-    graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ROOMS)
-    world = open_world(furnished(two_rooms()), HandCatalogue(), cache, graph=graph, size=48)
-    sensor = CameraSensor(PanoramaStore({world.name: world}), ("rgb", "depth"), ViewSettings(height=16, width=16))
-    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), sensor, opened=[world])
-
-
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory) -> Path:
     cache = tmp_path_factory.mktemp("drawn")
@@ -223,34 +211,34 @@ import functools, sys
 from pathlib import Path
 import gymnasium as gym, numpy as np
 from embodied import gl
-from test_gym_faults import pixels
+from hand_pixels import pixels
 
 if __name__ == "__main__":
-    context, cache = sys.argv[1], Path(sys.argv[2])
-    make = functools.partial(pixels, cache)
-    many = gym.vector.AsyncVectorEnv([make] * 2, context=context)
-    seen, _ = many.reset(seed=3)
+    make = functools.partial(pixels, Path(sys.argv[1]))
+    batches = [gym.vector.AsyncVectorEnv([make] * 2, context=context) for context in ("fork", "spawn")]
+    seen = [many.reset(seed=3)[0] for many in batches]
     assert gl._owner().context is None, "the parent has opened OpenGL"
     one = gym.vector.SyncVectorEnv([make] * 2)
     told, _ = one.reset(seed=3)
     for k in range(6):
-        assert seen["rgb"].any() and all((seen[n] == told[n]).all() for n in told), k
+        for found in seen:
+            assert found["rgb"].any() and all((found[n] == told[n]).all() for n in told), k
         moves = np.where(told["action_mask"][:, k % 3], k % 3, 16)
-        seen, told = many.step(moves)[0], one.step(moves)[0]
-    many.close(), one.close()
+        seen, told = [many.step(moves)[0] for many in batches], one.step(moves)[0]
+    for batch in (*batches, one):
+        batch.close()
     print("same")
 """
 
 
 @pytest.mark.gl
 @pytest.mark.slow
-@pytest.mark.parametrize("context", ["fork", "spawn"])
-def test_gymnasiums_processes_show_the_pictures_that_one_process_shows(context, drawn, tmp_path):
+def test_gymnasiums_processes_forked_or_spawned_show_the_pictures_that_one_process_shows(drawn, tmp_path):
     script = tmp_path / "workers.py"
     script.write_text(WORKERS)
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     done = subprocess.run(
-        [sys.executable, script, context, str(drawn)],
+        [sys.executable, script, str(drawn)],
         capture_output=True,
         text=True,
         timeout=120,

@@ -8,10 +8,9 @@ import gymnasium as gym
 import numpy as np
 import psutil
 import pytest
-from conftest import two_rooms
 from hand_data import built
+from hand_pixels import tasks_in, world_in
 from hand_worlds import grid_world
-from handmade import HandCatalogue, furnished
 
 import embodied.gym.env
 from agents.vision.encoder import random_encoder
@@ -32,31 +31,16 @@ from embodied.gym.eyes import (
 )
 from embodied.gym.in_step import SharedSyncVectorEnv, free_memory, refuse_too_many
 from embodied.gym.spaces import SpaceLayout, number
-from embodied.interface import FindObject, Move, Pose, Sight, Stop, Task
-from embodied.navigation.graph import graph_of
-from embodied.world import open_world
+from embodied.interface import Move, Sight, Stop
 
-NODES = np.array([[2.5, 2.6, 1.5], [4.6, 1.05, 1.5], [6.5, 1.05, 1.5]])
-ROOMS = ("living_room_1", "living_room_1", "bedroom_1")
 pytestmark = pytest.mark.gl
 
 
 @pytest.fixture(scope="module")
 def world(tmp_path_factory):
-    graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ROOMS)
-    cache = tmp_path_factory.mktemp("pixels")
-    with open_world(furnished(two_rooms()), HandCatalogue(), cache, graph=graph, size=48) as w:
+    with world_in(tmp_path_factory.mktemp("pixels")) as w:
         w.render_all()
         yield w
-
-
-def tasks_in(world) -> list[Task]:
-    what = FindObject("mug", "living_room", ("mug_1",))
-    where = [(0, 0), (1, 4), (2, 7), (0, 11)]
-    return [
-        Task(f"{world.name}/find/{k}", "find", world.name, Pose(v, turn), what, (2 - v,), f"find a mug {k}", 0.0, 9)
-        for k, (v, turn) in enumerate(where)
-    ]
 
 
 def env_of(world, sensor) -> HelpGymEnv:

@@ -7,18 +7,11 @@ import json
 
 import numpy as np
 import pytest
-from hand_data import built
+from hand_data import built, read_features
 from hand_worlds import line_world
 
 from embodied.datasets.folders import export_folder
-from embodied.datasets.matterport import (
-    action_list,
-    in_matterport_order,
-    read_features,
-    tokenised,
-    view_index,
-    write_features,
-)
+from embodied.datasets.matterport import action_list, in_matterport_order, tokenised, view_index, write_features
 from embodied.geometry import heading_of_yaw
 from embodied.interface import Pose
 from embodied.navigation.graph import from_matterport

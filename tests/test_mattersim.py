@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from embodied import mattersim
+from embodied.mattersim.__main__ import main as launch
 from embodied.mattersim.chance import Engine
 from embodied.mattersim.pictures import faces_of, tiles_of
 
@@ -342,30 +343,21 @@ print(name, __name__, sim.getState()[0].viewIndex)
 
 
 @pytest.mark.slow
-def test_a_script_runs_unchanged_with_the_launcher(folder, tmp_path):
+def test_a_script_runs_unchanged_with_the_launcher(folder, tmp_path, monkeypatch, capsys):
     (tmp_path / "train.py").write_text(SCRIPT)
     (tmp_path / "beside.py").write_text("name = 'found'\n")
     root = str(Path(mattersim.__file__).parents[2])
-    for dialect, view in (("hanna", 16), ("upstream", 13)):
-        command = [
-            sys.executable,
-            "-m",
-            "embodied.mattersim",
-            dialect,
-            str(tmp_path / "train.py"),
-            str(folder),
-            SCANS[0],
-        ]
-        done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-        assert done.stdout == f"found __main__ {view}\n"
-    done = subprocess.run(
-        [sys.executable, "-m", "embodied.mattersim", "other", "x.py"],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2 and "expected a dialect" in done.stderr
+    words = [str(tmp_path / "train.py"), str(folder), SCANS[0]]
+    command = [sys.executable, "-m", "embodied.mattersim", "hanna", *words]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    assert done.stdout == "found __main__ 16\n"
+    monkeypatch.setattr(sys, "argv", list(sys.argv))
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    assert launch(["upstream", *words]) == 0
+    assert capsys.readouterr().out == "found __main__ 13\n"
+    assert launch(["other", "x.py"]) == 2 and "expected a dialect" in capsys.readouterr().err
+    for name in ("MatterSim", "beside"):
+        del sys.modules[name]
 
 
 LISTS = [

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
 
@@ -27,16 +29,18 @@ def log_described(recording: rr.RecordingStream, world: Place, step: Step, heigh
         "view/panorama/described",
         rr.Points2D(at, labels=[label(f) for f, _ in here], show_labels=True, radii=3.0, colors=COLOUR),
     )
-    recording.log(
-        "task/described",
-        rr.Boxes3D(
-            centers=np.array([middle(p) for _, p in there]).reshape(-1, 3),
-            half_sizes=np.array([p.size for _, p in there]).reshape(-1, 3) / 2 + 0.04,
-            rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for _, p in there],
-            labels=[label(f) for f, _ in there],
-            colors=COLOUR,
-            radii=0.01,
-        ),
+    recording.log("task/described", boxes([p for _, p in there], [label(f) for f, _ in there], COLOUR))
+
+
+def boxes(things: Sequence[Placement], labels: Sequence[str], colour: tuple[int, int, int]) -> rr.Boxes3D:
+    """Boxes around things, a little larger than they are."""
+    return rr.Boxes3D(
+        centers=np.array([middle(p) for p in things]).reshape(-1, 3),
+        half_sizes=np.array([p.size for p in things]).reshape(-1, 3) / 2 + 0.05,
+        rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for p in things],
+        labels=labels,
+        colors=colour,
+        radii=0.012,
     )
 
 

@@ -28,7 +28,7 @@ from embodied.render.panorama import Panorama
 from embodied.render.photograph import PhotoCamera
 from embodied.world import World
 from viz.blueprint import blueprint_of
-from viz.described import log_described
+from viz.described import boxes, log_described
 from viz.house3d import light_meshes, lit_meshes, log_house
 from viz.sinks import Sinks, open_recording
 from viz.story import Story
@@ -173,30 +173,14 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
         world.house.placement_by_id[p] for p in getattr(task.goal, "placements", ()) if p in world.house.placement_by_id
     ]
     if sought:
-        centres = np.array([np.add(p.position, (0, 0, p.size[2] / 2)) for p in sought])
-        recording.log(
-            "task/sought",
-            rr.Boxes3D(
-                centers=centres,
-                half_sizes=np.array([p.size for p in sought]) / 2 + 0.05,
-                rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for p in sought],
-                colors=PALETTE["goal"],
-                labels=[p.object_class for p in sought],
-                radii=0.012,
-            ),
-            static=True,
-        )
+        recording.log("task/sought", boxes(sought, [p.object_class for p in sought], PALETTE["goal"]), static=True)
     recording.log(
         "task/start",
         rr.Points3D(on_floor(at[task.start.node], HEIGHTS["mark"]), radii=0.13, colors=PALETTE["start"]),
         static=True,
     )
     heading = "## " if len(task.request) <= SHORT else ""
-    recording.log(
-        "text/request",
-        rr.TextDocument(f"{heading}“{prose(task.request)}”", media_type=rr.MediaType.MARKDOWN),
-        static=True,
-    )
+    recording.log("text/request", markdown(f"{heading}“{prose(task.request)}”"), static=True)
     for name in ("goal", "target"):
         recording.log(
             f"plot/distance/{name}",
@@ -229,9 +213,9 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     state.before(step)
     recording.log("mode", rr.StateChange(state=mode_name(step)))
     told = instruction_text(step, state.left)
-    recording.log("text/instruction", rr.TextDocument(told, media_type=rr.MediaType.MARKDOWN))
+    recording.log("text/instruction", markdown(told))
     if task.kind == "hari":
-        recording.log("text/goals", rr.TextDocument(state.stack(world, step), media_type=rr.MediaType.MARKDOWN))
+        recording.log("text/goals", markdown(state.stack(world, step)))
         recording.log("plot/cost", rr.Scalars(state.cost + step.cost))
         log_described(recording, world, step, views.sizes.panorama)
     log_thought(recording, step)
@@ -241,7 +225,7 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     if state.left is not None:
         recording.log("plot/budget/left", rr.Scalars(state.left))
     recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
-    recording.log("text/dialogue", rr.TextDocument(state.told(), media_type=rr.MediaType.MARKDOWN))
+    recording.log("text/dialogue", markdown(state.told()))
     log_aim(recording, world, state, views)
 
 
@@ -255,7 +239,7 @@ def log_end(recording: rr.RecordingStream, world: World, task: Task, state: Stor
     recording.log("plot/distance/goal", rr.Scalars(distance))
     verdict = "reached the goal" if distance <= task.radius else f"missed the goal by {distance:.1f} m"
     state.dialogue.append(f"**Judge:** the agent {verdict}, after {state.count} steps and {state.requests} requests.")
-    recording.log("text/dialogue", rr.TextDocument(state.told(), media_type=rr.MediaType.MARKDOWN))
+    recording.log("text/dialogue", markdown(state.told()))
     recording.log("events", rr.TextLog(verdict, level="INFO" if distance <= task.radius else "ERROR"))
 
 
@@ -341,6 +325,10 @@ def log_thought(recording: rr.RecordingStream, step: Step) -> None:
             recording.log(f"plot/probability/{name}", rr.Scalars(float(p)))
     if thought.match is not None:
         recording.log("plot/probability/match", rr.Scalars(thought.match))
+
+
+def markdown(text: str) -> rr.TextDocument:
+    return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
 
 
 def mode_name(step: Step) -> str:

@@ -215,13 +215,7 @@ def _spawned() -> str:
     """The URL of the native viewer: the one that runs already, else a new one, which outlives this program."""
     if not listens(HERE, PORT):
         _need_screen()
-        viewer = subprocess.Popen(
-            [viewer_program(), "--bind", HERE, "--port", str(PORT), "--expect-data-soon", *LIMITS],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-            env=viewer_environment(),
-        )
+        viewer = _started("--bind", HERE, "--port", str(PORT), "--expect-data-soon")
         _wait_for(viewer, HERE, (PORT,), "use --serve and a browser, or --rrd and a file")
     return _url(PORT)
 
@@ -237,13 +231,7 @@ def _serve(bind: str) -> Iterator[None]:
     _refuse_taken(bind)
     _warn_of(bind)
     ports = ["--port", str(PORT), "--web-viewer-port", str(WEB_PORT)]
-    server = subprocess.Popen(
-        [viewer_program(), "--serve-web", "--bind", bind, *ports, *LIMITS],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,  # Ctrl-C is for us
-        env=viewer_environment(),
-    )
+    server = _started("--serve-web", "--bind", bind, *ports)
     try:
         reached = HERE if bind == EVERYWHERE else bind
         _wait_for(server, reached, (PORT, WEB_PORT), f"look whether {bind} is an address of this machine")
@@ -251,6 +239,17 @@ def _serve(bind: str) -> Iterator[None]:
     finally:
         server.terminate()
         server.wait()
+
+
+def _started(*options: str) -> subprocess.Popen:
+    """A viewer or server in a session of its own: Ctrl-C is for us."""
+    return subprocess.Popen(
+        [viewer_program(), *options, *LIMITS],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        env=viewer_environment(),
+    )
 
 
 def _wait_for(program: subprocess.Popen, host: str, ports: tuple[int, ...], remedy: str) -> None:

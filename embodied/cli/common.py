@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from tqdm import tqdm
 
@@ -73,28 +73,6 @@ def check_machine(pictures: str) -> None:
 def pause() -> float:
     """Seconds between two states of a progress bar."""
     return 0.1 if sys.stderr.isatty() else SELDOM
-
-
-class Stages:
-    """A bar over the named stages of a command; it appears when they take longer than two seconds."""
-
-    def __init__(self, *names: str) -> None:
-        self._names, self._bar = (
-            iter(names),
-            tqdm(total=len(names), delay=PATIENCE, leave=False, unit="stage", mininterval=pause()),
-        )
-        self._bar.set_description_str(next(self._names), refresh=False)
-
-    def next(self) -> None:
-        """The present stage is done."""
-        self._bar.update()
-        self._bar.set_description_str(next(self._names, "done"), refresh=False)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
 
 
 def bar(items: Iterable[T], name: str, unit: str, total: int | None = None) -> Iterable[T]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from embodied.cli.common import Furnished, Printed, Stages, catalogue_of, fetch, show
+from embodied.cli.common import Furnished, Printed, catalogue_of, fetch, show
 from embodied.cli.options import InputPath, OutputFolder, Settings
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
@@ -52,27 +52,21 @@ def run(args: Options) -> int:
         from embodied.scene.glb import export_glb
 
     catalogue, config = catalogue_of(args), args.config
-    with Stages("layout and furniture", "viewpoints", "floor plan", "meshes", "house.xml", "house.glb") as stages:
-        if args.plan:
-            house = house_of_plan(load_plan(args.plan), args.seed, config, catalogue)
-        else:
-            house = generate_house(args.seed, config, catalogue)
-        stages.next()
-        graph = build_graph(house)
-        stages.next()
-        args.out.mkdir(parents=True, exist_ok=True)
-        house.save(args.out / "house.json")
-        to_matterport(graph, house, args.out / "connectivity.json")
-        save_plan(house, args.out / "plan.png", graph=graph)
-        stages.next()
-        if args.glb or not args.no_mjcf:
-            fetch(catalogue, house)
-        stages.next()
-        if not args.no_mjcf:
-            export_mjcf(house, catalogue, args.out)
-        stages.next()
-        if args.glb:
-            export_glb(house, catalogue, args.out / "house.glb")
+    if args.plan:
+        house = house_of_plan(load_plan(args.plan), args.seed, config, catalogue)
+    else:
+        house = generate_house(args.seed, config, catalogue)
+    graph = build_graph(house)
+    args.out.mkdir(parents=True, exist_ok=True)
+    house.save(args.out / "house.json")
+    to_matterport(graph, house, args.out / "connectivity.json")
+    save_plan(house, args.out / "plan.png", graph=graph)
+    if args.glb or not args.no_mjcf:
+        fetch(catalogue, house)
+    if not args.no_mjcf:
+        export_mjcf(house, catalogue, args.out)
+    if args.glb:
+        export_glb(house, catalogue, args.out / "house.glb")
     facts = {
         "seed": args.seed,
         "digest": house.digest,

@@ -29,7 +29,7 @@ from embodied.render.pictures import PictureSettings
 if TYPE_CHECKING:
     from agents.language_models.client import Client
     from embodied.datasets.store import Dataset
-    from embodied.interface import Agent, Assistant, Place
+    from embodied.interface import Agent, Place
     from embodied.serve.game import AgentMaker
     from embodied.serve.study import Study
     from embodied.world import World
@@ -64,6 +64,7 @@ NEEDED = ("starlette", "uvicorn", "websockets")
 def run(args: Options) -> int:
     if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
         raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
+    from agents.language_models.assistant import assistant_maker
     from embodied.serve.run import open_study, serve
     from embodied.serve.study import load_study
 
@@ -80,7 +81,7 @@ def run(args: Options) -> int:
         out,
         draw,
         agents_of(args.study.parent / study.data, client),
-        {"llm": lambda base: model_assistant(base, client(), args.prompts)},
+        {"llm": assistant_maker("llm", client, args.prompts)},
         origins_of(args),
         lambda data, name: live_world(data, name, study, args),
     )
@@ -104,7 +105,7 @@ def run(args: Options) -> int:
 def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
     """The panoramas of a house: the data set's, else drawn into the cache."""
     if data.drawn_pictures(name) is not None:
-        return data.folder / "houses" / name / "panoramas.pano"
+        return data.panoramas(name)
     with world_of(data, name, PictureSettings(study.size, study.pictures), args) as world:
         note(f"panoramas of {name}: {study.pictures}, faces of {study.size} pixels")
         return world.render_all(progress=True)
@@ -130,13 +131,6 @@ def origins_of(args: Options) -> tuple[str, ...] | None:
     if args.address:
         return (*own, args.address.rstrip("/"))
     return own if args.host in LOOPBACKS else None
-
-
-def model_assistant(base: Assistant, client: Client, prompts: Path | None) -> Assistant:
-    """A language model that words what the simulated assistant knows."""
-    from agents.language_models.assistant import ModelAssistant
-
-    return ModelAssistant(base, client, prompts)
 
 
 def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentMaker]:

@@ -458,7 +458,7 @@ def _matterport(data: Dataset, root: Path) -> list[Path]:
     from embodied.datasets.skyboxes import drawn, write_skyboxes  # late: decodes pictures
 
     files = []
-    panoramas = {name: drawn(data.folder / "houses" / name / "panoramas.pano") for name in names_of(data)}
+    panoramas = {name: drawn(data.panoramas(name)) for name in names_of(data)}
     for name, file in panoramas.items():
         scan = root / "data/v1/scans" / scan_name(name)
         files += write_skyboxes(file, data.place(name).graph.ids, scan / "matterport_skybox_images")

@@ -168,7 +168,7 @@ def _pictures(data: Dataset, name: str) -> Path:
             f"{data.folder} has no pictures of {name!r}; draw them with `embodied dataset {data.kind} --out "
             f"{data.folder} ... --pictures fast`"
         )
-    return data.folder / "houses" / name / "panoramas.pano"
+    return data.panoramas(name)
 
 
 def state(pose: Pose, place: Place) -> np.ndarray:

@@ -205,17 +205,6 @@ def write_hdf5(path: Path, rows: Iterable[tuple[str, str, np.ndarray]]) -> None:
             data.attrs.update(facts)
 
 
-def read_features(path: Path) -> dict[tuple[str, str], np.ndarray]:
-    """(scan, viewpoint) -> (36, D) float32 in our order, from such a file."""
-    table = {}
-    with open(path, encoding="ascii") as f:
-        for line in f:
-            scan, viewpoint, _, _, _, code = line.rstrip("\r\n").split("\t")
-            features = np.frombuffer(base64.b64decode(code), dtype="<f4").reshape(VIEWS, -1)
-            table[scan, viewpoint] = in_matterport_order(features)
-    return table
-
-
 def tokenised(text: str) -> str:
     """Lower case, punctuation set apart by blanks."""
     return " ".join(re.findall(r"[a-z0-9'-]+|[^\sa-z0-9]", text.lower()))

@@ -170,7 +170,6 @@ class Dataset:
         from embodied.world import World  # the one part that needs a renderer
 
         place = self.place(name)
-        file = self.folder / "houses" / name / "panoramas.pano"
         # what is in a data set is data: whoever reads it has other drivers and, later, another version
         may = ("renderer", "code")
         return World(
@@ -179,17 +178,20 @@ class Dataset:
             place.graph,
             cache,
             PictureSettings.of(pictures, **changes),
-            file=file,
+            file=self.panoramas(name),
             may_differ=may,
         )
+
+    def panoramas(self, name: str) -> Path:
+        """The file with the panoramas of a house, there or not."""
+        return self._path(name, "panoramas.pano")
 
     def drawn_pictures(self, name: str) -> PictureSettings | None:
         """How the panoramas of a house that the data set holds were drawn; None where it holds none of this house."""
         from embodied.render.panorama_file import PanoramaFile, PanoramaFileError  # decodes pictures
 
-        path = self.folder / "houses" / name / "panoramas.pano"
         try:
-            with PanoramaFile(path) as file:
+            with PanoramaFile(self.panoramas(name)) as file:
                 made_of = dict(file.meta)
         except (FileNotFoundError, PanoramaFileError):
             return None

@@ -8,7 +8,6 @@ import operator
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
@@ -187,34 +186,6 @@ def number(action: Action, layout: SpaceLayout) -> int:
     if isinstance(action, Stop):
         return layout.candidates
     return layout.candidates + 1 + layout.intentions.index(action.intention)
-
-
-class Numbers(gym.ObservationWrapper):
-    """For learners that cannot read: the instruction becomes word numbers, the dictionary one flat vector.
-
-    Words are numbered by a stable hash into `vocabulary` bins; the vector is (instruction word
-    counts, candidates, has_target, mode, clock, action mask, means of features where there are any).
-    """
-
-    def __init__(self, env: gym.Env, vocabulary: int = 256) -> None:
-        super().__init__(env)
-        self._vocabulary = vocabulary
-        size = len(self.observation(env.observation_space.sample()))
-        self.observation_space = spaces.Box(-LARGE, LARGE, (size,), np.float32)
-
-    def observation(self, observation: dict[str, Any]) -> np.ndarray:
-        words = np.zeros(self._vocabulary, dtype=np.float32)
-        for word in text_of(observation["instruction"]).lower().split():
-            words[_stable(word) % self._vocabulary] += 1.0
-        parts = (
-            words,
-            np.ravel(observation["candidates"]),
-            [observation["has_target"], observation["mode"]],
-            observation["clock"],
-            observation["action_mask"],
-            *(np.mean(observation[name], axis=0) for name in ("features", "oracle") if name in observation),
-        )
-        return np.nan_to_num(np.concatenate([np.ravel(p) for p in parts])).astype(np.float32)
 
 
 def _stable(word: str) -> int:

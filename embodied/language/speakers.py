@@ -1,4 +1,4 @@
-"""People have habits of speech: who names landmarks, who counts metres, who chats, who hedges.
+"""People have habits of speech: who names landmarks, who counts metres, who chats, who hedges (speakers.toml).
 
 Some people are kept from learning (embodied.novelty): who speaks formally, and templates and words that
 `novel_templates` and the lexicon choose.
@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from assets.json_file import from_plain, read_toml
 from embodied.novelty import FAMILIAR
 
 
@@ -18,6 +20,8 @@ from embodied.novelty import FAMILIAR
 class Speaker:
     """Habits as probabilities."""
 
+    share: float
+    """Of all people."""
     habit: str
     """'terse', 'chatty', 'formal' or '': which templates, links and openings it likes."""
     landmarks: float = 0.8
@@ -49,60 +53,17 @@ class Speaker:
     """'familiar' or 'novel': which templates and words it knows; None: all."""
 
 
-SPEAKERS: tuple[tuple[float, Speaker], ...] = (
-    (0.28, Speaker("", clauses=3, clauses_per_sentence=3)),
-    (
-        0.16,
-        Speaker(
-            "terse",
-            clauses=3,
-            remarks=0.05,
-            landmarks=0.75,
-            colours=0.15,
-            joining=0.5,
-            clauses_per_sentence=3,
-            openings=0.0,
-            hedges=0.0,
-            plainness=0.9,
-        ),
-    ),
-    (
-        0.18,
-        Speaker(
-            "chatty",
-            clauses=4,
-            landmarks=0.9,
-            ornament=0.35,
-            remarks=0.2,
-            colours=0.45,
-            avoids=0.15,
-            openings=0.45,
-            hedges=0.12,
-            slips=0.03,
-            plainness=0.5,
-        ),
-    ),
-    (
-        0.12,
-        Speaker(
-            "formal", clauses=3, landmarks=0.7, metres=0.6, openings=0.25, hedges=0.0, slips=0.0, clauses_per_sentence=2
-        ),
-    ),
-    (0.16, Speaker("", landmarks=1.0, remarks=0.2, colours=0.6, joining=0.3, avoids=0.08)),
-    (0.10, Speaker("", clauses=3, landmarks=0.45, metres=0.7, counts=0.7, joining=0.55, clauses_per_sentence=2)),
-)
-"""(share, speaker): everyday, terse, chatty, formal, landmark-minded, direction-minded."""
-
-
+SPEAKERS = from_plain(tuple[Speaker, ...], read_toml(Path(__file__).with_suffix(".toml"))["speakers"])
+"""Everyday, terse, chatty, formal, landmark-minded, direction-minded."""
 NOVEL_HABIT = "formal"
 """Who is never heard in learning where some people are kept from it; novel people are formal or without a habit."""
 
 
 def draw_speaker(rng: np.random.Generator, novelty: str | None = None) -> Speaker:
     """One of the speakers of a novelty by their shares."""
-    known = [(share, s) for share, s in SPEAKERS if novelty is None or _is_one(s, novelty)]
-    shares = np.array([share for share, _ in known])
-    speaker = known[int(rng.choice(len(known), p=shares / shares.sum()))][1]
+    known = [s for s in SPEAKERS if novelty is None or _is_one(s, novelty)]
+    shares = np.array([s.share for s in known])
+    speaker = known[int(rng.choice(len(known), p=shares / shares.sum()))]
     return dataclasses.replace(speaker, novelty=novelty)
 
 

@@ -1,47 +1,17 @@
-"""How agents move and turn, in batches: in steps of 30 degrees (`DiscreteViews`), or freely (`Angles`)."""
+"""How agents move and turn, in batches: in steps of 30 degrees (`DiscreteViews`), or freely (`Angles`).
+
+Both have the same methods: `start` puts every agent somewhere; `act` lets every agent move to one of its locations and
+then turn, and raises ValueError for an index that it does not have; the others tell the pose of one agent of the batch.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 
 from embodied.mattersim.sight import HEADINGS, STEP, TILT, VIEWS, Bearings, NavigableLocations, ViewPoint
-
-
-class Motion(Protocol):
-    """A batch of poses."""
-
-    lookout: NavigableLocations
-
-    @property
-    def started(self) -> bool:
-        """Whether agents stand anywhere yet."""
-        ...
-
-    def start(self, rows: Sequence[int], headings: Sequence[float], elevations: Sequence[float]) -> None:
-        """Put every agent somewhere."""
-        ...
-
-    def act(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float]) -> None:
-        """Let every agent move to one of its locations, then turn. Raises ValueError for an index it does not have."""
-        ...
-
-    def row(self, agent: int) -> int:
-        """Row of its viewpoint in the graphs."""
-        ...
-
-    def here(self, agent: int) -> ViewPoint: ...
-
-    def locations(self, agent: int) -> tuple[ViewPoint, ...]: ...
-
-    def heading(self, agent: int) -> float: ...
-
-    def elevation(self, agent: int) -> float: ...
-
-    def view(self, agent: int) -> int: ...
 
 
 def heading_step(heading: float) -> int:
@@ -84,6 +54,7 @@ class DiscreteViews:
 
     @property
     def started(self) -> bool:
+        """Whether agents stand anywhere yet."""
         return bool(self._codes)
 
     def start(self, rows: Sequence[int], headings: Sequence[float], elevations: Sequence[float]) -> None:
@@ -106,6 +77,7 @@ class DiscreteViews:
         self._codes = codes
 
     def row(self, agent: int) -> int:
+        """Row of its viewpoint in the graphs."""
         return self._codes[agent] // VIEWS
 
     def here(self, agent: int) -> ViewPoint:
@@ -204,3 +176,7 @@ class Angles:
 
     def view(self, agent: int) -> int:
         return 0  # as there: set only when angles are discretized
+
+
+Motion = DiscreteViews | Angles
+"""A batch of poses."""

@@ -24,15 +24,17 @@ LEAF = 0.05
 
 def free_floor(house: House, storey: int) -> shapely.Geometry:
     """The floor that is neither wall, furniture nor door leaf; doorways included."""
-    open_floor = _floors_and_doorways(house, storey)
-    things = obstacles(house, storey, LOW, HEAD)
-    return open_floor.difference(shapely.union_all(things)) if things else open_floor
+    return _floor_without(house, storey, LOW, HEAD)
 
 
-def sight_floor(house: House, storey: int, height: float = EYE) -> shapely.Geometry:
-    """Where a horizontal sight line at `height` may run."""
-    open_floor = _floors_and_doorways(house, storey)
-    things = obstacles(house, storey, height - 0.02, height + 0.02)
+def sight_floor(house: House, storey: int) -> shapely.Geometry:
+    """Where a horizontal sight line at eye height may run."""
+    return _floor_without(house, storey, EYE - 0.02, EYE + 0.02)
+
+
+def _floor_without(house: House, storey: int, low: float, high: float) -> shapely.Geometry:
+    """Floors and doorways without what occupies heights between low and high."""
+    open_floor, things = _floors_and_doorways(house, storey), obstacles(house, storey, low, high)
     return open_floor.difference(shapely.union_all(things)) if things else open_floor
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -31,24 +31,37 @@ DRIVEN = ("motion", "touched", "goal")
 """Parts of what Drive-v0 shows that agent_pos has, where they are there."""
 
 
-class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
+E = TypeVar("E", continuous.ContinuousGymEnv, drive.DriveEnv)
+
+
+class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray], Generic[E]):
+    """What both environments have in common: `pixels`, which are black for a blind agent, and `agent_pos`."""
+
+    def __init__(self, env: E, height: int, width: int, numbers: int) -> None:
+        """`numbers`: of agent_pos."""
+        self.env: E = env
+        self.render_mode, self.metadata = env.render_mode, env.metadata
+        self._black = np.zeros((height, width, 3), np.uint8)
+        seen = spaces.Box(0, 255, self._black.shape, np.uint8)
+        self.observation_space = spaces.Dict(
+            {"pixels": seen, "agent_pos": spaces.Box(-LARGE, LARGE, (numbers,), np.float32)}
+        )
+
+    def render(self) -> np.ndarray | None:
+        return self.env.render()
+
+    def close(self) -> None:
+        self.env.close()
+
+
+class ContinuousForLeRobot(_ForLeRobot[continuous.ContinuousGymEnv]):
     """VLNCE-v0 or ObjectNav-v0 for LeRobot's policies; agent_pos is embodied.envs.continuous.POSITION."""
 
-    metadata = continuous.ContinuousGymEnv.metadata
-
     def __init__(self, env: continuous.ContinuousGymEnv) -> None:
-        self.env = env
-        lens, actions = env.course.lens, env.course.body.actions
-        self.observation_space = spaces.Dict(
-            {
-                "pixels": spaces.Box(0, 255, (lens.height, lens.width, 3), np.uint8),
-                "agent_pos": spaces.Box(-LARGE, LARGE, (len(POSITION),), np.float32),
-            }
-        )
-        self._black = black(self.observation_space)
-        self.action_space = spaces.Box(-1.0, 1.0, (actions,), np.float32)
-        self.render_mode = env.render_mode
-        self._max_episode_steps = env.course.body.steps
+        lens, body = env.course.lens, env.course.body
+        super().__init__(env, lens.height, lens.width, len(POSITION))
+        self.action_space = spaces.Box(-1.0, 1.0, (body.actions,), np.float32)
+        self._max_episode_steps = body.steps
 
     @property
     def task_description(self) -> str:
@@ -71,35 +84,18 @@ class ContinuousForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         _, reward, terminated, truncated, info = self.env.step(int(np.argmax(action)))
         return self._seen(), reward, terminated, truncated, info
 
-    def render(self) -> np.ndarray | None:
-        return self.env.render()
-
-    def close(self) -> None:
-        self.env.close()
-
     def _seen(self) -> dict[str, Any]:
         return {"pixels": self.env.pixels().get("rgb", self._black), "agent_pos": self.env.own_way()}
 
 
-class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
+class DriveForLeRobot(_ForLeRobot[drive.DriveEnv]):
     """Drive-v0 for LeRobot's policies; agent_pos is its motion, and the direction of the goal where there is one."""
 
-    metadata = drive.DriveEnv.metadata
-
     def __init__(self, env: drive.DriveEnv) -> None:
-        known = env.observation_space
-        assert isinstance(known, spaces.Dict), "as drive.seen_space gives it"
-        self.env = env
-        self.action_space, self.render_mode = env.action_space, env.render_mode
         settings = env.driving.settings
-        self._parts = [name for name in DRIVEN if name in known.spaces]
-        self.observation_space = spaces.Dict(
-            {
-                "pixels": spaces.Box(0, 255, (settings.height, settings.width, 3), np.uint8),
-                "agent_pos": spaces.Box(-LARGE, LARGE, (_driven(settings),), np.float32),
-            }
-        )
-        self._black = black(self.observation_space)
+        super().__init__(env, settings.height, settings.width, _driven(settings))
+        self.action_space = env.action_space
+        self._parts = [name for name in DRIVEN if name in drive.seen_space(settings)]
         self._max_episode_steps = round(settings.seconds / settings.control)
 
     @property
@@ -122,22 +118,9 @@ class DriveForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
         o, reward, terminated, truncated, info = self.env.step(action)
         return self._seen(o), reward, terminated, truncated, {"is_success": False} | info
 
-    def render(self) -> np.ndarray | None:
-        return self.env.render()
-
-    def close(self) -> None:
-        self.env.close()
-
     def _seen(self, o: dict[str, Any]) -> dict[str, Any]:
         state = np.concatenate([o[name] for name in self._parts]).astype(np.float32)
         return {"pixels": o.get("rgb", self._black), "agent_pos": state}
-
-
-def black(seen: spaces.Dict) -> np.ndarray:
-    """(h, w, 3) uint8: the pixels of a blind agent."""
-    shape = seen["pixels"].shape
-    assert shape is not None, "a Box"
-    return np.zeros(shape, np.uint8)
 
 
 def _driven(settings: DriveSettings) -> int:

@@ -1,0 +1,40 @@
+"""Two rooms with three viewpoints, quickly drawn, and environments that see them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from conftest import two_rooms
+from handmade import HandCatalogue, furnished
+
+from embodied.envs.base import HelpEnv
+from embodied.gym.env import HelpGymEnv
+from embodied.gym.eyes import CameraSensor, PanoramaStore, ViewSettings
+from embodied.interface import FindObject, Pose, Task
+from embodied.navigation.graph import graph_of
+from embodied.world import World, open_world
+
+NODES = np.array([[2.5, 2.6, 1.5], [4.6, 1.05, 1.5], [6.5, 1.05, 1.5]])
+ROOMS = ("living_room_1", "living_room_1", "bedroom_1")
+
+
+def world_in(cache: Path) -> World:
+    graph = graph_of(NODES, np.array([[0, 1], [1, 2]]), ("a", "b", "c"), ROOMS)
+    return open_world(furnished(two_rooms()), HandCatalogue(), cache, graph=graph, size=48)
+
+
+def tasks_in(world) -> list[Task]:
+    what = FindObject("mug", "living_room", ("mug_1",))
+    where = [(0, 0), (1, 4), (2, 7), (0, 11)]
+    return [
+        Task(f"{world.name}/find/{k}", "find", world.name, Pose(v, turn), what, (2 - v,), f"find a mug {k}", 0.0, 9)
+        for k, (v, turn) in enumerate(where)
+    ]
+
+
+def pixels(cache: Path) -> HelpGymEnv:
+    """An environment that sees the panoramas of the two rooms; draws those that are not in the cache."""
+    world = world_in(cache)
+    sensor = CameraSensor(PanoramaStore({world.name: world}), ("rgb", "depth"), ViewSettings(height=16, width=16))
+    return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), sensor, opened=[world])
