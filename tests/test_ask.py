@@ -28,11 +28,11 @@ from embodied.evaluation.ask import acted, observed, read_seeds, submitted
 from embodied.evaluation.metrics import price, success, success_progress, weighted_success
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv, layout_of
-from embodied.gym.eyes import NoSensor
+from embodied.gym.eyes import SensorSuite
 from embodied.interface import Ask, Intention, Move, Pose, Stop
 from embodied.policies.ask import RULES, Asker, Mind, baselines, reached
 from embodied.records import from_json, to_json
-from embodied.tasks.ask import AskConfig, ask_pool, ask_tasks
+from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks
 
 LITTLE = AskerConfig(hidden_size=16, passes=300)
 CHAIRS = ("red", "red", "blue", "blue")
@@ -80,7 +80,7 @@ def at_target(task, world) -> Pose:
 
 
 def test_the_stated_share_of_requests_is_ambiguous_and_all_can_be_solved(world, tasks, make_env):
-    assert sum(len(t.goal.fitting) > 1 for t in tasks) == round(AskConfig().ambiguous * len(tasks))
+    assert sum(len(t.goal.fitting) > 1 for t in tasks) == round(AMBIGUOUS * len(tasks))
     for t in tasks:
         assert t.goal.placement in t.goal.fitting and not set(t.goal.fitting) & set(t.goal.similar)
         assert all(word in t.request for word in (*t.goal.words, t.goal.object_class))
@@ -210,7 +210,7 @@ def test_measures_by_hand(world, tasks, make_env):
 def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = HelpGymEnv(make_env, tasks, NoSensor(), layout=layout_of("ask"), render_mode="rgb_array")
+        env = HelpGymEnv(make_env, tasks, SensorSuite(), layout=layout_of("ask"), render_mode="rgb_array")
         check_env(env, skip_render_check=True)
     assert env.render().ndim == 3
     assert gym.spec("embodied/Ask-v0").kwargs == {"kind": "ask"}

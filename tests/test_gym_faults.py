@@ -22,7 +22,7 @@ import embodied.gym.env
 from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import NoSensor
+from embodied.gym.eyes import SensorSuite
 from embodied.gym.in_step import SharedSyncVectorEnv
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.teachers.shortest import shortest_action
@@ -173,7 +173,7 @@ def test_a_data_set_that_is_dropped_keeps_none_of_its_houses(tmp_path):
     built(tmp_path / "data", "vnla")
     for _ in range(3):
         split = Dataset(tmp_path / "data").split("val_seen")
-        env = HelpGymEnv(split.make_env, split.tasks, NoSensor())
+        env = HelpGymEnv(split.make_env, split.tasks, SensorSuite())
         env.reset(seed=0)
         places = [weakref.ref(place) for place in split.worlds.values()]
         assert all(place() is not None for place in places)

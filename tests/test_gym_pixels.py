@@ -19,16 +19,7 @@ from agents.vision.live import LiveFeatures
 from embodied.envs.base import HelpEnv
 from embodied.gym import eyes as module
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import (
-    FAR,
-    CameraSensor,
-    FeatureSensor,
-    NoSensor,
-    PanoramaStore,
-    SensorSuite,
-    ViewSettings,
-    checked_sees,
-)
+from embodied.gym.eyes import FAR, CameraSensor, FeatureSensor, PanoramaStore, SensorSuite, ViewSettings, checked_sees
 from embodied.gym.in_step import SharedSyncVectorEnv, free_memory, refuse_too_many
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import Move, Sight, Stop
@@ -101,7 +92,7 @@ def test_features_come_from_the_very_panoramas_that_are_shown(world):
 def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world, threads):
     store = PanoramaStore({world.name: world})
     sensor = CameraSensor(store, ("rgb",), ViewSettings(height=16, width=16))
-    envs = SharedSyncVectorEnv(lambda: env_of(world, NoSensor()), 12, sensor, threads=threads)
+    envs = SharedSyncVectorEnv(lambda: env_of(world, SensorSuite()), 12, sensor, threads=threads)
     o, _ = envs.reset(seed=5)
     for _ in range(6):
         o, *_ = envs.step(np.zeros(12, dtype=np.int64))
@@ -117,7 +108,7 @@ def test_a_batch_gives_what_gymnasium_would_batch(world):
     sensor = CameraSensor(
         PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), ViewSettings(height=16, width=16)
     )
-    ours = SharedSyncVectorEnv(lambda: env_of(world, NoSensor()), 5, sensor, threads=2)
+    ours = SharedSyncVectorEnv(lambda: env_of(world, SensorSuite()), 5, sensor, threads=2)
     theirs = gym.vector.SyncVectorEnv([lambda: env_of(world, sensor)] * 5)
     assert ours.observation_space == theirs.observation_space
     assert ours.single_observation_space == theirs.single_observation_space
@@ -132,7 +123,7 @@ def test_a_batch_gives_what_gymnasium_would_batch(world):
         assert (earlier == kept).all(), "what was handed out stays"
     assert ours.get_attr("render_mode") == (None,) * 5
     with pytest.raises(ValueError, match="threads should be at least 1"):
-        SharedSyncVectorEnv(lambda: env_of(world, NoSensor()), 2, sensor, threads=0)
+        SharedSyncVectorEnv(lambda: env_of(world, SensorSuite()), 2, sensor, threads=0)
     ours.close(), theirs.close()
 
 

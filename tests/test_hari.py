@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world, room, thing
 
-from embodied.assistants.descriptions import Describer, DescriberConfig, dropped, frequent_classes
+from embodied.assistants.descriptions import Describer, dropped, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
 from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariEnv, shaped_costs
@@ -66,7 +66,6 @@ def test_at_most_twenty_objects_and_none_from_behind_the_wall():
     )
     behind = dataclasses.replace(world, house=other)
     assert len(Describer(()).dense(behind, 0)) == 1
-    assert len(Describer((), DescriberConfig(same_room=False)).dense(behind, 0)) == 2
 
 
 def test_pre_training_drops_features_and_varies_goals_as_appendix_e_says():

@@ -28,7 +28,7 @@ from embodied.errors import UnableError
 from embodied.evaluation import metrics, tables
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import NoSensor
+from embodied.gym.eyes import SensorSuite
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Sighting, Step, Subtask, Usage
 from embodied.language import PlainLanguage
 from embodied.records import from_json, to_json
@@ -410,7 +410,7 @@ def test_a_judge_rates_in_stars_and_describes(seen, answers):
 
 
 def test_the_gymnasium_wrapper_speaks_in_messages():
-    env = Messages(HelpGymEnv(find_env, find_tasks(3), NoSensor()))
+    env = Messages(HelpGymEnv(find_env, find_tasks(3), SensorSuite()))
     text, info = env.reset(seed=1)
     assert env.observation_space.contains(text) and "find" in text
     assert [m["role"] for m in info["messages"]] == ["system", "user"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,15 +18,10 @@ FARTHEST = 4
 """Largest distance bin: five values, metres rounded down (appendix E)."""
 
 
-@dataclass(frozen=True)
-class DescriberConfig:
-    """Table E.2, and which of its two radii is used for goals (docs/sources.md, S56)."""
-
-    state_radius: float = 5.0
-    goal_radius: float = 3.0
-    most_objects: int = 20
-    same_room: bool = True
-    """Only objects of the node's own room: nobody describes what is behind a wall."""
+STATE_RADIUS, GOAL_RADIUS = 5.0, 3.0
+"""Metres within which objects are described, of where the agent is and of a goal (docs/sources.md, S56)."""
+MOST_OBJECTS = 20
+"""Table E.2."""
 
 
 class Describer:
@@ -37,9 +31,9 @@ class Describer:
     a description must mean the same wherever the listener looks (docs/sources.md, S55).
     """
 
-    def __init__(self, frequent: Collection[str], config: DescriberConfig = DescriberConfig()) -> None:
+    def __init__(self, frequent: Collection[str]) -> None:
         """`frequent`: the object classes that sparse descriptions keep (the most frequent ones)."""
-        self._frequent, self._config = frozenset(frequent), config
+        self._frequent = frozenset(frequent)
         self._objects: dict[tuple[str, int, float], Description] = {}
         self._said: dict[tuple[str, str, int, int], Description] = {}
 
@@ -87,10 +81,10 @@ class Describer:
         return Feature("room", world.house.room_by_id[world.graph.room_of_node[node]].kind)
 
     def _near(self, world: Place, node: int, goal: bool) -> Description:
-        radius = self._config.goal_radius if goal else self._config.state_radius
+        radius = GOAL_RADIUS if goal else STATE_RADIUS
         key = (world.house.name, node, radius)
         if key not in self._objects:
-            self._objects[key] = near_objects(world, node, radius, self._config)
+            self._objects[key] = tuple(f for f, _ in near_placements(world, node, radius))
         return self._objects[key]
 
 
@@ -105,31 +99,25 @@ def dropped(description: Description, *, rng: np.random.Generator) -> Descriptio
     return tuple(description[i] for i in sorted(rng.choice(n, m, replace=False)))
 
 
-def near_objects(world: Place, node: int, radius: float, config: DescriberConfig) -> Description:
-    """Objects within `radius` metres (3-D, from eye to the middle of the object), nearest first."""
-    return tuple(f for f, _ in near_placements(world, node, radius, config))
-
-
-def near_placements(
-    world: Place, node: int, radius: float, config: DescriberConfig = DescriberConfig()
-) -> list[tuple[Feature, Placement]]:
-    """The same with what each feature set is said of."""
+def near_placements(world: Place, node: int, radius: float) -> list[tuple[Feature, Placement]]:
+    """Objects of the node's own room within `radius` metres (3-D, from eye to the middle of the object), nearest first,
+    with what each feature set is said of. Nobody describes what is behind a wall."""
     eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
     found = []
     for p in world.house.placements:
-        if p.object_class in NOT_OBJECTS or (config.same_room and p.room != room):
+        if p.object_class in NOT_OBJECTS or p.room != room:
             continue
         offset = np.asarray(p.position) + [0.0, 0.0, p.size[2] / 2] - eye
         distance = float(np.linalg.norm(offset))
         if distance <= radius:
             found.append((round(distance, 6), p.id, Feature("object", p.object_class, *_bins(offset)), p))
-    return [(feature, p) for _, _, feature, p in sorted(found, key=lambda x: x[:2])[: config.most_objects]]
+    return [(feature, p) for _, _, feature, p in sorted(found, key=lambda x: x[:2])[:MOST_OBJECTS]]
 
 
 def spoken_of(world: Place, node: int, description: Description) -> list[tuple[Feature, Placement]]:
     """What the objects of a description of `node` are, nearest first."""
     said = set(description)
-    return [(f, p) for f, p in near_placements(world, node, DescriberConfig().state_radius) if f in said]
+    return [(f, p) for f, p in near_placements(world, node, STATE_RADIUS) if f in said]
 
 
 def frequent_classes(worlds: Iterable[Place], share: float = KEPT) -> tuple[str, ...]:

@@ -211,13 +211,10 @@ def measure(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict:
 def costs(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict[str, float]:
     """Median processor seconds: of a bake per quality, its furniture imported and unwrapped, and of path tracing one
     view of the reference, by the name of the way."""
-    lit = {q: [_without_unwrapping(b[q].manifest) for b in baked] for q in BAKES}
+    without_unwrapping = lambda spent: sum(v for k, v in spent.items() if k != "unwrap")
+    lit = {q: [without_unwrapping(b[q].manifest["seconds"]) for b in baked] for q in BAKES}
     lit["reference"] = [s.processor for s in shots if s.way == "reference"]
     return {name: round(float(np.median(seconds)), 1) for name, seconds in lit.items()}
-
-
-def _without_unwrapping(manifest: dict) -> float:
-    return sum(v for k, v in manifest["seconds"].items() if k != "unwrap")
 
 
 def table(facts: dict) -> str:

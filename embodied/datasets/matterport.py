@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from assets.cache import atomic_path
+from assets.json_file import read_toml
 from embodied.action_spaces import bearing_order, directions, nearest_views
 from embodied.errors import UnableError
 from embodied.geometry import heading_of_yaw, wrap
@@ -36,65 +37,10 @@ if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
     from embodied.render.panorama import Panorama
 
-REGIONS = {
-    "bathroom": "a",
-    "main_bedroom": "b",
-    "bedroom": "b",
-    "kids_room": "b",
-    "guest_room": "b",
-    "closet": "c",
-    "dining_room": "d",
-    "family_room": "f",
-    "garage": "g",
-    "hall": "e",
-    "corridor": "h",
-    "library": "i",
-    "laundry_room": "j",
-    "kitchen": "k",
-    "living_room": "l",
-    "study": "o",
-    "sun_room": "p",
-    "playroom": "r",
-    "stairwell": "s",
-    "toilet": "t",
-    "workshop": "u",
-    "pantry": "u",
-    "gym": "w",
-}
+_LETTERS = read_toml(Path(__file__).with_name("regions.toml"))
+REGIONS = {kind: letter for letter, region in _LETTERS.items() for kind in region["kinds"]}
 """Our room kinds as Matterport's region letters; anything else is 'z', other room."""
-REGION_NAMES = {
-    "a": "bathroom",
-    "b": "bedroom",
-    "c": "closet",
-    "d": "dining room",
-    "e": "entryway",
-    "f": "family room",
-    "g": "garage",
-    "h": "hallway",
-    "i": "library",
-    "j": "laundry room",
-    "k": "kitchen",
-    "l": "living room",
-    "m": "meeting room",
-    "n": "lounge",
-    "o": "office",
-    "p": "porch",
-    "r": "rec room",
-    "s": "stairs",
-    "t": "toilet",
-    "u": "utility room",
-    "v": "tv room",
-    "w": "gym",
-    "x": "outdoor",
-    "y": "balcony",
-    "z": "other room",
-    "B": "bar",
-    "C": "classroom",
-    "D": "dining booth",
-    "S": "spa",
-    "Z": "junk",
-    "-": "no label",
-}
+REGION_NAMES = {letter: region["name"] for letter, region in _LETTERS.items()}
 CAMERA = {
     "left": (0, -1, 0),
     "right": (0, 1, 0),

@@ -92,11 +92,6 @@ class Taught:
         return f"{self.walk.excursion.world}_{self.walk.excursion.id}"
 
 
-def expert_alone(env: ContinuousEnv, label: int) -> int:
-    """The expert plays."""
-    return label
-
-
 def wandering(share: float, rng: np.random.Generator) -> Chosen:
     """The expert plays, but this share of its steps and turns is drawn among steps and turns instead."""
 
@@ -106,8 +101,9 @@ def wandering(share: float, rng: np.random.Generator) -> Chosen:
     return chosen
 
 
-def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = expert_alone) -> Taught:
-    """Play an episode with a policy and write down what the expert does at each of its states (Ross et al. 2011)."""
+def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = lambda env, label: label) -> Taught:
+    """Play an episode, as the expert does unless told otherwise, and write down what the expert does at each of its
+    states (Ross et al. 2011)."""
     env.reset(excursion, world)
     expert, labels = Follower(env, along=bool(excursion.reference)), []
     while not env.ended:
@@ -162,7 +158,7 @@ def export_walks(
     if not episodes:
         raise ValueError("there are no episodes to play; choose another split")
     env = ContinuousEnv(body, Grounds())
-    chosen = wandering(wander, stream(seed, "wander")) if wander else expert_alone
+    chosen = wandering(wander, stream(seed, "wander"))
     taught = (teach(env, e, worlds[e.world], chosen) for e in watch(episodes))
     if form == "vlnce":
         write_vlnce(folder, split, with_experts(episodes, worlds, ContinuousEnv(body, Grounds())))

@@ -95,16 +95,6 @@ def check_live(sees: Sequence[str], known: Sequence[str], height: int, width: in
         raise ValueError(f"a view of {height} x {width} pixels; each side needs 8 to 2048")
 
 
-class NoSensor:
-    """Sees nothing."""
-
-    def spaces(self) -> dict[str, spaces.Space]:
-        return {}
-
-    def look(self, o: Observation) -> Callable[[], Arrays]:
-        return dict
-
-
 @dataclass(frozen=True)
 class ViewSettings:
     """How pixels are framed.
@@ -278,9 +268,9 @@ class FeatureSensor:
 
 
 class SensorSuite:
-    """Several sensors as one."""
+    """Several sensors as one; without any, it sees nothing."""
 
-    def __init__(self, sensors: Sequence[Sensor]) -> None:
+    def __init__(self, sensors: Sequence[Sensor] = ()) -> None:
         self._sensors = tuple(sensors)
 
     def spaces(self) -> dict[str, spaces.Space]:

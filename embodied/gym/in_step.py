@@ -21,7 +21,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from embodied.gym.env import OWN, HelpGymEnv, check_options, open_resources
-from embodied.gym.eyes import Arrays, NoSensor, Sensor
+from embodied.gym.eyes import Arrays, Sensor, SensorSuite
 from embodied.gym.spaces import observation_space
 from embodied.seeds import checked_seed
 
@@ -52,7 +52,7 @@ def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **
 
     def one() -> HelpGymEnv:
         return HelpGymEnv(
-            shared.make_env, shared.tasks, NoSensor(), layout=shared.layout, render_mode=render_mode, **own
+            shared.make_env, shared.tasks, SensorSuite(), layout=shared.layout, render_mode=render_mode, **own
         )
 
     refuse_too_many(num_envs, observation_space(shared.layout, shared.sensor))
@@ -75,7 +75,7 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         opened: Sequence[World] = (),
     ) -> None:
         """Args:
-        make_one: makes the environment of a slot, with `embodied.gym.eyes.NoSensor`.
+        make_one: makes the environment of a slot, with a sensor that sees nothing.
         sensor: what the slots see; shared.
         threads: that look; one per core by default.
         opened: worlds that `close` closes.

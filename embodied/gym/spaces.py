@@ -15,7 +15,7 @@ from assets.catalogue import load_catalogue
 from assets.records import ROOM_KINDS
 from embodied.envs.base import ActionError
 from embodied.gym.eyes import LARGE, Sensor
-from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Feature, Intention, Mode, Move, Observation, Stop
+from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Intention, Mode, Move, Observation, Stop
 
 INTENTIONS = (Intention.HELP, Intention.CUR, Intention.GOAL, Intention.SUB)
 """What may be asked where the layout does not say otherwise."""
@@ -74,7 +74,7 @@ def observation_space(layout: SpaceLayout, sensor: Sensor) -> spaces.Dict:
         whole["detections"] = spaces.Box(-1.0, LARGE, (layout.detections, 4), np.float32)
         whole["advised"] = spaces.Discrete(layout.candidates + 2)
     if layout.descriptions:
-        whole["state"] = _description_space(layout)
+        whole["state"] = spaces.Box(0, LARGE, (layout.features, 5), np.float32)
         whole["goals"] = spaces.Box(0, LARGE, (layout.stack, layout.features, 5), np.float32)
     return spaces.Dict(whole)
 
@@ -215,17 +215,9 @@ def word_number(word: str) -> int:
     return len(known) + 1 + _stable(word) % OWN_WORDS
 
 
-def _description_space(layout: SpaceLayout) -> spaces.Box:
-    """(features, 5): kind + 1 (0 is padding), name, horizontal, vertical + 1, distance."""
-    return spaces.Box(0, LARGE, (layout.features, 5), np.float32)
-
-
 def _description(description: Description, layout: SpaceLayout) -> np.ndarray:
+    """(features, 5): kind + 1 (0 is padding), name, horizontal, vertical + 1, distance."""
     rows = np.zeros((layout.features, 5), dtype=np.float32)
     for i, f in enumerate(description[: layout.features]):
-        rows[i] = _feature(f)
+        rows[i] = KINDS.index(f.kind) + 1, word_number(f.name), f.horizontal, f.vertical + 1, f.distance
     return rows
-
-
-def _feature(f: Feature) -> tuple[int, ...]:
-    return (KINDS.index(f.kind) + 1, word_number(f.name), f.horizontal, f.vertical + 1, f.distance)

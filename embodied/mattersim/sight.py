@@ -59,41 +59,11 @@ class Bearings:
         return tuple(a.tolist() for a in (self.rows, self.count, self.heading, self.elevation, self.distance))
 
 
-def bearings(
-    graphs: Graphs, rows: np.ndarray, heading: np.ndarray, elevation: np.ndarray, half_field: float | None
-) -> Bearings:
-    """The navigable viewpoints of n poses.
-
-    Args:
-      rows: (n,) rows of the agents' viewpoints.
-      heading: (n,) radians clockwise from +y.
-      elevation: (n,) radians above the horizon.
-      half_field: radians to either side that may be walked to; None is everywhere (unrestricted navigation).
-    """
-    neighbours = graphs.neighbours[rows]
-    ahead = np.stack([np.cos(math.pi / 2 - heading), np.sin(math.pi / 2 - heading)], axis=-1).astype(np.float32)
-    x, y = graphs.offset[rows, :, 0], graphs.offset[rows, :, 1]
-    ax, ay = ahead[:, None, 0], ahead[:, None, 1]
-    rel_heading = np.arctan2(x * ay - y * ax, x * ax + y * ay).astype(float)
-    rel_elevation = graphs.slope[rows] - elevation[:, None]
-    keep = neighbours >= 0
-    if half_field is not None:
-        unit = graphs.unit[rows]
-        with np.errstate(invalid="ignore"):
-            keep &= (unit[..., 0] * ax + unit[..., 1] * ay).astype(float) >= math.cos(half_field)
-    angle = np.where(keep, np.sqrt(rel_heading**2 + rel_elevation**2), np.inf)
-    order = np.argsort(angle, axis=1, kind="stable")
-
-    def sort(values: np.ndarray) -> np.ndarray:
-        return np.take_along_axis(values, order, axis=1)
-
-    return Bearings(sort(neighbours), keep.sum(1), sort(rel_heading), sort(rel_elevation), sort(graphs.distance[rows]))
-
-
 class NavigableLocations:
     """Navigable locations as the programs read them. Those of discretized poses are kept, since they recur."""
 
     def __init__(self, graphs: Graphs, half_field: float | None) -> None:
+        """`half_field`: radians to either side that may be walked to; None is everywhere (unrestricted navigation)."""
         self.graphs, self.half_field = graphs, half_field
         self.view = functools.lru_cache(maxsize=100_000)(self._view)
         self._around = functools.lru_cache(maxsize=4096)(self._look_around)
@@ -120,8 +90,34 @@ class NavigableLocations:
         return self.bearings(np.full(VIEWS, row), views % HEADINGS * STEP, (views // HEADINGS - 1) * TILT)
 
     def bearings(self, rows: np.ndarray, heading: np.ndarray, elevation: np.ndarray) -> Bearings:
-        """The navigable viewpoints of n poses; the arrays are those of the function of this name."""
-        return bearings(self.graphs, rows, heading, elevation, self.half_field)
+        """The navigable viewpoints of n poses.
+
+        Args:
+          rows: (n,) rows of the agents' viewpoints.
+          heading: (n,) radians clockwise from +y.
+          elevation: (n,) radians above the horizon.
+        """
+        graphs = self.graphs
+        neighbours = graphs.neighbours[rows]
+        ahead = np.stack([np.cos(math.pi / 2 - heading), np.sin(math.pi / 2 - heading)], axis=-1).astype(np.float32)
+        x, y = graphs.offset[rows, :, 0], graphs.offset[rows, :, 1]
+        ax, ay = ahead[:, None, 0], ahead[:, None, 1]
+        rel_heading = np.arctan2(x * ay - y * ax, x * ax + y * ay).astype(float)
+        rel_elevation = graphs.slope[rows] - elevation[:, None]
+        keep = neighbours >= 0
+        if self.half_field is not None:
+            unit = graphs.unit[rows]
+            with np.errstate(invalid="ignore"):
+                keep &= (unit[..., 0] * ax + unit[..., 1] * ay).astype(float) >= math.cos(self.half_field)
+        angle = np.where(keep, np.sqrt(rel_heading**2 + rel_elevation**2), np.inf)
+        order = np.argsort(angle, axis=1, kind="stable")
+
+        def sort(values: np.ndarray) -> np.ndarray:
+            return np.take_along_axis(values, order, axis=1)
+
+        return Bearings(
+            sort(neighbours), keep.sum(1), sort(rel_heading), sort(rel_elevation), sort(graphs.distance[rows])
+        )
 
     def locations(self, row: int, seen: Bearings, at: int) -> tuple[tuple[int, ...], tuple[ViewPoint, ...]]:
         """Rows and locations of pose number `at` in `seen`, which is at `row`."""

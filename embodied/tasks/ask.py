@@ -18,24 +18,12 @@ Look = Callable[[Placement], tuple[str, ...]]
 """The words of colour and material of a placement."""
 UNSEEN = 0.25
 """Share of the object classes that are kept for the split of unseen classes."""
-
-
-@dataclass(frozen=True)
-class AskConfig:
-    """What an Ask-v0 task may be."""
-
-    ambiguous: float = 0.6
-    """Share of the tasks whose request fits several objects."""
-    reach: float = 2.0
-    """A goal node lies within this many metres of the object, in its room, and nearer to it than to its like."""
-    fewest_nodes: int = 4
-    """Nodes on the shortest path to the nearest goal node."""
-    most_nodes: int = 18
-    horizon: int = 60
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.ambiguous <= 1:
-            raise ValueError(f"ambiguous is a share from 0 to 1, got {self.ambiguous}")
+AMBIGUOUS = 0.6
+"""Share of the tasks whose request fits several objects."""
+REACH = 2.0
+"""A goal node lies within this many metres of the object, in its room, and nearer to it than to its like."""
+FEWEST_NODES, MOST_NODES, HORIZON = 4, 18, 60
+"""Nodes on the shortest path to the nearest goal node, and steps of an episode."""
 
 
 @dataclass(frozen=True)
@@ -55,16 +43,14 @@ def is_unseen(object_class: str) -> bool:
     return float(stream(0, "ask class", object_class).random()) < UNSEEN
 
 
-def ask_pool(
-    world: Place, look: Look, *, seed: int, unseen: bool | None = None, config: AskConfig = AskConfig()
-) -> AskPool:
+def ask_pool(world: Place, look: Look, *, seed: int, unseen: bool | None = None) -> AskPool:
     """All tasks of a house.
 
     Args:
       unseen: only classes that are kept from training, or only the others; all if None.
     """
     by_class: dict[str, list[Instance]] = {}
-    for x in find_instances(world, config.reach):
+    for x in find_instances(world, REACH):
         if unseen is None or is_unseen(x.object_class) == unseen:
             by_class.setdefault(x.object_class, []).append(x)
     found = [(x, alike) for _, alike in sorted(by_class.items()) if len(alike) > 1 for x in alike]
@@ -79,7 +65,7 @@ def ask_pool(
     for g, (_, goal_nodes) in enumerate(goals):
         ends = np.array(goal_nodes)
         count = hops[np.arange(len(hops)), ends[np.argmin(distance[:, ends], axis=1)]]
-        fits = (count >= config.fewest_nodes) & (count <= config.most_nodes)
+        fits = (count >= FEWEST_NODES) & (count <= MOST_NODES)
         pairs[kinds[g]].extend((g, int(v)) for v in np.flatnonzero(fits))
     classes = [goal.object_class for goal, _ in goals]
     clear, ambiguous = (
@@ -88,11 +74,11 @@ def ask_pool(
     return AskPool(world.house.name, tuple(goals), ambiguous, clear)
 
 
-def ask_tasks(pool: AskPool, count: int, *, seed: int, config: AskConfig = AskConfig()) -> list[Task]:
+def ask_tasks(pool: AskPool, count: int, *, seed: int) -> list[Task]:
     """The first `count` tasks of a house, of which the stated share is ambiguous; fewer where the house has fewer."""
     tasks = []
     for j in range(count):
-        before, after = math.floor(j * config.ambiguous + 1e-9), math.floor((j + 1) * config.ambiguous + 1e-9)
+        before, after = math.floor(j * AMBIGUOUS + 1e-9), math.floor((j + 1) * AMBIGUOUS + 1e-9)
         pairs, k = (pool.ambiguous, before) if after > before else (pool.clear, j - before)
         if k >= len(pairs):
             break
@@ -107,7 +93,7 @@ def ask_tasks(pool: AskPool, count: int, *, seed: int, config: AskConfig = AskCo
             goal_nodes=goal_nodes,
             request=request(goal),
             radius=0.0,
-            horizon=config.horizon,
+            horizon=HORIZON,
         )
         tasks.append(task)
     return tasks

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Place, Situation, Step, Stop
+from embodied.interface import VIEWS, Ask, Candidates, Episode, Label, Move, Place, Step, Stop
 from embodied.navigation.graph import nearest
-from embodied.teachers.shortest import shortest_action
+from embodied.teachers.shortest import ShortestTeacher, shortest_action
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -42,7 +42,7 @@ def base37_entropy(probabilities: np.ndarray, candidates: Candidates) -> float:
     return float(-(some * np.log(some)).sum() / np.log(VIEWS + 1))
 
 
-class HannaTeacher:
+class HannaTeacher(ShortestTeacher):
     """Labels finished episodes: reference actions, help requests with their reasons, mistakes.
 
     The rule for being lost is the authors' program's, because the text's would teach an agent to ask for help when it
@@ -52,10 +52,6 @@ class HannaTeacher:
 
     def __init__(self) -> None:
         self._moves = PanoramicMoves()
-
-    def label(self, situation: Situation) -> Label:
-        s = situation
-        return Label(shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes))
 
     def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         graph, steps = world.graph, episode.steps
