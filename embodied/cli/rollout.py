@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Annotated
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, show
 from embodied.cli.options import Count, CubeFace, HouseFolder, Option, drawn_as
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
-from embodied.policies.baselines import WITHOUT_LEARNING
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, PictureSettings
 
 if TYPE_CHECKING:
     from embodied.world import World
+
+
+AGENTS = ("shortest", "random", "forward10")
+"""As in embodied.policies.baselines, which --help should not import."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +30,7 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Folder that `embodied house` wrote (default: a house generated from --seed)."""
     seed: int = 0
     """Random seed of the house and its tasks."""
-    agent: Annotated[str, Option(words=tuple(WITHOUT_LEARNING))] = "shortest"
+    agent: Annotated[str, Option(words=AGENTS)] = "shortest"
     """The agent."""
     episodes: Count = 1
     """Play N tasks."""
@@ -51,6 +54,7 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> int:
     from embodied.evaluation.metrics import PER_EPISODE
     from embodied.evaluation.rollout import play
     from embodied.language import People
+    from embodied.policies.baselines import WITHOUT_LEARNING
     from embodied.render.photograph import PhotoCamera
     from embodied.tasks.find import find_pool, find_task
     from viz.recording import Pictures, record_episode
