@@ -223,7 +223,7 @@ def test_any_execution_can_be_described_even_standing_still(world):
 
 
 def test_speakers_have_shares_that_sum_to_one():
-    assert sum(share for share, _ in SPEAKERS) == pytest.approx(1.0)
+    assert sum(s.share for s in SPEAKERS) == pytest.approx(1.0)
     assert draw_speaker(np.random.default_rng(0)) == draw_speaker(np.random.default_rng(0))
 
 
@@ -281,7 +281,7 @@ def test_a_counted_door_is_found_and_another_number_is_not(world):
 
 
 def test_a_room_entered_from_its_own_kind_is_the_next_or_the_other_one(lexicon):
-    speaker = SPEAKERS[0][1]
+    speaker = SPEAKERS[0]
     walk = [
         Phrase(Enter("corridor")),
         Phrase(Turn("left")),
