@@ -241,7 +241,7 @@ def test_gymnasiums_processes_forked_or_spawned_show_the_pictures_that_one_proce
         [sys.executable, script, str(drawn)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=240,
         env={**os.environ, "PYTHONPATH": paths},
     )
     assert done.stdout.strip() == "same", done.stderr[-3000:]
