@@ -120,6 +120,8 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
         "agents/weights/iliad_nav_mini.safetensors",
         "agents/weights/iliad_regex_tiny.safetensors",
         "agents/studies/data/printed.json",
+        "embodied/datasets/regions.toml",
+        "embodied/language/speakers.toml",
     }
     assert not wanted - names
     assert any(n.startswith("assets/data/") and n.endswith(".json") for n in names)
