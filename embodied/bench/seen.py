@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +13,14 @@ from assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, measure, one_core, ratio
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
-from embodied.gym.env import HelpGymEnv
+from embodied.gym.env import HelpGymEnv, make
 from embodied.gym.eyes import CameraSensor, PanoramaStore, Sensor, ViewSettings
+from embodied.gym.in_step import make_vec
+from embodied.gym.playground import flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain import PlainLanguage
+from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import World, open_world
@@ -25,6 +29,12 @@ FLAT = HouseConfig(area=(70.0, 110.0))
 """Where the agent walks."""
 STEPS = 200
 """Of one timed call."""
+ROUND = 20
+"""Of one timed call of a batch."""
+ROUNDS = 40
+"""Untimed calls before, in which every process decodes the panoramas that it meets."""
+BATCH = 64
+"""Environments of the vectorised line."""
 LINES = (
     ("rgb, 128 x 128", ("rgb",), ViewSettings(), 4000.0),
     ("rgb, depth and ids, 128 x 128", ("rgb", "depth", "ids"), ViewSettings(), 2000.0),
@@ -34,10 +44,12 @@ LINES = (
 
 
 def seen(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
-    """Random walks through one flat whose panoramas are in memory."""
-    house = generate_house(seed, FLAT, catalogue)
-    with one_core(), open_world(house, catalogue, cache, pictures=kind) as world:
-        yield from _measures(world, seed)
+    """Random walks through one flat whose panoramas are in memory: on one core, and a batch that looks on all."""
+    with one_core():
+        house = generate_house(seed, FLAT, catalogue)
+        with open_world(house, catalogue, cache, pictures=kind) as world:
+            yield from _measures(world, seed)
+        yield from _batches(seed, cache, kind)
 
 
 def _measures(world: World, seed: int) -> Iterator[Measure]:
@@ -51,24 +63,77 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
         yield measure(f"steps, {name}", walk, "1/s", per=steps, aim=aim)
     plain = _env(world, tasks, CameraSensor(store, ("rgb",), ViewSettings()))
     resampled = measure("steps, rgb, 128 x 128, again", lambda: _walk(plain, STEPS, seed), "1/s", per=STEPS)
-    naive = measure("the naive way: a picture drawn per step", lambda: _walk(plain, 40, seed, world), "1/s", per=40)
+    naive = measure("the naive way: a picture drawn per step", lambda: _draw(plain, world, 40, seed), "1/s", per=40)
     yield naive
     yield ratio("resampled against drawn", resampled, naive)
+
+
+def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
+    """One environment against batches of them, all in the flat that `make` generates from `seed`."""
+    drawn = PictureSettings(kind=kind)
+    asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": drawn}
+    for world in flat_playground("find", seed, cache=cache, pictures=asked["pictures"], sees=("rgb",)).worlds.values():
+        assert isinstance(world, World), "generated, so it can be drawn"
+        with world:
+            world.render_all()
+    walk = _Alone(make("find", **asked))
+    alone = measure("steps of one environment, rgb, 128 x 128", walk, "1/s", per=STEPS, warm=ROUNDS)
+    yield alone
+    envs = make_vec("find", BATCH, **asked)
+    name = f"steps of {BATCH} environments in one process"
+    together = measure(name, _Together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
+    envs.close()
+    yield together
+    yield ratio(f"{name} against one", together, alone)
+
+
+class _Alone:
+    """Goes STEPS steps on: the first move there is, again and again."""
+
+    def __init__(self, env: HelpGymEnv) -> None:
+        self._env, self._seen = env, env.reset(seed=0)[0]
+
+    def __call__(self) -> None:
+        for _ in range(STEPS):
+            self._seen, _, terminated, truncated, _ = self._env.step(int(self._seen["action_mask"].argmax()))
+            if terminated or truncated:
+                self._seen, _ = self._env.reset()
+
+
+class _Together:
+    """The same in every slot, ROUND steps on."""
+
+    def __init__(self, envs: Any) -> None:
+        self._envs, self._seen = envs, envs.reset(seed=0)[0]
+
+    def __call__(self) -> None:
+        for _ in range(ROUND):
+            self._seen, *_ = self._envs.step(self._seen["action_mask"].argmax(1))
 
 
 def _env(world: World, tasks: list[Task], sensor: Sensor) -> HelpGymEnv:
     return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks, sensor, layout=SpaceLayout())
 
 
-def _walk(env: HelpGymEnv, steps: int, seed: int, drawn: World | None = None) -> None:
-    """Random moves, a new task when one ends; never stops of its own. `drawn`: a world that draws every view."""
+def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:
+    """Random moves, a new task when one ends; never stops of its own."""
     rng = stream(seed, "bench", "walk")
     o, _ = env.reset(seed=seed)
     for _ in range(steps):
         possible = np.flatnonzero(o["action_mask"][: SpaceLayout().candidates])
         o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
-        if drawn is not None:
-            at, pose = drawn.graph.positions[env.pose.node], env.pose
-            drawn.renderer.view(at, pose.yaw, pose.pitch, ViewSettings().vfov, (128, 128))
+        if terminated or truncated:
+            o, _ = env.reset()
+
+
+def _draw(env: HelpGymEnv, world: World, steps: int, seed: int) -> None:
+    """The same walk, but every view is drawn from the model."""
+    rng = stream(seed, "bench", "walk")
+    o, _ = env.reset(seed=seed)
+    for _ in range(steps):
+        possible = np.flatnonzero(o["action_mask"][: SpaceLayout().candidates])
+        o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
+        pose = env._env.pose
+        world.renderer.view(world.graph.positions[pose.node], pose.yaw, pose.pitch, ViewSettings().vfov, (128, 128))
         if terminated or truncated:
             o, _ = env.reset()

@@ -1,18 +1,21 @@
-"""Benchmarks of views of a panorama."""
+"""Benchmarks of views of a panorama: angles seen before and new ones, and viewpoints that are not in memory yet."""
 
 from __future__ import annotations
 
 import functools
 import itertools
 import math
+import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from assets.catalogue import Catalogue
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, measure, one_core
+from embodied.datasets.skyboxes import write_skybox
 from embodied.generate import generate_house
+from embodied.mattersim.pictures import Skyboxes, skybox_folder
 from embodied.render.panorama import VFOV36, Panorama, perspective_grid
 from embodied.world import open_world
 
@@ -22,21 +25,33 @@ VIEWS = 12
 """Headings of one timed call."""
 AIMS = (((480, 640), 1200.0, 700.0), ((224, 224), 5000.0, 3000.0))
 """Height and width, and how many views per second are promised: of rgb; of rgb, depth and ids."""
+SHOWN = {"rgb": ("rgb",), "depth": ("depth",), "ids": ("ids",), "rgb, depth and ids": ("rgb", "depth", "ids")}
 
 
 def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
     """Views per second of processor time of one viewpoint of a flat, on one core."""
     with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, size=SIZE, pictures="unlit") as world:
         panorama = world.renderer.panorama(world.graph.positions[0])
-    with one_core():
-        for size, colours, everything in AIMS:
-            name = f"views of {size[1]} x {size[0]}"
-            for shown, channels, aim in (
-                ("rgb", ("rgb",), colours),
-                ("rgb, depth and ids", ("rgb", "depth", "ids"), everything),
-            ):
-                look = functools.partial(_look, panorama, channels, size, itertools.cycle(range(VIEWS)))
-                yield measure(f"{name}, {shown}", look, "1/s", per=VIEWS, aim=aim, clock=time.process_time)
+    with one_core(), tempfile.TemporaryDirectory() as folder:
+        for (height, width), colours, everything in AIMS:
+            size, name = (height, width), f"views of {width} x {height}"
+            for shown, channels in SHOWN.items():
+                aim = {"rgb": colours, "rgb, depth and ids": everything}.get(shown)
+                yield _rate(
+                    f"{name}, {shown}",
+                    functools.partial(_look, panorama, channels, size, itertools.cycle(range(VIEWS))),
+                    aim,
+                )
+            for shown in ("rgb", "rgb, depth and ids"):
+                look = functools.partial(_look, panorama, SHOWN[shown], size, itertools.count(0.01, 1.01))
+                yield _rate(f"{name}, {shown}, new angles", look)
+        write_skybox(panorama, "viewpoint", skybox_folder(folder, "scan"))
+        for shown, depth in (("rgb", False), ("rgb and depth", True)):
+            yield _rate(f"skyboxes of {SIZE} not in memory, {shown}", functools.partial(_open, folder, depth))
+
+
+def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Measure:
+    return measure(name, body, "1/s", per=VIEWS, aim=aim, clock=time.process_time)
 
 
 def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], turns: Iterator[float]) -> None:
@@ -45,3 +60,12 @@ def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], 
         grid = perspective_grid(panorama.size, turn * math.pi / 6 % math.tau, 0.0, VFOV36, *size)
         for channel in channels:
             panorama.through(grid, channel)
+
+
+def _open(folder: str, depth: bool) -> None:
+    """VIEWS times the first picture of a skybox."""
+    for _ in range(VIEWS):
+        boxes = Skyboxes(folder, 1)
+        boxes.rgb("scan", "viewpoint", 0.0, 0.0, VFOV36, (480, 640))
+        if depth:
+            boxes.metres("scan", "viewpoint", 0.0, 0.0, VFOV36, (480, 640))
