@@ -36,7 +36,7 @@ SUPERSAMPLING = 1.5
 """Where the CPU draws, colours are drawn this many times larger and averaged: cheaper there than multi-sampling, which
 multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
 MULTISAMPLES = 4
-BARE = (np.zeros((1, 1, 3), np.uint8),)
+BARE: tuple[np.ndarray, ...] = (np.zeros((1, 1, 3), np.uint8),)
 """Pages of a house that is drawn without colours."""
 
 
