@@ -564,12 +564,12 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
             signal.raise_signal(signal.SIGINT)
 
     split = setting()
-    agent = agent_for(split, config)
+    agent, before = agent_for(split, config), signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
         imitation.train(HannaLearner(agent, split, HannaTeacher()), split, tmp_path, identity(agent), note=note)
     assert said[-1] == "stopped after update 20; the same command goes on from there"
     assert torch.load(tmp_path / "checkpoint.pt", weights_only=True)["progress"]["update"] == 20
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
     agent = agent_for(split, dataclasses.replace(config, iterations=21))
     imitation.train(HannaLearner(agent, split, HannaTeacher()), split, tmp_path, identity(agent), note=note)
     assert "continuing after update 20" in said and said[-1].startswith("21/21")
