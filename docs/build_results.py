@@ -1,5 +1,5 @@
 """Writes the tables of docs/results/data/*.json into the pages that show them and into README.md, and a page with all
-tables, and draws the figures made of them.
+tables.
 
     python docs/build_results.py            # writes
     python docs/build_results.py --check    # exits 1 where a page is not what the data say
@@ -119,39 +119,6 @@ def details() -> str:
     return "\n".join(parts)
 
 
-SERIES = {
-    "above": "learned, by threshold",
-    "every": "every k steps",
-    "with": "at random",
-    "trained": "trained with a price",
-}
-WIDE = 20.0
-"""Points of success; where an interval is wider, the training seeds disagree and no bar is drawn."""
-
-
-def draw_requests(table: dict, path: Path) -> None:
-    """Success against the number of requests; bars are 95 % intervals."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6, 3.6), layout="constrained")
-    axes = figure.subplots()
-    for color, (first, title) in enumerate(SERIES.items()):
-        values = [r["values"] for r in table["rows"] if r["label"].split()[0] == first]
-        points = [(v["requests_unseen_houses"]["mean"], v["success_unseen_houses"]) for v in values]
-        points.sort(key=lambda point: point[0])
-        x, y = [p for p, _ in points], [v["mean"] for _, v in points]
-        half = [v["half_width"] if v["half_width"] <= WIDE else 0.0 for _, v in points]
-        axes.errorbar(x, y, half, marker="o", markersize=4, capsize=2, color=f"C{color}", label=title)
-        wide = [(p, v["mean"]) for p, v in points if v["half_width"] > WIDE]
-        axes.plot(
-            *zip(*wide) if wide else ((), ()), "o", markersize=6, markerfacecolor="white", color=f"C{color}", zorder=3
-        )
-    axes.set(xlabel="requests per task", ylabel="success in unseen houses (%)", ylim=(0, 75), xlim=(0, None))
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
-    figure.savefig(path, dpi=110, metadata={"Software": None})
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--check", action="store_true", help="write nothing, exit 1 where a page is out of date")
@@ -168,7 +135,6 @@ def main() -> int:
             print(f"{page} is not what docs/results/data says; run python docs/build_results.py", file=sys.stderr)
         return int(bool(stale))
     DETAILS.write_text(details(), encoding="utf-8")
-    draw_requests(load("hanna-requests"), HERE / "images" / "requests.png")
     return 0
 
 

@@ -575,3 +575,4 @@ def test_the_tables_are_made_from_a_data_set(tmp_path):
     shares = [times["rows"][0]["values"][f"{name}_at_1_val_unseen_env"]["mean"] for name in INTENTIONS]
     assert sum(shares) == pytest.approx(1), "every running episode chooses one intention"
     assert (tmp_path / "out" / "hari-figure-4.5b.png").exists()
+    assert dataclasses.replace(study, elsewhere=data.folder).tables()["4.7"].splits == ("test_unseen_env",)

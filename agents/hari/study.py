@@ -18,7 +18,7 @@ from agents.hari.run import CONDITIONS, rules_of, train_execution, train_intenti
 from agents.studies.engine import Measured
 from agents.studies.episodes import JUDGES, EpisodeStudy
 from agents.studies.tables import Figure, StudyRow, StudyTable
-from embodied.datasets.store import SplitData, dataset_of
+from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 from embodied.interface import Agent, Ask, Episode, Move
@@ -54,7 +54,10 @@ TABLES: Mapping[str, StudyTable] = {
         ),
         ("success",),
         TEST,
-        tuple((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
+        (
+            *((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
+            (_learned("learned"), _learned("uncooperative", cooperative=False)),
+        ),
         pooled=ACTIONS,
     ),
     "4.8": StudyTable(
@@ -90,16 +93,21 @@ class HariStudy(EpisodeStudy):
     """Where the rows start from."""
     executor: Path | None = None
     """A trained execution policy; None trains one in the study's folder."""
+    elsewhere: Path | None = None
+    """Another data set, in whose unseen houses agents are judged; None: in those of `data`."""
 
     name = "hari"
     makers = ("agents.hari.run",)
     judges = (*JUDGES, "agents.hari.judging")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        """The splits out of distribution that there are come beside those of the tests."""
-        ood = dataset_of(self.data, "hari").ood
-        extended = lambda t: dataclasses.replace(t, splits=(*t.splits, *ood)) if t.splits == TEST else t
-        return {name: extended(table) for name, table in TABLES.items()}
+        """The splits out of distribution come beside those of the tests; elsewhere, no house is known."""
+        ood, found = self.judged_in({}).ood, {}
+        for name, table in TABLES.items():
+            splits = [s for s in table.splits if self.elsewhere is None or s.endswith("_env")]
+            splits += ood if table.splits == TEST else ()
+            found[name] = dataclasses.replace(table, splits=tuple(splits))
+        return found
 
     def settings(self, train: Mapping[str, Any], seed: int) -> IntentionConfig:
         return dataclasses.replace(self.config, seed=seed, **train)
@@ -130,7 +138,14 @@ class HariStudy(EpisodeStudy):
         return policies(agent, means)[judge["played"]]
 
     def where(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> SplitData:
-        return dataset_of(self.data, "hari").split(split, hari=rules_of(agent.config))
+        return self.judged_in(judge).split(split, hari=rules_of(agent.config))
+
+    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
+        return dataset_of(self.elsewhere or self.data, "hari")
+
+    def about(self) -> str:
+        other = self.judged_in({}).digest[:16]
+        return super().about() + (f" Judged in the data set {other}." if self.elsewhere else "")
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         if judge.get(TIMES):

@@ -169,6 +169,10 @@ class HariOptions(Study, Trained, Judged, WithData):
     """The settings to start from."""
     execution: InputPath | None = None
     """A trained execution policy (default: trained in --out first)."""
+    judged_in: InputFolder | None = None
+    """Evaluate in the unseen houses of another data set (default: of --data)."""
+    judging_seeds: Seeds = 3
+    """Evaluate with N random seeds, from --seed on."""
     config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES, skip=("stack", "cooperative", "perfect"))]
 
 
@@ -320,8 +324,9 @@ def hari(args: HariOptions) -> int:
     from agents.hari.study import HariStudy
 
     config, execution = args.config, EXECUTION_SCALES[args.scale]
-    learner = study_of(HariStudy, args, judging=(config.seed,), execution=execution, executor=args.execution)
-    return run_table(args, learner)
+    judging = tuple(range(config.seed, config.seed + args.judging_seeds))
+    more = {"execution": execution, "executor": args.execution, "elsewhere": args.judged_in}
+    return run_table(args, study_of(HariStudy, args, judging=judging, **more))
 
 
 def vnla(args: VnlaOptions) -> int:
