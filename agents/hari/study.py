@@ -72,7 +72,7 @@ TABLES: Mapping[str, StudyTable] = {
         "Intentions by time step",
         (StudyRow("learned", {}, {"played": "learned", TIMES: True}),),
         splits=("val_unseen_env",),
-        figure=Figure(tuple(f"{name}_at" for name in INTENTIONS), "time step", "share of running episodes"),
+        figure=Figure(tuple(f"{name}_at" for name in INTENTIONS), "time step", "share of running episodes", share=True),
     ),
     "figure 4.6": StudyTable(
         "What costs change",

@@ -78,7 +78,7 @@ TABLES: Mapping[str, StudyTable] = {
         "Success over the course of training",
         tuple(dataclasses.replace(row, judge={"curve": True}) for row in LEARNERS),
         splits=("validation",),
-        figure=Figure(("success_at",), "training episodes", "success (share)"),
+        figure=Figure(("success_at",), "training episodes", "success (share)", share=True),
     ),
 }
 

@@ -56,6 +56,8 @@ def draw(table: StudyTable, body: Mapping[str, Any], path: Path) -> None:
     axes.set_ylabel(spec.ylabel)
     if spec.log:
         axes.set_xscale("log")
+    if spec.share:
+        axes.set_ylim(-0.02, 1.02)
     axes.grid(alpha=0.3)
     figure.legend(fontsize=7, loc="outside right upper")
     with atomic_path(path) as temporary:

@@ -35,6 +35,8 @@ class Figure:
     """Key of the column over whose mean rows are drawn, instead of their `x`."""
     log: bool = False
     """Whether x grows by factors."""
+    share: bool = False
+    """Whether what is drawn lies between 0 and 1."""
 
 
 @dataclass(frozen=True)
