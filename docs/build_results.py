@@ -9,6 +9,11 @@ and `brief` leaves out notes and command:
 
     <!-- table: hanna-4.5 columns: success_unseen_houses rows: Learned | No ask = No help brief -->
     <!-- end -->
+
+Rows of several tables stand side by side so, each group as "table column: label / label = title":
+
+    <!-- beside: Seeing / Blind of: hanna-sight success_test_unseen: Seeing / Blind = HANNA | find-find ... -->
+    <!-- end -->
 """
 
 from __future__ import annotations
@@ -28,6 +33,7 @@ PLACE = re.compile(
     r" -->\n).*?<!-- end -->",
     re.DOTALL,
 )
+BESIDE = re.compile(r"(<!-- beside: (?P<columns>[^>]*?) of: (?P<rows>[^>]*?) -->\n).*?<!-- end -->", re.DOTALL)
 OLDER = "Measured with an earlier version."
 
 
@@ -107,7 +113,22 @@ def filled(text: str) -> str:
         made = markdown(load(m["name"]), m["columns"], m["rows"], brief=bool(m["brief"]))
         return f"{m[1]}{made}<!-- end -->" if m["brief"] else f"{m[1]}\n{made}\n<!-- end -->"
 
-    return PLACE.sub(table, text)
+    return BESIDE.sub(lambda m: f"{m[1]}\n{beside(m['columns'], m['rows'])}\n<!-- end -->", PLACE.sub(table, text))
+
+
+def beside(columns: str, groups: str) -> str:
+    """One number of several rows of a table, side by side; one line for each table."""
+    titles = columns.split(" / ")
+    lines = [f"|  | {' | '.join(titles)} |", "|" + "---|" * (len(titles) + 1)]
+    for group in groups.split(" | "):
+        (where, labels), title = group.rpartition(" = ")[0].split(": ", 1), group.rpartition(" = ")[2]
+        name, key = where.split()
+        table = load(name)
+        rows, (column,) = {r["label"]: r for r in table["rows"]}, [c for c in table["columns"] if c["key"] == key]
+        digits = digits_of(table, key), most_digits(table, column)
+        cells = [cell({"values": rows[x]["values"]}, key, *digits) for x in labels.split(" / ")]
+        lines.append(f"| {title} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
 
 
 def details() -> str:
