@@ -11,7 +11,9 @@ an object is right. Reward: 1 for stopping right, -0.3 for stopping elsewhere, -
 agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in --unseen
 others, beside a random walk that stops as often as suits it best; the curve in OUT/curve.csv and curve.png, the numbers
 in OUT/result.json. --blind shows black pictures instead: what the goal alone gives. --eyes encoder shows what the
-encoder that ships, which does not learn, makes of three views around straight ahead.
+encoder that ships, which does not learn, makes of three views around straight ahead. --eyes detector (of --task find)
+shows what a small network reads of these features: whether what is sought is visible in each of the three views, and
+whether it is so near that stopping is right. It is trained before, on the simulator's labels of the training flats.
 """
 
 from __future__ import annotations
@@ -37,7 +39,11 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents.vision.live import shipped_features
+from agents.common.shipped import SHIPPED_ENCODER
+from agents.vision.encoder import load_encoder
+from agents.vision.features import encode_panoramas
+from agents.vision.labels import look, visible_in_views
+from agents.vision.live import LiveFeatures, shipped_features
 from assets.cache import atomic_path, default_cache
 from assets.catalogue import load_catalogue
 from embodied.action_spaces import MonocularMoves
@@ -48,7 +54,7 @@ from embodied.geometry import wrap
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import CameraSensor, FeatureSensor, PanoramaStore, ViewSettings
 from embodied.gym.spaces import SpaceLayout
-from embodied.interface import TURNS, FollowRoute, Pose, Task
+from embodied.interface import TURNS, FollowRoute, Pose, Sight, Task, viewpoint
 from embodied.language.plain import PlainLanguage
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
@@ -88,6 +94,60 @@ class Arena:
     """The requests that are numbered; none for points."""
 
 
+class Detector(LiveFeatures):
+    """Whether each goal is visible in each view, and near enough to stop: what a network that was trained on the
+    simulator's labels of some flats reads of the shipped encoder's features."""
+
+    def __init__(self, network: torch.nn.Module, store: PanoramaStore, goals: int) -> None:
+        super().__init__(load_encoder(SHIPPED_ENCODER), store)
+        self._network, self._read, self.size = network, {}, 2 * goals
+
+    def features(self, sight: Sight) -> np.ndarray:
+        """(36, 2 C) float32 probabilities: of being visible, then of being near, too."""
+        key = viewpoint(sight)
+        if key not in self._read:
+            panorama = encode_panoramas(self._encoder, [self._store.at(sight)])[0]
+            self._read[key] = read(self._network, panorama.astype(np.float32))
+        return self._read[key]
+
+
+@torch.inference_mode()
+def read(network: torch.nn.Module, features: np.ndarray) -> np.ndarray:
+    """(36, D) features -> (36, 2 C) probabilities."""
+    return torch.sigmoid(network(torch.from_numpy(features))).numpy()
+
+
+def train_detector(place: Arena, seed: int, epochs: int = 30, batch: int = 512) -> torch.nn.Module:
+    """(..., D) features -> (..., 2 C) logits, trained on every view of the flats."""
+    encoder, seen, labels = load_encoder(SHIPPED_ENCODER), [], []
+    for world in place.worlds.values():
+        visible = visible_in_views(look(world, place.goals).share)  # (n, 36, C)
+        near = np.zeros((len(visible), 1, len(place.goals)), dtype=bool)
+        for task in place.tasks:
+            if task.world == world.name:
+                near[list(task.goal_nodes), 0, place.goals.index(task.request)] = True
+        seen.append(encode_panoramas(encoder, [world.panorama(n) for n in range(len(visible))]))
+        labels.append(np.concatenate([visible, visible & near], -1))
+    x = torch.from_numpy(np.concatenate(seen).astype(np.float32)).flatten(0, 1)
+    y = torch.from_numpy(np.concatenate(labels).astype(np.float32)).flatten(0, 1)
+    generator = torch.Generator().manual_seed(seed)
+    network = torch.nn.Sequential(
+        torch.nn.LayerNorm(x.shape[1]),
+        torch.nn.Dropout(0.3),
+        torch.nn.Linear(x.shape[1], 64),
+        torch.nn.ReLU(),
+        torch.nn.Dropout(0.3),
+        torch.nn.Linear(64, y.shape[1]),
+    )
+    optimizer = torch.optim.AdamW(network.parameters(), 1e-3, weight_decay=0.01)
+    for _ in range(epochs):
+        for rows in torch.randperm(len(x), generator=generator).split(batch):
+            optimizer.zero_grad()
+            torch.nn.functional.binary_cross_entropy_with_logits(network(x[rows]), y[rows]).backward()
+            optimizer.step()
+    return network.eval()
+
+
 class Seeker(gymnasium.Wrapper):
     """What PPO sees and does: colours or features of them, the goal as numbers, four actions."""
 
@@ -99,8 +159,9 @@ class Seeker(gymnasium.Wrapper):
         if self._coloured:
             seen = env.observation_space["rgb"]
         else:
-            shape = (len(AHEAD) * env.observation_space["features"].shape[1],)
-            seen = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
+            self._detected = env.observation_space["features"].shape[1] == 2 * len(goals)
+            many = 2 if self._detected else env.observation_space["features"].shape[1]
+            seen = gymnasium.spaces.Box(-np.inf, np.inf, (len(AHEAD) * many,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({"seen": seen, "goal": goal})
         self.action_space = gymnasium.spaces.Discrete(len(ACTIONS))
 
@@ -120,9 +181,12 @@ class Seeker(gymnasium.Wrapper):
         return {"seen": seen, "goal": self._numbered() if self._goals else self._direction()}
 
     def _ahead(self, features: np.ndarray) -> np.ndarray:
-        """Features of the level views around straight ahead."""
+        """Features of the level views around straight ahead; of a detector's, those of the goal alone."""
         turn = self.env._env.pose.turn
-        return features[[TURNS + (turn + k) % TURNS for k in AHEAD]].ravel()
+        seen = features[[TURNS + (turn + k) % TURNS for k in AHEAD]]
+        return (
+            seen[:, self._goals.index(self.env.task.request) :: len(self._goals)] if self._detected else seen
+        ).ravel()
 
     def _numbered(self) -> np.ndarray:
         goal = np.zeros(len(self._goals), np.float32)
@@ -137,7 +201,7 @@ class Seeker(gymnasium.Wrapper):
         return np.array([min(math.hypot(x, y) / FAR, 1.0), math.sin(aside), math.cos(aside)], np.float32)
 
 
-class Sight(BaseFeaturesExtractor):
+class Eyes(BaseFeaturesExtractor):
     """Three small convolutions of colours, or one layer over features, and the goal beside what they find."""
 
     def __init__(self, space: gymnasium.spaces.Dict, size: int = 128) -> None:
@@ -243,40 +307,56 @@ def find_tasks(world: World, seed: int) -> list[Task]:
     return [dataclasses.replace(t, request=t.goal.object_class) for t in tasks]
 
 
-def maker(place: Arena, blind: bool, encoded: bool) -> Callable[[], Seeker]:
+def maker(place: Arena, blind: bool, eyes: str, detector: torch.nn.Module | None = None) -> Callable[[], Seeker]:
     """A maker of environments that share the flats and their decoded panoramas."""
     store = PanoramaStore(place.worlds)
-    pixels = CameraSensor(store, ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
-    eyes = FeatureSensor("features", shipped_features(store)) if encoded else pixels
+    if eyes == "pixels":
+        sensor = CameraSensor(store, ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
+    else:
+        source = Detector(detector, store, len(place.goals)) if detector else shipped_features(store)
+        sensor = FeatureSensor("features", source)
     moves = MonocularMoves()
 
     def make() -> Seeker:
         env = HelpGymEnv(
-            lambda: HelpEnv(place.worlds, moves=moves), place.tasks, eyes, layout=LAYOUT, shaping=True, patience=HORIZON
+            lambda: HelpEnv(place.worlds, moves=moves),
+            place.tasks,
+            sensor,
+            layout=LAYOUT,
+            shaping=True,
+            patience=HORIZON,
         )
         return Seeker(env, place.goals, blind)
 
     return make
 
 
-def judged(env: gymnasium.Env, act: Callable[[dict[str, np.ndarray]], int], episodes: int, seed: int) -> float:
-    """Share of episodes that succeed."""
-    found = 0.0
+Outcomes = dict[str, list[float]]
+"""By flat, of each episode: 1 where it succeeded."""
+
+
+def judged(env: Seeker, act: Callable[[dict[str, np.ndarray]], int], episodes: int, seed: int) -> Outcomes:
+    """Which episodes succeed."""
+    found: Outcomes = {}
     for k in range(episodes):
         (observation, _), ended = env.reset(seed=seed + k), False
         while not ended:
             observation, _, terminated, truncated, info = env.step(act(observation))
             ended = terminated or truncated
-        found += info.get("success", 0.0)
-    return found / episodes
+        found.setdefault(env.env.task.world, []).append(info.get("success", 0.0))
+    return found
 
 
-def interval(share: float, n: int) -> str:
-    """A share of n episodes and its 95 % interval, per cent. Source: Wilson 1927."""
+def share(found: Outcomes) -> float:
+    return float(np.mean(sum(found.values(), [])))
+
+
+def interval(p: float, n: int) -> str:
+    """A share p of n episodes and its 95 % interval, per cent. Source: Wilson 1927."""
     z = 1.96
-    middle, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
+    middle, half = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
     low, high = (abs(100 * (middle + s * half) / (1 + z * z / n)) for s in (-1, 1))
-    return f"{100 * share:.0f} % ({low:.0f} to {high:.0f})"
+    return f"{100 * p:.0f} % ({low:.0f} to {high:.0f})"
 
 
 def walker(chance: float, rng: np.random.Generator) -> Callable[[dict[str, np.ndarray]], int]:
@@ -284,14 +364,14 @@ def walker(chance: float, rng: np.random.Generator) -> Callable[[dict[str, np.nd
     return lambda o: STOP if rng.random() < chance else int(rng.integers(STOP))
 
 
-def report(name: str, make: Callable[[], Seeker], learner: PPO, args: argparse.Namespace) -> dict[str, float]:
-    """Says how the learner and the random walk fare, and returns their shares of success."""
+def report(name: str, make: Callable[[], Seeker], learner: PPO, args: argparse.Namespace) -> dict[str, Any]:
+    """Says how the learner and the random walk fare; returns their shares of success and the learner's outcomes."""
     env, rng = make(), np.random.default_rng(args.seed)
-    learned = judged(env, lambda o: int(learner.predict(o, deterministic=False)[0]), args.judge, 1000)
-    random = max(judged(env, walker(chance, rng), args.judge, 1000) for chance in STOPS)
-    n = args.judge
+    outcomes = judged(env, lambda o: int(learner.predict(o, deterministic=False)[0]), args.judge, 1000)
+    random = max(share(judged(env, walker(chance, rng), args.judge, 1000)) for chance in STOPS)
+    learned, n = share(outcomes), args.judge
     print(f"{name}: succeeds in {interval(learned, n)} of {n} episodes, random walk {interval(random, n)}", flush=True)
-    return {"learned": learned, "random walk": random, "episodes": n}
+    return {"learned": learned, "random walk": random, "episodes": n, "outcomes": outcomes}
 
 
 def draw_curve(table: Path, random: float, picture: Path) -> None:
@@ -313,7 +393,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=10_000_000, help="at most so many")
     parser.add_argument("--flats", type=int, default=3, help="how many flats it learns in")
     parser.add_argument("--unseen", type=int, default=1, help="in how many other flats it is judged")
-    parser.add_argument("--eyes", default="pixels", choices=("pixels", "encoder"), help="colours, or frozen features")
+    parser.add_argument("--eyes", default="pixels", choices=("pixels", "encoder", "detector"), help="what it sees")
     parser.add_argument("--goals", nargs="+", default=GOALS, metavar="CLASS", help="what it looks for")
     parser.add_argument("--blind", action="store_true", help="black pictures, to compare with")
     parser.add_argument("--envs", type=int, default=16)
@@ -325,12 +405,15 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("out/ppo"))
     args = parser.parse_args()
+    if args.eyes == "detector" and args.task != "find":
+        parser.error("--eyes detector needs --task find: it detects what is sought")
     torch.set_num_threads(args.threads)
     args.out.mkdir(parents=True, exist_ok=True)
 
     home = arena(args, range(args.flats))
     print(f"{len(home.tasks)} tasks {', '.join(home.goals)}", flush=True)
-    make = maker(home, args.blind, args.eyes == "encoder")
+    detector = train_detector(home, args.seed) if args.eyes == "detector" else None
+    make = maker(home, args.blind, args.eyes, detector)
     envs, agent = DummyVecEnv([lambda: Monitor(make())] * args.envs), args.out / "agent.zip"
     learner = (
         PPO.load(agent, envs, device="cpu")
@@ -338,7 +421,7 @@ def main() -> None:
         else PPO(
             "MultiInputPolicy",
             envs,
-            policy_kwargs={"features_extractor_class": Sight, "net_arch": [64]},
+            policy_kwargs={"features_extractor_class": Eyes, "net_arch": [64]},
             n_steps=args.rollout,
             batch_size=256,
             n_epochs=4,
@@ -358,7 +441,7 @@ def main() -> None:
     draw_curve(args.out / "curve.csv", result["flats it learned in"]["random walk"], args.out / "curve.png")
     away = arena(args, range(args.flats, args.flats + args.unseen))
     if away.tasks:
-        others = maker(away, args.blind, args.eyes == "encoder")
+        others = maker(away, args.blind, args.eyes, detector)
         result["flats it never saw"] = report("flats it never saw", others, learner, args)
     settings = {name: value for name, value in vars(args).items() if name != "out"}
     (args.out / "result.json").write_text(
