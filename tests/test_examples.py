@@ -77,10 +77,11 @@ def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(ru
 
 @pytest.mark.gl
 @pytest.mark.slow
-def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(run, tmp_path):
+@pytest.mark.parametrize("what", [(), ("--task", "find", "--eyes", "detector")], ids=["pixels", "detector"])
+def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(run, tmp_path, what):
     pytest.importorskip("stable_baselines3")
     short = ("--pictures", "unlit", "--steps", "256", "--envs", "2", "--rollout", "64", "--judge", "3", "--flats", "1")
-    said = run("ppo_pixels.py", *short, "--out", "ppo")
+    said = run("ppo_pixels.py", *short, *what, "--out", "ppo")
     for where in ("flats it learned in", "flats it never saw"):
         assert re.search(where + r": succeeds in \d+ % \(\d+ to \d+\) of 3 episodes, random walk \d+ %", said)
     assert (tmp_path / "ppo" / "agent.zip").exists()
