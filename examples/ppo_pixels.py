@@ -40,10 +40,11 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from agents.common.shipped import SHIPPED_ENCODER
+from agents.common.weights import seeded
 from agents.vision.encoder import load_encoder
 from agents.vision.features import encode_panoramas
 from agents.vision.labels import look, visible_in_views
-from agents.vision.live import LiveFeatures, shipped_features
+from agents.vision.live import shipped_features
 from assets.cache import atomic_path, default_cache
 from assets.catalogue import load_catalogue
 from embodied.action_spaces import MonocularMoves
@@ -54,7 +55,7 @@ from embodied.geometry import wrap
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import CameraSensor, FeatureSensor, PanoramaStore, ViewSettings
 from embodied.gym.spaces import SpaceLayout
-from embodied.interface import TURNS, FollowRoute, Pose, Sight, Task, viewpoint
+from embodied.interface import TURNS, FeatureSource, FollowRoute, Pose, Sight, Task, Viewpoint, viewpoint
 from embodied.language.plain import PlainLanguage
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
@@ -94,27 +95,22 @@ class Arena:
     """The requests that are numbered; none for points."""
 
 
-class Detector(LiveFeatures):
+class Detector:
     """Whether each goal is visible in each view, and near enough to stop: what a network that was trained on the
-    simulator's labels of some flats reads of the shipped encoder's features."""
+    simulator's labels of some flats reads of an encoder's features."""
 
-    def __init__(self, network: torch.nn.Module, store: PanoramaStore, goals: int) -> None:
-        super().__init__(load_encoder(SHIPPED_ENCODER), store)
-        self._network, self._read, self.size = network, {}, 2 * goals
+    def __init__(self, network: torch.nn.Module, source: FeatureSource, goals: int) -> None:
+        self._network, self._source, self.size = network, source, 2 * goals
+        self._read: dict[Viewpoint, np.ndarray] = {}
 
     def features(self, sight: Sight) -> np.ndarray:
         """(36, 2 C) float32 probabilities: of being visible, then of being near, too."""
         key = viewpoint(sight)
         if key not in self._read:
-            panorama = encode_panoramas(self._encoder, [self._store.at(sight)])[0]
-            self._read[key] = read(self._network, panorama.astype(np.float32))
+            with torch.inference_mode():
+                logits = self._network(torch.from_numpy(self._source.features(sight)))
+            self._read[key] = torch.sigmoid(logits).numpy()
         return self._read[key]
-
-
-@torch.inference_mode()
-def read(network: torch.nn.Module, features: np.ndarray) -> np.ndarray:
-    """(36, D) features -> (36, 2 C) probabilities."""
-    return torch.sigmoid(network(torch.from_numpy(features))).numpy()
 
 
 def train_detector(place: Arena, seed: int, epochs: int = 30, batch: int = 512) -> torch.nn.Module:
@@ -130,37 +126,36 @@ def train_detector(place: Arena, seed: int, epochs: int = 30, batch: int = 512) 
         labels.append(np.concatenate([visible, visible & near], -1))
     x = torch.from_numpy(np.concatenate(seen).astype(np.float32)).flatten(0, 1)
     y = torch.from_numpy(np.concatenate(labels).astype(np.float32)).flatten(0, 1)
-    generator = torch.Generator().manual_seed(seed)
-    network = torch.nn.Sequential(
-        torch.nn.LayerNorm(x.shape[1]),
-        torch.nn.Dropout(0.3),
-        torch.nn.Linear(x.shape[1], 64),
-        torch.nn.ReLU(),
-        torch.nn.Dropout(0.3),
-        torch.nn.Linear(64, y.shape[1]),
-    )
-    optimizer = torch.optim.AdamW(network.parameters(), 1e-3, weight_decay=0.01)
-    for _ in range(epochs):
-        for rows in torch.randperm(len(x), generator=generator).split(batch):
-            optimizer.zero_grad()
-            torch.nn.functional.binary_cross_entropy_with_logits(network(x[rows]), y[rows]).backward()
-            optimizer.step()
+    with seeded(seed):  # an agent that goes on learning, or is judged again, sees with the same detector
+        network = torch.nn.Sequential(
+            torch.nn.LayerNorm(x.shape[1]),
+            torch.nn.Dropout(0.3),
+            torch.nn.Linear(x.shape[1], 64),
+            torch.nn.ReLU(),
+            torch.nn.Dropout(0.3),
+            torch.nn.Linear(64, y.shape[1]),
+        )
+        optimizer = torch.optim.AdamW(network.parameters(), 1e-3, weight_decay=0.01)
+        for _ in range(epochs):
+            for rows in torch.randperm(len(x)).split(batch):
+                optimizer.zero_grad()
+                torch.nn.functional.binary_cross_entropy_with_logits(network(x[rows]), y[rows]).backward()
+                optimizer.step()
     return network.eval()
 
 
 class Seeker(gymnasium.Wrapper):
     """What PPO sees and does: colours or features of them, the goal as numbers, four actions."""
 
-    def __init__(self, env: HelpGymEnv, goals: Sequence[str], blind: bool) -> None:
+    def __init__(self, env: HelpGymEnv, goals: Sequence[str], blind: bool, detected: bool) -> None:
         super().__init__(env)
-        self._goals, self._blind = goals, blind
+        self._goals, self._blind, self._detected = goals, blind, detected
         goal = gymnasium.spaces.Box(-1.0, 1.0, (len(goals) or 3,), np.float32)
         self._coloured = "rgb" in env.observation_space.spaces
         if self._coloured:
             seen = env.observation_space["rgb"]
         else:
-            self._detected = env.observation_space["features"].shape[1] == 2 * len(goals)
-            many = 2 if self._detected else env.observation_space["features"].shape[1]
+            many = 2 if detected else env.observation_space["features"].shape[1]
             seen = gymnasium.spaces.Box(-np.inf, np.inf, (len(AHEAD) * many,), np.float32)
         self.observation_space = gymnasium.spaces.Dict({"seen": seen, "goal": goal})
         self.action_space = gymnasium.spaces.Discrete(len(ACTIONS))
@@ -184,9 +179,9 @@ class Seeker(gymnasium.Wrapper):
         """Features of the level views around straight ahead; of a detector's, those of the goal alone."""
         turn = self.env._env.pose.turn
         seen = features[[TURNS + (turn + k) % TURNS for k in AHEAD]]
-        return (
-            seen[:, self._goals.index(self.env.task.request) :: len(self._goals)] if self._detected else seen
-        ).ravel()
+        if self._detected:
+            seen = seen[:, self._goals.index(self.env.task.request) :: len(self._goals)]
+        return seen.ravel()
 
     def _numbered(self) -> np.ndarray:
         goal = np.zeros(len(self._goals), np.float32)
@@ -313,7 +308,9 @@ def maker(place: Arena, blind: bool, eyes: str, detector: torch.nn.Module | None
     if eyes == "pixels":
         sensor = CameraSensor(store, ("rgb",), ViewSettings("view", SIDE, SIDE, ANGLE))
     else:
-        source = Detector(detector, store, len(place.goals)) if detector else shipped_features(store)
+        source = shipped_features(store)
+        if detector:
+            source = Detector(detector, source, len(place.goals))
         sensor = FeatureSensor("features", source)
     moves = MonocularMoves()
 
@@ -326,7 +323,7 @@ def maker(place: Arena, blind: bool, eyes: str, detector: torch.nn.Module | None
             shaping=True,
             patience=HORIZON,
         )
-        return Seeker(env, place.goals, blind)
+        return Seeker(env, place.goals, blind, detector is not None)
 
     return make
 
