@@ -19,6 +19,7 @@ from typing import Any
 
 from embodied import software
 from embodied.errors import UnableError
+from embodied.threads import keep_drawing_to_threads
 
 BACKENDS = ("egl", "osmesa")
 ELSEWHERE = (
@@ -217,6 +218,7 @@ def _let_go(owner: _Owner) -> None:
 
 def _create(backend: str) -> Any:
     software.load_triton_first()
+    keep_drawing_to_threads()
     try:
         if backend == "egl":
             from mujoco.egl import GLContext

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from conftest import two_rooms
@@ -21,7 +22,7 @@ from embodied.bench.light import psnr, ssim
 from embodied.geometry import r2
 from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, backend, in_numpy, settings_of
-from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, scene_of, threads_allowed, variant_of
+from embodied.light.backend import array, drjit, find_llvm, floats, mitsuba, scene_of, variant_of
 from embodied.light.baking import check, compose, solve
 from embodied.light.baking.denoise import Grid, smooth_pages
 from embodied.light.baking.house import brightest
@@ -35,6 +36,7 @@ from embodied.light.tracing.emitters import lamps_of, portals_of
 from embodied.light.tracing.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.scene.landscapes import Scenery
 from embodied.scene.part import Part
+from embodied.threads import keep_drawing_to_threads, threads_allowed
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
@@ -314,6 +316,22 @@ def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
         assert threads_allowed() == threads, text
     monkeypatch.delenv("OMP_NUM_THREADS")
     assert threads_allowed() is None
+
+
+def test_drawing_keeps_to_the_threads_of_a_process(monkeypatch):
+    told = []
+    monkeypatch.setattr(cv2, "setNumThreads", told.append)
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    for given, mesa in ((None, None), ("1", "0"), ("2", "2")):
+        monkeypatch.setenv("LP_NUM_THREADS", "")  # so that what was there comes back
+        monkeypatch.delenv("LP_NUM_THREADS")
+        monkeypatch.setenv("OMP_NUM_THREADS", given or "")
+        keep_drawing_to_threads()
+        assert os.environ.get("LP_NUM_THREADS") == mesa, given
+    assert told == [1, 2]
+    monkeypatch.setenv("LP_NUM_THREADS", "1")
+    keep_drawing_to_threads()
+    assert os.environ["LP_NUM_THREADS"] == "1", "whoever set Mesa's own switch meant it"
 
 
 @pytest.mark.slow

@@ -97,6 +97,26 @@ def test_one_pass_shows_what_two_show(mine, eye, yaw, pitch, size):
 
 
 @gl_test
+def test_what_shines_through_is_laid_over_all_of_its_part_and_no_more(mine, monkeypatch):
+    """From before panes, beside them and between them, whole pictures are laid over to the same result."""
+    parts, known = [], raster.extent
+
+    def noted(*given):
+        parts.append(known(*given))
+        return parts[-1]
+
+    cameras = [camera_at(eye, yaw, pitch, LENS) for eye, yaw, pitch in VIEWS]
+    cameras += [camera_at(EYE, k * math.pi / 8, 0.1 * (k % 3), LENS) for k in range(16)]
+    monkeypatch.setattr(raster, "extent", noted)
+    some = [mine.rgb(camera, SIZE) for camera in cameras]
+    monkeypatch.setattr(raster, "extent", lambda middles, reaches, matrix, size: (0, 0, size[1], size[0]))
+    assert all(np.array_equal(one, mine.rgb(camera, SIZE)) for one, camera in zip(some, cameras, strict=True))
+    whole = math.ceil(1.5 * SIZE[0]) * math.ceil(1.5 * SIZE[1])
+    areas = [width * height for _, _, width, height in parts]
+    assert 0 in areas and any(0 < a < whole for a in areas), "some views show no pane, and some a part of one"
+
+
+@gl_test
 def test_mujoco_and_shaders_do_not_disturb_each_other(mine, mujocos):
     camera = camera_at(EYE, 0.4, -0.2, LENS)
     first = [r.through(camera, SIZE) for r in (mine, mujocos)]

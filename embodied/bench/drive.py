@@ -1,4 +1,7 @@
-"""Benchmarks of live pictures and of the body on wheels that sees them, per second of processor time."""
+"""Benchmarks of live pictures and of the body on wheels that sees them, per second of processor time.
+
+With OMP_NUM_THREADS=1 they are of one core; threads that draw together take more processor time in all.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ import numpy as np
 
 from assets.catalogue import Catalogue
 from embodied.bench.seen import FLAT
-from embodied.bench.timing import Measure, measure, share
+from embodied.bench.timing import Measure, measure, one_core, share
 from embodied.generate import generate_house
 from embodied.gym.driving import DriveSettings, Driving, guided
 from embodied.render.camera import Camera
@@ -31,7 +34,7 @@ LINES = (("physics alone", ()), ("rgb, 128 x 128", ("rgb",)), ("rgb and depth, 1
 
 def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterator[Measure]:
     """Guided drives through one flat; whoever draws with the CPU has all of that counted."""
-    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, pictures=pictures) as world:
+    with one_core(), open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, pictures=pictures) as world:
         driving = Driving({world.name: world}, DriveSettings(sees=()))
         commands, cameras = recorded(driving, seed)
         rate = functools.partial(measure, unit="1/s", per=STEPS, clock=time.process_time)

@@ -24,6 +24,7 @@ from embodied.errors import UnableError
 from embodied.light import in_numpy
 from embodied.light.arrays import Array, RayScene
 from embodied.software import bundled, load_atomic
+from embodied.threads import threads_allowed
 
 _LLVM_PLACES = (
     "/usr/lib/*/libLLVM*.so*",
@@ -80,17 +81,6 @@ def _module() -> types.ModuleType:
     if (threads := threads_allowed()) is not None:
         dr.set_thread_count(threads)
     return mi
-
-
-def threads_allowed() -> int | None:
-    """How many threads this process should use, as OMP_NUM_THREADS has it but no more than there are processors; None
-    where nobody says.
-
-    The workers of joblib and of Ray get it as their share of the machine. Without it every process takes all
-    processors, and threads that wait for work do so awake (docs/pictures.md has what it costs).
-    """
-    first = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # a list is for nested loops
-    return min(int(first), os.cpu_count() or 1) if first.isdecimal() and int(first) > 0 else None
 
 
 def variant_of(has_backend: Callable[[str], bool]) -> str:

@@ -1,0 +1,27 @@
+"""How many threads this process may use, and whom that is told to."""
+
+from __future__ import annotations
+
+import os
+
+
+def threads_allowed() -> int | None:
+    """How many threads this process should use, as OMP_NUM_THREADS has it but no more than there are processors; None
+    where nobody says.
+
+    The workers of joblib and of Ray get it as their share of the machine. Without it every process takes all
+    processors, and threads that wait for work do so awake (docs/pictures.md has what it costs).
+    """
+    first = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # a list is for nested loops
+    return min(int(first), os.cpu_count() or 1) if first.isdecimal() and int(first) > 0 else None
+
+
+def keep_drawing_to_threads() -> None:
+    """Have Mesa's software OpenGL, which is not open yet, and OpenCV draw with as many threads as are allowed."""
+    threads = threads_allowed()
+    if threads is None:
+        return
+    import cv2
+
+    os.environ.setdefault("LP_NUM_THREADS", str(threads if threads > 1 else 0))  # 0: in the thread that draws
+    cv2.setNumThreads(threads)
