@@ -83,7 +83,7 @@ def test_pictures_are_those_of_mujoco(mine, mujocos, eye, yaw, pitch):
 
 @gl_test
 @pytest.mark.parametrize(("eye", "yaw", "pitch"), VIEWS)
-@pytest.mark.parametrize("size", [SIZE, (95, 127)])
+@pytest.mark.parametrize("size", [SIZE, (95, 127), (480, 640)])
 def test_one_pass_shows_what_two_show(mine, eye, yaw, pitch, size):
     """But for edges, where ids come from a sixth of a pixel beside; depth is that of the middle of the pixel."""
     camera = camera_at(eye, yaw, pitch, LENS)

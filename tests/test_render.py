@@ -16,10 +16,11 @@ from handmade import HandCatalogue, furnished
 from embodied import gl
 from embodied.render import visibility
 from embodied.render.camera import FAR, NEAR, camera_at, face_cameras
-from embodied.render.classic import Renderer, two_thirds
+from embodied.render.classic import Renderer
 from embodied.render.geoms import depth_of_reversed_z
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.render.pictures import KINDS, PictureSettings
+from embodied.render.supersampling import averaged, drawn_size, nearest, step_of
 from embodied.scene.house_meshes import owners
 from embodied.scene.model import VISUAL, compile_scene
 
@@ -194,11 +195,22 @@ def test_what_hangs_above_a_door_is_not_seen_through_it(house):
         assert sector.top < 0.6, "the door is lower than the ceiling"
 
 
-@pytest.mark.parametrize(("height", "width"), [(3, 3), (6, 9), (192, 150)])
-def test_two_thirds_are_the_mean_over_each_pixels_area(height, width):
-    picture = np.random.default_rng(0).integers(0, 256, (height, width, 3), np.uint8)
-    expected = cv2.resize(picture, (width // 3 * 2, height // 3 * 2), interpolation=cv2.INTER_AREA)[::-1]
-    np.testing.assert_array_equal(two_thirds(picture), expected)
+@pytest.mark.parametrize(("drawn", "size"), [((3, 3), (2, 2)), ((192, 150), (128, 100)), ((600, 800), (480, 640))])
+def test_what_is_drawn_larger_becomes_the_mean_over_each_pixels_area(drawn, size):
+    assert drawn_size(size) == drawn and step_of(size, drawn)
+    picture = np.random.default_rng(0).integers(0, 256, (*drawn, 3), np.uint8)
+    expected = cv2.resize(picture, size[::-1], interpolation=cv2.INTER_AREA)[::-1]
+    found = averaged(picture, size)
+    assert np.abs(found.astype(int) - expected).max() <= (0 if step_of(size, drawn) == 3 else 3)
+
+
+@pytest.mark.parametrize("size", [(8, 12), (480, 640)])
+def test_the_nearest_drawn_pixel_is_that_of_the_middle(size):
+    drawn = drawn_size(size)
+    rows, columns = np.divmod(nearest(np.arange(np.prod(drawn), dtype=np.int32).reshape(drawn), size), drawn[1])
+    for found, at, n in ((rows[:, 0], size[0], drawn[0]), (columns[0], size[1], drawn[1])):
+        apart = (found + 0.5) * at / n - (np.arange(at) + 0.5)
+        assert np.abs(apart).max() < 1 / 3
 
 
 def test_rooms_seen_through_two_windows_of_an_l_shape_are_kept():

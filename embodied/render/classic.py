@@ -6,7 +6,6 @@ the list of geoms to draw. MuJoCo draws them; where the CPU draws a lit house, e
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol, Self
@@ -24,6 +23,7 @@ from embodied.render.camera import FAR, NEAR, Camera, View, camera_at, face_came
 from embodied.render.geoms import Geoms
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
+from embodied.render.supersampling import averaged, drawn_size
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.model import compile_scene, drawn_meshes, give_memory_back
@@ -32,10 +32,8 @@ from embodied.scene.part import Part
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-SUPERSAMPLING = 1.5
-"""Where the CPU draws, colours are drawn this many times larger and averaged: cheaper there than multi-sampling, which
-multiplies the cost of every small triangle, and smoother. A GPU multi-samples instead."""
 MULTISAMPLES = 4
+"""Of a pixel, where a GPU draws."""
 BARE: tuple[np.ndarray, ...] = (np.zeros((1, 1, 3), np.uint8),)
 """Pages of a house that is drawn without colours."""
 
@@ -172,13 +170,14 @@ class Renderer:
     def through(self, camera: Camera, size: tuple[int, int], *, cull: bool = True) -> View:
         """The picture of (height, width) that `camera` takes; `cull` as in `view`.
 
-        Where the CPU draws a lit house, ids are of a point a sixth of a pixel beside the middle, which tells at edges.
+        Where the CPU draws a lit house, an id is of a point up to a third of a pixel beside the middle: it tells at
+        edges.
         """
         drawing, chosen = self._open(), self._chosen(camera, size, cull)
         if self._painter is not None:
             return View(self._rgb(camera, size, chosen), *self._seen(camera, size, chosen))
         picture, depth, ids = drawing.view(camera, size, self._drawn_size(size), chosen, whole=not cull)
-        return View(self._overlaid(shrunk(picture, size), camera), cv2.flip(depth, 0), cv2.flip(ids, 0))
+        return View(self._overlaid(averaged(picture, size), camera), cv2.flip(depth, 0), cv2.flip(ids, 0))
 
     @gl.drawing()
     def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
@@ -264,14 +263,13 @@ class Renderer:
 
     def _drawn_size(self, size: tuple[int, int]) -> tuple[int, int]:
         """(height, width) at which colours of a picture of `size` are drawn."""
-        factor = SUPERSAMPLING if self._software else 1.0
-        return math.ceil(size[0] * factor), math.ceil(size[1] * factor)
+        return drawn_size(size) if self._software else size
 
     def _rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
         if self._painter is not None:
             return self._overlaid(self._painter.rgb(camera, size, NEAR, FAR), camera)
         picture = self._open().rgb(camera, self._drawn_size(size), chosen, whole=False)
-        return self._overlaid(shrunk(picture, size), camera)
+        return self._overlaid(averaged(picture, size), camera)
 
     def _overlaid(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
         return rgb if self._overlay is None else self._overlay.over(rgb, camera)
@@ -279,34 +277,6 @@ class Renderer:
     def _seen(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         depth, ids = self._open().depth_and_ids(camera, size, chosen, whole=False)
         return cv2.flip(depth, 0), cv2.flip(ids, 0)
-
-
-def shrunk(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """(h, w, 3) uint8 of `size`, top row first, from a larger picture of 3 or 4 channels, bottom row first."""
-    height, width = picture.shape[:2]
-    if (height % 3, width % 3, 2 * height, 2 * width) == (0, 0, 3 * size[0], 3 * size[1]):
-        return two_thirds(picture)
-    if (height, width) != tuple(size):
-        picture = cv2.resize(picture, (size[1], size[0]), interpolation=cv2.INTER_AREA)
-    return picture[::-1, :, :3]
-
-
-def two_thirds(picture: np.ndarray) -> np.ndarray:
-    """(2 h, 2 w, 3) uint8 from (3 h, 3 w, 3 or 4), bottom row first: the mean over each pixel's area, top row first."""
-    if picture.shape[2] == 3:
-        picture = cv2.cvtColor(picture, cv2.COLOR_RGB2RGBA)
-    rgba = cv2.remap(picture, *_thirds(*picture.shape[:2]), interpolation=cv2.INTER_LINEAR)
-    return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
-
-
-@functools.lru_cache(maxsize=8)
-def _thirds(height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """The maps of cv2.remap for `two_thirds`: a mean of three pixels' one and a half is one sample between two."""
-    columns, rows = (
-        n // 2 * 3 + np.where(n % 2, 5 / 3, 1 / 3) for n in map(np.arange, (width // 3 * 2, height // 3 * 2))
-    )
-    x, y = np.broadcast_arrays(columns[None], rows[::-1, None])
-    return x.astype(np.float32), y.astype(np.float32)
 
 
 def _bare_meshes(parts: Sequence[Part]) -> list[LitMesh]:

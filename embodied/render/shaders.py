@@ -32,17 +32,20 @@ void main() { vec2 place = place_of() - 0.5; column = place.x; row = place.y; }
 ALL = (
     _PLACE
     + """
+uniform vec3 drawn;  // as many pixels, along a side, as show one fewer of the wanted picture; 1 over that; their ratio
 flat in uint id;
 layout(location = 0) out float column;
 layout(location = 1) out float row;
 layout(location = 2) out uint number;
-layout(location = 3) out float metres;
+layout(location = 3) out float near;
 void main() {
     vec2 place = place_of() - 0.5;
     column = place.x; row = place.y; number = id;
-    vec2 aside = vec2(1 - ivec2(gl_FragCoord.xy) % 3) * 0.25;  // to the middle of a pixel of two thirds the size
-    float near = gl_FragCoord.w + aside.x * dFdx(gl_FragCoord.w) + aside.y * dFdy(gl_FragCoord.w);
-    metres = id == 0u ? uintBitsToFloat(0x7f800000u) : 1.0 / near;
+    vec2 mine = gl_FragCoord.xy - drawn.x * floor(gl_FragCoord.xy * drawn.y);
+    vec2 wanted = floor(mine) - vec2(greaterThan(mine, vec2(0.5 * drawn.x))) + 0.5;
+    vec2 aside = wanted * drawn.z - mine;  // to the middle of the wanted pixel
+    float w = gl_FragCoord.w + aside.x * dFdx(gl_FragCoord.w) + aside.y * dFdy(gl_FragCoord.w);
+    near = id == 0u ? 0.0 : w;
 }
 """
 )
@@ -60,6 +63,6 @@ void main() {
 NUMBERS = """#version 330
 flat in uint id;
 layout(location = 0) out uint number;
-layout(location = 1) out float metres;
-void main() { number = id; metres = id == 0u ? uintBitsToFloat(0x7f800000u) : 1.0 / gl_FragCoord.w; }
+layout(location = 1) out float near;
+void main() { number = id; near = id == 0u ? 0.0 : gl_FragCoord.w; }
 """
