@@ -45,8 +45,8 @@ FRAMES = {"places": ("column", "row"), "numbers": ("number", "near"), "all": tup
 EDGE = 0.01
 """Metres before the eye from which on it is known where a point is seen."""
 COARSE = 1.5
-"""Widest cell of a copy that is drawn in place of a mesh, pixels: between 0 and 1.5 a picture of 128 x 128 loses 0.12 dB
-of 33.5 against one drawn eight times as large; at 2.5 one sees gaps between drawers close."""
+"""Widest cell of a copy that is drawn in place of a mesh, pixels: between 0 and 1.5 a picture of 128 x 128 loses 0.12
+of 33.5 dB against one drawn eight times as large; at 2.5 one sees gaps between drawers close."""
 
 
 class Raster:
