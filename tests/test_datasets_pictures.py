@@ -6,6 +6,7 @@ import dataclasses
 import os
 import shutil
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,11 +14,12 @@ from hand_data import build, small_house
 from handmade import HandCatalogue
 from test_cluster import FakeRay
 
-from agents.vision import drawn
+from agents.vision import drawn, occasions
 from agents.vision import run as vision
 from agents.vision.config import PLAIN, RENDER_PRESETS
 from agents.vision.encoder import random_encoder
 from agents.vision.features import encode_panoramas, feature_path, load_features
+from agents.vision.occasions import OCCASIONS, shown_path
 from agents.vision.resnet import ARCHITECTURES
 from embodied.cli.dataset import chosen_pictures
 from embodied.datasets import build as building
@@ -51,7 +53,7 @@ def data(tmp_path_factory) -> Dataset:
 
 @pytest.fixture(autouse=True)
 def hand_catalogue(monkeypatch):
-    for module in (building, drawn):
+    for module in (building, drawn, occasions):
         monkeypatch.setattr(module, "load_catalogue", lambda *_: HandCatalogue())
 
 
@@ -147,12 +149,13 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     names = [u.name for u in building.units(data.scale)]
     lit = PictureSettings(16, "fast")
 
-    def features(kind: str | None, ray: str | None = None, houses: int | None = None, lights: int = 1) -> str:
-        lines: list[str] = []
+    lines: list[str] = []
+
+    def features(kind: str | None, houses: int | None = None, **how: Any) -> str:
+        lines.clear()
         vision.make_features(
-            data.folder, encoder, data.folder / "cache", picture_kind=kind, ray=ray, first=houses, lights=lights,
-            note=lines.append,
-        )  # fmt: skip
+            data.folder, encoder, data.folder / "cache", picture_kind=kind, first=houses, note=lines.append, **how
+        )
         return lines[-1]
 
     for name in names:
@@ -165,7 +168,12 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
         pretend_drawn(data, name, lit, code="whoever drew them")
     assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_gloss_16")
     assert features("fast").startswith("0 of 3 houses made")
-    assert features("unlit").startswith("0 of 3 houses made"), "they are still there"
+    camera = OCCASIONS["camera"]
+    assert features("unlit", shown=[camera]).startswith("0 of 3 houses made"), "they are still there"
+    assert sorted(lines[:-1]) == [f"{n}: 1 of 1 kinds of pictures made that are shown" for n in sorted(names)]
+    assert all(shown_path(data, n, camera, encoder.digest, SMALL).exists() for n in names)
+    features("unlit", shown=[camera])
+    assert sorted(lines[:-1]) == [f"{n}: 0 of 1 kinds of pictures made that are shown" for n in sorted(names)]
     with pytest.raises(ValueError, match="2 lightings want pictures with light, not 'unlit': say --pictures fast"):
         features("unlit", lights=2)
     name = names[0]

@@ -161,12 +161,13 @@ def make_features(
             note(line)
             yield line
 
-    arguments = (data.folder.resolve(), encoder, cache, threads, lights)
-    for_each_unit(_make_features, missing, arguments, workers=workers, watch=watch, ray_address=ray)
-    others = [at for at in shown if at != Occasion()]
-    for name in names if others else ():
-        made = make_shown(data, name, others, encoder, cache, wanted[name])
-        note(f"{name}: {len(made)} of {len(others)} kinds of pictures made that are shown")
+    common = (data.folder.resolve(), encoder, cache, threads)
+    for_each_unit(_make_features, missing, (*common, lights), workers=workers, watch=watch, ray_address=ray)
+    others = tuple(at for at in shown if at != Occasion())
+    if others:
+        for_each_unit(
+            _make_shown, list(wanted.items()), (*common, others), workers=workers, watch=watch, ray_address=ray
+        )
     note(f"{len(missing)} of {len(wanted)} houses made, {_ways(wanted.values())}, encoder {encoder.digest[:16]}")
 
 
@@ -197,3 +198,18 @@ def _make_features(
             save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
             nodes += len(world.graph.positions)
     return f"{name}: {nodes} nodes, {pictures.kind} pictures of {pictures.size} pixels"
+
+
+def _make_shown(
+    unit: tuple[str, PictureSettings],
+    folder: Path,
+    encoder: Encoder,
+    cache: Path,
+    threads: int,
+    occasions: Sequence[Occasion],
+) -> str:
+    """The features of what helpers show of one house (name, how it is drawn); returns what was done."""
+    use_threads(threads)
+    name, pictures = unit
+    made = make_shown(Dataset(folder), name, occasions, encoder, cache, pictures)
+    return f"{name}: {len(made)} of {len(occasions)} kinds of pictures made that are shown"
