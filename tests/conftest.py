@@ -50,6 +50,7 @@ def shared_folder(tmp_path_factory) -> None:
     """A folder that all workers of a test run may use, as `hand_data.built` does; named in the environment."""
     own = tmp_path_factory.getbasetemp()
     os.environ["EMBODIED_TESTS_SHARED"] = str(own.parent if "PYTEST_XDIST_WORKER" in os.environ else own)
+    os.environ.setdefault("SB3_LOGDIR", str(own / "stable_baselines3"))  # whose logs lie in the temporary folder else
 
 
 @pytest.fixture(scope="session")
