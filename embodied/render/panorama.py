@@ -240,9 +240,9 @@ class Pad:
 
 @functools.lru_cache(maxsize=48)
 def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int, width: int) -> PixelGrid:
+    """The grid of an upright perspective picture on faces of side `s`."""
     if not (abs(yaw) <= MOST_TURNS and abs(pitch) <= math.pi):
         raise ValueError(f"yaw and pitch are in radians, got {yaw:g} and {pitch:g}; math.radians(90) is 90 degrees")
-    """The grid of an upright perspective picture on faces of side `s`."""
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     tall = math.tan(vfov / 2)
     down = tall * (1 - 2 * (np.arange(height)[:, None] + 0.5) / height)
