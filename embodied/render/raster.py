@@ -399,6 +399,7 @@ def _read(frame: str, name: str, size: tuple[int, int]) -> np.ndarray:
 
 
 def _metres(near: np.ndarray) -> np.ndarray:
+    """(h, w) float32 metres from 1 over them; inf where that is 0."""
     with np.errstate(divide="ignore"):
         return np.float32(1) / near
 
