@@ -14,7 +14,7 @@ from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
 from agents.iliad.nav.run import NavGrounds, reworded
 from agents.iliad.nav.world import Trip
-from agents.studies.wordings import PARAPHRASED, SYNONYMS, WORDING
+from agents.studies.wordings import NEAREST, PARAPHRASED, SYNONYMS, WORDING
 from assets.catalogue import load_catalogue
 from embodied.interface import Pose
 from embodied.language import parse
@@ -92,8 +92,9 @@ def test_the_grammar_cannot_read_them(lexicon):
 @pytest.mark.parametrize("learner", ["vln", "hanna", "vnla"])
 def test_every_reader_is_judged_in_all_wordings(learner):
     table = importlib.import_module(f"agents.{learner}.study").TABLES["words"]
-    assert [r.judge.get(WORDING) for r in table.rows] == [None, SYNONYMS, PARAPHRASED] * 2
-    assert [bool(r.train) for r in table.rows] == [False] * 3 + [True] * 3
+    assert [r.judge.get(WORDING) for r in table.rows] == [None, SYNONYMS, PARAPHRASED] * 4
+    assert [bool(r.judge.get(NEAREST)) for r in table.rows] == ([False] * 3 + [True] * 3) * 2
+    assert [bool(r.train) for r in table.rows] == [False] * 6 + [True] * 6
 
 
 def test_navs_test_requests_are_said_otherwise_and_those_of_training_are_not():

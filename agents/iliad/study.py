@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.common.checkpoint import read_checkpoint
+from agents.common.nearest_clauses import NearestClauses
 from agents.common.session import Note
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav import run as nav
@@ -23,7 +24,7 @@ from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
 from agents.studies.engine import Measured, StudyLearner
 from agents.studies.tables import Figure, StudyRow, StudyTable
-from agents.studies.wordings import SPEAKERS, WORDING, saying, speakers_table, words_table
+from agents.studies.wordings import NEAREST, SPEAKERS, WORDING, code_of, saying, speakers_table, words_table
 from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
@@ -160,6 +161,18 @@ class NavStudyWorld:
         good = successes(NavWorld(grounds.data.eyes.places), student, trips)
         return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 
+    def said(self, grounds: nav.NavGrounds, judge: Mapping[str, Any]) -> nav.NavGrounds:
+        """With the test requests as a row has them said and read."""
+        cache, how = self.houses.cache, judge.get(WORDING)
+        if speakers := judge.get(SPEAKERS):
+            grounds = nav.spoken(grounds, speakers, cache)
+        if how:
+            grounds = nav.reworded(grounds, saying(how, grounds.data.eyes.vocabulary.words, cache))
+        if judge.get(NEAREST):
+            heard = (request for trip in grounds.data.splits["train"] for request in trip.requests)
+            grounds = nav.reworded(grounds, NearestClauses(heard))
+        return grounds
+
     def chance(self, grounds: nav.NavGrounds, split: str, seed: int) -> Samples:
         """Which requests of a split are fulfilled by walks of the marginal, which knows nothing of requests."""
         trips, places = grounds.data.splits[split], grounds.data.eyes.places
@@ -233,7 +246,7 @@ class IliadStudy(StudyLearner):
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {"threshold": self.config.threshold, **self._world(row.train).source()}
+        return {"threshold": self.config.threshold, **self._world(row.train).source(), **code_of(row.judge)}
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         if weights is None:
@@ -243,12 +256,9 @@ class IliadStudy(StudyLearner):
         if row.judge.get("curve"):
             return {f"success at {h['episodes']:g}": Samples((h["success"],)) for h in history}
         needed = episodes_to(history, self.config.threshold) / 1000
-        world, how, speakers = self._world(row.train), row.judge.get(WORDING), row.judge.get(SPEAKERS)
-        grounds = _grounds(world, folder)
-        if how and isinstance(world, NavStudyWorld):
-            grounds = nav.reworded(grounds, saying(how, grounds.data.eyes.vocabulary.words, world.houses.cache))
-        if speakers and isinstance(world, NavStudyWorld):
-            grounds = nav.spoken(grounds, speakers, world.houses.cache)
+        world, grounds = self._world(row.train), _grounds(self._world(row.train), folder)
+        if isinstance(world, NavStudyWorld):
+            grounds = world.said(grounds, row.judge)
         found = {"success": world.judge(grounds, weights, split)}
         return found | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
 

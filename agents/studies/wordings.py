@@ -1,17 +1,20 @@
-"""The table of every learner that reads: instructions as they were said, in synonyms and paraphrased, with and without
-pre-trained word vectors."""
+"""The tables of every learner that reads: instructions as they were said, in synonyms, paraphrased and by people never
+heard, without and with pre-trained vectors of words and of sentences."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from agents.common.nearest_clauses import NearestClauses
 from agents.common.paraphrases import paraphraser
 from agents.common.unheard import Reworded, in_synonyms
 from agents.studies.tables import StudyRow, StudyTable
 from assets.catalogue import load_catalogue
+from assets.closure import code_digest
 from embodied.interface import Policy
 from embodied.novelty import FAMILIAR, NOVEL
 
@@ -19,6 +22,8 @@ WORDING, SYNONYMS, PARAPHRASED = "wording", "synonyms", "paraphrased"
 """In a row's `judge`: how instructions are said; as they are without."""
 SPEAKERS = "speakers"
 """In a row's `judge`: the novelty of who describes routes; those of the data set without."""
+NEAREST = "nearest"
+"""In a row's `judge`: whether clauses never heard are read as the nearest ones that were (NearestClauses)."""
 
 
 def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
@@ -27,33 +32,48 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
     Args:
       row: makes a row of its label and of what differs in training.
     """
-    learned, read = row("learned words"), row("pre-trained vectors", word_vectors="minilm")
-    rows = {(r.label, how): _said(r, how) for r in (learned, read) for how in ("", SYNONYMS, PARAPHRASED)}
-    hows = (SYNONYMS, PARAPHRASED)
-    lost = [(rows[r.label, ""], rows[r.label, how]) for how in hows for r in (learned, read)]
-    won = [(rows[read.label, how], rows[learned.label, how]) for how in hows]
+    said, *others = ([_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row))
+    lost = [(plain, other) for plain, *unheard in (said, *others) for other in unheard]
+    won = [(a, b) for reader in others for a, b in zip(reader[1:], said[1:], strict=True)]
     title = "Instructions in unheard words and sentences"
-    return StudyTable(title, tuple(rows.values()), tuple(columns), tuple(splits), (*lost, *won))
+    rows = (*said, *itertools.chain(*others))
+    return StudyTable(title, rows, tuple(columns), tuple(splits), (*lost, *won))
 
 
 def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
     """Learned from familiar people alone, judged by them and by the others; `row` as in words_table."""
 
-    def heard(novelty: str, label: str, **train: Any) -> StudyRow:
+    def heard(reader: StudyRow, novelty: str) -> StudyRow:
         who = "people never heard" if novelty == NOVEL else "people heard in training"
-        made = row(f"{label}, {who}", speakers=FAMILIAR, **train)
-        return dataclasses.replace(made, judge={**made.judge, SPEAKERS: novelty})
+        return dataclasses.replace(reader, label=f"{reader.label}, {who}", judge={**reader.judge, SPEAKERS: novelty})
 
-    def pair(label: str, **train: Any) -> tuple[StudyRow, StudyRow]:
-        return heard(FAMILIAR, label, **train), heard(NOVEL, label, **train)
-
-    learned, read = pair("learned words"), pair("pre-trained vectors", word_vectors="minilm")
+    readers = _readers(lambda label, **train: row(label, speakers=FAMILIAR, **train))
+    pairs = [(heard(r, FAMILIAR), heard(r, NOVEL)) for r in readers]
+    (_, learned), *others = pairs
     title = "Instructions of people who were never heard in training"
-    return StudyTable(title, (*learned, *read), tuple(columns), tuple(splits), (learned, read, (read[1], learned[1])))
+    rows, won = tuple(r for pair in pairs for r in pair), [(novel, learned) for _, novel in others]
+    return StudyTable(title, rows, tuple(columns), tuple(splits), (*pairs, *won))
+
+
+def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
+    """Agents that learn words from instructions alone, and with pre-trained vectors; both also with nearest clauses."""
+
+    def nearest(reader: StudyRow) -> StudyRow:
+        return dataclasses.replace(
+            reader, label=f"{reader.label}, nearest clauses", judge={**reader.judge, NEAREST: True}
+        )
+
+    learned, vectors = row("learned words"), row("pre-trained vectors", word_vectors="minilm")
+    return learned, nearest(learned), vectors, nearest(vectors)
 
 
 def _said(row: StudyRow, how: str) -> StudyRow:
     return dataclasses.replace(row, label=f"{row.label}, {how}", judge={**row.judge, WORDING: how}) if how else row
+
+
+def code_of(judge: Mapping[str, Any]) -> dict[str, str]:
+    """The code that words or reads what is said in a row, as a part of what was judged."""
+    return {"wording": code_digest(__name__)} if {WORDING, SPEAKERS, NEAREST} & set(judge) else {}
 
 
 def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
@@ -61,6 +81,15 @@ def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
     return in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache))
 
 
-def hearing(policy: Any, how: str, known: Sequence[str], cache: Path) -> Policy:
-    """A policy to which everything is said so."""
-    return Reworded(policy, saying(how, known, cache))
+def hearing(
+    policy: Any, judge: Mapping[str, Any], known: Sequence[str], heard: Callable[[], NearestClauses], cache: Path
+) -> Policy:
+    """A policy to which everything is said as a row has it.
+
+    Args:
+      known: words that the agent knows.
+      heard: gives the clauses of its training.
+    """
+    policy = Reworded(policy, heard()) if judge.get(NEAREST) else policy
+    how = judge.get(WORDING)
+    return Reworded(policy, saying(how, known, cache)) if how else policy

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
 VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
 """As in embodied.envs.vnla, which --help should not import."""
+READINGS = ("as-said", "nearest-clauses")
 STATES = ("none", "sparse", "dense")
 """As in embodied.envs.hari, which --help should not import."""
 SEES = ("names", "strip", "panorama", "nothing")
@@ -97,6 +98,9 @@ class OfTrained:
     """How goal images differ from what the agent sees there; same: not at all; camera: taken by a robot's camera; hour:
     at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
     another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees."""
+    reading: Annotated[str, Option(words=READINGS)] = READINGS[0]
+    """How agents read clauses that were never said in training: as they are, or as the nearest ones of the data set's
+    training houses (with the extra [sentences])."""
 
 
 @dataclass(frozen=True, kw_only=True)

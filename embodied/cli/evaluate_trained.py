@@ -50,13 +50,16 @@ def evaluate_trained(
       ValueError: an unknown row.
     """
     from agents.common.device import use_threads
+    from agents.common.unheard import Reworded
     from agents.common.weights import weights_digest
     from agents.studies.episodes import JUDGES, evaluate_frozen
     from agents.vision.drawn import pictures_of
     from agents.vision.occasions import OCCASIONS
     from embodied.identity import identity_of
+    from embodied.interface import PrivilegedPolicy
 
     use_threads(args.threads)
+    read = _reader(args, data)
     rows_of = {"hari": _hari, "vln": _vln, "vnla": _vnla, "hanna": _hanna}[args.kind](args, data, file)
     found, blind = list[Any](), set[str]()
     for split in splits:
@@ -65,6 +68,8 @@ def evaluate_trained(
             raise ValueError(f"unknown rows {unknown}; there are {list(known.players)}")
         for name in bar(wanted or known.usual, "agents", "agent"):
             whole, player = known.players[name]
+            if read and not isinstance(player, PrivilegedPolicy):
+                player = Reworded(player, read)
             found += evaluate_frozen(
                 instead(whole), {name: player}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
                 keep=functools.partial(keep, split),
@@ -76,6 +81,13 @@ def evaluate_trained(
     facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
     facts |= {"shown": dataclasses.asdict(OCCASIONS[args.shown]), "identity": identity_of(*JUDGES)}
     return found, facts
+
+
+def _reader(args: Options, data: Dataset) -> Callable[[str], str] | None:
+    """What agents read instead of a text, where --reading says so."""
+    from agents.common.nearest_clauses import NearestClauses, heard_in
+
+    return NearestClauses(heard_in(data)) if args.reading == "nearest-clauses" else None
 
 
 @dataclass(frozen=True)
