@@ -60,12 +60,6 @@ def test_a_number_that_was_not_said_is_not_read():
     assert none("rotate leftward") == "rotate leftward"
 
 
-def test_two_new_clauses_are_read_as_one_where_that_is_nearer():
-    read = NearestClauses(["find a mug in a hall", "find a bed", "turn left"], lambda: sentences, lambda: words)
-    assert read("seek a mug , in the aisle . turn left") == "find a mug in a hall . turn left"
-    assert read("seek a bed , rotate leftward") == "find a bed , turn left"
-
-
 def test_every_clause_is_embedded_once(read):
     counted = []
     once = NearestClauses(HEARD, lambda: lambda said: counted.append(len(said)) or sentences(said), lambda: words)

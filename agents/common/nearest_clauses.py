@@ -57,8 +57,7 @@ def heard_in(data: Dataset, houses: int | None = None) -> list[str]:
 
 
 class NearestClauses:
-    """Reads a text: a clause that is new, in words or in their order, is replaced by the nearest one heard; two of them
-    with a comma between by one, where it is nearer to both together than others are to each.
+    """Reads a text: clauses that are new, in words or in their order, are replaced by the nearest one heard.
 
     Examples:
       >>> read = NearestClauses(["turn left , go to the hall"])
@@ -110,33 +109,20 @@ class NearestClauses:
         return _unit(rows - rows.mean(0)), rows.mean(0)
 
     def __call__(self, text: str) -> str:
-        read, (*parts, last) = "", ENDS.split(text.lower())
-        clauses = [*zip(parts[::2], parts[1::2], strict=True), (last, "")]
-        while clauses:
-            (clause, end), *clauses = clauses
-            if self.new(clause):
-                said, how = self.nearest(clause)
-                if clauses and end.strip() == "," and self.new(clauses[0][0]):
-                    both = self.nearest(clause + end + clauses[0][0])
-                    if both[1] > (how + self.nearest(clauses[0][0])[1]) / 2:
-                        (_, end), *clauses = clauses
-                        said, _ = both
-                clause = said
-            read += clause + end
-        return read
+        parts = ENDS.split(text.lower())
+        return "".join(self.nearest(p) if i % 2 == 0 and self.new(p) else p for i, p in enumerate(parts))
 
     def new(self, clause: str) -> bool:
         """Whether too many of its words follow each other that never did."""
         pairs = _pairs(clause) if clause else []
         return sum(p not in self.pairs for p in pairs) > NOVEL * len(pairs)
 
-    def _nearest(self, clause: str) -> tuple[str, float]:
-        """The nearest clause heard, and how near it is; the clause itself, if all have other numbers."""
+    def _nearest(self, clause: str) -> str:
+        """The nearest clause heard; the clause itself, if all have other numbers."""
         said = NUMBER.findall(clause)
         fits = np.array([numbers <= set(said) for numbers in self.numbers])
         nearness = self.vectors @ self._sentences()([clause])[0] + self._matching(tokenize(clause))
-        best = int(np.where(fits, nearness, -np.inf).argmax())
-        return (self.clauses[best], float(nearness[best])) if fits.any() else (clause, 0.0)
+        return self.clauses[int(np.where(fits, nearness, -np.inf).argmax())] if fits.any() else clause
 
     def _matching(self, words: Sequence[str]) -> np.ndarray:
         """(K,) mean cosine of these words with the most similar ones of a clause, and of its words with theirs."""
