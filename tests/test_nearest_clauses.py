@@ -10,6 +10,7 @@ from hand_data import built
 
 from agents.common import nearest_clauses, word_vectors
 from agents.common.nearest_clauses import NearestClauses, heard_in
+from embodied.cli import main
 from embodied.datasets.store import Dataset
 
 MEANING = {"rotate": "turn", "leftward": "left", "aisle": "hall"}
@@ -95,3 +96,9 @@ def test_a_missing_package_is_named(monkeypatch):
     word_vectors.minilm.cache_clear()
     with pytest.raises(word_vectors.UnableError, match="sentences"):
         nearest_clauses.minilm_sentences.__wrapped__()
+
+
+@pytest.mark.parametrize("order", [["vnla"], ["hari", "--agent", "shortest"]])
+def test_agents_that_read_nothing_refuse_another_reading(order, capsys):
+    assert main(["evaluate", *order, "--reading", "nearest-clauses"]) == 2
+    assert "trained agents of hanna, vln, vnla" in capsys.readouterr().err

@@ -10,14 +10,14 @@ import torch
 from torch import nn
 
 from agents.common import word_vectors
-from agents.common.unheard import UNHEARD, Reworded, in_synonyms
+from agents.common.unheard import UNHEARD, in_synonyms, reworded
 from agents.common.vocabulary import build_vocabulary
 from agents.common.word_vectors import Lexicon, WordEmbedding, take_weights, use_vectors, vocabulary_with
 from agents.hanna.attention import TextEncoder
 from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
 from embodied.errors import UnableError
-from embodied.interface import Candidates, Mode, Observation, Sight, Stop
+from embodied.interface import Candidates, Mode, Observation, Sight, Stop, act
 
 WORDS = build_vocabulary(["walk to the hall, turn left", "stop near the bed"]).words
 ALIKE = {"stroll": "walk", "corridor": "hall"}
@@ -125,10 +125,23 @@ def test_a_policy_hears_other_words_and_all_else_as_it_is():
     heard, none = [], np.zeros(0, np.float32)
     nowhere = Candidates(none, none, np.zeros(0, int), np.zeros(0, bool))
     o = Observation(Sight("house", 0), 0, 0, nowhere, "find a mug", None, Mode.MAIN, (), None, 0, 0)
-    actions, memory = Reworded(Listening(), str.upper).act([o, None], "kept", rngs=[])
+    actions, memory = reworded(Listening(), str.upper).act([o, None], "kept", rngs=[])
     assert memory == "kept" and len(actions) == 2
     (same, nothing), *_ = heard
     assert nothing is None and same == dataclasses.replace(o, instruction="FIND A MUG") != o
+
+
+def test_an_agent_that_is_shown_the_situation_hears_other_words_too():
+    class Shown:
+        def act_privileged(self, observations, situations, memory, *, rngs):
+            heard.append((observations[0].instruction, situations))
+            return [Stop()], memory
+
+    heard, none = [], np.zeros(0, np.float32)
+    nowhere = Candidates(none, none, np.zeros(0, int), np.zeros(0, bool))
+    o = Observation(Sight("house", 0), 0, 0, nowhere, "find a mug", None, Mode.MAIN, (), None, 0, 0)
+    assert act(reworded(Shown(), str.upper), [o], ["situation"], "kept", rngs=[]) == ([Stop()], "kept")
+    assert heard == [("FIND A MUG", ["situation"])]
 
 
 def test_an_agent_that_learned_words_alone_begins_with_vectors_and_acts_as_before():

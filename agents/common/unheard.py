@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from assets.json_file import from_plain, read_toml
-from embodied.interface import Actions, Observations, Policy
+from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedPolicy, Situations
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,11 @@ def in_synonyms(known: Collection[str]) -> Callable[[str], str]:
     return functools.cache(lambda text: re.sub("[a-z]+", lambda m: new.get(m[0], m[0]), text.lower()))
 
 
+def reworded(agent: Agent, say: Callable[[str], str]) -> Agent:
+    """An agent to which everything is said in other words."""
+    return RewordedPrivileged(agent, say) if isinstance(agent, PrivilegedPolicy) else Reworded(agent, say)
+
+
 @dataclass(frozen=True)
 class Reworded:
     """A policy to which everything is said in other words."""
@@ -48,5 +53,21 @@ class Reworded:
     def act(
         self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[Actions, Any]:
-        heard = [o if o is None else dataclasses.replace(o, instruction=self.say(o.instruction)) for o in observations]
-        return self.policy.act(heard, memory, rngs=rngs)
+        return self.policy.act(_said(observations, self.say), memory, rngs=rngs)
+
+
+@dataclass(frozen=True)
+class RewordedPrivileged:
+    """As Reworded, of a policy that is shown the situations; tasks in them stay as they are."""
+
+    policy: PrivilegedPolicy
+    say: Callable[[str], str]
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        return self.policy.act_privileged(_said(observations, self.say), situations, memory, rngs=rngs)
+
+
+def _said(observations: Observations, say: Callable[[str], str]) -> Observations:
+    return [o if o is None else dataclasses.replace(o, instruction=say(o.instruction)) for o in observations]

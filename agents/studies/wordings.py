@@ -11,11 +11,11 @@ from typing import Any
 
 from agents.common.nearest_clauses import NearestClauses
 from agents.common.paraphrases import paraphraser
-from agents.common.unheard import Reworded, in_synonyms
+from agents.common.unheard import in_synonyms, reworded
 from agents.studies.tables import StudyRow, StudyTable
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest
-from embodied.interface import Policy
+from embodied.interface import Agent
 from embodied.novelty import FAMILIAR, NOVEL
 
 WORDING, SYNONYMS, PARAPHRASED = "wording", "synonyms", "paraphrased"
@@ -82,14 +82,14 @@ def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
 
 
 def hearing(
-    policy: Any, judge: Mapping[str, Any], known: Sequence[str], heard: Callable[[], NearestClauses], cache: Path
-) -> Policy:
-    """A policy to which everything is said as a row has it.
+    agent: Agent, judge: Mapping[str, Any], known: Sequence[str], heard: Callable[[], NearestClauses], cache: Path
+) -> Agent:
+    """An agent to which everything is said as a row has it.
 
     Args:
       known: words that the agent knows.
       heard: gives the clauses of its training.
     """
-    policy = Reworded(policy, heard()) if judge.get(NEAREST) else policy
+    agent = reworded(agent, heard()) if judge.get(NEAREST) else agent
     how = judge.get(WORDING)
-    return Reworded(policy, saying(how, known, cache)) if how else policy
+    return reworded(agent, saying(how, known, cache)) if how else agent

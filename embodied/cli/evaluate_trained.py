@@ -50,13 +50,12 @@ def evaluate_trained(
       ValueError: an unknown row.
     """
     from agents.common.device import use_threads
-    from agents.common.unheard import Reworded
+    from agents.common.unheard import reworded
     from agents.common.weights import weights_digest
     from agents.studies.episodes import JUDGES, evaluate_frozen
     from agents.vision.drawn import pictures_of
     from agents.vision.occasions import OCCASIONS
     from embodied.identity import identity_of
-    from embodied.interface import PrivilegedPolicy
 
     use_threads(args.threads)
     read = _reader(args, data)
@@ -68,10 +67,9 @@ def evaluate_trained(
             raise ValueError(f"unknown rows {unknown}; there are {list(known.players)}")
         for name in bar(wanted or known.usual, "agents", "agent"):
             whole, player = known.players[name]
-            if read and not isinstance(player, PrivilegedPolicy):
-                player = Reworded(player, read)
+            agent = reworded(player, read) if read else player
             found += evaluate_frozen(
-                instead(whole), {name: player}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
+                instead(whole), {name: agent}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
                 keep=functools.partial(keep, split),
             )  # fmt: skip
         blind |= set(known.blind)
@@ -79,7 +77,11 @@ def evaluate_trained(
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}
     facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
-    facts |= {"shown": dataclasses.asdict(OCCASIONS[args.shown]), "identity": identity_of(*JUDGES)}
+    facts |= {
+        "shown": dataclasses.asdict(OCCASIONS[args.shown]),
+        "reading": args.reading,
+        "identity": identity_of(*JUDGES),
+    }
     return found, facts
 
 
