@@ -35,19 +35,23 @@ def _row(label: str, played: str = LEARNED, rooms: bool = True, **train: Any) ->
     return StudyRow(label, train, {"played": played, ROOMS: rooms})
 
 
-def _table(title: str, *rows: StudyRow) -> StudyTable:
-    return StudyTable(title, rows, COLUMNS, SPLITS)
+def _table(title: str, *rows: StudyRow, compared: Sequence[tuple[StudyRow, StudyRow]] = ()) -> StudyTable:
+    return StudyTable(title, rows, COLUMNS, SPLITS, tuple(compared))
 
 
+RANDOM_ASKER, LEARNED_ASKER = _row("random", asker="random"), _row("learned")
 PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
 TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
         "Who decides when to ask",
         _row("none", asker="none"),
         _row("first", asker="first"),
-        _row("random", asker="random"),
+        RANDOM_ASKER,
         _row("teacher", TEACHER),
-        _row("learned"),
+        LEARNED_ASKER,
+        StudyRow("scripted listener, random", None, {"played": "listener, random", ROOMS: True}),
+        StudyRow("scripted listener, teacher", None, {"played": "listener, teacher", ROOMS: True}),
+        compared=((LEARNED_ASKER, RANDOM_ASKER),),
     ),
     "interventions": _table(
         "Direct and indirect intervention",
@@ -116,10 +120,14 @@ class VnlaStudy(SightedStudy):
         train_agent(self.lessons(train), self.settings(train, seed), self.evaluation, home, note=note)
         return home / "best.safetensors"
 
-    def policies(self, agent: VnlaAgent, judge: Mapping[str, Any], split: str) -> Agent:
+    def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
+        if agent is None:
+            return super().policies(agent, judge, split)
         return self.heard(agent, player(agent, self.lessons(judge).split(split).bank, judge["played"]), judge)
 
-    def where(self, agent: VnlaAgent, judge: Mapping[str, Any], split: str) -> SplitData:
+    def where(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
+        if agent is None:
+            return super().where(agent, judge, split)
         return self.judged_in(judge).split(split, vnla=rules_of_row(agent, judge["played"]))
 
     def lessons(self, how: Mapping[str, Any] = NOTHING) -> Lessons:
