@@ -76,6 +76,9 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert run(*judge, "--rows", "listener") == 2 and "unknown rows ['listener']" in capsys.readouterr().err
 
 
+LISTENER = "scripted listener asking at random"
+
+
 def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path, capsys):
     words = ("study", "vnla", "interventions", "rooms", "--data", data.folder, "--out", tmp_path, *SMALL)
     words = (*words, "--iterations", 1, "--seeds", 1, "--tasks", 2)
@@ -92,10 +95,11 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     assert run(*words, "--tasks", 3, "--rows", "direct, not in words") == 0
     assert trained == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("best.safetensors")}
     assert len(list(tmp_path.rglob("runs/*/judged/*.json"))) == 6 * 2 + 2, "other tasks are judged"
-    askers = ("study", "vnla", "askers", *words[4:], "--rows", "learned", "teacher")
+    askers = ("study", "vnla", "askers", *words[4:], "--rows", "learned", "teacher", LISTENER)
     assert run(*askers) == 0
     text = (tmp_path / "vnla-askers.md").read_text()
-    assert "| teacher |" in text and "Not run: none, first, random." in text and "(34.95)" in text
+    assert "| teacher |" in text and f"| {LISTENER} |" in text and "(34.95)" in text
+    assert "Not run: none, first, random, scripted listener asking as the teacher." in text
     printed = ("study", "vnla", "algorithm-6", *words[4:], "--rows", "Algorithm 6, learned")
     assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
     (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")

@@ -49,8 +49,8 @@ TABLES: Mapping[str, StudyTable] = {
         RANDOM_ASKER,
         _row("teacher", TEACHER),
         LEARNED_ASKER,
-        StudyRow("scripted listener, random", None, {"played": "listener, random", ROOMS: True}),
-        StudyRow("scripted listener, teacher", None, {"played": "listener, teacher", ROOMS: True}),
+        StudyRow("scripted listener asking at random", None, {"played": "listener, random", ROOMS: True}),
+        StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher", ROOMS: True}),
         compared=((LEARNED_ASKER, RANDOM_ASKER),),
     ),
     "interventions": _table(
