@@ -14,7 +14,7 @@ from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
 from agents.iliad.nav.run import NavGrounds, reworded
 from agents.iliad.nav.world import Trip
-from agents.studies.wordings import NEAREST, PARAPHRASED, SYNONYMS, WORDING
+from agents.studies.wordings import NEAREST, PARAPHRASED, SPEAKERS, SYNONYMS, WORDING, code_of
 from assets.catalogue import load_catalogue
 from embodied.interface import Pose
 from embodied.language import parse
@@ -95,6 +95,13 @@ def test_every_reader_is_judged_in_all_wordings(learner):
     assert [r.judge.get(WORDING) for r in table.rows] == [None, SYNONYMS, PARAPHRASED] * 4
     assert [bool(r.judge.get(NEAREST)) for r in table.rows] == ([False] * 3 + [True] * 3) * 2
     assert [bool(r.train) for r in table.rows] == [False] * 6 + [True] * 6
+
+
+def test_what_was_judged_names_the_code_that_words_it():
+    assert not code_of({"played": "learned"})
+    assert len(code_of({WORDING: SYNONYMS})["wording"]) == 16 and code_of({NEAREST: True}) == code_of(
+        {SPEAKERS: "novel"}
+    )
 
 
 def test_navs_test_requests_are_said_otherwise_and_those_of_training_are_not():
