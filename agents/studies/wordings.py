@@ -32,11 +32,11 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
     Args:
       row: makes a row of its label and of what differs in training.
     """
-    said, *others = ([_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row))
-    lost = [(plain, other) for plain, *unheard in (said, *others) for other in unheard]
-    won = [(a, b) for reader in others for a, b in zip(reader[1:], said[1:], strict=True)]
+    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row)]
+    lost = [(said, other) for said, *unheard in readers for other in unheard]
+    won = [pair for alike in [*zip(*readers, strict=True)][1:] for pair in _changes(alike)]
     title = "Instructions in unheard words and sentences"
-    rows = (*said, *itertools.chain(*others))
+    rows = tuple(itertools.chain(*readers))
     return StudyTable(title, rows, tuple(columns), tuple(splits), (*lost, *won))
 
 
@@ -49,9 +49,8 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
 
     readers = _readers(lambda label, **train: row(label, speakers=FAMILIAR, **train))
     pairs = [(heard(r, FAMILIAR), heard(r, NOVEL)) for r in readers]
-    (_, learned), *others = pairs
     title = "Instructions of people who were never heard in training"
-    rows, won = tuple(r for pair in pairs for r in pair), [(novel, learned) for _, novel in others]
+    rows, won = tuple(itertools.chain(*pairs)), _changes([novel for _, novel in pairs])
     return StudyTable(title, rows, tuple(columns), tuple(splits), (*pairs, *won))
 
 
@@ -65,6 +64,12 @@ def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
 
     learned, vectors = row("learned words"), row("pre-trained vectors", word_vectors="minilm")
     return learned, nearest(learned), vectors, nearest(vectors)
+
+
+def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:
+    """Rows of all readers, compared where they differ in one thing."""
+    learned, nearest, vectors, both = readers
+    return [(nearest, learned), (vectors, learned), (both, vectors)]
 
 
 def _said(row: StudyRow, how: str) -> StudyRow:
