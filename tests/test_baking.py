@@ -12,7 +12,7 @@ from handmade import HandCatalogue, furnished
 
 from embodied.house.house import Light, Sky
 from embodied.house.shapes import inward
-from embodied.light import LightError, StaleBake, bake, bake_all, lightings_of, open_bake
+from embodied.light import LightError, StaleBake, backend, bake, bake_all, lightings_of, open_bake
 from embodied.light.backend import floats
 from embodied.light.baking import check, solve
 from embodied.light.baking import house as baking
@@ -55,6 +55,15 @@ def test_what_stands_in_outer_walls_takes_light_from_the_open_sky_on_its_outer_s
         assert not e[mine & (towards > 0.9)].any()
         kinds.add(window)
     assert kinds == {True, False}
+
+
+def test_where_a_kernel_knows_one_scene_light_is_the_same(lit, solved, tmp_path, monkeypatch):
+    """As on CUDA, where rays into two scenes in one kernel meet nothing: every ray is traced by a kernel of its own."""
+    house, catalogue, *_ = lit
+    monkeypatch.setattr(backend, "_one_scene_per_kernel", lambda: True)
+    again = baking.solve_house(house, baking.Shared(house, house_parts(house, catalogue), tmp_path, TINY), TINY)
+    assert isinstance(again.space.scene, backend.Apart) and not isinstance(solved.space.scene, backend.Apart)
+    assert np.allclose(again.light.soft, solved.light.soft, rtol=1e-4, atol=1e-4)
 
 
 def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):

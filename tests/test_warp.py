@@ -31,6 +31,15 @@ def test_without_mujoco_warp_the_error_says_what_to_install(monkeypatch):
         importlib.import_module("embodied.render.warp")
 
 
+@pytest.fixture(scope="module", params=["cpu", "cuda:0"])
+def device(request):
+    pytest.importorskip("mujoco_warp", reason="needs the extra [warp]")
+    warp = pytest.importorskip("warp")
+    if request.param not in map(str, warp.get_devices()):
+        pytest.skip(f"needs {request.param}")
+    return request.param
+
+
 @pytest.fixture(scope="module")
 def house():
     pytest.importorskip("mujoco_warp", reason="needs the extra [warp]")
@@ -57,10 +66,10 @@ def classic(house, lit):
 
 
 @pytest.fixture(scope="module")
-def warped(house, lit):
+def warped(house, lit, device):
     from embodied.render.warp import WarpRenderer
 
-    with WarpRenderer(house, HandCatalogue(), lit, size=(SIZE, SIZE), device="cpu") as renderer:
+    with WarpRenderer(house, HandCatalogue(), lit, size=(SIZE, SIZE), device=device) as renderer:
         yield renderer
 
 
@@ -139,15 +148,15 @@ def test_a_batch_larger_than_the_renderer_is_refused(warped):
 
 @pytest.mark.slow
 @pytest.mark.gl
-def test_bodies_of_a_batch_drive_and_see_as_each_alone_does(house, lit, classic):
+def test_bodies_of_a_batch_drive_and_see_as_each_alone_does(house, lit, classic, device):
     torch = pytest.importorskip("torch")
     from embodied.gym.drive_vector import DriveVectorEnv
 
     world = SimpleNamespace(name="house", house=house, catalogue=HandCatalogue(), lit=lit)
     settings = DriveSettings(height=SIZE, width=SIZE, farthest=5.0, seconds=0.4)
-    envs = DriveVectorEnv(world, settings, 2, device="cpu", out=torch.from_dlpack)
+    envs = DriveVectorEnv(world, settings, 2, device=device, out=torch.from_dlpack)
     seen, _ = envs.reset(seed=3)
-    assert {name: x.numpy() for name, x in seen.items()} in envs.observation_space
+    assert {name: x.cpu().numpy() for name, x in seen.items()} in envs.observation_space
     alone = [Driving({"house": world}, dataclasses.replace(settings, sees=())) for _ in range(2)]
     for i, driving in enumerate(alone):
         driving.reset(np_random(3 + i)[0])
@@ -161,8 +170,8 @@ def test_bodies_of_a_batch_drive_and_see_as_each_alone_does(house, lit, classic)
             assert abs(batched.yaw - driving.driver.yaw) < 0.02 and info["metres"][i] > 0
             assert float(rewards[i]) == pytest.approx(outcome.reward, abs=0.01)
             shot = classic.through(driving.camera(), (SIZE, SIZE))
-            assert decibels(shot.rgb, seen["rgb"][i].numpy()) > 20 and seen["depth"].dtype == torch.float32
-            assert np.median(np.abs(shot.depth - seen["depth"][i].numpy())) < 0.05
+            assert decibels(shot.rgb, seen["rgb"][i].cpu().numpy()) > 20 and seen["depth"].dtype == torch.float32
+            assert np.median(np.abs(shot.depth - seen["depth"][i].cpu().numpy())) < 0.05
     assert truncated.all() and not terminated.any()
     _, rewards, _, truncated, _ = envs.step(actions)
     assert not truncated.any() and not rewards.any(), "what has ended begins anew"

@@ -1,4 +1,4 @@
-"""Benchmarks on a CUDA device: live pictures by OpenGL and by MuJoCo Warp, features and learning.
+"""Benchmarks on a CUDA device: live pictures by OpenGL and by MuJoCo Warp, bodies on wheels, features, learning, light.
 
 Where there is no CUDA device a few small pictures are drawn on the CPU, which tells that all parts work and no more.
 """
@@ -17,21 +17,27 @@ import numpy as np
 
 from assets.catalogue import Catalogue
 from embodied import gl
+from embodied.bench.bakes import QUALITIES
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, from_values, measure
 from embodied.errors import UnableError
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
+from embodied.light.backend import device
+from embodied.light.baking.house import bake, forget
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 from embodied.seeds import stream
 from embodied.world import World, open_world
 
-CONTEXTS = (1, 4, 8)
-"""Processes that draw at once by OpenGL, each with a context of its own."""
+CONTEXTS = (1, 4, 16)
+"""Processes that draw pictures of LIVE pixels at once by OpenGL, each with a context of its own."""
+LIVE = 128
 SIZES, WORLDS = (64, 128, 256), (64, 256, 1024)
 """Sides of square pictures, pixels, and how many Warp draws at once."""
 SEES = (("rgb",), ("rgb", "depth", "ids"))
+BODIES = (64, 256, 1024)
+"""On wheels at once, each with a camera of LIVE pixels."""
 SMALL = HouseConfig(area=(34.0, 44.0))
 """The flat of the check on the CPU."""
 SECONDS = 3.0
@@ -62,22 +68,27 @@ def gpu(
     house = generate_house(seed, FLAT if card else SMALL, catalogue)
     with open_world(house, catalogue, cache, pictures=f"{light}-matte") as world:
         assert world.lit is not None
-        for count, size in itertools.product(contexts, sizes):
+        for count in contexts:
             yield from_values(
-                f"classic, {gl.info().device}, {count} contexts, {size} x {size}, rgb",
-                _by_processes(count, house, catalogue, cache, light, size, seed),
+                f"classic, {gl.info().device}, {count} contexts, {LIVE} x {LIVE}, rgb",
+                _by_processes(count, house, catalogue, cache, light, LIVE, seed),
                 "1/s",
             )
-        for size, count in itertools.product(sizes, worlds):
-            with warp.WarpRenderer(house, catalogue, world.lit, worlds=count, size=(size, size)) as renderer:
-                poses = _poses(world, count, seed)
-                for sees in SEES:
-                    look = functools.partial(_look, renderer, poses, sees)
+        for size in sizes:
+            with warp.WarpRenderer(house, catalogue, world.lit, worlds=max(worlds), size=(size, size)) as renderer:
+                for count, sees in itertools.product(worlds, SEES):
+                    look = functools.partial(_look, renderer, _poses(world, count, seed), sees)
                     name = f"Warp, {card or 'CPU'}, {count} worlds, {size} x {size}, {', '.join(sees)}"
                     yield measure(name, look, "1/s", repeats=REPEATS, per=count)
-    device = "cuda" if card else "cpu"
-    for name, (body, per) in works(device).items():
-        yield measure(f"{name}, {card or 'CPU'}", body, "1/s", repeats=REPEATS, per=per)
+        for name, (body, per) in works("cuda" if card else "cpu").items():
+            yield measure(f"{name}, {card or 'CPU'}", body, "1/s", repeats=REPEATS, per=per)
+        for quality in QUALITIES if card else ():
+            name = f"light of a flat of {house.area:.0f} m², {quality}, {card if device() == 'cuda' else device()}"
+            yield measure(name, functools.partial(_light, house, catalogue, cache, quality), "s", repeats=3)
+        for count in BODIES if card else (4,):
+            yield _drive(
+                world, count, f"bodies on wheels, {card or 'CPU'}, {count} at once, {LIVE} x {LIVE}, rgb: steps"
+            )
 
 
 def _poses(world: World, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -85,6 +96,27 @@ def _poses(world: World, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]
     rng = stream(seed, "bench", "gpu")
     nodes = rng.integers(len(world.graph.positions), size=count)
     return world.graph.positions[nodes], rng.uniform(-np.pi, np.pi, count)
+
+
+def _drive(world: World, count: int, name: str) -> Measure:
+    """Steps per second of all bodies together, whose commands are drawn at random."""
+    from embodied.gym.drive_vector import DriveVectorEnv  # late: extras
+    from embodied.gym.driving import DriveSettings
+
+    rng = stream(0, "bench", "gpu", "drive")
+    envs = DriveVectorEnv(world, DriveSettings(sees=("rgb",), height=LIVE, width=LIVE), count, out=lambda array: array)
+    try:
+        envs.reset(seed=0)
+        step = lambda: envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))
+        return measure(name, step, "1/s", repeats=2 * REPEATS, warm=3, per=count)
+    finally:
+        envs.close()
+
+
+def _light(house: House, catalogue: Catalogue, cache: Path, quality: str) -> None:
+    """Light the house anew; the first call compiles, and unwraps what no cache has."""
+    forget(cache, house, catalogue, quality)
+    bake(house, catalogue, cache, quality)
 
 
 def _look(renderer: Any, poses: tuple[np.ndarray, np.ndarray], sees: tuple[str, ...]) -> None:

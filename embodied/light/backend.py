@@ -16,13 +16,15 @@ import re
 import types
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from embodied.errors import UnableError
 from embodied.light import in_numpy
-from embodied.light.arrays import Array, RayScene
+from embodied.light.arrays import Array, Ray, RayScene
 from embodied.software import bundled, load_atomic
 from embodied.threads import threads_allowed
 
@@ -126,7 +128,8 @@ def scene_of(corners: np.ndarray) -> RayScene:
     """
     mi = _module()
     if mi is not in_numpy:
-        return _scene(mi, corners)
+        scene = _scene(mi, corners)
+        return Apart(scene) if _one_scene_per_kernel() else scene
     meet = in_numpy.embree(corners)
     if meet is None:
         import mitsuba
@@ -145,6 +148,38 @@ def _scene(mi: types.ModuleType, corners: np.ndarray) -> RayScene:
     params["faces"] = np.arange(3 * m, dtype=np.uint32)
     params.update()
     return mi.load_dict({"type": "scene", "triangles": mesh})
+
+
+def _one_scene_per_kernel() -> bool:
+    """Whether rays are traced by OptiX, which meets nothing where one kernel traces rays in two scenes."""
+    return device() == "cuda"
+
+
+@dataclass(frozen=True)
+class Apart:
+    """A scene whose rays are traced by kernels of their own. They cannot be recorded, so loops must be `looped`."""
+
+    scene: RayScene
+
+    def ray_test(self, ray: Ray, active: Array = True) -> Array:
+        return _evaluated(self.scene.ray_test(ray, active))
+
+    def ray_intersect_preliminary(self, ray: Ray, coherent: bool = False, active: Array = True) -> Any:
+        return _evaluated(self.scene.ray_intersect_preliminary(ray, coherent, active))
+
+
+def _evaluated(found: Any) -> Any:
+    drjit().eval(found)
+    return found
+
+
+def looped(
+    state: tuple[Array, ...], cond: Callable[..., Array], body: Callable[..., tuple[Array, ...]]
+) -> tuple[Array, ...]:
+    """`while_loop` of Dr.Jit around rays: one kernel, or where `scene_of` keeps scenes apart some for each round."""
+    if _one_scene_per_kernel():
+        return drjit().while_loop(state, cond, body, mode="evaluated")
+    return drjit().while_loop(state, cond, body)
 
 
 ALIGNED = 64
@@ -226,7 +261,7 @@ def number(x: int) -> Array:
 
 
 def added_up(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Array) -> tuple[Array, ...]:
-    """Sums of what `one` returns for 0 to `count` - 1, in one kernel.
+    """Sums of what `one` returns for 0 to `count` - 1, in one kernel where rays allow it (`looped`).
 
     Args:
       one: from a device number k (UInt32) to as many arrays as there are `zeros`.
@@ -235,7 +270,7 @@ def added_up(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Arra
     dr = drjit()
     last = number(count)
     body = lambda k, *totals: (k + 1, *(t + x for t, x in zip(totals, one(k))))
-    totals = dr.while_loop((mitsuba().UInt32(0), *zeros), lambda k, *_: k < last, body)[1:]
+    totals = looped((mitsuba().UInt32(0), *zeros), lambda k, *_: k < last, body)[1:]
     dr.eval(*totals)
     return totals
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import constant, drjit, floats, mitsuba, number, scene_of
+from embodied.light.backend import constant, drjit, floats, looped, mitsuba, number, scene_of
 from embodied.light.pages.atlas import Page
 from embodied.light.pages.unwrap import face_normals
 
@@ -160,7 +160,7 @@ def _straight_down(
         return k + 1, face, dr.select(new, hit.prim_uv.x, u), dr.select(new, hit.prim_uv.y, v)
 
     none, zero = dr.zeros(mi.Int32, len(spot)) - 1, dr.zeros(mi.Float, len(spot))
-    _, face, u, v = dr.while_loop((mi.UInt32(0), none, zero, zero), lambda k, *_: k < last, body)
+    _, face, u, v = looped((mi.UInt32(0), none, zero, zero), lambda k, *_: k < last, body)
     dr.eval(face, u, v)
     return np.array(face), np.array(u), np.array(v)
 
