@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import re
 
@@ -97,11 +98,13 @@ def test_every_reader_is_judged_in_all_wordings(learner):
     assert [bool(r.train) for r in table.rows] == [False] * 6 + [True] * 6
 
 
-def test_what_was_judged_names_the_code_that_words_it():
+def test_what_was_judged_names_the_code_and_the_texts_that_word_it(monkeypatch):
     assert not code_of({"played": "learned"})
-    assert len(code_of({WORDING: SYNONYMS})["wording"]) == 16 and code_of({NEAREST: True}) == code_of(
-        {SPEAKERS: "novel"}
-    )
+    before, heard = code_of({WORDING: SYNONYMS}), code_of({NEAREST: True})
+    assert len(before["wording"]) == 16 and heard == code_of({SPEAKERS: "novel"})
+    other = dataclasses.replace(UNHEARD, requests=("fetch {thing}{where}",))
+    monkeypatch.setattr("agents.studies.wordings.UNHEARD", other)
+    assert code_of({WORDING: SYNONYMS}) != before and code_of({NEAREST: True}) == heard
 
 
 def test_navs_test_requests_are_said_otherwise_and_those_of_training_are_not():

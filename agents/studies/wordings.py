@@ -11,8 +11,9 @@ from typing import Any
 
 from agents.common.nearest_clauses import NearestClauses
 from agents.common.paraphrases import paraphraser
-from agents.common.unheard import in_synonyms, reworded
+from agents.common.unheard import UNHEARD, in_synonyms, reworded
 from agents.studies.tables import StudyRow, StudyTable
+from assets.cache import digest
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest
 from embodied.interface import Agent
@@ -77,8 +78,9 @@ def _said(row: StudyRow, how: str) -> StudyRow:
 
 
 def code_of(judge: Mapping[str, Any]) -> dict[str, str]:
-    """The code that words or reads what is said in a row, as a part of what was judged."""
-    return {"wording": code_digest(__name__)} if {WORDING, SPEAKERS, NEAREST} & set(judge) else {}
+    """The code and the texts that word or read what is said in a row, as a part of what was judged."""
+    code = {"wording": code_digest(__name__)} if {WORDING, SPEAKERS, NEAREST} & set(judge) else {}
+    return code | ({"texts": digest(dataclasses.asdict(UNHEARD))} if judge.get(WORDING) else {})
 
 
 def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
