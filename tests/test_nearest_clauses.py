@@ -61,12 +61,33 @@ def test_a_number_that_was_not_said_is_not_read():
     assert none("rotate leftward") == "rotate leftward"
 
 
+def test_a_clause_goes_to_the_side_that_was_said_in_whatever_word():
+    heard = ["turn right at the big red door", "turn left"]
+    read = NearestClauses(heard, lambda: sentences, lambda: words)
+    assert read("rotate left at the big red door") == "turn left", "though the other clause shares more words"
+    assert read("rotate leftward at the big red door") == "turn left"
+    assert NearestClauses(heard[:1], lambda: sentences, lambda: words)("rotate leftward") == heard[0]
+
+
+def test_what_ends_texts_is_rather_read_at_their_ends():
+    heard = ["walk on . the walk ends"] * 9
+    alike = NearestClauses(heard, lambda: lambda said: np.ones((len(said), 1)), lambda: words)
+    assert alike("the walk . the walk") == "walk on . the walk ends"
+
+
+def test_two_new_clauses_are_read_as_one_that_is_much_nearer_than_both():
+    read = NearestClauses(["find a mug in the hall", "go on", "turn left"], lambda: sentences, lambda: words)
+    assert read("seek a mug , it stands in the aisle") == "find a mug in the hall"
+    assert read("rotate leftward , march on") == "turn left , go on", "each is near enough"
+    assert read("seek a mug . it stands in the aisle").count(".") == 1, "sentences stay apart"
+
+
 def test_every_clause_is_embedded_once(read):
     counted = []
     once = NearestClauses(HEARD, lambda: lambda said: counted.append(len(said)) or sentences(said), lambda: words)
     for _ in range(3):
         once("rotate leftward . rotate leftward")
-    assert counted == [6, 1], "what was heard, and the new clause"
+    assert counted == [6, 1, 1], "what was heard, and the new clause before others and at the end"
 
 
 def test_the_training_houses_of_a_data_set_are_what_was_heard(tmp_path, monkeypatch):
@@ -80,9 +101,14 @@ def test_the_training_houses_of_a_data_set_are_what_was_heard(tmp_path, monkeypa
     heard, one = set(heard_in(data)), set(heard_in(data, houses=1))
     assert {t.request for t in data.tasks("train")} <= heard and {r.instruction for r in routes} <= heard
     assert unheard and not {r.instruction for r in unheard} & heard, "wordings that are kept for evaluation"
-    assert "turn 60 degrees left , stop" in heard, "what VNLA's advisor can say"
     others = {t.request for t in data.tasks("train") if t.world != first}
     assert len(names) > 1 and one < heard and heard - one <= others
+
+
+def test_vnlas_advisor_is_heard_before_requests_in_vnlas_data_sets_alone(tmp_path):
+    said, others = (heard_in(built(tmp_path / kind, kind)) for kind in ("vnla", "hanna"))
+    assert any(text.startswith("turn 60 degrees left , stop . find ") for text in said)
+    assert not any("degrees" in text for text in others)
 
 
 def test_minilm_reads_sentences_that_share_no_word_with_what_was_heard():

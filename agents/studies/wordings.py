@@ -1,5 +1,5 @@
 """The tables of every learner that reads: instructions as they were said, in synonyms, paraphrased and by people never
-heard, without and with pre-trained vectors of words and of sentences."""
+heard: by agents that learn words from instructions, read nearest clauses, or begin with pre-trained vectors."""
 
 from __future__ import annotations
 
@@ -56,21 +56,15 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
 
 
 def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
-    """Agents that learn words from instructions alone, and with pre-trained vectors; both also with nearest clauses."""
-
-    def nearest(reader: StudyRow) -> StudyRow:
-        return dataclasses.replace(
-            reader, label=f"{reader.label}, nearest clauses", judge={**reader.judge, NEAREST: True}
-        )
-
-    learned, vectors = row("learned words"), row("pre-trained vectors", word_vectors="minilm")
-    return learned, nearest(learned), vectors, nearest(vectors)
+    """Agents that learn words from instructions alone, the same with nearest clauses, and with pre-trained vectors."""
+    learned = row("learned words")
+    nearest = dataclasses.replace(learned, label="nearest clauses", judge={**learned.judge, NEAREST: True})
+    return learned, nearest, row("pre-trained vectors", word_vectors="minilm")
 
 
 def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:
-    """Rows of all readers, compared where they differ in one thing."""
-    learned, nearest, vectors, both = readers
-    return [(nearest, learned), (vectors, learned), (both, vectors)]
+    learned, nearest, vectors = readers
+    return [(nearest, learned), (vectors, learned)]
 
 
 def _said(row: StudyRow, how: str) -> StudyRow:
