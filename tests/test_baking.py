@@ -57,9 +57,10 @@ def test_what_stands_in_outer_walls_takes_light_from_the_open_sky_on_its_outer_s
     assert kinds == {True, False}
 
 
-@pytest.mark.skipif(backend.device() != "llvm", reason="compares CUDA's way with LLVM's, on LLVM")
 def test_where_a_kernel_knows_one_scene_light_is_the_same(lit, solved, tmp_path, monkeypatch):
     """As on CUDA, where rays into two scenes in one kernel meet nothing: every ray is traced by a kernel of its own."""
+    if backend.device() != "llvm":
+        pytest.skip("compares CUDA's way with LLVM's, on LLVM")
     house, catalogue, *_ = lit
     monkeypatch.setattr(backend, "_one_scene_per_kernel", lambda: True)
     again = baking.solve_house(house, baking.Shared(house, house_parts(house, catalogue), tmp_path, TINY), TINY)
