@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import functools
 import importlib.metadata
+import re
 import sys
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -58,7 +59,7 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
         if name in found or name in without or path is None:
             continue
         found[name] = path
-        names, _ = _read(path.read_bytes(), name, path.name == "__init__.py")
+        names = _read(path.read_bytes(), name, path.name == "__init__.py").imports
         ours = [n for n in names if n.split(".")[0] in OURS]
         waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if "." in n]  # packages run before their modules
         libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in known)
@@ -88,26 +89,42 @@ def imported(tree: ast.Module, module: str, *, package: bool) -> Iterator[str]:
 def code_digest(*makers: str, root: Path = ROOT, without: tuple[str, ...] = ()) -> str:
     """Hex digest of what the import closure of `makers` does: its code, data files beside it, versions of libraries.
 
+    Data files are those in a folder `data` beside a module, and tables (.toml) beside a module that names them.
+
     Args:
       without: as for `closure`; 'assets.data' leaves out the data files beside the modules of `assets`.
     """
     whole = closure(*makers, root=root, without=without)
+    read = {name: _read(path.read_bytes(), name, path.name == "__init__.py") for name, path in whole.modules.items()}
     folders = {path.parent / "data" for path in whole.modules.values()}
     named = [f for f in folders if ".".join(f.relative_to(root).parts) not in without]
-    data = sorted(f for folder in named for f in folder.glob("*") if f.is_file())
+    data = {f for folder in named for f in folder.glob("*") if f.is_file()}
+    data |= {f for name, path in whole.modules.items() for t in read[name].tables if (f := path.with_name(t)).is_file()}
     return digest(
-        {name: _read(path.read_bytes(), name, path.name == "__init__.py")[1] for name, path in whole.modules.items()},
-        {f.relative_to(root).as_posix(): digest(f) for f in data},
+        {name: module.digest for name, module in read.items()},
+        {f.relative_to(root).as_posix(): digest(f) for f in sorted(data)},
         {name: _version(name) for name in whole.libraries},
     )[:16]
 
 
+@dataclass(frozen=True)
+class _Read:
+    """What is in the source of a module."""
+
+    imports: tuple[str, ...]
+    tables: frozenset[str]
+    """Names of .toml files that it holds, docstrings left out."""
+    digest: str
+    """Of its syntax tree: the same in all versions of Python."""
+
+
 @functools.lru_cache(maxsize=1024)
-def _read(source: bytes, module: str, package: bool) -> tuple[tuple[str, ...], str]:
-    """What a module imports, and the digest of its syntax tree: the same in all versions of Python."""
+def _read(source: bytes, module: str, package: bool) -> _Read:
     tree = ast.parse(source)
-    names = tuple(imported(tree, module, package=package))
-    return names, digest(repr(_described(tree)))
+    docstrings = {node.value for node in ast.walk(tree) if isinstance(node, ast.Expr) and _is_docstring(node)}
+    texts = [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and n not in docstrings]
+    tables = frozenset(text for text in texts if isinstance(text, str) and re.fullmatch(r"\w+\.toml", text))
+    return _Read(tuple(imported(tree, module, package=package)), tables, digest(repr(_described(tree))))
 
 
 def _last_name(node: ast.expr) -> str:

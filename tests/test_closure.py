@@ -55,6 +55,36 @@ def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
 
 
 @pytest.mark.parametrize(
+    ("table", "maker"),
+    [
+        ("embodied/language/templates.toml", "embodied.language.voice"),
+        ("embodied/language/speakers.toml", "embodied.language.voice"),
+        ("embodied/generate/tastes.toml", "embodied.generate"),
+        ("embodied/generate/furnish/smalls.toml", "embodied.generate"),
+    ],
+)
+def test_a_table_is_in_the_key_of_what_is_made_by_it(tree, table, maker):
+    before, apart = key(tree, maker), key(tree, "embodied.render.panorama")
+    edit(tree / table, "\n", "\n# another table\n")
+    assert key(tree, maker) != before
+    assert key(tree, "embodied.render.panorama") == apart, "which knows no table"
+
+
+def test_a_table_that_a_docstring_names_is_in_no_key(tmp_path):
+    package = tmp_path / "embodied"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "a.py").write_text('"""See other.toml."""\n\nTABLE = "own.toml"\n')
+    for name in ("own", "other"):
+        (package / f"{name}.toml").write_text("x = 1\n")
+    before = key(tmp_path, "embodied.a")
+    (package / "other.toml").write_text("x = 2\n")
+    assert key(tmp_path, "embodied.a") == before
+    (package / "own.toml").write_text("x = 2\n")
+    assert key(tmp_path, "embodied.a") != before
+
+
+@pytest.mark.parametrize(
     ("file", "old", "new"),
     [
         ("embodied/house/house.py", "inner_wall: float = 0.12", "inner_wall: float = 0.13"),

@@ -53,7 +53,7 @@ class Speaker:
     """'familiar' or 'novel': which templates and words it knows; None: all."""
 
 
-SPEAKERS = from_plain(tuple[Speaker, ...], read_toml(Path(__file__).with_suffix(".toml"))["speakers"])
+SPEAKERS = from_plain(tuple[Speaker, ...], read_toml(Path(__file__).with_name("speakers.toml"))["speakers"])
 """Everyday, terse, chatty, formal, landmark-minded, direction-minded."""
 NOVEL_HABIT = "formal"
 """Who is never heard in learning where some people are kept from it; novel people are formal or without a habit."""
