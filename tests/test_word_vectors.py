@@ -62,6 +62,24 @@ def test_marks_that_are_no_words_stay_unknown():
     assert Lexicon(WORDS).number("%") == 1 and Lexicon(WORDS).number("42") == 1
 
 
+@pytest.mark.parametrize("vectors", ["learned", "minilm"])
+def test_texts_of_training_can_be_said_in_other_words(vectors):
+    say = lambda text: text.replace("walk", "amble")
+    words = build_vocabulary(["walk to the bed"], reword=say)
+    assert {"walk", "amble"} <= set(words.words)
+    heard, plain = vocabulary_with(words.words, vectors, words.reword), vocabulary_with(words.words, vectors)
+    assert (heard.encode("walk on", 5) == plain.encode("amble on", 5)).all()
+    assert (heard.encode("walk on", 5) != plain.encode("walk on", 5)).any()
+
+
+def test_a_text_is_read_from_its_end_and_its_own_end_stays_where_it_is_too_long():
+    words = build_vocabulary(["a b c d"])
+    number, end = words.number, words.number("<EOS>")
+    assert list(words.encode("a b", 4, backwards=True)) == [number("b"), number("a"), end, 0]
+    assert list(words.encode("a b c d", 3, backwards=True)) == [number("b"), number("a"), end]
+    assert list(words.encode("a b c d", 3)) == [number("a"), number("b"), number("c")], "and the same text as it is"
+
+
 def test_without_vectors_an_embedding_is_torchs():
     torch.manual_seed(3)
     ours = WordEmbedding(9, 4)

@@ -1,18 +1,22 @@
 """Whole sentences that no speaker of the corpus says: an instruction is read by its grammar and said in other frames.
 
-Nouns, colours and numbers stay as they were said; word order, verbs and what joins clauses are others (unheard.toml).
+Nouns, colours and numbers stay as they were said; word order, verbs and what joins clauses are others: in training
+those of varied.toml, in tests those of unheard.toml.
 """
 
 from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from agents.common.unheard import UNHEARD
 from assets.catalogue import Catalogue
+from assets.json_file import from_plain, read_toml
 from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
 from embodied.language.grammar import kind_of, normalised, parse
 from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
@@ -21,35 +25,78 @@ from embodied.language.templates import WORDS
 from embodied.seeds import stream
 
 BACKWARD_SHARE = 0.15
+PARAPHRASED, RENAMED = 0.4, 0.5
+"""In training: share of the texts that is said in other frames, and with other words (docs/sources.md, S184)."""
 FIND = "find "
 
 
-def paraphraser(catalogue: Catalogue) -> Callable[[str], str]:
+@dataclass(frozen=True)
+class Wordings:
+    """What is in unheard.toml and in varied.toml."""
+
+    joints: tuple[str, ...]
+    backwards: str
+    requests: tuple[str, ...]
+    where: tuple[str, ...]
+    synonyms: Mapping[str, tuple[str, ...]]
+    frames: Mapping[str, tuple[str, ...]]
+    actions: Mapping[str, tuple[str, ...]]
+
+
+VARIED = from_plain(Wordings, read_toml(Path(__file__).with_name("varied.toml")))
+
+
+def paraphraser(catalogue: Catalogue, wordings: Wordings) -> Callable[[str], str]:
     """What rewords instructions, requests and sub-goals about things of a catalogue; the same text always alike."""
-    return functools.cache(functools.partial(paraphrase, lexicon=lexicon_of(catalogue)))
+    return functools.cache(functools.partial(paraphrase, lexicon=lexicon_of(catalogue), wordings=wordings))
 
 
-def paraphrase(text: str, lexicon: Lexicon) -> str:
+def varied(catalogue: Catalogue) -> Callable[[str], str]:
+    """What rewords a share of the texts of training in the wordings of varied.toml; the same text always alike."""
+    lexicon = lexicon_of(catalogue)
+
+    def say(text: str) -> str:
+        rng = stream(0, "varied", text)
+        text = paraphrase(text, lexicon, VARIED) if rng.random() < PARAPHRASED else text
+        return some_in_synonyms(text, rng.random(), rng) if rng.random() < RENAMED else text
+
+    return functools.cache(say)
+
+
+def some_in_synonyms(text: str, share: float, rng: np.random.Generator) -> str:
+    """The text with that share of its words in words of about the same meaning, those of training."""
+
+    def other(word: re.Match[str]) -> str:
+        like = VARIED.synonyms.get(word[0], ())
+        return like[int(rng.integers(len(like)))] if like and rng.random() < share else word[0]
+
+    return re.sub("[a-z]+", other, text.lower())
+
+
+def paraphrase(text: str, lexicon: Lexicon, wordings: Wordings) -> str:
     """The text in other sentences; what its grammar does not read is left out. A text of which it reads none stays."""
     rng = stream(0, "paraphrase", text)
     *subgoals, last = text.split(" . ")
     if last.startswith(FIND):
-        return " . ".join([*(_actions(heard_subgoal(s), rng) for s in subgoals), _request(last, rng)])
+        actions = [_actions(heard_subgoal(s), wordings, rng) for s in subgoals]
+        return " . ".join([*actions, _request(last, wordings, rng)])
     try:
         clauses = parse(text, lexicon).clauses
     except ValueError:  # no instruction
         return text
-    return _joined(list(_said(clauses, normalised(text), lexicon, rng)), rng)
+    return _joined(list(_said(clauses, normalised(text), lexicon, wordings, rng)), wordings, rng)
 
 
-def _said(clauses: Sequence[Clause], text: str, lexicon: Lexicon, rng: np.random.Generator) -> list[str]:
+def _said(
+    clauses: Sequence[Clause], text: str, lexicon: Lexicon, wordings: Wordings, rng: np.random.Generator
+) -> list[str]:
     """Each clause, or two at once, in a frame."""
     said, i = [], 0
     while i < len(clauses):
         kinds = " ".join(kind_of(c) for c in clauses[i : i + 2])
-        many = 2 if i + 1 < len(clauses) and kinds in UNHEARD.frames and rng.random() < 0.5 else 1
+        many = 2 if i + 1 < len(clauses) and kinds in wordings.frames and rng.random() < 0.5 else 1
         now = clauses[i : i + many]
-        frames = UNHEARD.frames[" ".join(kind_of(c) for c in now)]
+        frames = wordings.frames[" ".join(kind_of(c) for c in now)]
         said.append(frames[int(rng.integers(len(frames)))].format(**_slots(now, text, lexicon)))
         i += many
     return said
@@ -84,27 +131,27 @@ def _longest_in(text: str, nouns: Iterable[str]) -> str:
     return max((n for n in nouns if f" {n} " in f" {text} "), key=len, default="")
 
 
-def _joined(said: list[str], rng: np.random.Generator) -> str:
+def _joined(said: list[str], wordings: Wordings, rng: np.random.Generator) -> str:
     text = said[0]
     for before, more in itertools.pairwise(said):
         if text == before and len(said) > 2 and rng.random() < BACKWARD_SHARE:
-            text = UNHEARD.backwards.format(first=before, second=more)
+            text = wordings.backwards.format(first=before, second=more)
         else:
-            text += UNHEARD.joints[int(rng.integers(len(UNHEARD.joints)))] + more
+            text += wordings.joints[int(rng.integers(len(wordings.joints)))] + more
     return ". ".join(s[:1].upper() + s[1:] for s in text.split(". ")) + "."
 
 
-def _request(text: str, rng: np.random.Generator) -> str:
+def _request(text: str, wordings: Wordings, rng: np.random.Generator) -> str:
     """'find a mug in a kitchen' otherwise."""
     thing, _, room = text.removeprefix(FIND).partition(" in ")
-    where = UNHEARD.where[int(rng.integers(len(UNHEARD.where)))].format(room=room) if room else ""
-    return UNHEARD.requests[int(rng.integers(len(UNHEARD.requests)))].format(thing=thing, where=where)
+    where = wordings.where[int(rng.integers(len(wordings.where)))].format(room=room) if room else ""
+    return wordings.requests[int(rng.integers(len(wordings.requests)))].format(thing=thing, where=where)
 
 
-def _actions(words: Sequence[str], rng: np.random.Generator) -> str:
+def _actions(words: Sequence[str], wordings: Wordings, rng: np.random.Generator) -> str:
     """VNLA's sub-goal otherwise."""
     said = []
     for word, group in itertools.groupby(words):
-        n, frames = len(list(group)), UNHEARD.actions[word]
+        n, frames = len(list(group)), wordings.actions[word]
         said.append(frames[int(rng.integers(len(frames)))].format(n=n if word == "forward" else 30 * n))
     return " ; ".join(said)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -61,10 +62,10 @@ class SightedAgent:
         return self.about.config
 
     @classmethod
-    def new(cls, about: About) -> Self:
-        """An untrained agent; its weights follow from the seed."""
+    def new(cls, about: About, reword: Callable[[str], str] | None = None) -> Self:
+        """An untrained agent; its weights follow from the seed. `reword` as Vocabulary has it, for training."""
         with seeded(about.config.seed):
-            network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors)
+            network, vocabulary = cls.network_of(about), vocabulary_with(about.words, about.config.word_vectors, reword)
             use_vectors(network, vocabulary)
             return cls(about, network, vocabulary)
 

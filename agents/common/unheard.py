@@ -5,31 +5,18 @@ from __future__ import annotations
 import dataclasses
 import functools
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from agents.common.paraphrases import Wordings
 from assets.json_file import from_plain, read_toml
 from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedPolicy, Situations
 
-
-@dataclass(frozen=True)
-class Unheard:
-    """What is in unheard.toml."""
-
-    joints: tuple[str, ...]
-    backwards: str
-    requests: tuple[str, ...]
-    where: tuple[str, ...]
-    synonyms: Mapping[str, tuple[str, ...]]
-    frames: Mapping[str, tuple[str, ...]]
-    actions: Mapping[str, tuple[str, ...]]
-
-
-UNHEARD = from_plain(Unheard, read_toml(Path(__file__).with_name("unheard.toml")))
+UNHEARD = from_plain(Wordings, read_toml(Path(__file__).with_name("unheard.toml")))
 
 
 def in_synonyms(known: Collection[str]) -> Callable[[str], str]:

@@ -6,8 +6,8 @@ import collections
 import functools
 import itertools
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,6 +29,8 @@ def tokenize(text: str) -> list[str]:
 class Vocabulary:
     words: tuple[str, ...]
     """Word of each number; starts with PAD, UNKNOWN, END."""
+    reword: Callable[[str], str] | None = field(default=None, compare=False, repr=False)
+    """What says texts in other words before they are encoded: in training, where wordings are varied."""
 
     def __post_init__(self) -> None:
         if self.words[:3] != (PAD, UNKNOWN, END):
@@ -47,15 +49,21 @@ class Vocabulary:
         """The number of a word, that of UNKNOWN where there is none."""
         return self.number_of.get(word, UNKNOWN_NUMBER)
 
-    def encode(self, text: str, length: int) -> np.ndarray:
-        """(length,) int64 numbers of the words, then END if it fits, then padding; not to be changed."""
-        found = self._encoded.get((text, length))
+    def encode(self, text: str, length: int, *, backwards: bool = False) -> np.ndarray:
+        """(length,) int64 numbers of the words, then END if it fits, then padding; not to be changed.
+
+        Args:
+          backwards: the last word first; of a text that is too long, its end is left out and END is kept.
+        """
+        key = text, length, backwards
+        found = self._encoded.get(key)
         if found is None:
             if len(self._encoded) >= REMEMBERED:
                 self._encoded.clear()
-            numbers = self.sentence(tokenize(text))[:length]
+            words = tokenize(self.reword(text) if self.reword else text)
+            numbers = self.sentence(words[: length - 1][::-1] if backwards else words)[:length]
             padding = [PAD_NUMBER] * (length - len(numbers))
-            found = self._encoded[text, length] = np.array(numbers + padding, dtype=np.int64)
+            found = self._encoded[key] = np.array(numbers + padding, dtype=np.int64)
         return found
 
     def sentence(self, words: Iterable[str]) -> list[int]:
@@ -73,13 +81,16 @@ class Vocabulary:
         return tuple(self.words[n] for n in before if n != PAD_NUMBER)
 
     @functools.cached_property
-    def _encoded(self) -> dict[tuple[str, int], np.ndarray]:
+    def _encoded(self) -> dict[tuple[str, int, bool], np.ndarray]:
         return {}
 
 
-def build_vocabulary(texts: Iterable[str], least: int = 1) -> Vocabulary:
-    """The vocabulary of `texts`: words seen at least `least` times, most frequent first, ties by alphabet."""
-    return most_frequent((word for text in texts for word in tokenize(text)), least=least)
+def build_vocabulary(texts: Iterable[str], least: int = 1, reword: Callable[[str], str] | None = None) -> Vocabulary:
+    """The vocabulary of `texts`: words seen at least `least` times, most frequent first, ties by alphabet; with
+    `reword`, which the vocabulary keeps, of the texts as they are and as it says them."""
+    every = itertools.chain.from_iterable((t, reword(t)) if reword else (t,) for t in texts)
+    found = most_frequent((word for text in every for word in tokenize(text)), least=least)
+    return Vocabulary(found.words, reword)
 
 
 def most_frequent(words: Iterable[str], least: int = 1, most: int | None = None) -> Vocabulary:

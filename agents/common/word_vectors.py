@@ -82,9 +82,9 @@ class Lexicon(Vocabulary):
         return vector / vector.norm()
 
 
-def vocabulary_with(words: tuple[str, ...], vectors: str) -> Vocabulary:
-    """The vocabulary of an agent whose setting `word_vectors` is `vectors`."""
-    return Vocabulary(words) if vectors == LEARNED_WORDS else Lexicon(words)
+def vocabulary_with(words: tuple[str, ...], vectors: str, reword: Callable[[str], str] | None = None) -> Vocabulary:
+    """The vocabulary of an agent whose setting `word_vectors` is `vectors`; `reword` as Vocabulary has it."""
+    return Vocabulary(words, reword) if vectors == LEARNED_WORDS else Lexicon(words, reword)
 
 
 class WordEmbedding(nn.Embedding):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Unpack
 
@@ -19,11 +20,11 @@ from embodied.novelty import FAMILIAR
 from embodied.teachers.hanna import HannaTeacher
 
 
-def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
+def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[str], str] | None = None) -> Vocabulary:
     """Words of the training split's first `houses` houses: requests and the routes that training hears."""
     names = data.names("train")[:houses]
     routes = [r.instruction for n in names for r in data.routes(n) if r.split == "train_seen"]
-    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], least=2)
+    return build_vocabulary([*(t.request for t in data.tasks("train") if t.world in names), *routes], 2, reword)
 
 
 def train_agent(
@@ -48,8 +49,9 @@ def train_agent(
     training = lessons.split("train", houses=houses, lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else HannaAgent.load(begin)
-    words = other.vocabulary if other else vocabulary_of(lessons.data, houses)
-    agent, begun = HannaAgent.new(lessons.about(HannaAbout, config, evaluation, words)), dict[str, str]()
+    reword, begun = lessons.rewording(config), dict[str, str]()
+    words = other.vocabulary if other else vocabulary_of(lessons.data, houses, reword)
+    agent = HannaAgent.new(lessons.about(HannaAbout, config, evaluation, words), reword)
     if other is not None and begin is not None:
         take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
         begun["begin"] = weights_digest(begin)

@@ -39,7 +39,7 @@ LEARNERS = (
     StudyRow("ADEL"),
 )
 DAGGER, BLIND = LEARNERS[0], StudyRow("DAgger, blind", {"learner": "dagger", "blind": True})
-OWN = ("blind", "word_vectors")
+OWN = ("blind", "word_vectors", "varied_words")
 """Settings of NAV's students in which rows differ."""
 CHANCE = StudyRow("chance: a random shortest path of 2 to 6 edges", None)
 TABLES: Mapping[str, StudyTable] = {
@@ -161,13 +161,15 @@ class NavStudyWorld:
         good = successes(NavWorld(grounds.data.eyes.places), student, trips)
         return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 
-    def said(self, grounds: nav.NavGrounds, judge: Mapping[str, Any]) -> nav.NavGrounds:
-        """With the test requests as a row has them said and read."""
+    def said(self, grounds: nav.NavGrounds, judge: Mapping[str, Any], best: Path) -> nav.NavGrounds:
+        """With the test requests as a row has them said to a trained student and read by it."""
         cache, how = self.houses.cache, judge.get(WORDING)
         if speakers := judge.get(SPEAKERS):
             grounds = nav.spoken(grounds, speakers, cache)
         if how:
-            grounds = nav.reworded(grounds, saying(how, grounds.data.eyes.vocabulary.words, cache))
+            grounds = nav.reworded(
+                grounds, saying(how, load_follower(best, grounds.data.eyes).eyes.vocabulary.words, cache)
+            )
         if judge.get(NEAREST):
             heard = (request for trip in grounds.data.splits["train"] for request in trip.requests)
             grounds = nav.reworded(grounds, NearestClauses(heard))
@@ -258,7 +260,7 @@ class IliadStudy(StudyLearner):
         needed = episodes_to(history, self.config.threshold) / 1000
         world, grounds = self._world(row.train), _grounds(self._world(row.train), folder)
         if isinstance(world, NavStudyWorld):
-            grounds = world.said(grounds, row.judge)
+            grounds = world.said(grounds, row.judge, weights)
         found = {"success": world.judge(grounds, weights, split)}
         return found | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
 

@@ -1,5 +1,6 @@
 """The tables of every learner that reads instructions: as they were said, in synonyms, paraphrased, and of people never
-heard. Each judges three readers: words learned from instructions, nearest clauses, and pre-trained vectors."""
+heard. Each judges several readers: words learned from instructions, the same with nearest clauses, pre-trained vectors
+and, but for people never heard, varied words in training."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
     Args:
       row: makes a row of its label and of what differs in training.
     """
-    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row)]
+    varied = row("varied words", word_vectors="minilm", varied_words=True)
+    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in (*_readers(row), varied)]
     lost = [(said, other) for said, *unheard in readers for other in unheard]
     won = [pair for alike in [*zip(*readers, strict=True)][1:] for pair in _changes(alike)]
     title = "Instructions in unheard words and sentences"
@@ -63,8 +65,8 @@ def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
 
 
 def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:
-    learned, nearest, vectors = readers
-    return [(nearest, learned), (vectors, learned)]
+    learned, *others = readers
+    return [(other, learned) for other in others]
 
 
 def _said(row: StudyRow, how: str) -> StudyRow:
@@ -79,7 +81,7 @@ def code_of(judge: Mapping[str, Any]) -> dict[str, str]:
 
 def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
     """What says a text as a row has it to an agent that knows the words `known`."""
-    return in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache))
+    return in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache), UNHEARD)
 
 
 def hearing(

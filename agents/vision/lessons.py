@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 from agents.common.more_paths import SaidBy
+from agents.common.paraphrases import varied
 from agents.common.playing import TaskSet
 from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.sighted import About
@@ -20,6 +21,7 @@ from agents.vision.encoder import Encoder
 from agents.vision.features import feature_path, load_bank
 from agents.vision.occasions import OCCASIONS, showing
 from assets.cache import default_cache
+from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.evaluate import spread
@@ -80,6 +82,10 @@ class Lessons:
     def said_by(self, novelty: str) -> Lessons:
         """The same with routes as somebody of a novelty describes them."""
         return dataclasses.replace(self, data=SaidBy(novelty, self.data, cache=self.cache))
+
+    def rewording(self, config: ImitationSettings) -> Callable[[str], str] | None:
+        """What says the texts of training in other words, if the settings want it."""
+        return varied(load_catalogue(self.cache)) if config.varied_words else None
 
     def identity(self) -> dict[str, str]:
         """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""

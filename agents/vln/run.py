@@ -47,8 +47,8 @@ def train_follower(
         training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(lessons, training, config)])
     if config.spoken_share:
         training = dataclasses.replace(training, tasks=mixed(training, config, speaker))
-    words = build_vocabulary(t.request for t in training.tasks)
-    agent = VlnAgent.new(lessons.about(VlnAbout, config, evaluation, words))
+    words = build_vocabulary((t.request for t in training.tasks), reword=lessons.rewording(config))
+    agent = VlnAgent.new(lessons.about(VlnAbout, config, evaluation, words), words.reword)
     agent.network.to(lessons.device)
     spoken = {"speaker": weights_digest(speaker)} if speaker and config.spoken_share else {}
     identity = identity_of("agents.vln.run", settings=config, **lessons.identity(), **spoken)

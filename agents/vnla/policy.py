@@ -16,7 +16,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.choosing import Chooser, choose_greedily, choose_sampled
-from agents.common.vocabulary import Vocabulary, tokenize
+from agents.common.vocabulary import Vocabulary
 from agents.vision.bank import FeatureBank
 from agents.vnla.network import (
     ASK,
@@ -206,8 +206,7 @@ class VnlaPolicy:
 
     def encode(self, text: str) -> np.ndarray:
         """(L,) int64 numbers of the words, the last one first, then the end, then padding, as in the program."""
-        words = tokenize(text)[: self.instruction_length - 1]
-        return self.vocabulary.encode(" ".join(words[::-1]), self.instruction_length)
+        return self.vocabulary.encode(text, self.instruction_length, backwards=True)
 
     def _listen(self, memory: VnlaMemory, seen: Sequence[Observation]) -> VnlaMemory:
         """Read the texts that are new, and notice what was carried out: an advisor may have acted in its place."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from pathlib import Path
 from typing import Unpack
 
@@ -20,12 +22,15 @@ from embodied.identity import identity_of
 from embodied.language.plain import PlainLanguage
 
 
-def vocabulary_of(data: Dataset, houses: int | None = None) -> Vocabulary:
+def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[str], str] | None = None) -> Vocabulary:
     """Words of the requests in the training split's first `houses` houses, and of all that the advisor can say."""
     names = data.names("train")[:houses]
     requests = [t.request for t in data.tasks("train") if t.world in names]
     said = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
-    return build_vocabulary([*requests, *said, *(s.text for s in data.said(names))])
+    heard = [*requests, *said, *(s.text for s in data.said(names))]
+    if reword:  # advice is said before a request
+        heard += [f"{s} . {r}" for s, r in zip(itertools.cycle(said), requests, strict=False)]
+    return build_vocabulary(heard, reword=reword)
 
 
 def train_agent(
@@ -39,7 +44,8 @@ def train_agent(
     houses = config.training_houses or None
     training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
-    agent = VnlaAgent.new(lessons.about(VnlaAbout, config, evaluation, vocabulary_of(lessons.data, houses)))
+    words = vocabulary_of(lessons.data, houses, lessons.rewording(config))
+    agent = VnlaAgent.new(lessons.about(VnlaAbout, config, evaluation, words), words.reword)
     agent.network.to(lessons.device)
     identity = identity_of("agents.vnla.run", settings=config, **lessons.identity())
     return imitation.train(VnlaLearner(agent, training), validation, folder, identity, **options)

@@ -65,6 +65,8 @@ class NavConfig:
     """Whose requests are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
     word_vectors: str = LEARNED_WORDS
     """What followers know of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
+    varied_words: bool = False
+    """Most of what is said to students in training is said in words and sentences of other writers."""
     data_seed: int = 0
     """Random seed of the further paths and of the teacher, which all students share."""
 

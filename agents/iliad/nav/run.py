@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from agents.common.more_paths import SaidBy
+from agents.common.paraphrases import varied
 from agents.common.session import Note
+from agents.common.vocabulary import build_vocabulary
 from agents.common.word_vectors import vocabulary_with
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
@@ -58,6 +60,8 @@ class NavGrounds:
     config: NavConfig
     data: NavData
     teacher: DescribingTeacher[Trip, NavWalk]
+    cache: Path
+    """Where the catalogue is."""
 
 
 def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = print) -> NavGrounds:
@@ -70,7 +74,7 @@ def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = 
     counts = ", ".join(f"{len(v)} {part}" for part, v in data.splits.items())
     words = len(data.eyes.vocabulary)
     note(f"trips: {counts}; {len(data.eyes.places)} houses, {words} words, pictures {data.pictures}")
-    return NavGrounds(config, data, _teacher(config, data, source.cache, Path(folder), note))
+    return NavGrounds(config, data, _teacher(config, data, source.cache, Path(folder), note), source.cache)
 
 
 def _teacher(
@@ -112,7 +116,10 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
     """A student of this seed with everything around it."""
     c, data = grounds.config, grounds.data
     eyes, splits = data.eyes.blind() if c.blind else data.eyes, data.splits
-    eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(eyes.vocabulary.words, c.word_vectors))
+    reword, words = varied(load_catalogue(grounds.cache)) if c.varied_words else None, eyes.vocabulary.words
+    if reword:
+        words = build_vocabulary((r for trip in splits["train"] for r in trip.requests), reword=reword).words
+    eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors, reword))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
     explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
