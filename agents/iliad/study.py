@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from agents.common.checkpoint import read_checkpoint
-from agents.common.nearest_clauses import NearestClauses
 from agents.common.session import Note
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav import run as nav
@@ -24,7 +23,7 @@ from agents.iliad.regex.world import RegexWorld
 from agents.iliad.training import episodes_to, successes
 from agents.studies.engine import Measured, StudyLearner
 from agents.studies.tables import Figure, StudyRow, StudyTable
-from agents.studies.wordings import NEAREST, SPEAKERS, WORDING, code_of, saying, speakers_table, words_table
+from agents.studies.wordings import SPEAKERS, WORDING, code_of, saying, speakers_table, words_table
 from assets.cache import digest
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
@@ -162,7 +161,7 @@ class NavStudyWorld:
         return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 
     def said(self, grounds: nav.NavGrounds, judge: Mapping[str, Any], best: Path) -> nav.NavGrounds:
-        """With the test requests as a row has them said to a trained student and read by it."""
+        """With the test requests as a row has them said to a trained student."""
         cache, how = self.houses.cache, judge.get(WORDING)
         if speakers := judge.get(SPEAKERS):
             grounds = nav.spoken(grounds, speakers, cache)
@@ -170,9 +169,6 @@ class NavStudyWorld:
             grounds = nav.reworded(
                 grounds, saying(how, load_follower(best, grounds.data.eyes).eyes.vocabulary.words, cache)
             )
-        if judge.get(NEAREST):
-            heard = (request for trip in grounds.data.splits["train"] for request in trip.requests)
-            grounds = nav.reworded(grounds, NearestClauses(heard))
         return grounds
 
     def chance(self, grounds: nav.NavGrounds, split: str, seed: int) -> Samples:

@@ -1,6 +1,6 @@
 """The tables of every learner that reads instructions: as they were said, in synonyms, paraphrased, and of people never
-heard. Each judges several readers: words learned from instructions, the same with nearest clauses, pre-trained vectors
-and, but for people never heard, varied words in training."""
+heard. Each judges three readers: words learned from instructions, pre-trained vectors, and these with varied words in
+training."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.common.nearest_clauses import NearestClauses
 from agents.common.paraphrases import paraphraser
 from agents.common.unheard import UNHEARD, in_synonyms, reworded
 from agents.studies.tables import StudyRow, StudyTable
@@ -24,8 +23,6 @@ WORDING, SYNONYMS, PARAPHRASED = "wording", "synonyms", "paraphrased"
 """In a row's `judge`: how instructions are said; as they are without."""
 SPEAKERS = "speakers"
 """In a row's `judge`: the novelty of who describes routes; those of the data set without."""
-NEAREST = "nearest"
-"""In a row's `judge`: whether clauses never heard are read as the nearest ones that were (NearestClauses)."""
 
 
 def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
@@ -34,8 +31,7 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
     Args:
       row: makes a row of its label and of what differs in training.
     """
-    varied = row("varied words", word_vectors="minilm", varied_words=True)
-    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in (*_readers(row), varied)]
+    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row)]
     lost = [(said, other) for said, *unheard in readers for other in unheard]
     won = [pair for alike in [*zip(*readers, strict=True)][1:] for pair in _changes(alike)]
     title = "Instructions in unheard words and sentences"
@@ -58,10 +54,9 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
 
 
 def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
-    """Agents that learn words from instructions alone, the same with nearest clauses, and with pre-trained vectors."""
-    learned = row("learned words")
-    nearest = dataclasses.replace(learned, label="nearest clauses", judge={**learned.judge, NEAREST: True})
-    return learned, nearest, row("pre-trained vectors", word_vectors="minilm")
+    """Agents that learn words from instructions alone, with pre-trained vectors, and from varied words, too."""
+    vectors = row("pre-trained vectors", word_vectors="minilm")
+    return row("learned words"), vectors, row("varied words", word_vectors="minilm", varied_words=True)
 
 
 def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:
@@ -75,7 +70,7 @@ def _said(row: StudyRow, how: str) -> StudyRow:
 
 def code_of(judge: Mapping[str, Any]) -> dict[str, str]:
     """The code and the texts that word or read what is said in a row, as a part of what was judged."""
-    code = {"wording": code_digest(__name__)} if {WORDING, SPEAKERS, NEAREST} & set(judge) else {}
+    code = {"wording": code_digest(__name__)} if {WORDING, SPEAKERS} & set(judge) else {}
     return code | ({"texts": digest(dataclasses.asdict(UNHEARD))} if judge.get(WORDING) else {})
 
 
@@ -84,15 +79,7 @@ def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
     return in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache), UNHEARD)
 
 
-def hearing(
-    agent: Agent, judge: Mapping[str, Any], known: Sequence[str], heard: Callable[[], NearestClauses], cache: Path
-) -> Agent:
-    """An agent to which everything is said as a row has it.
-
-    Args:
-      known: words that the agent knows.
-      heard: gives the clauses of its training.
-    """
-    agent = reworded(agent, heard()) if judge.get(NEAREST) else agent
+def hearing(agent: Agent, judge: Mapping[str, Any], known: Sequence[str], cache: Path) -> Agent:
+    """An agent that knows the words `known`, to which everything is said as a row has it."""
     how = judge.get(WORDING)
     return reworded(agent, saying(how, known, cache)) if how else agent

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from agents.common.nearest_clauses import NearestClauses, heard_in
-from agents.common.settings import EVERYBODY, EvaluationSettings, ImitationSettings
+from agents.common.settings import EvaluationSettings, ImitationSettings
 from agents.common.sighted import SightedAgent
 from agents.studies.episodes import EpisodeStudy
 from agents.studies.tables import StudyRow, StudyTable
@@ -21,7 +19,6 @@ from assets.cache import default_cache
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
-from embodied.novelty import FAMILIAR
 
 SPLITS = ("test_seen", "test_unseen")
 NOTHING: Mapping[str, Any] = {}
@@ -71,7 +68,7 @@ class SightedStudy(EpisodeStudy):
 
     def heard(self, agent: Any, policy: Any, judge: Mapping[str, Any]) -> Agent:
         """The policy of an agent, to which everything is said as the row has it."""
-        return hearing(policy, judge, agent.about.words, functools.partial(_clauses, self, agent.config), self.cache)
+        return hearing(policy, judge, agent.about.words, self.cache)
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return self.judged_lessons(judge).data
@@ -100,14 +97,6 @@ class SightedStudy(EpisodeStudy):
     def about(self) -> str:
         c, drawn = self.config, self.lessons().pictures("train")
         return f"{super().about()} Trained {c.iterations} updates of {c.batch} episodes on pictures {drawn}."
-
-
-@functools.lru_cache(maxsize=4)
-def _clauses(study: SightedStudy, config: ImitationSettings) -> NearestClauses:
-    """Those that agents of these settings heard in training."""
-    lessons = study.lessons()
-    heard = lessons.said_by(FAMILIAR) if getattr(config, "speakers", EVERYBODY) == FAMILIAR else lessons
-    return NearestClauses(heard_in(heard.data, config.training_houses or None))
 
 
 def spoken(lessons: Lessons, judge: Mapping[str, Any]) -> Lessons:

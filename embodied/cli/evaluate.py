@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from embodied.cli.common import bar, catalogue_of, note, show
-from embodied.cli.evaluate_options import AS_SAID, READERS, TEMPLATE, Options
+from embodied.cli.evaluate_options import TEMPLATE, Options
 from embodied.cli.model import client_of
 
 if TYPE_CHECKING:
@@ -59,8 +59,6 @@ def run(args: Options) -> int:
     names, files = _agents(args)
     if files and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
-    if args.reading != AS_SAID and not (files and args.kind in READERS):
-        raise ValueError(f"--reading {args.reading} is for trained agents of {', '.join(READERS)}; leave it out")
     splits = _splits(args)
     if data is not None:
         for split in splits:

@@ -16,10 +16,6 @@ if TYPE_CHECKING:
 KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
 VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
 """As in embodied.envs.vnla, which --help should not import."""
-AS_SAID = "as-said"
-READINGS = (AS_SAID, "nearest-clauses")
-READERS = ("hanna", "vln", "vnla")
-"""Kinds whose trained agents read sentences."""
 STATES = ("none", "sparse", "dense")
 """As in embodied.envs.hari, which --help should not import."""
 SEES = ("names", "strip", "panorama", "nothing")
@@ -101,9 +97,6 @@ class OfTrained:
     """How goal images differ from what the agent sees there; same: not at all; camera: taken by a robot's camera; hour:
     at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
     another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees."""
-    reading: Annotated[str, Option(words=READINGS)] = AS_SAID
-    """How agents read clauses that were never said in training: as they are, or as the nearest ones of the data set's
-    training houses (with the extra [sentences])."""
 
 
 @dataclass(frozen=True, kw_only=True)

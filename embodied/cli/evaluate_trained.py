@@ -50,7 +50,6 @@ def evaluate_trained(
       ValueError: an unknown row.
     """
     from agents.common.device import use_threads
-    from agents.common.unheard import reworded
     from agents.common.weights import weights_digest
     from agents.studies.episodes import JUDGES, evaluate_frozen
     from agents.vision.drawn import pictures_of
@@ -58,7 +57,6 @@ def evaluate_trained(
     from embodied.identity import identity_of
 
     use_threads(args.threads)
-    read = _reader(args, data)
     rows_of = {"hari": _hari, "vln": _vln, "vnla": _vnla, "hanna": _hanna}[args.kind](args, data, file)
     found, blind = list[Any](), set[str]()
     for split in splits:
@@ -67,9 +65,8 @@ def evaluate_trained(
             raise ValueError(f"unknown rows {unknown}; there are {list(known.players)}")
         for name in bar(wanted or known.usual, "agents", "agent"):
             whole, player = known.players[name]
-            agent = reworded(player, read) if read else player
             found += evaluate_frozen(
-                instead(whole), {name: agent}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
+                instead(whole), {name: player}, seed=args.seed, limit=args.tasks, batch=args.batch or 32,
                 keep=functools.partial(keep, split),
             )  # fmt: skip
         blind |= set(known.blind)
@@ -77,19 +74,8 @@ def evaluate_trained(
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}
     facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
-    facts |= {
-        "shown": dataclasses.asdict(OCCASIONS[args.shown]),
-        "reading": args.reading,
-        "identity": identity_of(*JUDGES),
-    }
+    facts |= {"shown": dataclasses.asdict(OCCASIONS[args.shown]), "identity": identity_of(*JUDGES)}
     return found, facts
-
-
-def _reader(args: Options, data: Dataset) -> Callable[[str], str] | None:
-    """What agents read instead of a text, where --reading says so."""
-    from agents.common.nearest_clauses import NearestClauses, heard_in
-
-    return NearestClauses(heard_in(data)) if args.reading == "nearest-clauses" else None
 
 
 @dataclass(frozen=True)
