@@ -25,13 +25,16 @@ SPEAKERS = "speakers"
 """In a row's `judge`: the novelty of who describes routes; those of the data set without."""
 
 
-def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
+def words_table(
+    row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str], **varied: Any
+) -> StudyTable:
     """The table of a learner.
 
     Args:
       row: makes a row of its label and of what differs in training.
+      varied: what else differs in the training of agents that hear varied words.
     """
-    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row)]
+    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row, **varied)]
     lost = [(said, other) for said, *unheard in readers for other in unheard]
     won = [pair for alike in [*zip(*readers, strict=True)][1:] for pair in _changes(alike)]
     title = "Instructions in unheard words and sentences"
@@ -53,10 +56,10 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
     return StudyTable(title, rows, tuple(columns), tuple(splits), (*pairs, *won))
 
 
-def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
+def _readers(row: Callable[..., StudyRow], **varied: Any) -> tuple[StudyRow, ...]:
     """Agents that learn words from instructions alone, with pre-trained vectors, and from varied words, too."""
     vectors = row("pre-trained vectors", word_vectors="minilm")
-    return row("learned words"), vectors, row("varied words", word_vectors="minilm", varied_words=True)
+    return row("learned words"), vectors, row("varied words", word_vectors="minilm", varied_words=True, **varied)
 
 
 def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:
