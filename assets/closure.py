@@ -113,7 +113,7 @@ class _Read:
 
     imports: tuple[str, ...]
     tables: frozenset[str]
-    """Names of .toml files that it holds, docstrings left out."""
+    """Strings in it that name a .toml file."""
     digest: str
     """Of its syntax tree: the same in all versions of Python."""
 
@@ -121,8 +121,7 @@ class _Read:
 @functools.lru_cache(maxsize=1024)
 def _read(source: bytes, module: str, package: bool) -> _Read:
     tree = ast.parse(source)
-    docstrings = {node.value for node in ast.walk(tree) if isinstance(node, ast.Expr) and _is_docstring(node)}
-    texts = [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and n not in docstrings]
+    texts = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
     tables = frozenset(text for text in texts if isinstance(text, str) and re.fullmatch(r"\w+\.toml", text))
     return _Read(tuple(imported(tree, module, package=package)), tables, digest(repr(_described(tree))))
 

@@ -70,7 +70,7 @@ def test_a_table_is_in_the_key_of_what_is_made_by_it(tree, table, maker):
     assert key(tree, "embodied.render.panorama") == apart, "which knows no table"
 
 
-def test_a_table_that_a_docstring_names_is_in_no_key(tmp_path):
+def test_a_table_that_a_docstring_mentions_is_in_no_key(tmp_path):
     package = tmp_path / "embodied"
     package.mkdir()
     (package / "__init__.py").write_text("")

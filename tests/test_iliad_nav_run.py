@@ -13,7 +13,7 @@ from agents.common.checkpoint import CheckpointError
 from agents.common.word_vectors import Lexicon
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.run import NavSource, learn, prepare
+from agents.iliad.nav.run import NavSource, learn, prepare, problem_of
 from agents.iliad.nav.showing import episode_of, lines_of, tell
 from agents.iliad.nav.stages import config_of, load_follower, new_follower
 from agents.iliad.nav.student import NavStudent
@@ -165,6 +165,10 @@ def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(sourc
     assert [isinstance(v, Lexicon) for v in vocabularies] == [False, True, True]
     plain, varied, vectors = map(len, vocabularies)
     assert plain == vectors < varied
+    grounds = prepare(dataclasses.replace(SMALL, varied_words=True), source, tmp_path / "shared", note=silent)
+    reword = problem_of(grounds, 0).student.eyes.vocabulary.reword
+    requests = [r for trip in grounds.data.splits["train"] for r in trip.requests]
+    assert reword is not None and any(reword(r) != r for r in requests)
 
 
 def test_commands_train_and_show(source, tmp_path, capsys):

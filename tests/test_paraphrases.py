@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import importlib
 import re
+import shutil
 
 import pytest
 
@@ -15,8 +15,10 @@ from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
 from agents.iliad.nav.run import NavGrounds, reworded
 from agents.iliad.nav.world import Trip
+from agents.studies import wordings
 from agents.studies.wordings import PARAPHRASED, SPEAKERS, SYNONYMS, WORDING, code_of
 from assets.catalogue import load_catalogue
+from assets.closure import ROOT, code_digest
 from embodied.interface import Pose
 from embodied.language import parse
 from embodied.language.clauses import Enter, Exit, Past, StopIn, Turn
@@ -39,10 +41,20 @@ def test_every_clause_has_frames_and_none_is_a_template():
         assert not frames_of(wordings) & {t.text for t in TEMPLATES}
 
 
-def test_nothing_of_the_tests_is_heard_in_training():
-    """But single words, which the tests leave out: in_synonyms says only what an agent does not know."""
+def test_no_frame_of_the_tests_and_none_of_its_words_in_their_places_are_heard_in_training():
+    """Synonyms of the tests are chosen among the words that an agent does not know."""
     assert not frames_of(UNHEARD) & frames_of(VARIED)
     assert not set(UNHEARD.requests) & set(VARIED.requests) and not set(UNHEARD.where) & set(VARIED.where)
+    pairs = [{(word, w) for word, like in x.synonyms.items() for w in like} for x in (UNHEARD, VARIED)]
+    assert not pairs[0] & pairs[1]
+    texts = " ".join((*frames_of(UNHEARD), *UNHEARD.requests, *UNHEARD.where, *UNHEARD.joints))
+    assert not {w for like in VARIED.synonyms.values() for w in like} & set(tokenize(re.sub(r"{\w+}", "", texts)))
+
+
+def test_synonyms_of_training_name_no_other_room(lexicon):
+    kinds = {noun.lower(): kind for kind, nouns in ROOM_NOUNS.items() for noun in nouns}
+    for word, like in VARIED.synonyms.items():
+        assert {kinds.get(w, kinds.get(word)) for w in like} <= {kinds.get(word)}, word
 
 
 def frames_of(wordings: Wordings) -> set[str]:
@@ -88,6 +100,10 @@ def test_requests_and_sub_goals_of_vnla_are_said_otherwise(lexicon):
     assert "60 degrees" in goal and "left" in goal and "2 paces" in goal and "forward" not in goal
     assert "a mug" in request and "a kitchen" in request and "find" not in request
     assert paraphrase("hm", lexicon, UNHEARD) == "hm", "what says nothing stays"
+    for advice in ("turn sharply left", "look around", "walk over to the fridge", "go forward two steps"):
+        assert paraphrase(f"{advice} . find a mug", lexicon, UNHEARD).startswith(f"{advice} . "), (
+            "a person's words stay"
+        )
 
 
 def test_the_grammar_cannot_read_them(lexicon):
@@ -119,13 +135,14 @@ def test_every_reader_is_judged_in_all_wordings(learner):
     assert [r.train.get("varied_words", False) for r in table.rows] == [False] * 6 + [True] * 3
 
 
-def test_what_was_judged_names_the_code_and_the_texts_that_word_it(monkeypatch):
+def test_what_was_judged_names_the_code_that_words_it_and_with_it_the_texts(tmp_path):
     assert not code_of({"played": "learned"})
-    before, heard = code_of({WORDING: SYNONYMS}), code_of({SPEAKERS: "novel"})
-    assert len(before["wording"]) == 16 and heard.keys() == {"wording"}
-    other = dataclasses.replace(UNHEARD, requests=("fetch {thing}{where}",))
-    monkeypatch.setattr("agents.studies.wordings.UNHEARD", other)
-    assert code_of({WORDING: SYNONYMS}) != before and code_of({SPEAKERS: "novel"}) == heard
+    assert code_of({WORDING: SYNONYMS}) == code_of({SPEAKERS: "novel"}) == {"wording": code_digest(wordings.__name__)}
+    for package in ("agents", "assets", "embodied"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
+    texts = tmp_path / "agents/common/unheard.toml"
+    texts.write_text(texts.read_text().replace("mosey", "shuffle"))
+    assert code_digest(wordings.__name__, root=tmp_path) != code_digest(wordings.__name__)
 
 
 def test_navs_test_requests_are_said_otherwise_and_those_of_training_are_not():

@@ -72,6 +72,17 @@ def test_texts_of_training_can_be_said_in_other_words(vectors):
     assert (heard.encode("walk on", 5) != plain.encode("walk on", 5)).any()
 
 
+def test_an_agent_hears_other_words_in_training_and_what_is_said_afterwards(tmp_path):
+    agent = VlnAgent.new(
+        VlnAbout(config=FollowerSettings(hidden_size=16), encoder="hand", feature_size=8, words=WORDS),
+        lambda text: text.replace("walk", "stop"),
+    )
+    heard = agent.vocabulary.encode("walk to the hall", 4)
+    agent.save(tmp_path / "agent.safetensors")
+    again = VlnAgent.load(tmp_path / "agent.safetensors").vocabulary
+    assert (heard == again.encode("stop to the hall", 4)).all() and again.reword is None
+
+
 def test_a_text_is_read_from_its_end_and_its_own_end_stays_where_it_is_too_long():
     words = build_vocabulary(["a b c d"])
     number, end = words.number, words.number("<EOS>")

@@ -20,13 +20,13 @@ from assets.json_file import from_plain, read_toml
 from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
 from embodied.language.grammar import kind_of, normalised, parse
 from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
-from embodied.language.plain import heard_subgoal
+from embodied.language.plain import PlainLanguage, heard_subgoal
 from embodied.language.templates import WORDS
 from embodied.seeds import stream
 
 BACKWARD_SHARE = 0.15
-PARAPHRASED, RENAMED = 0.4, 0.5
-"""In training: share of the texts that is said in other frames, and with other words (docs/sources.md, S184)."""
+PARAPHRASED_SHARE, RENAMED_SHARE = 0.4, 0.3
+"""Of the texts of training, in other frames and in synonyms (docs/sources.md, S184)."""
 FIND = "find "
 
 
@@ -53,14 +53,15 @@ def paraphraser(catalogue: Catalogue, wordings: Wordings) -> Callable[[str], str
 
 def varied(catalogue: Catalogue) -> Callable[[str], str]:
     """What rewords a share of the texts of training in the wordings of varied.toml; the same text always alike."""
-    lexicon = lexicon_of(catalogue)
+    return functools.partial(_varied, lexicon=lexicon_of(catalogue))
 
-    def say(text: str) -> str:
-        rng = stream(0, "varied", text)
-        text = paraphrase(text, lexicon, VARIED) if rng.random() < PARAPHRASED else text
-        return some_in_synonyms(text, rng.random(), rng) if rng.random() < RENAMED else text
 
-    return functools.cache(say)
+def _varied(text: str, lexicon: Lexicon) -> str:
+    rng = stream(0, "varied", text)
+    how = rng.random() - PARAPHRASED_SHARE
+    if how < 0:
+        return paraphrase(text, lexicon, VARIED)
+    return some_in_synonyms(text, rng.random(), rng) if how < RENAMED_SHARE else text
 
 
 def some_in_synonyms(text: str, share: float, rng: np.random.Generator) -> str:
@@ -78,8 +79,7 @@ def paraphrase(text: str, lexicon: Lexicon, wordings: Wordings) -> str:
     rng = stream(0, "paraphrase", text)
     *subgoals, last = text.split(" . ")
     if last.startswith(FIND):
-        actions = [_actions(heard_subgoal(s), wordings, rng) for s in subgoals]
-        return " . ".join([*actions, _request(last, wordings, rng)])
+        return " . ".join([*(_subgoal(s, wordings, rng) for s in subgoals), _request(last, wordings, rng)])
     try:
         clauses = parse(text, lexicon).clauses
     except ValueError:  # no instruction
@@ -148,8 +148,15 @@ def _request(text: str, wordings: Wordings, rng: np.random.Generator) -> str:
     return wordings.requests[int(rng.integers(len(wordings.requests)))].format(thing=thing, where=where)
 
 
-def _actions(words: Sequence[str], wordings: Wordings, rng: np.random.Generator) -> str:
-    """VNLA's sub-goal otherwise."""
+def _subgoal(text: str, wordings: Wordings, rng: np.random.Generator) -> str:
+    """VNLA's sub-goal otherwise; as it is where it is not in the advisor's words, but a person's."""
+    try:
+        words = heard_subgoal(text)
+        plain = PlainLanguage().subgoal(words) == text
+    except (ValueError, IndexError, KeyError):
+        plain = False
+    if not plain:
+        return text
     said = []
     for word, group in itertools.groupby(words):
         n, frames = len(list(group)), wordings.actions[word]

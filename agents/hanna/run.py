@@ -10,6 +10,7 @@ from agents.common import imitation
 from agents.common.session import Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.weights import weights_digest
+from agents.common.word_vectors import LEARNED_WORDS
 from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
 from agents.hanna.training import HannaLearner
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
@@ -42,13 +43,15 @@ def train_agent(
       begin: a trained agent whose weights and words a new run begins with.
 
     Raises:
-      ValueError: `begin` has networks of other sizes, or learned from another encoder.
+      ValueError: `begin` has networks of other sizes, learned from another encoder, or knows no varied words.
     """
     houses = config.training_houses or None
     lessons = lessons.said_by(FAMILIAR) if config.speakers == FAMILIAR else lessons
     training = lessons.split("train", houses=houses, lights=config.lights)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else HannaAgent.load(begin)
+    if other and config.varied_words and not other.config.varied_words and config.word_vectors == LEARNED_WORDS:
+        raise ValueError(f"{begin} knows none of the varied words; add --word-vectors minilm, or leave --begin out")
     reword, begun = lessons.rewording(config), dict[str, str]()
     words = other.vocabulary if other else vocabulary_of(lessons.data, houses, reword)
     agent = HannaAgent.new(lessons.about(HannaAbout, config, evaluation, words), reword)

@@ -59,8 +59,6 @@ SIGHT_ROWS = (
     without("Random walk", "random walk"),
 )
 """What the seeing agent is compared with: without sight, without learning, without help, with other rules of asking."""
-PARAPHRASE = 80
-"""Words up to which agents read that learn from varied words: two in five paraphrases exceed the usual 50."""
 PICTURE = "picture"
 """In a row's `judge`: no agent plays; places are recognised in pictures that were taken then."""
 LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
@@ -99,7 +97,7 @@ TABLES: Mapping[str, StudyTable] = {
         ("test_unseen",),
         tuple((OURS_SEEING, row) for row in SIGHT_ROWS if row.train is not None),
     ),
-    "words": words_table(learned, FULL, TEST[1:], instruction_length=PARAPHRASE),
+    "words": words_table(learned, FULL, TEST[1:]),
     "speakers": speakers_table(learned, FULL, TEST[1:]),
     "places": StudyTable(
         "Recognising places in pictures from another time",

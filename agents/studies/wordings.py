@@ -13,7 +13,6 @@ from typing import Any
 from agents.common.paraphrases import paraphraser
 from agents.common.unheard import UNHEARD, in_synonyms, reworded
 from agents.studies.tables import StudyRow, StudyTable
-from assets.cache import digest
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest
 from embodied.interface import Agent
@@ -25,16 +24,13 @@ SPEAKERS = "speakers"
 """In a row's `judge`: the novelty of who describes routes; those of the data set without."""
 
 
-def words_table(
-    row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str], **varied: Any
-) -> StudyTable:
+def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
     """The table of a learner.
 
     Args:
       row: makes a row of its label and of what differs in training.
-      varied: what else differs in the training of agents that hear varied words.
     """
-    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row, **varied)]
+    readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row)]
     lost = [(said, other) for said, *unheard in readers for other in unheard]
     won = [pair for alike in [*zip(*readers, strict=True)][1:] for pair in _changes(alike)]
     title = "Instructions in unheard words and sentences"
@@ -56,10 +52,10 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
     return StudyTable(title, rows, tuple(columns), tuple(splits), (*pairs, *won))
 
 
-def _readers(row: Callable[..., StudyRow], **varied: Any) -> tuple[StudyRow, ...]:
+def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
     """Agents that learn words from instructions alone, with pre-trained vectors, and from varied words, too."""
     vectors = row("pre-trained vectors", word_vectors="minilm")
-    return row("learned words"), vectors, row("varied words", word_vectors="minilm", varied_words=True, **varied)
+    return row("learned words"), vectors, row("varied words", word_vectors="minilm", varied_words=True)
 
 
 def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:
@@ -72,9 +68,8 @@ def _said(row: StudyRow, how: str) -> StudyRow:
 
 
 def code_of(judge: Mapping[str, Any]) -> dict[str, str]:
-    """The code and the texts that word or read what is said in a row, as a part of what was judged."""
-    code = {"wording": code_digest(__name__)} if {WORDING, SPEAKERS} & set(judge) else {}
-    return code | ({"texts": digest(dataclasses.asdict(UNHEARD))} if judge.get(WORDING) else {})
+    """The code and texts that word what is said in a row, as a part of what was judged."""
+    return {"wording": code_digest(__name__)} if {WORDING, SPEAKERS} & set(judge) else {}
 
 
 def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:

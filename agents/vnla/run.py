@@ -29,7 +29,7 @@ def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[st
     said = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
     heard = [*requests, *said, *(s.text for s in data.said(names))]
     if reword:  # advice is said before a request
-        heard += [f"{s} . {r}" for s, r in zip(itertools.cycle(said), requests, strict=False)]
+        heard += [f"{s} . {r}" for s, r in zip(itertools.cycle(said), requests)]
     return build_vocabulary(heard, reword=reword)
 
 

@@ -133,13 +133,17 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
 
+WORDLESS = ("instruction_length", "word_vectors", "varied_words")
+"""Of the settings of agents, those that an agent that is told a class has no use for."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class FindOptions(Study, Trained, WithData, EncoderFile):
     """Agents that find things without help, with sight and without."""
 
     judged_tasks: Count = 50
     """Evaluate on at most N tasks of each unseen house."""
-    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=("lights", "instruction_length"))]
+    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=("lights", *WORDLESS))]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -116,9 +116,8 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
     """A student of this seed with everything around it."""
     c, data = grounds.config, grounds.data
     eyes, splits = data.eyes.blind() if c.blind else data.eyes, data.splits
-    reword, words = varied(load_catalogue(grounds.cache)) if c.varied_words else None, eyes.vocabulary.words
-    if reword:
-        words = build_vocabulary((r for trip in splits["train"] for r in trip.requests), reword=reword).words
+    reword = varied(load_catalogue(grounds.cache)) if c.varied_words else None
+    words = build_vocabulary((request for trip in splits["train"] for request in trip.requests), reword=reword).words
     eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors, reword))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
     explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)

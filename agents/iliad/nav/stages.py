@@ -152,7 +152,8 @@ def _about(config: NavConfig, eyes: NavEyes) -> NavAbout:
 
 def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> TeachingStage:
     students = {"teacher", "pragmatics", "candidates", "executor_iterations", "describer_iterations", "blind"}
-    settings = {k: v for k, v in dataclasses.asdict(config).items() if k not in {*students, "varied_words"}}
+    students |= {"varied_words"}
+    settings = {k: v for k, v in dataclasses.asdict(config).items() if k not in students}
     parts = {"stage": name, "updates": updates, "seed": config.data_seed, "settings": settings, "data": data.digest}
     identity, rate = identity_of("agents.iliad.nav.stages", **parts), config.teacher_rate
     about = _about(config, data.eyes)
