@@ -15,7 +15,7 @@ from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData
 from agents.iliad.nav.run import NavGrounds, reworded
 from agents.iliad.nav.world import Trip
-from agents.studies import wordings
+from agents.studies import wordings as studied
 from agents.studies.wordings import PARAPHRASED, SPEAKERS, SYNONYMS, WORDING, code_of
 from assets.catalogue import load_catalogue
 from assets.closure import ROOT, code_digest
@@ -101,9 +101,8 @@ def test_requests_and_sub_goals_of_vnla_are_said_otherwise(lexicon):
     assert "a mug" in request and "a kitchen" in request and "find" not in request
     assert paraphrase("hm", lexicon, UNHEARD) == "hm", "what says nothing stays"
     for advice in ("turn sharply left", "look around", "walk over to the fridge", "go forward two steps"):
-        assert paraphrase(f"{advice} . find a mug", lexicon, UNHEARD).startswith(f"{advice} . "), (
-            "a person's words stay"
-        )
+        said = paraphrase(f"{advice} . find a mug", lexicon, UNHEARD)
+        assert said.startswith(f"{advice} . "), "a person's words stay"
 
 
 def test_the_grammar_cannot_read_them(lexicon):
@@ -137,12 +136,12 @@ def test_every_reader_is_judged_in_all_wordings(learner):
 
 def test_what_was_judged_names_the_code_that_words_it_and_with_it_the_texts(tmp_path):
     assert not code_of({"played": "learned"})
-    assert code_of({WORDING: SYNONYMS}) == code_of({SPEAKERS: "novel"}) == {"wording": code_digest(wordings.__name__)}
+    assert code_of({WORDING: SYNONYMS}) == code_of({SPEAKERS: "novel"}) == {"wording": code_digest(studied.__name__)}
     for package in ("agents", "assets", "embodied"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
     texts = tmp_path / "agents/common/unheard.toml"
     texts.write_text(texts.read_text().replace("mosey", "shuffle"))
-    assert code_digest(wordings.__name__, root=tmp_path) != code_digest(wordings.__name__)
+    assert code_digest(studied.__name__, root=tmp_path) != code_digest(studied.__name__)
 
 
 def test_navs_test_requests_are_said_otherwise_and_those_of_training_are_not():

@@ -152,10 +152,9 @@ def _subgoal(text: str, wordings: Wordings, rng: np.random.Generator) -> str:
     """VNLA's sub-goal otherwise; as it is where it is not in the advisor's words, but a person's."""
     try:
         words = heard_subgoal(text)
-        plain = PlainLanguage().subgoal(words) == text
-    except (ValueError, IndexError, KeyError):
-        plain = False
-    if not plain:
+    except (ValueError, IndexError):
+        return text
+    if not set(words) <= set(wordings.actions) or PlainLanguage().subgoal(words) != text:
         return text
     said = []
     for word, group in itertools.groupby(words):
