@@ -119,6 +119,7 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
         "agents/weights/hari_mini.safetensors",
         "agents/weights/iliad_nav_mini.safetensors",
         "agents/weights/iliad_regex_tiny.safetensors",
+        "agents/common/varied.toml",
         "agents/studies/data/printed.json",
         "embodied/datasets/regions.toml",
         "embodied/language/speakers.toml",
