@@ -59,8 +59,8 @@ def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
 
 
 def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:
-    learned, *others = readers
-    return [(other, learned) for other in others]
+    """Each reader beside the one before it, from which it differs in one setting."""
+    return [(after, before) for before, after in itertools.pairwise(readers)]
 
 
 def _said(row: StudyRow, how: str) -> StudyRow:
