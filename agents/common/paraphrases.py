@@ -58,10 +58,12 @@ def varied(catalogue: Catalogue) -> Callable[[str], str]:
 
 def _varied(text: str, lexicon: Lexicon) -> str:
     rng = stream(0, "varied", text)
-    how = rng.random() - PARAPHRASED_SHARE
-    if how < 0:
+    drawn = rng.random()
+    if drawn < PARAPHRASED_SHARE:
         return paraphrase(text, lexicon, VARIED)
-    return some_in_synonyms(text, rng.random(), rng) if how < RENAMED_SHARE else text
+    if drawn < PARAPHRASED_SHARE + RENAMED_SHARE:
+        return some_in_synonyms(text, rng.random(), rng)
+    return text
 
 
 def some_in_synonyms(text: str, share: float, rng: np.random.Generator) -> str:
