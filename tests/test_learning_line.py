@@ -245,6 +245,17 @@ def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tm
     run_study(learner, ["4.4"], out, note=print)
 
 
+def test_an_agent_that_knows_no_varied_words_cannot_go_on_with_them(study, tmp_path):
+    learner, out = study
+    lessons = Lessons(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
+    varied, begin = dataclasses.replace(learner.config, varied_words=True), next(iter(times(out, "best.safetensors")))
+    with pytest.raises(ValueError, match="knows none of the varied words; add --word-vectors minilm"):
+        train_agent(lessons, varied, learner.evaluation, tmp_path / "begun", begin=begin, note=print)
+    train_agent(lessons, varied, learner.evaluation, tmp_path / "new", note=print)
+    words, plain = (HannaAgent.load(f).about.words for f in ((tmp_path / "new" / "best.safetensors"), begin))
+    assert set(plain) < set(words), "it heard the words as they are and others"
+
+
 def test_processor_time_is_counted_over_sessions(study, tmp_path):
     learner, _ = study
     lessons = Lessons(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
