@@ -238,6 +238,9 @@ def test_a_size_of_ones_own_is_a_scale():
     wanted = scale("40x4000", "hanna")
     assert dict(wanted.houses) == {"train": 40, "val": 4, "test": 8}
     assert {s.name: s.tasks for s in wanted.splits}["test_unseen"] == 800
+    for kind in ("hanna", "hari"):
+        splits = {s.name: s.tasks for s in scale(own_size(2, 50, 3, 7), kind).splits}
+        assert {n for s, n in splits.items() if s.startswith(("val_", "test_"))} == {7} and splits["train"] == 50
     assert dict(scale("1x5", "hari").houses) == {"train": 1, "extra": 1, "val": 1, "test": 1}
     with pytest.raises(ValueError, match="at least one house"):
         own_size(0, 10)

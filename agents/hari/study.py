@@ -94,17 +94,19 @@ class HariStudy(EpisodeStudy):
     executor: Path | None = None
     """A trained execution policy; None trains one in the study's folder."""
     elsewhere: Path | None = None
-    """Another data set, in whose unseen houses agents are judged; None: in those of `data`."""
+    """Another data set to judge in: in its unseen houses, and in all its splits if `data` has the same houses and tasks
+    to learn from; None: in `data`."""
 
     name = "hari"
     makers = ("agents.hari.run",)
     judges = (*JUDGES, "agents.hari.judging")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        """The splits out of distribution come beside those of the tests; elsewhere, no house is known."""
+        """The splits out of distribution come beside those of the tests; elsewhere, houses may all be unknown."""
+        known = self.judged_in({}).lessons == dataset_of(self.data, "hari").lessons
         ood, found = self.judged_in({}).ood, {}
         for name, table in TABLES.items():
-            splits = [s for s in table.splits if self.elsewhere is None or s.endswith("_env")]
+            splits = [s for s in table.splits if known or s.endswith("_env")]
             splits += ood if table.splits == TEST else ()
             found[name] = dataclasses.replace(table, splits=tuple(splits))
         return found

@@ -46,6 +46,8 @@ class Options(Furnished, Printed):
     """With --houses: N training tasks (default: 100 per house)."""
     test_houses: Annotated[int | None, Option(whole(1, HOUSES), "N")] = None
     """With --houses: N houses to test in, with as many tasks each."""
+    evaluation_tasks: Count | None = None
+    """With --houses: N tasks in every split to validate and to test in."""
     seed: int = 0
     """Random seed; the same seed gives the same data set."""
     area: Annotated[tuple[float, float], Option(metavar=("LOW", "HIGH"))] = (150.0, 420.0)
@@ -174,10 +176,13 @@ def chosen_scale(args: Options) -> str:
     Raises:
       ValueError: both of them, or --tasks alone.
     """
+    sizes = (args.tasks, args.test_houses, args.evaluation_tasks)
     if args.houses is None:
-        if args.tasks is not None or args.test_houses is not None:
-            raise ValueError("--tasks and --test-houses want --houses beside it; or choose a --scale")
+        if any(n is not None for n in sizes):
+            raise ValueError(
+                "--tasks, --test-houses and --evaluation-tasks want --houses beside them; or choose a --scale"
+            )
         return args.scale or "mini"
     if args.scale:
         raise ValueError("--scale and --houses say the same thing twice; leave one out")
-    return own_size(args.houses, 100 * args.houses if args.tasks is None else args.tasks, args.test_houses)
+    return own_size(args.houses, args.tasks or 100 * args.houses, *sizes[1:])

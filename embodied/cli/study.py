@@ -174,7 +174,8 @@ class HariOptions(Study, Trained, Judged, WithData):
     execution: InputPath | None = None
     """A trained execution policy (default: trained in --out first)."""
     judged_in: InputFolder | None = None
-    """Evaluate in the unseen houses of another data set (default: of --data)."""
+    """Evaluate in another data set: in all its splits if it differs from --data in --evaluation-tasks only, else in its
+    unseen houses (default: in --data)."""
     judging_seeds: Seeds = 3
     """Evaluate with N random seeds, from --seed on."""
     config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES, skip=("stack", "cooperative", "perfect"))]

@@ -89,14 +89,20 @@ PAPER: Mapping[str, tuple[Mapping[str, int], tuple[SplitPlan, ...]]] = {
 
 
 def _small(
-    kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int
+    kind: str, houses: tuple[int, int, int, int], tasks: int, judged: int, each: int | None = None
 ) -> tuple[Mapping[str, int], tuple[SplitPlan, ...]]:
+    """
+    Args:
+      judged: tasks in unseen houses; the other splits to evaluate in have a half or, HARI's, a third as many.
+      each: instead, tasks of every split to evaluate in.
+    """
     train, extra, val, test = houses
+    judged = each or judged
     if kind == "hari":
-        third = max(1, judged // 3)
+        third = each or max(1, judged // 3)
         sizes = (tasks, max(1, tasks // 10), tasks, (third, third, third), (third, third, judged))
         return {"train": train, "extra": extra, "val": val, "test": test}, _hari(sizes)
-    held = max(1, judged // 2)
+    held = each or max(1, judged // 2)
     return {"train": train, "val": val, "test": test}, _seen_and_unseen(tasks, held, held, held, judged)
 
 
@@ -110,21 +116,22 @@ SMALL: Mapping[str, tuple[tuple[int, int, int, int], int, int]] = {
 SCALES = ("paper", *SMALL)
 OOD = "test_ood"
 """The split of houses out of distribution: models, looks, speakers and words that occur in no other split."""
-OWN_SIZE = re.compile(r"([1-9]\d*)x([1-9]\d*)(?:x([1-9]\d*))?")
+OWN_SIZE = re.compile(r"([1-9]\d*)x([1-9]\d*)(?:x([1-9]\d*))?(?:/([1-9]\d*))?")
 
 
-def own_size(houses: int, tasks: int, test: int | None = None) -> str:
-    """The name of a scale with so many training houses and tasks, '40x4000', and so many houses to test in, if that is
-    said: '40x4000x60'.
+def own_size(houses: int, tasks: int, test: int | None = None, evaluation: int | None = None) -> str:
+    """The name of a scale with so many training houses and tasks, '40x4000', and, if that is said, so many houses to
+    test in, '40x4000x60', and tasks in every split to evaluate in, '40x4000x60/400'.
 
     Raises:
       ValueError: less than one of any.
     """
-    if houses < 1 or tasks < 1 or (test is not None and test < 1):
+    if any(n is not None and n < 1 for n in (houses, tasks, test, evaluation)):
         raise ValueError(
-            f"a data set needs at least one house, one task and one house to test in, got {houses}, {tasks} and {test}"
+            "a data set needs at least one house, one task, one house to test in and one task to evaluate in, got "
+            f"{houses}, {tasks}, {test} and {evaluation}"
         )
-    return f"{houses}x{tasks}" + ("" if test is None else f"x{test}")
+    return f"{houses}x{tasks}" + ("" if test is None else f"x{test}") + ("" if evaluation is None else f"/{evaluation}")
 
 
 def scale(name: str, kind: str, ood: int = 0) -> Scale:
@@ -135,7 +142,8 @@ def scale(name: str, kind: str, ood: int = 0) -> Scale:
     learn from, with as many tasks each, and 'maxi' twice those; the first houses of a larger one
     are those of the smaller; 'tiny' is for tests. '40x4000' has 40 houses and 4,000 tasks to learn
     from, a tenth as many houses to validate in, a fifth as many to test in and a fifth as many
-    tasks there; '40x4000x60' has 60 to test in, with as many tasks each. Houses out of distribution
+    tasks there; '40x4000x60' has 60 to test in, with as many tasks each, and '40x4000x60/400' has 400 tasks in every
+    split to evaluate in; its tasks begin with those of the former. Houses out of distribution
     have as many tasks each as the others to test in.
 
     Raises:
@@ -149,7 +157,8 @@ def scale(name: str, kind: str, ood: int = 0) -> Scale:
         n, tasks = int(own[1]), int(own[2])
         test = int(own[3]) if own[3] else max(1, n // 5)
         judged = max(2, round(tasks / n * test) if own[3] else tasks // 5)
-        houses, splits = _small(kind, (n, max(1, n // 3), max(1, n // 10), test), tasks, judged)
+        each = int(own[4]) if own[4] else None
+        houses, splits = _small(kind, (n, max(1, n // 3), max(1, n // 10), test), tasks, judged, each)
     elif name == "paper":
         houses, splits = PAPER[kind]
     elif name in SMALL:

@@ -127,6 +127,14 @@ class Dataset:
         wanted = self._split(split)
         return tuple(u.name for u in units(self.scale) if u.group in wanted.all_groups)
 
+    @property
+    def lessons(self) -> Mapping[str, str]:
+        """Digests of the houses and tasks to learn from, by file: the same in data sets that differ only in how many
+        tasks they evaluate in."""
+        files = ("house.json", "tasks_train.jsonl", "tasks_pretrain.jsonl")
+        wanted = [f"{name}/{f}" for name in self.names("train") for f in files]
+        return {f: self.index.files[f] for f in wanted if f in self.index.files}
+
     def place(self, name: str) -> StoredPlace:
         """House and graph by name."""
         if name not in self._places:
