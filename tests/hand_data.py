@@ -49,7 +49,7 @@ def build(folder, cache, kind="hanna", workers=1, size="tiny", make_house=hand_h
 
 def built(folder, kind="hanna", size="tiny", make_house=hand_house, **options):
     """What `build` makes, copied into `folder` if any worker of this test run has built it before."""
-    name = "_".join(map(str, (kind, size, make_house.__name__, *itertools.chain(*options.items()))))
+    name = "_".join(map(str, (kind, size, make_house.__name__, *itertools.chain(*options.items())))).replace("/", "_")
     whole = Path(os.environ["EMBODIED_TESTS_SHARED"], "built", name)
     if not whole.exists():
         whole.parent.mkdir(exist_ok=True)

@@ -19,6 +19,7 @@ from agents.hari import pretraining
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
 from agents.hari.intention import IntentionRun, counts_of, train, train_step, values
+from agents.hari.judging import TEST
 from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from agents.hari.policy import DO, DONE, Belief, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from agents.hari.pretraining import (
@@ -575,4 +576,13 @@ def test_the_tables_are_made_from_a_data_set(tmp_path):
     shares = [times["rows"][0]["values"][f"{name}_at_1_val_unseen_env"]["mean"] for name in INTENTIONS]
     assert sum(shares) == pytest.approx(1), "every running episode chooses one intention"
     assert (tmp_path / "out" / "hari-figure-4.5b.png").exists()
-    assert dataclasses.replace(study, elsewhere=data.folder).tables()["4.7"].splits == ("test_unseen_env",)
+
+
+def test_another_data_set_judges_what_it_may(tmp_path):
+    """All splits where houses and tasks to learn from are the same, as in a set with more to evaluate in."""
+    sizes = ("2x20x1", "2x20x1/5", "1x20x1")
+    data, more, other = (built(tmp_path / str(k), "hari", size) for k, size in enumerate(sizes))
+    study = HariStudy(data.folder, (0,), 2, (0,), execution=SMALL, config=QUICK)
+    splits = [dataclasses.replace(study, elsewhere=d.folder).tables()["4.7"].splits for d in (more, other)]
+    assert splits == [TEST, ("test_unseen_env",)]
+    assert len(more.tasks("test_unseen_start")) > len(data.tasks("test_unseen_start"))
