@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hand_data import build, small_house
 
+from agents.common.weights import weights_digest
 from agents.studies.engine import run_study
 from agents.vision.config import RENDER_PRESETS, VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource
@@ -81,6 +82,22 @@ def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_i
     kept = {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
     run_study(setting, ["pictures"], out, rows=rows, note=lambda line: None)
     assert kept == {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
+
+
+@pytest.mark.slow
+def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setting, tmp_path):
+    source = dataclasses.replace(setting.source, picture_kind="unlit", lights=1)
+    config = dataclasses.replace(setting.config, epochs=1)
+    study = dataclasses.replace(setting, source=source, config=config, houses=(1,), lit_houses=1, ready={})
+    body = read_json(
+        run_study(study, ["houses"], tmp_path / "study", note=lambda line: None)["houses"].with_suffix(".json")
+    )
+    assert [r["label"] for r in body["rows"]] == ["1 houses", "1 houses, 1 of them lit"]
+    assert [c["key"] for c in body["columns"]][::5] == ["AP_fast", "AP_unlit"]
+    digests = {p.parent.name: weights_digest(p) for p in (tmp_path / "study").rglob("encoder.safetensors")}
+    assert len(set(digests.values())) == 2, "one of them learned from lit pictures"
+    wider = dataclasses.replace(study, houses=(2, 8), config=dataclasses.replace(config, epochs=3))
+    assert [r.train["epochs"] for r in wider.tables()["houses"].rows] == [12, 3, 3], "as many updates"
 
 
 def test_an_encoder_that_the_study_trains_keeps_its_name(setting):

@@ -4,9 +4,11 @@ dissertation, whose features are a ResNet-152's).
     embodied study vision encoders --data DATA --out STUDY
     embodied study vision pictures --data DATA --out STUDY --split test_unseen
     embodied study vision pictures --data DATA --out STUDY --lights 3 --encoders one=A.safetensors three=B.safetensors
+    embodied study vision houses --data DATA --out STUDY --pictures unlit --houses 12 48 128 --test-pictures unlit fast
 
 Readers are fitted on training houses, in the pictures that the encoders of the study learn from; 'pictures' judges
-houses in their own light.
+houses in their own light. In 'houses', encoders learn in so many houses, all for as many updates, and readers are
+fitted in the same few houses for all, in the kind of pictures that is judged.
 """
 
 from __future__ import annotations
@@ -40,6 +42,10 @@ TRAINED = "compact"
 COLUMNS = ("AP", "chance AP", "room accuracy", "depth R²", "place AUC", "ms a node", "MB")
 READY = "ready"
 """In a row: the name of encoders that are there already."""
+LIT = "lit"
+"""In a row: so many of the houses to learn from are seen in light."""
+READERS = "readers"
+"""In a row: readers are fitted in so many houses, drawn as those that are judged."""
 STRIPS = 8
 """Strips at once when an encoder's price is measured."""
 
@@ -60,6 +66,10 @@ class EncoderStudy(StudyLearner):
     device: str = "cpu"
     workers: int = 1
     """Houses drawn side by side."""
+    houses: tuple[int, ...] = ()
+    """Numbers of houses that encoders of the table of houses learn in."""
+    lit_houses: int = 12
+    """In that table: so many houses are seen in light by one more encoder, and by readers."""
     ready: Mapping[str, Sequence[Path]] = field(default_factory=dict)
     """Encoders that are there already, judged beside those that are trained: by row, one file per training seed."""
 
@@ -75,7 +85,18 @@ class EncoderStudy(StudyLearner):
         return {
             "encoders": StudyTable("Encoders: what linear readers make of them", rows, COLUMNS),
             "pictures": StudyTable("Encoders, judged on other pictures", rows, COLUMNS[:5], self.pictures),
+            "houses": StudyTable("Encoders by houses to learn in", self._by_houses(), COLUMNS[:5], self.pictures),
         }
+
+    def _by_houses(self) -> tuple[StudyRow, ...]:
+        """As many updates in fewer and in more houses, and in the most with some of them lit."""
+        if not self.houses:
+            return ()
+        most = max(self.houses)
+        train = {n: {"training_houses": n, "epochs": round(self.config.epochs * most / n)} for n in self.houses}
+        judge = {READERS: self.lit_houses}
+        mixed = StudyRow(f"{most} houses, {self.lit_houses} of them lit", {**train[most], LIT: self.lit_houses}, judge)
+        return (*(StudyRow(f"{n} houses", train[n], judge) for n in self.houses), mixed)
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         train = row.train or {}
@@ -84,31 +105,44 @@ class EncoderStudy(StudyLearner):
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Strips are drawn before encoders share the cores."""
         data = Dataset(self.source.data)
+        lit = max((row.judge.get(READERS, 0) for row in rows), default=0)
         for way in ("", *splits):
-            houses = houses_of(data, (self.split,)) + (training_houses(data, self.config) if not way else [])
-            self._source(way).strips(houses, workers=self.workers, note=note)
+            seen = training_houses(data, self.config)[: lit if way else None]
+            self._source(way).strips([*houses_of(data, (self.split,)), *seen], workers=self.workers, note=note)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         if READY in train:
             return identity_of(file=weights_digest(self.ready[train[READY]][seed]))
-        config = dataclasses.replace(self.config, seed=seed, **train)
-        return identity_of("agents.vision.run", settings=config, **self._drawn())
+        light = {LIT: train[LIT], "lit pictures": self._lit().picture_kind} if LIT in train else {}
+        return identity_of("agents.vision.run", settings=self._settings(train, seed), **light, **self._drawn())
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         if READY in train:
             return self.ready[train[READY]][seed]
-        config = dataclasses.replace(self.config, seed=seed, **train)
-        trained_encoder(self._seen(), config, home, note, device=self.device)
+        config, lit = self._settings(train, seed), train.get(LIT, 0)
+        names = training_houses(Dataset(self.source.data), config)
+        seen = [*self._lit().strips(names[:lit], note=note), *self.source.strips(names[lit:], note=note)]
+        trained_encoder(seen, config, home, note, device=self.device)
         return home / "encoder.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**self._drawn(), "of": self.split, "least views": self.config.least_views}
+
+    def _settings(self, train: Mapping[str, Any], seed: int) -> VisionConfig:
+        return dataclasses.replace(self.config, seed=seed, **{k: v for k, v in train.items() if k != LIT})
+
+    def _lit(self) -> StripSource:
+        """Pictures with light: of the first kind that is judged and has any."""
+        return self._source(next((k for k in self.pictures if RENDER_PRESETS[k].lit_by), "fast"))
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         assert weights is not None, "every row is an encoder"
         data, encoder, seen = Dataset(self.source.data), load_encoder(weights), self._seen()
         classes = [seen[0].classes[i] for i in frequent_classes(seen, self.config.least_views)]
         unseen = self._source(split).strips(houses_of(data, (self.split,)))
+        if READERS in row.judge:
+            names = training_houses(data, self.config)[: row.judge[READERS]]
+            seen = self._source(split).strips(names, note=lambda line: None)
         known, other = (labelled(data, houses, encoder, classes) for houses in (seen, unseen))
         found = read(known, other, seed=self.config.seed)
         numbers = (found.mean_ap, found.chance_ap, 100 * found.room_accuracy, found.depth_r2, found.place_auc)

@@ -151,13 +151,17 @@ class VisionOptions(Study, Trained, Strips, WithData):
     """Encoders that turn pictures into features."""
 
     tables: Tables
-    """Make these tables: encoders or pictures."""
+    """Make these tables: encoders, pictures or houses."""
     seeds: Seeds = 1
+    houses: Annotated[tuple[int, ...], Option(whole(1), "N")] = ()
+    """Numbers of training houses that the table `houses` compares."""
+    lit_houses: Count = 12
+    """In the table `houses`: N houses are lit for one more encoder, and for readers."""
     encoders: NamedFiles = ()
     """Evaluate these encoders instead of training those that --rows names; those of one name are training seeds of one
     kind."""
     test_pictures: tuple[Annotated[str, PRESETS], ...] = tuple(RENDER_PRESETS)
-    """Kinds of pictures that the table `pictures` evaluates on (default: all)."""
+    """Kinds of pictures that the tables `pictures` and `houses` evaluate on (default: all)."""
     split: str = "val_unseen"
     """Evaluate on the houses of this split."""
     config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig(), skip=("network", "begin", "frozen", "like"))]
