@@ -35,6 +35,8 @@ VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
 MOST_TURNS = 4 * math.pi
 """Largest angle that is taken for radians; larger ones are most often degrees."""
+NEXT = 16
+"""From one pixel to the next of those that tell about which part of the faces a picture shows."""
 CREASE = 0.05
 """Depths that differ by more than this share belong to different things and are not mixed."""
 
@@ -137,7 +139,7 @@ class Panorama:
         return resampled_depth(self._padded_nearness, grid)
 
     def _ids(self, grid: PixelGrid) -> np.ndarray:
-        _, x, y = grid.maps()
+        _, x, y = _maps(self._padded_ids, grid)
         return cv2.remap(self._padded_ids, x, y, cv2.INTER_NEAREST).view(np.int32)
 
 
@@ -180,14 +182,14 @@ def _padded(faces: Sequence[np.ndarray] | np.ndarray, ratio: np.ndarray | None =
 
 def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w, 3) uint8: what a grid shows of `padded_rgba`."""
-    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, grid.maps()
+    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, _maps(padded, grid)
     cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=rgba)
     return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
 
 
 def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w) float32: the depth that a grid shows of `padded_nearness`; inf where nothing is."""
-    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), grid.maps()
+    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), _maps(padded, grid)
     nearest = cv2.remap(padded, x, y, cv2.INTER_NEAREST)
     cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=work.smooth)
     cv2.divide(work.smooth, nearest, dst=work.ratio)
@@ -196,6 +198,14 @@ def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     cv2.multiply(nearest, along, dst=nearest)
     with np.errstate(divide="ignore"):
         return np.divide(1.0, nearest, out=nearest)
+
+
+def _maps(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
+    """The maps of a grid, once what they show has been read: in order it comes into the cache sooner than by pixels."""
+    maps, words = grid.maps(), padded.view(np.int32).reshape(padded.shape[:2])
+    for rows, columns in grid.shown:
+        cv2.countNonZero(words[rows, columns])
+    return maps
 
 
 @dataclass(eq=False)
@@ -230,13 +240,16 @@ def _scratch(shape: tuple[int, int], thread: int) -> _Scratch:
 class PixelGrid:
     """Where the pixels of a picture lie on the padded faces."""
 
-    def __init__(self, shape: tuple[int, int], draw: Callable[[np.ndarray], None], *, keep: bool = False) -> None:
+    def __init__(
+        self, s: int, shape: tuple[int, int], draw: Callable[[np.ndarray], None], *, keep: bool = False
+    ) -> None:
         """Args:
+        s: side of a face, pixels.
         shape: height and width of the picture.
         draw: writes the maps.
         keep: keep them from the first time on.
         """
-        self.shape, self.draw = shape, draw
+        self.s, self.shape, self.draw = s, shape, draw
         self._keep = keep
         self._kept: np.ndarray | None = None
 
@@ -260,6 +273,16 @@ class PixelGrid:
         self.draw(work.maps)
         work.grid = self
         return work.maps
+
+    @functools.cached_property
+    def shown(self) -> list[tuple[slice, slice]]:
+        """About which rows and columns of the padded faces the picture shows."""
+        x, y = self.maps()[1:, ::NEXT, ::NEXT].astype(int)
+        faces, found = y // (self.s + 2), []
+        for face in np.unique(faces):
+            across, down = x[faces == face], y[faces == face]
+            found.append((slice(down.min(), down.max() + NEXT), slice(across.min(), across.max() + NEXT)))
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +309,7 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
     rows = np.stack([np.ones(height), tall / height * np.arange(height - 1, -height, -2)], axis=1)
     columns = np.stack([cp * cy + sy * right, cp * sy - cy * right, np.full(width, sp)])
     up = np.array([-sp * cy, -sp * sy, cp])
-    return PixelGrid((height, width), functools.partial(_draw, s, rows, columns, up))
+    return PixelGrid(s, (height, width), functools.partial(_draw, s, rows, columns, up))
 
 
 @functools.lru_cache(maxsize=4)
@@ -298,7 +321,7 @@ def grid36(s: int, size: int) -> PixelGrid:
             view = perspective_grid.__wrapped__(s, yaw, pitch, VFOV36, size, size)
             view.draw(maps[:, k * size : (k + 1) * size])
 
-    return PixelGrid((VIEWS * size, size), draw, keep=True)
+    return PixelGrid(s, (VIEWS * size, size), draw, keep=True)
 
 
 @functools.lru_cache(maxsize=4)
@@ -309,7 +332,7 @@ def equirect_grid(s: int, height: int) -> PixelGrid:
     rows = np.stack([np.cos(pitch), np.sin(pitch)], axis=1)
     columns = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(2 * height)])
     draw = functools.partial(_draw, s, rows, columns, np.array([0.0, 0.0, 1.0]))
-    return PixelGrid((height, 2 * height), draw, keep=True)
+    return PixelGrid(s, (height, 2 * height), draw, keep=True)
 
 
 def _draw(s: int, rows: np.ndarray, columns: np.ndarray, up: np.ndarray, maps: np.ndarray) -> None:
