@@ -12,7 +12,7 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.datasets import matterport
 from embodied.interface import Pose
 from embodied.navigation.graph import graph_of
-from embodied.render.panorama import FACES, Panorama, face_rays, ray_stretch
+from embodied.render.panorama import FACES, Panorama, face_rays, perspective_grid, ray_stretch
 from embodied.render.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
 
 S = 64
@@ -67,6 +67,33 @@ def test_a_resampled_view_equals_the_closed_form(yaw, pitch, vfov):
     hit = np.argmin(room / np.maximum(np.abs(unit), 1e-9), axis=-1)
     agree = ids == 1 + 2 * hit + (np.take_along_axis(unit, hit[..., None], -1)[..., 0] > 0)
     assert agree.mean() > 0.97
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_every_pixel_is_looked_up_where_its_ray_meets_the_cube(seed):
+    """Also where opposite faces are seen at once, straight up and down, and on seams (yaws of whole 15 degrees)."""
+    rng = np.random.default_rng(seed)
+    yaw = rng.uniform(-math.pi, math.pi) if seed % 3 else math.radians(15 * rng.integers(24))
+    pitch = (rng.uniform(-math.pi / 2, math.pi / 2), 0.0, math.radians(30), math.pi / 2)[seed % 4]
+    vfov, (h, w) = rng.uniform(0.2, 2.8), rng.integers(1, 60, 2).tolist()
+    along, x, y = perspective_grid(S, float(yaw), float(pitch), float(vfov), h, w).maps()
+    rays = pinhole(yaw, pitch, vfov, h, w)
+    face = np.floor(y / (S + 2)).astype(int)
+    forward, up = (np.array([f[i] for f in FACES])[face] for i in (0, 1))
+    depth, right, above = ((rays * axis).sum(-1) for axis in (forward, np.cross(forward, up), up))
+    assert np.allclose(depth, np.abs(rays).max(-1), rtol=1e-5), "the nearest face"
+    assert np.allclose(along, depth, rtol=1e-5)
+    assert np.abs(x - (S + 1) / 2 - S / 2 * right / depth).max() < 0.001
+    assert np.abs(y - face * (S + 2) - (S + 1) / 2 + S / 2 * above / depth).max() < 0.001
+
+
+def test_a_picture_does_not_depend_on_what_was_asked_before():
+    p, poses = analytic(), [(0.3 + k, 0.1 * k) for k in range(5)]
+    first = [p.view(*pose, size=(30, 40)) for pose in poses]
+    p.equirect(30)
+    for _ in range(3):
+        for pose, pictures in reversed(list(zip(poses, first, strict=True))):
+            assert all(map(np.array_equal, p.view(*pose, size=(30, 40)), pictures))
 
 
 def test_no_seam_where_faces_meet():

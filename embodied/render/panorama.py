@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -27,10 +27,16 @@ FACES = (
     ((0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
 )
 """Forward and up direction of every face, world."""
+AXES = np.array([(forward, np.cross(forward, up), up) for forward, up in FACES])
+"""(6, 3, 3): forward, right and up of every face, world."""
+INSIDE = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]) @ AXES
+"""(6, 4, 3): the products of a ray with these are not negative where it meets the face."""
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
 MOST_TURNS = 4 * math.pi
 """Largest angle that is taken for radians; larger ones are most often degrees."""
+NEXT = 16
+"""From one pixel to the next of those that tell about which part of the faces a picture shows."""
 CREASE = 0.05
 """Depths that differ by more than this share belong to different things and are not mixed."""
 
@@ -133,7 +139,8 @@ class Panorama:
         return resampled_depth(self._padded_nearness, grid)
 
     def _ids(self, grid: PixelGrid) -> np.ndarray:
-        return cv2.remap(self._padded_ids, grid.x, grid.y, cv2.INTER_NEAREST).view(np.int32)
+        _, x, y = _maps(self._padded_ids, grid)
+        return cv2.remap(self._padded_ids, x, y, cv2.INTER_NEAREST).view(np.int32)
 
 
 def padded_rgba(faces: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
@@ -175,32 +182,46 @@ def _padded(faces: Sequence[np.ndarray] | np.ndarray, ratio: np.ndarray | None =
 
 def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w, 3) uint8: what a grid shows of `padded_rgba`."""
-    rgba = _scratch(grid.x.shape, threading.get_ident()).rgba
-    cv2.remap(padded, grid.x, grid.y, cv2.INTER_LINEAR, dst=rgba)
+    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, _maps(padded, grid)
+    cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=rgba)
     return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
 
 
 def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w) float32: the depth that a grid shows of `padded_nearness`; inf where nothing is."""
-    work = _scratch(grid.x.shape, threading.get_ident())
-    smooth = cv2.remap(padded, grid.x, grid.y, cv2.INTER_LINEAR)
-    cv2.remap(padded, grid.x, grid.y, cv2.INTER_NEAREST, dst=work.nearest)
-    cv2.absdiff(smooth, work.nearest, dst=work.other)
-    cv2.scaleAdd(work.nearest, -CREASE, work.other, dst=work.other)
-    cv2.compare(work.other, 0.0, cv2.CMP_GT, dst=work.mixed)
-    cv2.copyTo(work.nearest, work.mixed, smooth)
+    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), _maps(padded, grid)
+    nearest = cv2.remap(padded, x, y, cv2.INTER_NEAREST)
+    cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=work.smooth)
+    cv2.divide(work.smooth, nearest, dst=work.ratio)
+    cv2.inRange(work.ratio, 1 - CREASE, 1 + CREASE, dst=work.mask)
+    cv2.copyTo(work.smooth, work.mask, nearest)
+    cv2.multiply(nearest, along, dst=nearest)
     with np.errstate(divide="ignore"):
-        return np.divide(grid.stretch, smooth, out=smooth)
+        return np.divide(1.0, nearest, out=nearest)
 
 
-@dataclass(frozen=True, eq=False)
+def _maps(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
+    """The maps of a grid, once what they show has been read: in order it comes into the cache sooner than by pixels."""
+    maps, words = grid.maps(), padded.view(np.int32).reshape(padded.shape[:2])
+    for rows, columns in grid.shown:
+        cv2.countNonZero(words[rows, columns])
+    return maps
+
+
+@dataclass(eq=False)
 class _Scratch:
     """Arrays of one picture's size to work in: fresh memory costs more than what is done with it."""
 
     rgba: np.ndarray
-    nearest: np.ndarray
-    other: np.ndarray
-    mixed: np.ndarray
+    smooth: np.ndarray
+    ratio: np.ndarray
+    mask: np.ndarray
+    maps: np.ndarray
+    """(3, h, w)."""
+    face: np.ndarray
+    """(3 h w,), for the maps of one face."""
+    grid: PixelGrid | None = None
+    """Whose maps they are."""
 
 
 @functools.lru_cache(maxsize=8)
@@ -211,18 +232,57 @@ def _scratch(shape: tuple[int, int], thread: int) -> _Scratch:
         np.empty(shape, np.float32),
         np.empty(shape, np.float32),
         np.empty(shape, np.uint8),
+        np.empty((3, *shape), np.float32),
+        np.empty(3 * shape[0] * shape[1], np.float32),
     )
 
 
-@dataclass(frozen=True, eq=False)
 class PixelGrid:
-    """Where the pixels of a picture lie on the padded faces. (h, w) float32 arrays."""
+    """Where the pixels of a picture lie on the padded faces."""
 
-    x: np.ndarray
-    y: np.ndarray
-    """The two maps of cv2.remap."""
-    stretch: np.ndarray
-    """Depth in this picture per depth in the face."""
+    def __init__(
+        self, s: int, shape: tuple[int, int], draw: Callable[[np.ndarray], None], *, keep: bool = False
+    ) -> None:
+        """Args:
+        s: side of a face, pixels.
+        shape: height and width of the picture.
+        draw: writes the maps.
+        keep: keep them from the first time on.
+        """
+        self.s, self.shape, self.draw = s, shape, draw
+        self._keep = keep
+        self._kept: np.ndarray | None = None
+
+    def maps(self) -> np.ndarray:
+        """(3, h, w) float32: depth in the face per depth in the picture, then the two maps of cv2.remap.
+
+        They are kept from the second time on, since fresh memory costs more than to draw them. Before, they stand
+        until this thread asks another grid of this shape.
+        """
+        if self._kept is not None:
+            return self._kept
+        work = _scratch(self.shape, threading.get_ident())
+        if work.grid is self:
+            return work.maps
+        if self._keep:
+            kept = np.empty_like(work.maps)
+            self.draw(kept)
+            self._kept = kept
+            return kept
+        work.grid, self._keep = None, True
+        self.draw(work.maps)
+        work.grid = self
+        return work.maps
+
+    @functools.cached_property
+    def shown(self) -> list[tuple[slice, slice]]:
+        """About which rows and columns of the padded faces the picture shows."""
+        x, y = self.maps()[1:, ::NEXT, ::NEXT].astype(int)
+        faces, found = y // (self.s + 2), []
+        for face in np.unique(faces):
+            across, down = x[faces == face], y[faces == face]
+            found.append((slice(down.min(), down.max() + NEXT), slice(across.min(), across.max() + NEXT)))
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,65 +305,84 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
         raise ValueError(f"yaw and pitch are in radians, got {yaw:g} and {pitch:g}; math.radians(90) is 90 degrees")
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     tall = math.tan(vfov / 2)
-    down = tall * (1 - 2 * (np.arange(height)[:, None] + 0.5) / height)
-    across = tall * width / height * (2 * (np.arange(width) + 0.5) / width - 1)
-    ahead = (cp - sp * down).astype(np.float32)
-    x = np.add(cy * ahead, (sy * across).astype(np.float32))
-    y = np.add(sy * ahead, (-cy * across).astype(np.float32))
-    return _grid(s, x, y, (sp + cp * down).astype(np.float32))
+    right = tall / height * np.arange(1 - width, width, 2)
+    rows = np.stack([np.ones(height), tall / height * np.arange(height - 1, -height, -2)], axis=1)
+    columns = np.stack([cp * cy + sy * right, cp * sy - cy * right, np.full(width, sp)])
+    up = np.array([-sp * cy, -sp * sy, cp])
+    return PixelGrid(s, (height, width), functools.partial(_draw, s, rows, columns, up))
 
 
 @functools.lru_cache(maxsize=4)
 def grid36(s: int, size: int) -> PixelGrid:
     """The 36 views of `Panorama.views36`, below each other."""
-    views = zip(VIEW_YAWS, VIEW_PITCHES, strict=True)
-    grids = [perspective_grid.__wrapped__(s, yaw, pitch, VFOV36, size, size) for yaw, pitch in views]
-    return PixelGrid(*(np.concatenate([getattr(g, name) for g in grids]) for name in ("x", "y", "stretch")))
+
+    def draw(maps: np.ndarray) -> None:
+        for k, (yaw, pitch) in enumerate(zip(VIEW_YAWS, VIEW_PITCHES, strict=True)):
+            view = perspective_grid.__wrapped__(s, yaw, pitch, VFOV36, size, size)
+            view.draw(maps[:, k * size : (k + 1) * size])
+
+    return PixelGrid(s, (VIEWS * size, size), draw, keep=True)
 
 
 @functools.lru_cache(maxsize=4)
 def equirect_grid(s: int, height: int) -> PixelGrid:
     """The grid of an equirectangular picture of (height, 2 height) pixels."""
     yaw = np.pi - (np.arange(2 * height) + 0.5) * np.pi / height
-    pitch = np.pi / 2 - (np.arange(height)[:, None] + 0.5) * np.pi / height
-    x, y = np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw)
-    return _grid(s, x.astype(np.float32), y.astype(np.float32), np.sin(pitch).astype(np.float32))
+    pitch = np.pi / 2 - (np.arange(height) + 0.5) * np.pi / height
+    rows = np.stack([np.cos(pitch), np.sin(pitch)], axis=1)
+    columns = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(2 * height)])
+    draw = functools.partial(_draw, s, rows, columns, np.array([0.0, 0.0, 1.0]))
+    return PixelGrid(s, (height, 2 * height), draw, keep=True)
 
 
-def _grid(s: int, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> PixelGrid:
-    """Where rays meet the faces.
+def _draw(s: int, rows: np.ndarray, columns: np.ndarray, up: np.ndarray, maps: np.ndarray) -> None:
+    """Write the maps of a picture whose pixel (i, j) looks along rows[i, 0] columns[:, j] + rows[i, 1] up.
+
+    On one face the maps are fractions of linear functions of the ray, and those are products of a (h, 2) and a (2, w)
+    matrix. Every face is written where it may be seen; where two may, the one that the ray goes along more is.
 
     Args:
-      x, y: (h, w) float32, components of the rays, world; overwritten.
-      z: (h, 1) float32, the third: one for each row. Depth in the picture is in units of these rays.
+      rows: (h, 2), the first column not negative.
+      columns: (3, w) world.
+      up: (3,) world.
+      maps: (3, h, w) float32; depth in the picture is in units of the rays.
     """
-    # A face of the four around shows (x / y, -z / |y|) where |y| is the larger, else (-y / x, -z / |x|).
-    half = s / 2
-    across, vertical = np.negative(y), np.abs(y)
-    swapped = cv2.compare(vertical, np.abs(x), cv2.CMP_GT)
-    cv2.copyTo(x, swapped, across)
-    along = x.copy()
-    cv2.copyTo(y, swapped, along)
-    back = cv2.compare(along, 0.0, cv2.CMP_LT)
-    with np.errstate(divide="ignore", invalid="ignore"):  # straight up and down
-        np.divide(half, along, out=along)
-        np.multiply(across, along, out=across)
-    np.abs(along, out=along)
-    np.multiply(along, -z, out=vertical)
-    face = cv2.addWeighted(swapped, 1 / 255, back, 2 / 255, 0.0)
-    steep = np.flatnonzero(np.abs(z[:, 0]) * cv2.reduce(along, 1, cv2.REDUCE_MAX)[:, 0] > half)
-    if len(steep):  # rows that see the faces above and below: (-y, x) / |z| and (-y / |z|, x / z)
-        rows = slice(int(steep[0]), int(steep[-1]) + 1)
-        nearer = half / np.where(z[rows] == 0, 1, z[rows])
-        mask = cv2.compare(along[rows] * np.abs(z[rows]), half, cv2.CMP_GT)
-        cv2.copyTo(y[rows] * -np.abs(nearer), mask, across[rows])
-        cv2.copyTo(x[rows] * nearer, mask, vertical[rows])
-        for values, to in ((np.abs(nearer), along), (np.where(z[rows] > 0, 4, 5).astype(np.uint8), face)):
-            cv2.copyTo(np.repeat(values, x.shape[1], axis=1), mask, to[rows])
-    across += np.float32(half + 0.5)
-    cv2.addWeighted(face, s + 2, vertical, 1.0, half + 0.5, dst=vertical, dtype=cv2.CV_32F)
-    along *= np.float32(1 / half)
-    return PixelGrid(across, vertical, along)
+    across, rising = INSIDE @ columns, (INSIDE @ up)[..., None]
+    (least, lowest), (most, highest) = rows.min(0), rows.max(0)
+    reach = np.maximum(least * across, most * across) + np.maximum(lowest * rising, highest * rising)
+    wide = (reach >= 0).all(1)
+    high = (rows[:, 0] * across.max(2, keepdims=True) + rows[:, 1] * rising >= 0).all(1)
+    seen = [(k, _span(high[k]), _span(wide[k])) for k in np.flatnonzero(high.any(1) & wide.any(1))]
+    apart = sum(maps[0, i, j].size for _, i, j in seen) == maps[0].size
+    if not apart:
+        maps[0] = 0
+    rows, linear = rows.astype(np.float32), linear_maps(s)
+    factors = np.empty((3, 2, columns.shape[1]), np.float32)
+    spare = _scratch(maps.shape[1:], threading.get_ident()).face
+    for n, (face, i, j) in enumerate(seen):
+        factors[:, 0], factors[:, 1] = linear[face] @ columns, (linear[face] @ up)[:, None]
+        here = maps[:, i, j]
+        if apart or n == 0:
+            np.matmul(rows[i], factors[..., j], out=here)
+            continue
+        found = np.matmul(rows[i], factors[..., j], out=spare[: here.size].reshape(here.shape))
+        nearer = cv2.compare(found[0], here[0], cv2.CMP_GT)
+        for values, to in zip(found, here, strict=True):
+            cv2.copyTo(values, nearer, to)
+    np.divide(maps[1:], maps[0], out=maps[1:])
+
+
+def _span(where: np.ndarray) -> slice:
+    """From the first to the last that is true."""
+    found = np.flatnonzero(where)
+    return slice(int(found[0]), int(found[-1]) + 1)
+
+
+@functools.lru_cache(maxsize=8)
+def linear_maps(s: int) -> np.ndarray:
+    """(6, 3, 3): multiplied with a ray: how far it goes along a face's axis, and that times x and y of its pixel."""
+    middle = (s + 1) / 2
+    return np.array([[[1, 0, 0], [middle, s / 2, 0], [middle + k * (s + 2), 0, -s / 2]] for k in range(6)]) @ AXES
 
 
 @functools.lru_cache(maxsize=8)
@@ -315,8 +394,8 @@ def pad_grid(s: int) -> Pad:
     face = np.repeat(np.arange(6), len(row))
     row, column = np.tile(row, 6), np.tile(column, 6)
     u, v = (column - 0.5) / s * 2 - 1, (row - 0.5) / s * 2 - 1
-    forward, up = (np.array([f[i] for f in FACES])[face] for i in (0, 1))
-    rays = forward + u[:, None] * np.cross(forward, up) - v[:, None] * up
+    forward, right, up = AXES[face].swapaxes(0, 1)
+    rays = forward + u[:, None] * right - v[:, None] * up
     lengths = np.linalg.norm(rays, axis=-1)
     other, ou, ov, along = _face_coordinates(rays / lengths[:, None])
     x, y = (np.clip((w + 1) / 2 * s - 0.5, 0, s - 1) for w in (ou, ov))
@@ -332,8 +411,7 @@ def pad_grid(s: int) -> Pad:
 
 def _face_coordinates(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Face index, u (right) and v (down) in [-1, 1], and the part of each unit ray along the face's axis."""
-    forward, up = (np.array([f[i] for f in FACES]) for i in (0, 1))
-    right = np.cross(forward, up)
+    forward, right, up = AXES.swapaxes(0, 1)
     face = np.argmax(rays @ forward.T, axis=-1)
     along, u, v = (np.sum(rays * axes[face], axis=-1) for axes in (forward, right, -up))
     return face, u / along, v / along, along
@@ -350,8 +428,8 @@ def ray_stretch(s: int) -> np.ndarray:
 def face_rays(s: int) -> np.ndarray:
     """(6, s, s, 3) float32 unit directions, world, of every pixel."""
     u = (np.arange(s) + 0.5) / s * 2 - 1
-    forward, up = (np.array([f[i] for f in FACES])[:, None, None] for i in (0, 1))
-    rays = forward + u[None, None, :, None] * np.cross(forward, up) - u[None, :, None, None] * up
+    forward, right, up = AXES.swapaxes(0, 1)[:, :, None, None]
+    rays = forward + u[None, None, :, None] * right - u[None, :, None, None] * up
     return (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).astype(np.float32)
 
 
