@@ -28,6 +28,18 @@ class Maps:
     """(n, n) float32 in [0, 1]."""
 
 
+def maps_of(
+    color: np.ndarray,
+    height: np.ndarray | float,
+    roughness: np.ndarray | float,
+    darkest: float = 0.01,
+    brightest: float = 0.98,
+) -> Maps:
+    """Maps of a colour (n, n, 3) kept between two limits; height and roughness may be one number for all of it."""
+    height, roughness = (np.full(color.shape[:2], given, np.float32) for given in (height, roughness))
+    return Maps(np.clip(color, darkest, brightest).astype(np.float32), height, roughness)
+
+
 # ------------------------------------------------------------------ noise
 
 

@@ -19,6 +19,7 @@ from assets.materials.maps import (
     coordinates,
     fbm,
     look_up,
+    maps_of,
     mix,
     noise,
     rgb,
@@ -67,11 +68,7 @@ class Tiles:
         lie = self.waviness * (tilt[pieces.piece, 0] * pieces.along + tilt[pieces.piece, 1] * pieces.across) / 0.1
         height = inside * (height + lie) + 0.0012 * slope
         rough = np.where(inside > 0.5, self.gloss + rough, 0.88)
-        return Maps(
-            np.clip(color, 0.01, 0.98).astype(np.float32),
-            height.astype(np.float32),
-            np.clip(rough, 0.05, 1).astype(np.float32),
-        )
+        return maps_of(color, height, np.clip(rough, 0.05, 1))
 
 
 def checker(n: int, tile: float, *, rng: np.random.Generator) -> Maps:
@@ -193,11 +190,7 @@ def slab(n: int, tile: float, surface: Callable[..., Face], gloss: float, *, rng
     """One endless face of stone."""
     u, v = coordinates(n, tile)
     color, rough, height = surface(u / tile, v / tile, n, rng=rng)
-    return Maps(
-        np.clip(color, 0.01, 0.98).astype(np.float32),
-        np.asarray(height, np.float32) + np.zeros((n, n), np.float32),
-        np.clip(gloss + rough, 0.05, 1).astype(np.float32),
-    )
+    return maps_of(color, height, np.clip(gloss + rough, 0.05, 1))
 
 
 def granite(
@@ -221,7 +214,7 @@ def granite(
         best = np.maximum(best, f)
     cloud = fbm(n, 3, 12, 1.0, rng=rng)
     color *= (1 + 0.03 * cloud)[..., None]
-    return Maps(np.clip(color, 0.01, 0.97), np.zeros((n, n), np.float32), np.full((n, n), gloss, np.float32))
+    return maps_of(color, 0.0, gloss, 0.01, 0.97)
 
 
 def terrazzo(
@@ -262,7 +255,7 @@ def terrazzo(
         placed += 1.6 * r * r
     fine = noise(n, 0.8, 0.8, rng=rng)
     out = color.astype(np.float32) / 255 * (1 + 0.02 * fine)[..., None]
-    return Maps(np.clip(out, 0.01, 0.98), np.zeros((n, n), np.float32), np.full((n, n), 0.22, np.float32))
+    return maps_of(out, 0.0, 0.22)
 
 
 def concrete(
@@ -285,9 +278,7 @@ def concrete(
         * (1 - 0.45 * holes)[..., None]
     )
     height = 1e-4 * cloud + 3e-5 * grain - 1e-3 * holes
-    return Maps(
-        np.clip(color, 0.02, 0.97).astype(np.float32), height, np.clip(gloss + 0.06 * sweep, 0.1, 1).astype(np.float32)
-    )
+    return maps_of(color, height, np.clip(gloss + 0.06 * sweep, 0.1, 1), 0.02, 0.97)
 
 
 @dataclass(frozen=True)
@@ -327,11 +318,7 @@ class Brick:
         if self.painted:
             shade = 1 - 0.13 * (1 - smooth_step(blurred(face, 2.0), 0.2, 0.9))
             mixed = rgb(self.color) * (shade * (1 + 0.012 * cloud))[..., None]
-        return Maps(
-            np.clip(mixed, 0.02, 0.97).astype(np.float32),
-            relief.astype(np.float32),
-            np.full((n, n), 0.6 if self.painted else 0.88, np.float32),
-        )
+        return maps_of(mixed, relief, 0.6 if self.painted else 0.88, 0.02, 0.97)
 
 
 def rubble(
@@ -374,8 +361,4 @@ def rubble(
     stone = rgb(base) * (1 + tone[owner] + 0.07 * cloud + 0.03 * grain)[..., None] * (1 + hue[owner])
     color = rgb(mortar) * (1 + 0.05 * cloud)[..., None] * (1 - face)[..., None] + stone * face[..., None]
     dome = smooth_step(edge, 0.0, 0.03)
-    return Maps(
-        np.clip(color, 0.02, 0.97).astype(np.float32),
-        (0.012 * dome + 0.0012 * cloud * face).astype(np.float32),
-        np.full((n, n), 0.9, np.float32),
-    )
+    return maps_of(color, 0.012 * dome + 0.0012 * cloud * face, 0.9, 0.02, 0.97)

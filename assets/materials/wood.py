@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.materials.maps import Layout, Maps, fbm, look_up, mix, noise, planks, rgb, smooth_step
+from assets.materials.maps import Layout, Maps, fbm, look_up, maps_of, mix, noise, planks, rgb, smooth_step
 
 
 @dataclass(frozen=True)
@@ -137,11 +137,7 @@ def boards(
         color = color * (1 - 0.55 * cut)[..., None]
         rough = rough + 0.25 * cut
         height = height - 6e-4 * cut + rng.normal(0, 5e-5, layout.count)[piece] * (1 - cut)
-    return Maps(
-        np.clip(color, 0.01, 0.98).astype(np.float32),
-        height.astype(np.float32),
-        np.clip(rough, 0.08, 1).astype(np.float32),
-    )
+    return maps_of(color, height, np.clip(rough, 0.08, 1))
 
 
 @dataclass(frozen=True, eq=False)
