@@ -241,8 +241,8 @@ def poster(n: int, tile: float, ground: Color, ink: Color, accent: Color, *, rng
             image = _fill(image, ring, accent if round(r * 100) % 12 < 6 else ink)
     elif kind == 1:
         for k in range(6):
-            step = _rectangle(0.2 + 0.1 * k, 0.14, 0.26 + 0.1 * k, 0.2 + 0.08 * k)
-            image = _fill(image, step, accent if k % 2 else ink)
+            bar = _rectangle(0.2 + 0.1 * k, 0.14, 0.26 + 0.1 * k, 0.2 + 0.08 * k)
+            image = _fill(image, bar, accent if k % 2 else ink)
     else:
         half = np.linspace(0, np.pi, 50)
         for k in range(4):

@@ -8,7 +8,7 @@ are integers in decimetres.
 from __future__ import annotations
 
 import itertools
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,11 +37,11 @@ class Stretch:
 
     def strip(self, base: int, out: int, depth: int, *, rank: float, band: int, u_band: int) -> Strip:
         """A row of rooms along it; see the fields of Strip."""
-        return Strip(*astuple(self), base, out, depth, rank, band, u_band)
+        return Strip(self.axis, self.start, self.way, self.length, base, out, depth, rank, band, u_band)
 
     def corridor(self, low: int, high: int, free: tuple[bool, bool]) -> Band:
         """A corridor along it; see the fields of Band."""
-        return Band(*astuple(self), low, high, free)
+        return Band(self.axis, self.start, self.way, self.length, low, high, free)
 
 
 @dataclass(frozen=True)
