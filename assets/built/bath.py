@@ -53,9 +53,8 @@ def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     z0, z1, y = 0.28, top - 0.05, -d / 2 + 0.01
     body = carcass((-w / 2 + 0.01, y + 0.02, z0), (w / 2 - 0.01, d / 2, z1), top=False)
     mid = (z0 + z1) / 2
-    doors = [
-        front(-w / 2 + 0.01, w / 2 - 0.01, a, b, y, str(look.get("style", "flat"))) for a, b in ((z0, mid), (mid, z1))
-    ]
+    style, x = str(look.get("style", "flat")), w / 2 - 0.01
+    doors = [front(-x, x, a, b, y, style) for a, b in ((z0, mid), (mid, z1))]
     grips = [handle(0, b - 0.05, y, "bar", False, w * 0.3) for b in (mid, z1)]
     t = np.linspace(0, 2 * np.pi, 41)[:-1]
     rx, ry, deep, cy = min(0.24, w * 0.38), d * 0.30, 0.10, -0.03
@@ -67,9 +66,8 @@ def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     bowl = moved(scaled(reversed_shape(bowl), rx, ry, 1), 0, cy, top)
     drain = moved(cylinder(0.022, 0, 0.003, 0.001, 14), 0, cy, top - deep)
     ty = cy + ry + 0.035
-    spout = tube(
-        [(0, ty, top), (0, ty, top + 0.09), (0, ty - 0.03, top + 0.115), (0, ty - 0.11, top + 0.10)], 0.011, 10
-    )
+    neck = [(0, ty, top), (0, ty, top + 0.09), (0, ty - 0.03, top + 0.115), (0, ty - 0.11, top + 0.10)]
+    spout = tube(neck, 0.011, 10)
     lever = tube([(0, ty, top + 0.09), (0, ty + 0.005, top + 0.13), (0, ty - 0.05, top + tap)], 0.006, 8)
     base = moved(cylinder(0.022, 0, 0.012, 0.003, 14), 0, ty, top)
     wood = material(look, "front", finish, "oak/0")

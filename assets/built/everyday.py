@@ -224,10 +224,8 @@ def _crumpled(size: Size, cells: int, roundness: float, *, rng: np.random.Genera
         wave = np.sin(rate * (x * np.cos(turn) + y * np.sin(turn)) + 0.9 * np.sin(2.5 * y + k) + rng.uniform(0, 6))
         ridges = np.maximum(ridges, rng.uniform(0.5, 1.0) * (1 - np.abs(wave)) ** 1.3)
     rise = height * (0.22 + 0.78 * ridges / ridges.max()) * np.clip(1 - square**6, 0, 1) ** 0.5 + 0.004
-    px, py = (
-        half * reach * ((1 - roundness) * flat + roundness * square * round_)
-        for half, flat, round_ in ((width / 2, x, np.cos(a)), (depth / 2, y, np.sin(a)))
-    )
+    axes = ((width / 2, x, np.cos(a)), (depth / 2, y, np.sin(a)))
+    px, py = (half * reach * ((1 - roundness) * u + roundness * square * v) for half, u, v in axes)
     top = sheet(np.stack([px, py, rise], -1))
     low = sheet(np.stack([px, py, 0 * rise], -1))
     up = rim(np.stack([px, py, rise], -1))
@@ -284,9 +282,8 @@ def dish_rack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Genera
     feet = [moved(foot, x * (w / 2 - 0.02), y * (d / 2 - 0.02)) for x in (-1, 1) for y in (-1, 1)]
     r = min(0.12, d / 2, (h - 0.03) / 2)
     flat = lathe([(0, 0), (r * 0.62, 0.003), (r, 0.016), (r * 0.99, 0.018), (r * 0.6, 0.006), (0, 0.005)], 24, 0.7)
-    stand = [
-        moved(turned(turned(flat, np.pi / 2, "y"), 0.16, "y"), x, 0, r + 0.022) for x in np.linspace(-0.36, 0.05, 4) * w
-    ]
+    lean = turned(turned(flat, np.pi / 2, "y"), 0.16, "y")
+    stand = [moved(lean, x, 0, r + 0.022) for x in np.linspace(-0.36, 0.05, 4) * w]
     cup = lathe([(0.0, 0.08), (0.03, 0.08), (0.038, 0.0), (0.034, 0.0), (0.026, 0.076), (0, 0.076)], 18)
     cups = [moved(cup, 0.32 * w, y, 0.024) for y in (-0.2 * d, 0.2 * d)]
     return parts_of(

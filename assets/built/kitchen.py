@@ -196,10 +196,8 @@ def cooker(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
 def _level_grip(x: float, z: float, y: float, length: float) -> Shape:
     """The round bar of an oven's door on two feet."""
     bar = tube([(x - length / 2, y - 0.026, z), (x + length / 2, y - 0.026, z)], 0.0075, 10)
-    feet = [
-        tube([(x + s * (length / 2 - 0.03), y, z), (x + s * (length / 2 - 0.03), y - 0.026, z)], 0.006, 8)
-        for s in (-1, 1)
-    ]
+    ends = (x + s * (length / 2 - 0.03) for s in (-1, 1))
+    feet = [tube([(at, y, z), (at, y - 0.026, z)], 0.006, 8) for at in ends]
     return joined(bar, *feet)
 
 
@@ -235,10 +233,8 @@ def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
         left = columns > 1 and k % 2 == 1
         grips.append(handle(a + 0.035 if left else b - 0.035, 0.12, y, _on_door(grip), True))
     if look.get("glazed"):
-        inside = [
-            box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018])
-            for z in np.linspace(0, h, 4)[1:-1]
-        ]
+        heights = np.linspace(0, h, 4)[1:-1]
+        inside = [box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018]) for z in heights]
         crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=rng)
     return parts_of(
         (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
@@ -283,9 +279,8 @@ def tall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     cut = PLINTH[0] + 0.72
     columns = max(1, round(w / 0.6))
     edges = np.linspace(-w / 2, w / 2, columns + 1)
-    doors = [
-        front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in ((PLINTH[0], cut), (cut, h))
-    ]
+    rows = ((PLINTH[0], cut), (cut, h))
+    doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in rows]
     grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
     side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
     return parts_of(
@@ -313,10 +308,8 @@ def fridge(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
         box([-w / 2 + 0.05, back_of_doors - 0.014, z], [w / 2 - 0.05, back_of_doors - 0.008, z + 0.006])
         for z in (0.012, 0.024, 0.036)
     ]
-    doors = [
-        box([-w / 2, front_y, z0], [w / 2, back_of_doors, z1], 0.016)
-        for z0, z1 in ((foot - 0.012, split - 0.008), (split + 0.008, h - 0.004))
-    ]
+    rows = ((foot - 0.012, split - 0.008), (split + 0.008, h - 0.004))
+    doors = [box([-w / 2, front_y, z0], [w / 2, back_of_doors, z1], 0.016) for z0, z1 in rows]
     hinges = [box([w / 2 - 0.09, back_of_doors - 0.03, h - 0.006], [w / 2 - 0.01, back_of_doors + 0.05, h], 0.002)]
     x = -w / 2 + 0.055
     grips = [_long_grip(x, front_y, z0, z1) for z0, z1 in ((split - 0.46, split - 0.04), (split + 0.04, split + 0.70))]

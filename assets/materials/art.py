@@ -196,11 +196,7 @@ def brushwork(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.ran
         long, wide = rng.uniform(0.15, 0.42), rng.uniform(0.03, 0.10)
         u = (x - at[0]) * np.cos(angle) + (y - at[1]) * np.sin(angle)
         v = -(x - at[0]) * np.sin(angle) + (y - at[1]) * np.cos(angle) + 0.25 * u * u
-        bristles = (
-            np.interp(v.reshape(-1), np.linspace(-wide, wide, 60), rng.normal(0, 1, 60))
-            .reshape(n, n)
-            .astype(np.float32)
-        )
+        bristles = np.interp(v, np.linspace(-wide, wide, 60), rng.normal(0, 1, 60)).astype(np.float32)
         ragged = 0.25 * long * bristles * 0.35
         inside = smooth_step(wide - np.abs(v), 0.0, 0.008) * smooth_step(long - np.abs(u) + ragged, 0.0, 0.05)
         c = rgb(colors[rng.integers(len(colors))]) * (1 + 0.09 * bristles)[..., None]
@@ -289,13 +285,8 @@ def oriental(
     corner = np.hypot(ax - 0.8, ay - 0.76) * (1 + 0.10 * np.cos(8 * np.arctan2(ay - 0.76, ax - 0.8)))
     image = mix(image, tints[0], 1 - smooth_step(corner, 0.25, 0.265))
     edge = np.minimum(1 - ax, 1 - ay)
-    for outer, inner, c in (
-        (0.0, 0.24, tints[2]),
-        (0.012, 0.05, tints[1]),
-        (0.055, 0.185, tints[0]),
-        (0.19, 0.23, tints[3]),
-    ):
-        image = np.where(((edge > outer) & (edge < inner))[..., None], c, image)
+    for outer, inner, k in ((0.0, 0.24, 2), (0.012, 0.05, 1), (0.055, 0.185, 0), (0.19, 0.23, 3)):
+        image = np.where(((edge > outer) & (edge < inner))[..., None], tints[k], image)
     along = np.where(1 - ax < 1 - ay, y, x)
     motif = np.cos(along * np.pi * 13) * 0.04 - np.abs(edge - 0.12)
     image = mix(image, tints[3], (motif > -0.012).astype(np.float32) * (np.abs(edge - 0.12) < 0.05))
@@ -403,28 +394,20 @@ def dial(
 ) -> Maps:
     """A clock face with hands."""
     image = rgb(face, (n, n))
+    font, scale, thick = cv2.FONT_HERSHEY_SIMPLEX, n / 500, max(1, n // 170)
     for k in range(60):
         a = k * np.pi / 30
         d = np.array([np.sin(a), -np.cos(a)])
         big = k % 5 == 0
-        image = _stroke(
-            image, 0.5 + np.array([0.44, 0.385 if big else 0.42])[:, None] * d, 0.010 if big else 0.004, ink
-        )
+        tick = 0.5 + np.array([0.44, 0.385 if big else 0.42])[:, None] * d
+        image = _stroke(image, tick, 0.010 if big else 0.004, ink)
         if big and numerals:
             text = str(k // 5 or 12)
-            (w, h), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, n / 500, max(1, n // 170))
+            (w, h), _ = cv2.getTextSize(text, font, scale, thick)
             p = 0.5 + 0.32 * d
             mask = np.zeros((n, n), np.uint8)
-            cv2.putText(
-                mask,
-                text,
-                (round(p[0] * n - w / 2), round(p[1] * n + h / 2)),
-                cv2.FONT_HERSHEY_SIMPLEX,
-                n / 500,
-                255,
-                max(1, n // 170),
-                cv2.LINE_AA,
-            )
+            at = round(p[0] * n - w / 2), round(p[1] * n + h / 2)
+            cv2.putText(mask, text, at, font, scale, 255, thick, cv2.LINE_AA)
             image = mix(image, rgb(ink), mask.astype(np.float32) / 255)
     for turn, long, wide in ((hour / 12, 0.22, 0.022), (hour % 1, 0.34, 0.014)):
         a = 2 * np.pi * turn

@@ -236,11 +236,8 @@ def terrazzo(
             break
         r = size / pixel * float(np.clip(rng.lognormal(-0.5, 0.55), 0.15, 1.8))
         angle = np.sort(rng.random(rng.integers(4, 8))) * 2 * np.pi
-        shape = (
-            np.stack([np.cos(angle), np.sin(angle) * rng.uniform(0.6, 1.0)], 1)
-            * r
-            * rng.uniform(0.7, 1.0, (len(angle), 1))
-        )
+        shape = np.stack([np.cos(angle), np.sin(angle) * rng.uniform(0.6, 1.0)], 1) * r
+        shape = shape * rng.uniform(0.7, 1.0, (len(angle), 1))
         spin = rng.uniform(0, 6.28)
         shape = shape @ np.array([[np.cos(spin), -np.sin(spin)], [np.sin(spin), np.cos(spin)]])
         at = rng.random(2) * n
@@ -272,11 +269,8 @@ def concrete(
     sweep = fbm(n, 3, 40, 1.5, 2.5, rng=rng)
     grain = noise(n, 0.8, 0.8, rng=rng)
     holes = smooth_step(noise(n, 2.2, 2.2, rng=rng), 3.15, 3.5)
-    color = (
-        rgb(base)
-        * (1 + contrast * cloud + 0.6 * contrast * sweep + 0.018 * grain)[..., None]
-        * (1 - 0.45 * holes)[..., None]
-    )
+    color = rgb(base) * (1 + contrast * cloud + 0.6 * contrast * sweep + 0.018 * grain)[..., None]
+    color = color * (1 - 0.45 * holes)[..., None]
     height = 1e-4 * cloud + 3e-5 * grain - 1e-3 * holes
     return maps_of(color, height, np.clip(gloss + 0.06 * sweep, 0.1, 1), 0.02, 0.97)
 
@@ -333,13 +327,8 @@ def rubble(
     """Natural stone walling: cells of jittered points, flat courses, each stone its own shade."""
     rows = int(across * 1.7)
     py, px = np.meshgrid(np.arange(rows), np.arange(across), indexing="ij")
-    points = np.stack(
-        [
-            (px + 0.5 * (py % 2) + rng.uniform(-0.28, 0.28, px.shape)) / across,
-            (py + rng.uniform(-0.2, 0.2, px.shape)) / rows,
-        ],
-        -1,
-    ).reshape(-1, 2)
+    at_x, at_y = px + 0.5 * (py % 2) + rng.uniform(-0.28, 0.28, px.shape), py + rng.uniform(-0.2, 0.2, px.shape)
+    points = np.stack([at_x / across, at_y / rows], -1).reshape(-1, 2)
     u, v = coordinates(n, tile)
     bend = fbm(n, 4, 60, 1.5, rng=rng)
     x, y = u / tile + 0.0025 * bend, v / tile + 0.0025 * np.roll(bend, n // 3, 0)

@@ -462,12 +462,9 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
 def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.CollisionBox, ...]:
     """The collision boxes of a placement, in the asset frame; kept where the catalogue has a cache."""
     asset, parts = catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params)
-    cache = getattr(catalogue, "cache", None)
-    return (
-        collision.object_boxes(asset, parts, p.size)
-        if cache is None
-        else collision.kept_boxes(asset, parts, p.size, cache)
-    )
+    if (cache := getattr(catalogue, "cache", None)) is None:
+        return collision.object_boxes(asset, parts, p.size)
+    return collision.kept_boxes(asset, parts, p.size, cache)
 
 
 def _add_boxes(
