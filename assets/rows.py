@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType, ModuleType
 from typing import Any
 
 from assets import json_file
@@ -228,6 +229,18 @@ def asset_of(where: str, key: str, row: Mapping[str, Any]) -> Asset:
         pack=key.split("/")[0],
         creator=row.get("creator", ""),
         licence=row.get("licence", ""),
+    )
+
+
+def made_in(*modules: ModuleType) -> Mapping[str, Any]:
+    """What rows may name of modules, as '<module>.<name>': the functions and classes that they define and show."""
+    return MappingProxyType(
+        {
+            f"{module.__name__.rpartition('.')[2]}.{name}": maker
+            for module in modules
+            for name, maker in vars(module).items()
+            if callable(maker) and getattr(maker, "__module__", "") == module.__name__ and not name.startswith("_")
+        }
     )
 
 

@@ -26,10 +26,8 @@ def bed(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     cover = box([-inner / 2 - 0.012, -d / 2 + thick, rail + 0.06], [inner / 2 + 0.012, d / 2 - 0.62, top], 0.03)
     count = max(1, round(w / 0.8))
     each = inner / count
-    pillows = [
-        moved(pillow(each * 0.86, 0.42, 0.15), -inner / 2 + each * (k + 0.5), d / 2 - 0.3, top + 0.04)
-        for k in range(count)
-    ]
+    one = pillow(each * 0.86, 0.42, 0.15)
+    pillows = [moved(one, -inner / 2 + each * (k + 0.5), d / 2 - 0.3, top + 0.04) for k in range(count)]
     return parts_of(
         (material(look, "wood", finish, "oak/0"), frame),
         (finish("cotton/0"), [mattress, *pillows]),

@@ -24,18 +24,22 @@ from assets.built.maker import (
 from assets.built.primitives import (
     Shape,
     ball,
+    between,
     box,
     cylinder,
     extruded,
+    hung,
     joined,
     lathe,
     moved,
     quads,
+    reversed_shape,
     scaled,
     sheet,
     shifted_uv,
     tube,
     turned,
+    unrolled_uv,
 )
 from assets.built.soft import layers
 from assets.records import Finish, MeshPart
@@ -49,9 +53,8 @@ def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     z0, z1, y = 0.28, top - 0.05, -d / 2 + 0.01
     body = carcass((-w / 2 + 0.01, y + 0.02, z0), (w / 2 - 0.01, d / 2, z1), top=False)
     mid = (z0 + z1) / 2
-    doors = [
-        front(-w / 2 + 0.01, w / 2 - 0.01, a, b, y, str(look.get("style", "flat"))) for a, b in ((z0, mid), (mid, z1))
-    ]
+    style, x = str(look.get("style", "flat")), w / 2 - 0.01
+    doors = [front(-x, x, a, b, y, style) for a, b in ((z0, mid), (mid, z1))]
     grips = [handle(0, b - 0.05, y, "bar", False, w * 0.3) for b in (mid, z1)]
     t = np.linspace(0, 2 * np.pi, 41)[:-1]
     rx, ry, deep, cy = min(0.24, w * 0.38), d * 0.30, 0.10, -0.03
@@ -60,13 +63,11 @@ def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     slab = extruded(plate, top - 0.05, top)
     profile = [(0.08, -deep), (0.55, -deep * 0.93), (0.85, -deep * 0.6), (0.97, -0.015), (1.0, 0.0)]
     bowl = lathe([(0.0, -deep), *profile], 40, 0.9)
-    bowl = Shape(bowl.vertices, bowl.faces[:, ::-1], -bowl.normals, bowl.uv)
-    bowl = moved(scaled(bowl, rx, ry, 1), 0, cy, top)
+    bowl = moved(scaled(reversed_shape(bowl), rx, ry, 1), 0, cy, top)
     drain = moved(cylinder(0.022, 0, 0.003, 0.001, 14), 0, cy, top - deep)
     ty = cy + ry + 0.035
-    spout = tube(
-        [(0, ty, top), (0, ty, top + 0.09), (0, ty - 0.03, top + 0.115), (0, ty - 0.11, top + 0.10)], 0.011, 10
-    )
+    neck = [(0, ty, top), (0, ty, top + 0.09), (0, ty - 0.03, top + 0.115), (0, ty - 0.11, top + 0.10)]
+    spout = tube(neck, 0.011, 10)
     lever = tube([(0, ty, top + 0.09), (0, ty + 0.005, top + 0.13), (0, ty - 0.05, top + tap)], 0.006, 8)
     base = moved(cylinder(0.022, 0, 0.012, 0.003, 14), 0, ty, top)
     wood = material(look, "front", finish, "oak/0")
@@ -104,18 +105,8 @@ def shower(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     head = moved(lathe([(0, -0.02), (0.11, -0.02), (0.11, -0.010), (0.02, 0.0), (0, 0.0)], 28), 0, by - 0.28, h - 0.02)
     mixer = [moved(turned(cylinder(0.022, -0.13, 0.13, 0.004, 14), np.pi / 2, "y"), 0, by, 1.08)]
     s = np.linspace(0, 1, 14)
-    hose = tube(
-        np.stack(
-            [
-                0.10 + 0.05 * np.sin(np.pi * s),
-                by - 0.02 - 0.05 * np.sin(np.pi * s),
-                1.06 - 0.55 * np.sin(np.pi * s) + 0.45 * s,
-            ],
-            1,
-        ),
-        0.006,
-        7,
-    )
+    sag = np.sin(np.pi * s)
+    hose = tube(np.stack([0.10 + 0.05 * sag, by - 0.02 - 0.05 * sag, 1.06 - 0.55 * sag + 0.45 * s], 1), 0.006, 7)
     stays = [box([-0.012, by, z], [0.012, d / 2, z + 0.02]) for z in (1.07, h - 0.12)]
     drain = moved(cylinder(0.045, 0, 0.004, 0.001, 18), -w * 0.1, d * 0.25, 0.02)
     return parts_of(
@@ -154,19 +145,12 @@ def towel_rail(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
     y, z = -d * 0.1, h - 0.035
     rail = tube([(-w / 2, y, z), (w / 2, y, z)], 0.008, 10)
     posts = [
-        joined(
-            tube([(x, y, z), (x, d / 2, z)], 0.007, 8),
-            moved(turned(cylinder(0.022, 0, 0.006, 0.002, 14), np.pi / 2, "x"), x, d / 2, z),
-        )
+        joined(tube([(x, y, z), (x, d / 2, z)], 0.007, 8), hung(cylinder(0.022, 0, 0.006, 0.002, 14), x, d / 2, z))
         for x in (-w / 2 + 0.02, w / 2 - 0.02)
     ]
     tw = w * float(look.get("share", 0.72))
-    towel = moved(
-        shifted_uv(_draped(tw, h - 0.012, min(d * 0.7, 0.06), rng=rng), *rng.random(2)),
-        rng.uniform(-0.05, 0.05) * w,
-        y,
-        0,
-    )
+    towel = shifted_uv(_draped(tw, h - 0.012, min(d * 0.7, 0.06), rng=rng), *rng.random(2))
+    towel = moved(towel, rng.uniform(-0.05, 0.05) * w, y, 0)
     return parts_of(
         (metal(look, finish, "chrome"), [rail, *posts]), (material(look, "cloth", finish, "terry/0"), towel)
     )
@@ -188,7 +172,7 @@ def hanging_towel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Ge
     cloth = np.stack(np.broadcast_arrays(x, y, z), -1)
     hook = joined(
         tube([(0, d / 2, h - 0.03), (0, -d * 0.1, h - 0.035), (0, -d * 0.25, h - 0.005)], 0.006, 8),
-        moved(turned(cylinder(0.02, 0, 0.006, 0.002, 14), np.pi / 2, "x"), 0, d / 2, h - 0.03),
+        hung(cylinder(0.02, 0, 0.006, 0.002, 14), 0, d / 2, h - 0.03),
     )
     terry, low, high = material(look, "cloth", finish, "terry/0"), 2, 4  # rows of the woven border
     pile = [sheet(cloth[: low + 1], 0.006), sheet(cloth[high:], 0.006)]
@@ -214,11 +198,8 @@ def toilet_brush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     w, _, h = size
     r = w / 2
     cup = lathe([(0, 0), (r, 0), (r, h * 0.42), (r * 0.86, h * 0.42), (r * 0.84, h * 0.1), (0, h * 0.1)], 24)
-    stick = lathe(
-        [(0, h * 0.2), (0.007, h * 0.2), (0.007, h * 0.8), (0.011, h * 0.84), (0.011, h * 0.98), (0.006, h), (0, h)],
-        12,
-        0.9,
-    )
+    grip = [(0.007, h * 0.8), (0.011, h * 0.84), (0.011, h * 0.98), (0.006, h), (0, h)]
+    stick = lathe([(0, h * 0.2), (0.007, h * 0.2), *grip], 12, 0.9)
     lid = lathe([(0, h * 0.42), (r * 0.8, h * 0.42), (r * 0.5, h * 0.46), (0, h * 0.47)], 24, 0.9)
     return parts_of((metal(look, finish, "white"), cup), (CHROME, [stick, lid]))
 
@@ -226,23 +207,11 @@ def toilet_brush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
 def soap_dispenser(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     r = min(w, d) * 0.5
-    body = lathe(
-        [(0, 0), (r * 0.94, 0), (r, 0.006), (r, h * 0.62), (r * 0.85, h * 0.70), (r * 0.35, h * 0.72), (0, h * 0.72)],
-        24,
-        0.6,
-    )
+    shoulder = [(r, h * 0.62), (r * 0.85, h * 0.70), (r * 0.35, h * 0.72), (0, h * 0.72)]
+    body = lathe([(0, 0), (r * 0.94, 0), (r, 0.006), *shoulder], 24, 0.6)
+    collar = [(0, h * 0.7), (r * 0.38, h * 0.7), (r * 0.38, h * 0.78)]
     pump = [
-        lathe(
-            [
-                (0, h * 0.7),
-                (r * 0.38, h * 0.7),
-                (r * 0.38, h * 0.78),
-                (r * 0.14, h * 0.79),
-                (r * 0.14, h * 0.93),
-                (0, h * 0.93),
-            ],
-            14,
-        ),
+        lathe([*collar, (r * 0.14, h * 0.79), (r * 0.14, h * 0.93), (0, h * 0.93)], 14),
         tube([(0, 0, h * 0.955), (0, -r * 0.98, h * 0.935)], h * 0.03, 7),
         lathe([(0, h * 0.92), (r * 0.3, h * 0.93), (r * 0.3, h), (0, h)], 14),
     ]
@@ -262,10 +231,8 @@ def toothbrush_cup(size: Size, look: Look, finish: FinishOf, *, rng: np.random.G
     brushes = []
     for k, c in enumerate(((0.20, 0.45, 0.70), (0.85, 0.40, 0.42), (0.92, 0.92, 0.90))[: 2 + int(rng.integers(2))]):
         a = 2.2 * k + rng.uniform(0, 1)
-        foot, top = (
-            np.array([-0.4 * r * np.cos(a), -0.4 * r * np.sin(a), 0.012]),
-            np.array([0.75 * r * np.cos(a), 0.75 * r * np.sin(a), h * rng.uniform(0.9, 0.99)]),
-        )
+        foot = np.array([-0.4 * r * np.cos(a), -0.4 * r * np.sin(a), 0.012])
+        top = np.array([0.75 * r * np.cos(a), 0.75 * r * np.sin(a), h * rng.uniform(0.9, 0.99)])
         stick = tube([foot, (foot + top) / 2, top], [0.004, 0.005, 0.0035], 6)
         head = moved(box([-0.005, -0.006, -0.014], [0.005, 0.006, 0.010], 0.001), *(top + [0.004, 0, 0]))
         brushes += [(plain(c, 0.35), stick), (plain((0.93, 0.95, 0.96), 0.8), head)]
@@ -276,22 +243,11 @@ def paper_roll(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
     """A toilet roll on a wall bracket, its end hanging."""
     w, d, h = size
     r = min(h * 0.42, d * 0.42)
-    roll = moved(
-        turned(lathe([(0.02, -0.05), (r, -0.05), (r, 0.05), (0.02, 0.05), (0.02, -0.05)], 28), np.pi / 2, "y"),
-        0,
-        -d / 2 + r,
-        h - r - 0.012,
-    )
-    loose = box([-0.05, -d / 2, 0], [0.05, -d / 2 + 0.0015, h - r - 0.012])
-    arm = tube(
-        [
-            (w / 2 - 0.008, d / 2, h - r - 0.012),
-            (w / 2 - 0.008, -d / 2 + r, h - r - 0.012),
-            (-w / 2, -d / 2 + r, h - r - 0.012),
-        ],
-        0.006,
-        8,
-    )
+    x, y, z = w / 2 - 0.008, -d / 2 + r, h - r - 0.012
+    roll = lathe([(0.02, -0.05), (r, -0.05), (r, 0.05), (0.02, 0.05), (0.02, -0.05)], 28)
+    roll = moved(turned(roll, np.pi / 2, "y"), 0, y, z)
+    loose = box([-0.05, -d / 2, 0], [0.05, -d / 2 + 0.0015, z])
+    arm = tube([(x, d / 2, z), (x, y, z), (-w / 2, y, z)], 0.006, 8)
     plate = box([w / 2 - 0.03, d / 2 - 0.006, h - r - 0.035], [w / 2, d / 2, h], 0.002)
     return parts_of((plain((0.94, 0.94, 0.93), 0.95, specular=0.05), [roll, loose]), (CHROME, [arm, plate]))
 
@@ -304,32 +260,24 @@ def bin_(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     if look.get("lid"):
         return parts_of(*_pedal_bin(w, d, h, main))
     wall, low = 0.004, 0.82
-    shell = lathe(
-        [(0, 0), (r * low, 0), (r, h - 0.004), (r - wall, h - 0.004), (r * low - wall, 0.006), (0, 0.006)], 32
-    )
+    sheet_steel = [(0, 0), (r * low, 0), (r, h - 0.004), (r - wall, h - 0.004), (r * low - wall, 0.006), (0, 0.006)]
     t = np.linspace(0, 2 * np.pi, 33)[:-1]
-    rim = tube(
-        np.stack([(r - 0.004) * np.cos(t), (r - 0.004) * np.sin(t), 0 * t + h - 0.004], 1), 0.004, 7, closed=True
-    )
+    around = np.stack([(r - 0.004) * np.cos(t), (r - 0.004) * np.sin(t), 0 * t + h - 0.004], 1)
+    shell, edge = lathe(sheet_steel, 32), tube(around, 0.004, 7, closed=True)
     paper = []
     for k in range(5):
         a, q = 2.4 * k + rng.uniform(0, 1), r * low * (0.45 if k else 0.0)
         lump = ball(0.04, 10, 7)
         dents = rng.normal(1.0, 0.13, (len(lump.vertices), 1))
-        paper.append(
-            moved(_faceted(lump.vertices * dents, lump.faces), q * np.cos(a), q * np.sin(a), 0.04 + 0.03 * (k % 3))
-        )
-    return parts_of((main, [scaled(s, 1, d / w, 1) for s in (shell, rim)]), (PAPER, paper))
+        lump = _faceted(lump.vertices * dents, lump.faces)
+        paper.append(moved(lump, q * np.cos(a), q * np.sin(a), 0.04 + 0.03 * (k % 3)))
+    return parts_of((main, [scaled(s, 1, d / w, 1) for s in (shell, edge)]), (PAPER, paper))
 
 
 def _faceted(vertices: np.ndarray, faces: np.ndarray) -> Shape:
     """Triangles with a normal each, as paper has that was crumpled; corners that lie together stay together."""
-    _, first, weld = np.unique(
-        np.round(vertices / np.linalg.norm(vertices, axis=1, keepdims=True), 4),
-        axis=0,
-        return_index=True,
-        return_inverse=True,
-    )
+    ways = np.round(vertices / np.linalg.norm(vertices, axis=1, keepdims=True), 4)
+    _, first, weld = np.unique(ways, axis=0, return_index=True, return_inverse=True)
     corners = vertices[first][weld.reshape(-1)][faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     sound = np.linalg.norm(normals, axis=1) > 1e-12
@@ -367,33 +315,19 @@ def laundry_basket(size: Size, look: Look, finish: FinishOf, *, rng: np.random.G
     body = shapely.box(-w / 2, -d / 2, w / 2, d / 2).buffer(-0.06).buffer(0.06, quad_segs=4)
     ring = np.asarray(shapely.geometry.polygon.orient(body).exterior.coords)[:-1]
     top = h * 0.93
-    lay = []
-    for scale0, scale1, z0, z1, flip in ((0.84, 0.985, 0.0, top, False), (0.80, 0.945, 0.01, top, True)):
-        a = np.column_stack([ring * scale0, np.full(len(ring), z0)])
-        b = np.column_stack([ring * scale1, np.full(len(ring), z1)])
-        corners = np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], 1)
-        run = np.concatenate([[0], np.cumsum(np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1))])
-        uv = np.stack(
-            [
-                np.stack([run[:-1], 0 * run[:-1]], 1),
-                np.stack([run[1:], 0 * run[1:]], 1),
-                np.stack([run[1:], 0 * run[1:] + h], 1),
-                np.stack([run[:-1], 0 * run[:-1] + h], 1),
-            ],
-            1,
-        )
-        lay.append(quads(corners[:, ::-1] if flip else corners, uv[:, ::-1] if flip else uv))
+    at = lambda scale, z: np.column_stack([ring * scale, np.full(len(ring), z)])
+    uv = unrolled_uv(ring, 0.0, h)
+    lay = [between(at(0.84, 0.0), at(0.985, top), uv), between(at(0.945, top), at(0.80, 0.01), uv[:, ::-1])]
     bottom = quads([[(-w * 0.4, -d * 0.4, 0), (-w * 0.4, d * 0.4, 0), (w * 0.4, d * 0.4, 0), (w * 0.4, -d * 0.4, 0)]])
-    rim = tube(np.column_stack([ring * 0.965, np.full(len(ring), top)]), min(0.014, h * 0.03), 8, closed=True)
+    edge = tube(at(0.965, top), min(0.014, h * 0.03), 8, closed=True)
     x, y = np.meshgrid(np.linspace(-1, 1, 13), np.linspace(-1, 1, 13))
     bump = sum(
         rng.normal(0, 0.5) * np.sin(rng.uniform(1.5, 4) * (x * np.cos(a) + y * np.sin(a)) + a)
         for a in rng.uniform(0, 6, 6)
     )
-    edge = np.maximum(np.abs(x), np.abs(y))
-    z = top * 0.9 + (h - top * 0.9) * np.clip(0.55 + 0.25 * bump, 0, 1) * (1 - edge**4)
+    z = top * 0.9 + (h - top * 0.9) * np.clip(0.55 + 0.25 * bump, 0, 1) * (1 - np.maximum(np.abs(x), np.abs(y)) ** 4)
     heap = sheet(np.stack([x * w * 0.43, y * d * 0.43, z], -1))
     return parts_of(
-        (material(look, "skin", finish, "wicker/0"), [*lay, bottom, rim]),
+        (material(look, "skin", finish, "wicker/0"), [*lay, bottom, edge]),
         (material(look, "cloth", finish, "cotton/3"), heap),
     )

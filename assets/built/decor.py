@@ -23,9 +23,31 @@ from assets.built.maker import (
     plain,
     whole_image,
 )
-from assets.built.primitives import Shape, ball, box, cylinder, flat, lathe, moved, quads, scaled, sheet, tube, turned
+from assets.built.primitives import (
+    Shape,
+    ball,
+    between,
+    box,
+    cylinder,
+    flat,
+    frame,
+    lathe,
+    moved,
+    scaled,
+    sheet,
+    tube,
+    turned,
+    upright,
+)
 from assets.records import MeshPart
 
+GLAZES = {
+    "white": plain((0.85, 0.83, 0.78), 0.55),
+    "blue": plain((0.16, 0.26, 0.38), 0.4),
+    "green": plain((0.25, 0.36, 0.30), 0.4),
+    "terracotta": plain((0.66, 0.40, 0.29), 0.4),
+    "black": plain((0.08, 0.08, 0.085), 0.4),
+}
 FRAMES = {"black": BLACK, "white": WHITE, "brass": BRASS}
 
 
@@ -37,44 +59,26 @@ def picture(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     f = float(look.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
     m = float(look.get("mat", 0.0)) * min(w, h)
     y0, y1 = -d / 2, d / 2
-    outer = [(-w / 2, 0), (w / 2, 0), (w / 2, h), (-w / 2, h)]
-    frame = []
+    moulding = []
     lines = [(0.0, y1), (0.0, y0 + 0.004), (0.25 * f, y0), (0.8 * f, y0 + 0.001), (f, y0 + 0.006), (f, y0 + 0.012)]
     for (a, ya), (b, yb) in itertools.pairwise(lines):
-        pa, pb = _inset(outer, a), _inset(outer, b)
-        for k in range(4):
-            n = (k + 1) % 4
-            quad = [(*pa[k], ya), (*pa[n], ya), (*pb[n], yb), (*pb[k], yb)]
-            q = quads([[(x, y, z) for x, z, y in quad]])
-            frame.append(q if k % 2 == 0 else Shape(q.vertices, q.faces, q.normals, q.uv[:, ::-1]))
-    back = quads([[(w / 2, y1, 0), (-w / 2, y1, 0), (-w / 2, y1, h), (w / 2, y1, h)]])
+        strip = between(_inset(w, h, a, ya), _inset(w, h, b, yb))
+        upright_grain = (np.arange(len(strip.uv)) // 4 % 2 == 1)[:, None]
+        uv = np.where(upright_grain, strip.uv[:, ::-1], strip.uv)
+        moulding.append(Shape(strip.vertices, strip.faces, strip.normals, uv))
+    back = upright(w / 2, -w / 2, 0, h, y1)
     art = material(look, "art", finish, "art_hills/0")
     g = f + m
     x0, x1, z0, z1 = -w / 2 + g, w / 2 - g, g, h - g
-    image = quads([[(x0, y0 + 0.0125, z0), (x1, y0 + 0.0125, z0), (x1, y0 + 0.0125, z1), (x0, y0 + 0.0125, z1)]])
-    image = whole_image(image, art, x0, x1, z0, z1)
-    mat = []
-    if m > 0:
-        rim, hole = _inset(outer, f), _inset(outer, g)
-        mat = [
-            quads(
-                [
-                    [
-                        (rim[k][0], y0 + 0.012, rim[k][1]),
-                        (rim[(k + 1) % 4][0], y0 + 0.012, rim[(k + 1) % 4][1]),
-                        (hole[(k + 1) % 4][0], y0 + 0.012, hole[(k + 1) % 4][1]),
-                        (hole[k][0], y0 + 0.012, hole[k][1]),
-                    ]
-                ]
-            )
-            for k in range(4)
-        ]
-    return parts_of((wood, frame), (PAPER, [*mat, back]), (art, image))
+    image = whole_image(upright(x0, x1, z0, z1, y0 + 0.0125), art, x0, x1, z0, z1)
+    mat = [between(_inset(w, h, f, y0 + 0.012), _inset(w, h, g, y0 + 0.012))] if m > 0 else []
+    return parts_of((wood, moulding), (PAPER, [*mat, back]), (art, image))
 
 
-def _inset(corners: list[tuple[float, float]], by: float) -> list[tuple[float, float]]:
-    (x0, z0), _, (x1, z1), _ = corners
-    return [(x0 + by, z0 + by), (x1 - by, z0 + by), (x1 - by, z1 - by), (x0 + by, z1 - by)]
+def _inset(w: float, h: float, by: float, y: float) -> list[tuple[float, float, float]]:
+    """Corners at y of a rectangle w wide and h high, less `by` on all sides."""
+    x0, x1, z0, z1 = -w / 2 + by, w / 2 - by, by, h - by
+    return [(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]
 
 
 def canvas(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -101,43 +105,16 @@ def mirror(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     name = str(look.get("frame", "black"))
     rim = FRAMES[name] if name in FRAMES else finish(name)
     if look.get("round"):
-        ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)][::1], 48)
+        ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)], 48)
         ring = moved(scaled(turned(ring, np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
         disc = lathe([(0.5 - f / w, 0), (0, 0)], 48)
         disc = moved(scaled(turned(disc, np.pi / 2, "x"), w, 1, h), 0, y0 + 0.006, h / 2)
-        disc = Shape(
-            disc.vertices,
-            disc.faces if _faces_front(disc) else disc.faces[:, ::-1],
-            np.tile([0.0, -1.0, 0.0], (len(disc.vertices), 1)),
-            disc.uv,
-        )
+        disc = Shape(disc.vertices, disc.faces, np.tile([0.0, -1.0, 0.0], (len(disc.vertices), 1)), disc.uv)
         back = moved(scaled(turned(cylinder(0.49, 0, 0.004, 0, 32), np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
         return parts_of((rim, ring), (BLACK, back), (MIRROR, disc))
-    boards = [
-        box([-w / 2, y0, 0], [-w / 2 + f, d / 2, h], 0.002),
-        box([w / 2 - f, y0, 0], [w / 2, d / 2, h], 0.002),
-        box([-w / 2 + f, y0, h - f], [w / 2 - f, d / 2, h], 0.002),
-        box([-w / 2 + f, y0, 0], [w / 2 - f, d / 2, f], 0.002),
-    ]
-    glass = quads(
-        [
-            [
-                (-w / 2 + f, y0 + 0.006, f),
-                (w / 2 - f, y0 + 0.006, f),
-                (w / 2 - f, y0 + 0.006, h - f),
-                (-w / 2 + f, y0 + 0.006, h - f),
-            ]
-        ]
-    )
-    back = quads(
-        [[(w / 2 - f, d / 2, f), (-w / 2 + f, d / 2, f), (-w / 2 + f, d / 2, h - f), (w / 2 - f, d / 2, h - f)]]
-    )
+    x, boards = w / 2 - f, frame(-w / 2, w / 2, 0, h, (y0, d / 2), f, 0.002)
+    glass, back = upright(-x, x, f, h - f, y0 + 0.006), upright(x, -x, f, h - f, d / 2)
     return parts_of((rim, boards), (BLACK, back), (MIRROR, glass))
-
-
-def _faces_front(shape: Shape) -> bool:
-    a, b, c = (shape.vertices[shape.faces[0, k]] for k in range(3))
-    return float(np.cross(b - a, c - a)[1]) < 0
 
 
 def wall_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -172,32 +149,14 @@ def vase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         *[(a * w, b * (body - 0.004)) for a, b in zip(inner[:8:-1], t[:8:-1])],
         (0, body * 0.4),
     ]
-    clay = (
-        plain((0.85, 0.83, 0.78), 0.55)
-        if look.get("glaze", "white") == "white"
-        else plain(
-            {
-                "blue": (0.16, 0.26, 0.38),
-                "green": (0.25, 0.36, 0.30),
-                "terracotta": (0.66, 0.40, 0.29),
-                "black": (0.08, 0.08, 0.085),
-            }[str(look["glaze"])],
-            0.4,
-        )
-    )
+    clay = GLAZES[str(look.get("glaze", "white"))]
     twigs, buds = [], []
     if branches:
         for _ in range(7):
             a, lean = rng.uniform(0, 6.28), rng.uniform(0.04, 0.5) * w * 0.9
             s = np.linspace(0, 1, 6)
-            bow = np.stack(
-                [
-                    np.cos(a) * lean * s**1.5,
-                    np.sin(a) * lean * s**1.5,
-                    body * 0.75 + (h - body * 0.75) * s * rng.uniform(0.82, 1.0),
-                ],
-                1,
-            )
+            z = body * 0.75 + (h - body * 0.75) * s * rng.uniform(0.82, 1.0)
+            bow = np.stack([np.cos(a) * lean * s**1.5, np.sin(a) * lean * s**1.5, z], 1)
             bow[1:-1, :2] += rng.normal(0, 0.006, (4, 2))
             twigs.append(tube(bow, np.linspace(0.0028, 0.0012, 6), 5))
             for q in np.linspace(0.45, 1, 6):

@@ -25,39 +25,20 @@ def shoes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     laces: list[Shape] = []
     for side in (-1, 1):
         s, t = np.linspace(0, 1, 22), np.linspace(0, np.pi, 13)
-        outline = (
-            width
-            / 2
-            * (
-                0.62
-                + 0.50 * np.sin(np.pi * np.clip(s, 0, 1) ** 0.75) ** 0.7
-                - 0.22 * np.exp(-(((s - 0.38) / 0.16) ** 2))
-            )
-            * np.clip(np.sin(np.pi * np.clip(s * 0.94 + 0.03, 0, 1)) * 3.2, 0, 1) ** 0.5
-        )
-        height = h * np.interp(
-            s, [0, 0.08, 0.22, 0.42, 0.60, 0.80, 0.94, 1], [0.55, 0.98, 0.92, 0.86, 0.72, 0.50, 0.36, 0.16]
-        )
+        wide = 0.62 + 0.50 * np.sin(np.pi * s**0.75) ** 0.7 - 0.22 * np.exp(-(((s - 0.38) / 0.16) ** 2))
+        outline = width / 2 * wide * np.clip(np.sin(np.pi * (s * 0.94 + 0.03)) * 3.2, 0, 1) ** 0.5
+        places = [0, 0.08, 0.22, 0.42, 0.60, 0.80, 0.94, 1]
+        height = h * np.interp(s, places, [0.55, 0.98, 0.92, 0.86, 0.72, 0.50, 0.36, 0.16])
         y = length * (0.5 - s)
-        x = outline[:, None] * np.cos(t)[None]
-        z = 0.024 + (height[:, None] - 0.024) * np.sin(t)[None] ** 0.55
+        across = outline[:, None] * np.cos(t)[None]
+        up = 0.024 + (height[:, None] - 0.024) * np.sin(t)[None] ** 0.55
         open_ = ((s > 0.08) & (s < 0.40))[:, None] * np.exp(-((np.cos(t)[None] / 0.55) ** 4))
-        dent = z - open_ * h * 0.42
-        upper = sheet(np.stack([-x, y[:, None] + 0 * x, dent], -1)[::-1])
+        upper = sheet(np.stack([-across, y[:, None] + 0 * across, up - open_ * h * 0.42], -1)[::-1])
         lay = [(upper, uppers), (_sole(outline, y), soles)]
         for k, q in enumerate((0.46, 0.53, 0.60)):
             i = int(q * 21)
-            lay.append(
-                (
-                    bar(
-                        [-outline[i] * 0.45, y[i], height[i] * 0.97],
-                        [outline[i] * 0.45, y[i] - 0.004 * k, height[i] * 0.97],
-                        0.007,
-                        0.005,
-                    ),
-                    laces,
-                )
-            )
+            x, z = outline[i] * 0.45, height[i] * 0.97
+            lay.append((bar([-x, y[i], z], [x, y[i] - 0.004 * k, z], 0.007, 0.005), laces))
         turn, at = side * 0.04 + rng.normal(0, 0.05), side * w * 0.25
         for shape, group in lay:
             group.append(moved(turned(scaled(shape, side, 1, 1), turn), at, rng.normal(0, 0.003)))
@@ -87,17 +68,9 @@ def coat_hooks(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
         hooks.append(tube([(x, y, h - 0.065), (x, y - 0.025, h - 0.075), (x, y - 0.035, h - 0.06)], 0.005, 8))
         if k in full:
             drop = (h - 0.04) * (1.0 if k == min(full) else rng.uniform(0.72, 0.98))
-            clothes.append(
-                (
-                    finish(cloths[order[k % len(cloths)]]),
-                    moved(
-                        _coat(min(0.40, w / count * 2.0), d * 0.62, drop, rng=rng),
-                        x,
-                        d / 2 - 0.02 - d * 0.40,
-                        h - 0.035 - drop,
-                    ),
-                )
-            )
+            garment = _coat(min(0.40, w / count * 2.0), d * 0.62, drop, rng=rng)
+            garment = moved(garment, x, d / 2 - 0.02 - d * 0.40, h - 0.035 - drop)
+            clothes.append((finish(cloths[order[k % len(cloths)]]), garment))
     return parts_of((material(look, "wood", finish, "oak/0"), plank), (metal(look, finish, "black"), hooks), *clothes)
 
 
@@ -165,15 +138,11 @@ def umbrella_stand(size: Size, look: Look, finish: FinishOf, *, rng: np.random.G
     shafts, cloths = [], []
     for k, lean in enumerate((0.10, -0.12)):
         t = np.linspace(0, 1, 7)
-        foot, crook = (
-            np.array([-lean * r * 3, 0.02 * k, 0.02]),
-            np.array([lean * r * 5, 0.03 * k, h * (0.90 - 0.05 * k)]),
-        )
-        shafts.append(tube([foot, crook], 0.005, 7))
-        hook = crook + np.stack(
-            [0.032 * (1 - np.cos(np.pi * t)), 0 * t, 0.032 * np.sin(np.pi * t) + 0.01 * (t < 0.1)], 1
-        )
-        shafts.append(tube(hook, 0.008, 8))
+        foot = np.array([-lean * r * 3, 0.02 * k, 0.02])
+        crook = np.array([lean * r * 5, 0.03 * k, h * (0.90 - 0.05 * k)])
+        up = 0.032 * np.sin(np.pi * t) + 0.01 * (t < 0.1)
+        hook = crook + np.stack([0.032 * (1 - np.cos(np.pi * t)), 0 * t, up], 1)
+        shafts += [tube([foot, crook], 0.005, 7), tube(hook, 0.008, 8)]
         along = foot + (crook - foot) * np.array([0.12, 0.3, 0.55, 0.75])[:, None]
         cloths.append(tube(along, [0.008, 0.026, 0.032, 0.012], 10))
     return parts_of(

@@ -8,13 +8,17 @@ from assets.built.maker import BLACK, GLASS, PAPER, STEEL, FinishOf, Look, Size,
 from assets.built.primitives import (
     Shape,
     ball,
+    between,
     box,
     cylinder,
+    frame,
+    hung,
     joined,
     lathe,
     moved,
     quads,
     reversed_shape,
+    rim,
     scaled,
     sheet,
     shifted_uv,
@@ -102,16 +106,12 @@ def note(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         wall, roof, sky = (crayons[k] for k in rng.permutation(5)[:3])
         grass, sun = (0.3, 0.6, 0.25), (0.95, 0.8, 0.2)
         left = float(rng.uniform(0.15, 0.4))
+        steps = ((0.05 * k, 0.04 * k) for k in range(4))
+        tiles = [patch(left - 0.04 + into, left + 0.38 - into, 0.5 + up, 0.55 + up) for into, up in steps]
         marks = [
             (plain(grass, 0.9), [patch(0.06, 0.94, 0.16, 0.24)]),
             (plain(wall, 0.9), [patch(left, left + 0.34, 0.24, 0.5)]),
-            (
-                plain(roof, 0.9),
-                [
-                    patch(left - 0.04 + 0.05 * k, left + 0.38 - 0.05 * k, 0.5 + 0.04 * k, 0.55 + 0.04 * k)
-                    for k in range(4)
-                ],
-            ),
+            (plain(roof, 0.9), tiles),
             (plain(sun, 0.9), [patch(0.74, 0.88, 0.76, 0.88)]),
             (plain(sky, 0.9), [patch(0.06, 0.66, 0.9, 0.94), patch(left + 0.06, left + 0.14, 0.34, 0.44)]),
         ]
@@ -128,12 +128,7 @@ def notice_board(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     """A framed cork board with notes and cards pinned to it."""
     w, d, h = size
     f, y = 0.022, d / 2
-    frame = [
-        box([-w / 2, y - 0.02, 0], [-w / 2 + f, y, h], 0.002),
-        box([w / 2 - f, y - 0.02, 0], [w / 2, y, h], 0.002),
-        box([-w / 2 + f, y - 0.02, 0], [w / 2 - f, y, f], 0.002),
-        box([-w / 2 + f, y - 0.02, h - f], [w / 2 - f, y, h], 0.002),
-    ]
+    left, right, top, bottom = frame(-w / 2, w / 2, 0, h, (y - 0.02, y), f, 0.002)
     cork = box([-w / 2 + f, y - 0.01, f], [w / 2 - f, y, h - f])
     leaves: dict[str, list[Shape]] = {}
     pins: list[Shape] = []
@@ -150,7 +145,7 @@ def notice_board(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
         leaves.setdefault(names[int(rng.integers(len(names)))], []).append(moved(leaf, cx, y - 0.0105, cz))
         pins.append(moved(ball(0.005, 8, 5), cx, y - 0.014, cz + ph * 0.42))
     return parts_of(
-        (material(look, "wood", finish, "oak/0"), frame),
+        (material(look, "wood", finish, "oak/0"), [left, right, bottom, top]),
         (plain((0.62, 0.45, 0.28), 0.95, specular=0.1), cork),
         *((plain(TINTS[n], 0.9), s) for n, s in sorted(leaves.items())),
         (plain((0.66, 0.16, 0.13), 0.35), pins),
@@ -173,7 +168,7 @@ def wall_calendar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Ge
         for x in np.linspace(a + 0.015, b - 0.015, 7)
         for z in np.linspace(h * 0.06, h * 0.42, 5)
     ]
-    nail = moved(turned(cylinder(0.004, 0, 0.012), np.pi / 2, "x"), 0, y, h * 0.99)
+    nail = hung(cylinder(0.004, 0, 0.012), 0, y, h * 0.99)
     return parts_of((PAPER, leaf), (art, picture), (plain((0.3, 0.3, 0.33), 0.8), days), (STEEL, nail))
 
 
@@ -204,9 +199,8 @@ def cable(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     t = np.linspace(0, 1, 40)
     turns = 2 * np.pi * (1.6 + rng.uniform(0, 0.6))
     r = 0.5 - 0.33 * t + 0.04 * np.sin(9 * t + rng.uniform(0, 6))
-    path = np.stack(
-        [w * 0.9 * r * np.cos(turns * t), d * 0.9 * r * np.sin(turns * t), 0.0022 + 0.002 * np.sin(12 * t)], 1
-    )
+    x, y = w * 0.9 * r * np.cos(turns * t), d * 0.9 * r * np.sin(turns * t)
+    path = np.stack([x, y, 0.0022 + 0.002 * np.sin(12 * t)], 1)
     end = path[-1]
     plug = moved(box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004), end[0], end[1])
     tip = moved(box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001), *path[0, :2])
@@ -230,20 +224,12 @@ def _crumpled(size: Size, cells: int, roundness: float, *, rng: np.random.Genera
         wave = np.sin(rate * (x * np.cos(turn) + y * np.sin(turn)) + 0.9 * np.sin(2.5 * y + k) + rng.uniform(0, 6))
         ridges = np.maximum(ridges, rng.uniform(0.5, 1.0) * (1 - np.abs(wave)) ** 1.3)
     rise = height * (0.22 + 0.78 * ridges / ridges.max()) * np.clip(1 - square**6, 0, 1) ** 0.5 + 0.004
-    px, py = (
-        half * reach * ((1 - roundness) * flat + roundness * square * round_)
-        for half, flat, round_ in ((width / 2, x, np.cos(a)), (depth / 2, y, np.sin(a)))
-    )
+    axes = ((width / 2, x, np.cos(a)), (depth / 2, y, np.sin(a)))
+    px, py = (half * reach * ((1 - roundness) * u + roundness * square * v) for half, u, v in axes)
     top = sheet(np.stack([px, py, rise], -1))
     low = sheet(np.stack([px, py, 0 * rise], -1))
-    low = Shape(low.vertices, low.faces[:, ::-1], -low.normals, low.uv)
-    rim = [(0, j) for j in range(cells)] + [(i, cells) for i in range(cells)]
-    rim += [(cells, j) for j in range(cells, 0, -1)] + [(i, 0) for i in range(cells, 0, -1)]
-    i, j = np.array(rim).T
-    up = np.stack([px, py, rise], -1)[i, j]
-    down = up * [1, 1, 0]
-    side = quads(np.stack([down, np.roll(down, -1, 0), np.roll(up, -1, 0), up], 1))
-    return shifted_uv(joined(top, low, side), *rng.random(2))
+    up = rim(np.stack([px, py, rise], -1))
+    return shifted_uv(joined(top, reversed_shape(low), between(up * [1, 1, 0], up)), *rng.random(2))
 
 
 def thrown_clothes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -296,9 +282,8 @@ def dish_rack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Genera
     feet = [moved(foot, x * (w / 2 - 0.02), y * (d / 2 - 0.02)) for x in (-1, 1) for y in (-1, 1)]
     r = min(0.12, d / 2, (h - 0.03) / 2)
     flat = lathe([(0, 0), (r * 0.62, 0.003), (r, 0.016), (r * 0.99, 0.018), (r * 0.6, 0.006), (0, 0.005)], 24, 0.7)
-    stand = [
-        moved(turned(turned(flat, np.pi / 2, "y"), 0.16, "y"), x, 0, r + 0.022) for x in np.linspace(-0.36, 0.05, 4) * w
-    ]
+    lean = turned(turned(flat, np.pi / 2, "y"), 0.16, "y")
+    stand = [moved(lean, x, 0, r + 0.022) for x in np.linspace(-0.36, 0.05, 4) * w]
     cup = lathe([(0.0, 0.08), (0.03, 0.08), (0.038, 0.0), (0.034, 0.0), (0.026, 0.076), (0, 0.076)], 18)
     cups = [moved(cup, 0.32 * w, y, 0.024) for y in (-0.2 * d, 0.2 * d)]
     return parts_of(
@@ -313,20 +298,9 @@ def jar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     """A storage jar with a lid, full to three quarters."""
     w, _, h = size
     r, body = w / 2, h * 0.86
-    shell = lathe(
-        [
-            (0, 0),
-            (r * 0.94, 0),
-            (r, 0.006),
-            (r, body * 0.88),
-            (r * 0.86, body),
-            (r * 0.82, body),
-            (r * 0.96, body * 0.86),
-        ]
-        + [(r * 0.96, 0.008), (0, 0.006)],
-        22,
-        0.7,
-    )
+    outside = [(0, 0), (r * 0.94, 0), (r, 0.006), (r, body * 0.88), (r * 0.86, body)]
+    within = [(r * 0.82, body), (r * 0.96, body * 0.86), (r * 0.96, 0.008), (0, 0.006)]
+    shell = lathe([*outside, *within], 22, 0.7)
     grain = {
         "pasta": (0.85, 0.70, 0.38),
         "beans": (0.45, 0.20, 0.14),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assets.built.maker import BLACK, CHROME, WHITE, FinishOf, Look, Size, material, parts_of, plain
-from assets.built.primitives import Shape, box, cylinder, lathe, moved, quads, tube, turned
+from assets.built.primitives import Shape, box, cylinder, hung, lathe, moved, quads, tube, turned
 from assets.records import MeshPart
 
 
@@ -19,26 +19,19 @@ def switch(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
 def socket(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     plate = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002)
-    ring = moved(
-        turned(lathe([(0.0195, 0), (0.021, 0.0), (0.021, 0.0012), (0.0195, 0.0012), (0.0195, 0)], 24), np.pi / 2, "x"),
-        0,
-        -d / 2,
-        h / 2,
-    )
-    well = moved(
-        turned(lathe([(0, 0), (0.0195, 0), (0.0195, 0.0006), (0, 0.0006)], 24), np.pi / 2, "x"), 0, -d / 2, h / 2
-    )
-    holes = [
-        moved(turned(cylinder(0.0025, 0, 0.001, 0, 10), np.pi / 2, "x"), x, -d / 2 - 0.0003, h / 2)
-        for x in (-0.0095, 0.0095)
-    ]
+    around = [(0.0195, 0), (0.021, 0.0), (0.021, 0.0012), (0.0195, 0.0012), (0.0195, 0)]
+    ring = hung(lathe(around, 24), 0, -d / 2, h / 2)
+    well = hung(lathe([(0, 0), (0.0195, 0), (0.0195, 0.0006), (0, 0.0006)], 24), 0, -d / 2, h / 2)
+    holes = [hung(cylinder(0.0025, 0, 0.001, 0, 10), x, -d / 2 - 0.0003, h / 2) for x in (-0.0095, 0.0095)]
     return parts_of((WHITE, [plate, ring]), (plain((0.78, 0.77, 0.75), 0.5), well), (BLACK, holes))
 
 
 def radiator(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Panel radiator with ribs, grille and valve; or columns where look['kind'] is 'columns'."""
     w, d, h = size
-    made = []
+    made: list[Shape] = []
+    grille: list[Shape] = []
+    pipe: list[Shape] = []
     if look.get("kind") == "columns":
         count = max(4, round(w / 0.055))
         for x in np.linspace(-w / 2 + 0.022, w / 2 - 0.022, count):
@@ -46,6 +39,7 @@ def radiator(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
                 made.append(tube([(x, y, 0.03), (x, y, h - 0.03)], 0.0125, 8, caps=False))
             for z in (0.03, h - 0.03):
                 made.append(box([x - 0.02, -d / 2, z - 0.03], [x + 0.02, d / 2, z + 0.03], 0.010))
+        knob = [moved(turned(cylinder(0.018, 0, 0.06, 0.004, 14), np.pi / 2, "y"), w / 2 - 0.05, -d / 2 + 0.03, 0.05)]
     else:
         right = w / 2 - 0.07  # the valve stands beside the panel
         made.append(box([-w / 2, -d / 2 + 0.016, 0], [right, d / 2 - 0.02, h], 0.006))
@@ -56,26 +50,13 @@ def radiator(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
             for x in (-w / 2 + 0.115, right - 0.115)
             for z in (0.1, h - 0.15)
         ]
-    grille = (
-        []
-        if look.get("kind") == "columns"
-        else [
+        grille = [
             box([x - 0.004, -d / 2 + 0.02, h - 0.001], [x + 0.004, d / 2 - 0.028, h + 0.0015])
             for x in np.linspace(-w / 2 + 0.02, w / 2 - 0.09, max(8, round(w / 0.022)))
         ]
-    )
-    pipe: list[Shape] = []
-    if look.get("kind") == "columns":
-        knob = [moved(turned(cylinder(0.018, 0, 0.06, 0.004, 14), np.pi / 2, "y"), w / 2 - 0.05, -d / 2 + 0.03, 0.05)]
-    else:
-        knob, pipe = _valve(w / 2 - 0.03, w / 2 - 0.07, d, h)
+        knob, pipe = _valve(w / 2 - 0.03, right, d, h)
     return parts_of(
-        (
-            finish("lacquer_white/0")
-            if look.get("skin") is None
-            else material(look, "skin", finish, "lacquer_white/0"),
-            made,
-        ),
+        (material(look, "skin", finish, "lacquer_white/0"), made),
         (CHROME, pipe),
         (plain((0.35, 0.35, 0.35), 0.6), grille),
         (WHITE, knob),
@@ -103,13 +84,8 @@ def _valve(x: float, panel: float, d: float, h: float) -> tuple[list[Shape], lis
     """A thermostat's head above the valve at x beside the panel's edge, and the pipes to panel, wall and vent."""
     y = -d / 2 + 0.035
     head = lathe([(0, 0.075), (0.017, 0.075), (0.021, 0.082), (0.022, 0.135), (0.018, 0.142), (0, 0.142)], 18, 0.9)
-    ribs = [
-        box(
-            [x + 0.0215 * c - 0.002, y + 0.0215 * s - 0.002, 0.088],
-            [x + 0.0215 * c + 0.002, y + 0.0215 * s + 0.002, 0.13],
-        )
-        for c, s in ((np.cos(t), np.sin(t)) for t in np.linspace(0, 2 * np.pi, 9)[:-1])
-    ]
+    around = ((x + 0.0215 * np.cos(t), y + 0.0215 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 9)[:-1])
+    ribs = [box([u - 0.002, v - 0.002, 0.088], [u + 0.002, v + 0.002, 0.13]) for u, v in around]
     pipes = [
         moved(cylinder(0.012, 0.02, 0.078, 0.002, 14), x, y, 0),
         tube([(x, y, 0.045), (panel - 0.01, y, 0.045)], 0.009, 10),

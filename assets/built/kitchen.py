@@ -26,7 +26,20 @@ from assets.built.maker import (
     parts_of,
     plain,
 )
-from assets.built.primitives import Shape, box, cylinder, joined, lathe, moved, quads, tube, turned
+from assets.built.primitives import (
+    Shape,
+    between,
+    box,
+    cylinder,
+    hung,
+    joined,
+    lathe,
+    moved,
+    quads,
+    tube,
+    turned,
+    upright,
+)
 from assets.records import Finish, MeshPart
 
 TOP = 0.038
@@ -118,20 +131,13 @@ def sink(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     top = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
     low = [(f0[0], f0[1]), (f1[0], f0[1]), (f1[0], f1[1]), (f0[0], f1[1])]
     zb = h - deep
-    walls = [[(*top[k], h), (*top[(k + 1) % 4], h), (*low[(k + 1) % 4], zb), (*low[k], zb)] for k in range(4)]
-    basin = quads(np.array([*[q[::-1] for q in walls], [(*p, zb) for p in low]])[:, ::1])
-    basin = _facing_up(basin)
+    ground = [(*p, zb) for p in low]
+    basin = joined(between([(*p, h) for p in top], ground), quads([ground]))
     drain = moved(cylinder(0.035, 0, 0.003, 0.001, 14), 0, by, zb)
     ty = hi[1] + 0.045
     t = np.linspace(0, np.pi, 10)
-    neck = np.concatenate(
-        [
-            [(0, ty, h)],
-            [(0, ty, h + 0.17)],
-            np.stack([0 * t, ty - 0.085 + 0.085 * np.cos(t), h + 0.20 + 0.085 * np.sin(t)], 1),
-            [(0, ty - 0.17, h + 0.15)],
-        ]
-    )
+    bow = np.stack([0 * t, ty - 0.085 + 0.085 * np.cos(t), h + 0.20 + 0.085 * np.sin(t)], 1)
+    neck = np.concatenate([[(0, ty, h), (0, ty, h + 0.17)], bow, [(0, ty - 0.17, h + 0.15)]])
     tap = [
         tube(neck, 0.012, 10),
         moved(cylinder(0.025, 0, 0.02, 0.004, 14), 0, ty, h),
@@ -145,28 +151,14 @@ def sink(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     return _base((w, d, h), look, finish, doors, grips, worktop, ((STEEL, [*rim, basin, drain]), (CHROME, tap)))
 
 
-def _facing_up(shape: Shape) -> Shape:
-    """A basin's inner faces turned towards its open top."""
-    corners = shape.vertices.reshape(-1, 4, 3)
-    middle = corners.reshape(-1, 3).mean(0) + [0, 0, 0.05]
-    done = []
-    for q in corners:
-        n = np.cross(q[2] - q[0], q[3] - q[1])
-        done.append(q if n @ (middle - q.mean(0)) > 0 else q[::-1])
-    return quads(np.array(done))
-
-
 def cooker(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Built-in oven with a glass door under a ceramic hob in the worktop."""
     w, d, h = size
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
     panel, drawer = 0.11, 0.12
     ow = min(w, 0.6)
-    sides = (
-        []
-        if w - ow < 0.01
-        else [box([-w / 2, y, z0], [-ow / 2, y + 0.02, z1], 0.001), box([ow / 2, y, z0], [w / 2, y + 0.02, z1], 0.001)]
-    )
+    edges = ((-w / 2, -ow / 2), (ow / 2, w / 2)) if w - ow >= 0.01 else ()
+    sides = [box([a, y, z0], [b, y + 0.02, z1], 0.001) for a, b in edges]
     kick = front(-ow / 2, ow / 2, z0, z0 + drawer, y, "flat")
     steel = [box([-ow / 2 + 0.002, y, z1 - panel], [ow / 2 - 0.002, y + 0.02, z1], 0.002)]
     glass = [box([-ow / 2 + 0.002, y, z0 + drawer + 0.003], [ow / 2 - 0.002, y + 0.02, z1 - panel - 0.003], 0.003)]
@@ -204,10 +196,8 @@ def cooker(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
 def _level_grip(x: float, z: float, y: float, length: float) -> Shape:
     """The round bar of an oven's door on two feet."""
     bar = tube([(x - length / 2, y - 0.026, z), (x + length / 2, y - 0.026, z)], 0.0075, 10)
-    feet = [
-        tube([(x + s * (length / 2 - 0.03), y, z), (x + s * (length / 2 - 0.03), y - 0.026, z)], 0.006, 8)
-        for s in (-1, 1)
-    ]
+    ends = (x + s * (length / 2 - 0.03) for s in (-1, 1))
+    feet = [tube([(at, y, z), (at, y - 0.026, z)], 0.006, 8) for at in ends]
     return joined(bar, *feet)
 
 
@@ -237,20 +227,14 @@ def wall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
                 box([a + r, y, 0.0015], [b - r, y + 0.02, r], 0.0015),
                 *(box([a + r, y + 0.004, z - 0.007], [b - r, y + 0.016, z + 0.007], 0.002) for z in (h / 3, 2 * h / 3)),
             ]
-            panes.append(
-                quads(
-                    [[(a + r, y + 0.01, r), (b - r, y + 0.01, r), (b - r, y + 0.01, h - r), (a + r, y + 0.01, h - r)]]
-                )
-            )
+            panes.append(upright(a + r, b - r, r, h - r, y + 0.01))
         else:
             doors.append(front(a, b, 0, h, y, style))
         left = columns > 1 and k % 2 == 1
         grips.append(handle(a + 0.035 if left else b - 0.035, 0.12, y, _on_door(grip), True))
     if look.get("glazed"):
-        inside = [
-            box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018])
-            for z in np.linspace(0, h, 4)[1:-1]
-        ]
+        heights = np.linspace(0, h, 4)[1:-1]
+        inside = [box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018]) for z in heights]
         crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=rng)
     return parts_of(
         (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
@@ -271,10 +255,8 @@ def _crockery(
     dish = [(0, 0), (r * 0.35, 0), (r * 0.62, 0.04), (r * 0.7, 0.06), (r * 0.66, 0.06), (r * 0.3, 0.01), (0, 0.01)]
     cup = [(0, 0), (0.026, 0), (0.038, 0.075), (0.035, 0.075), (0.024, 0.008), (0, 0.008)]
     glass = [(0, 0), (0.026, 0), (0.032, 0.11), (0.030, 0.11), (0.024, 0.006), (0, 0.006)]
-    white, colour = (
-        plain((0.91, 0.90, 0.88), 0.15),
-        plain(((0.33, 0.45, 0.53), (0.72, 0.62, 0.48))[int(rng.integers(2))], 0.2),
-    )
+    white = plain((0.91, 0.90, 0.88), 0.15)
+    colour = plain(((0.33, 0.45, 0.53), (0.72, 0.62, 0.48))[int(rng.integers(2))], 0.2)
     light: list[Shape] = []
     tinted: list[Shape] = []
     clear: list[Shape] = []
@@ -297,9 +279,8 @@ def tall_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     cut = PLINTH[0] + 0.72
     columns = max(1, round(w / 0.6))
     edges = np.linspace(-w / 2, w / 2, columns + 1)
-    doors = [
-        front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in ((PLINTH[0], cut), (cut, h))
-    ]
+    rows = ((PLINTH[0], cut), (cut, h))
+    doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in rows]
     grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
     side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
     return parts_of(
@@ -327,10 +308,8 @@ def fridge(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
         box([-w / 2 + 0.05, back_of_doors - 0.014, z], [w / 2 - 0.05, back_of_doors - 0.008, z + 0.006])
         for z in (0.012, 0.024, 0.036)
     ]
-    doors = [
-        box([-w / 2, front_y, z0], [w / 2, back_of_doors, z1], 0.016)
-        for z0, z1 in ((foot - 0.012, split - 0.008), (split + 0.008, h - 0.004))
-    ]
+    rows = ((foot - 0.012, split - 0.008), (split + 0.008, h - 0.004))
+    doors = [box([-w / 2, front_y, z0], [w / 2, back_of_doors, z1], 0.016) for z0, z1 in rows]
     hinges = [box([w / 2 - 0.09, back_of_doors - 0.03, h - 0.006], [w / 2 - 0.01, back_of_doors + 0.05, h], 0.002)]
     x = -w / 2 + 0.055
     grips = [_long_grip(x, front_y, z0, z1) for z0, z1 in ((split - 0.46, split - 0.04), (split + 0.04, split + 0.70))]
@@ -400,7 +379,7 @@ def _notes(
         leaf = turned(box([-pw / 2, -0.0008, -ph], [pw / 2, 0, 0]), rng.normal(0, 0.05), "y")
         tint = ((0.9, 0.885, 0.84), (0.9, 0.8, 0.4), (0.9, 0.885, 0.84), (0.75, 0.83, 0.88), (0.88, 0.62, 0.66))
         papers.append((plain(tint[int(rng.integers(5))], 0.9), moved(leaf, x, y - 0.0004, z)))
-        magnets.append(moved(turned(cylinder(0.012, 0, 0.006, 0.002, 12), np.pi / 2, "x"), x, y, z - 0.015))
+        magnets.append(hung(cylinder(0.012, 0, 0.006, 0.002, 12), x, y, z - 0.015))
     return papers, magnets
 
 
@@ -447,12 +426,9 @@ def hood(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     w, d, h = size
     rim, slope = 0.05, min(0.16, h * 0.3)
     sw, sd = min(0.30, w * 0.5), min(0.26, d * 0.55)
-    low = [(-w / 2, -d / 2), (w / 2, -d / 2), (w / 2, d / 2), (-w / 2, d / 2)]
-    high = [(-sw / 2, d / 2 - sd), (sw / 2, d / 2 - sd), (sw / 2, d / 2), (-sw / 2, d / 2)]
-    sides = [
-        [(*low[k], rim), (*low[(k + 1) % 4], rim), (*high[(k + 1) % 4], rim + slope), (*high[k], rim + slope)]
-        for k in range(4)
-    ]
+    low = [(-w / 2, -d / 2, rim), (w / 2, -d / 2, rim), (w / 2, d / 2, rim), (-w / 2, d / 2, rim)]
+    y, z = d / 2 - sd, rim + slope
+    high = [(-sw / 2, y, z), (sw / 2, y, z), (sw / 2, d / 2, z), (-sw / 2, d / 2, z)]
     shaft = box([-sw / 2, d / 2 - sd, rim + slope], [sw / 2, d / 2, h], 0.002)
     filters = [
         box([-w / 2 + 0.05, -d / 2 + 0.06, -0.001], [-0.01, d / 2 - 0.06, 0.004]),
@@ -460,7 +436,7 @@ def hood(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     ]
     lamps = [moved(cylinder(0.025, -0.002, 0.003, 0.0, 12), x, -d / 2 + 0.035, 0) for x in (-w * 0.25, w * 0.25)]
     return parts_of(
-        (metal(look, finish), [box([-w / 2, -d / 2, 0], [w / 2, d / 2, rim], 0.002), quads(np.array(sides)), shaft]),
+        (metal(look, finish), [box([-w / 2, -d / 2, 0], [w / 2, d / 2, rim], 0.002), between(low, high), shaft]),
         (plain((0.45, 0.45, 0.45), 0.4, 1.0), filters),
         (plain((0.95, 0.93, 0.88), 0.3), lamps),
     )

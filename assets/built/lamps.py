@@ -25,6 +25,7 @@ from assets.built.primitives import (
     ball,
     box,
     cylinder,
+    hung,
     joined,
     lathe,
     moved,
@@ -47,6 +48,11 @@ def _bulb(z: float, r: float = 0.03) -> Shape:
     return moved(scaled(ball(r, 12, 9), 1, 1, 1.15), 0, 0, z)
 
 
+def _canopy(h: float) -> Shape:
+    """What hides the hook in the ceiling, at h."""
+    return lathe([(0, h - 0.03), (0.05, h - 0.03), (0.055, h - 0.02), (0.055, h), (0, h)], 20)
+
+
 def _drum(r0: float, r1: float, z0: float, z1: float, segments: int = 32) -> Shape:
     """A fabric shade, open above and below."""
     return two_sided(lathe([(r0, z0), (r1, z1)], segments))
@@ -61,35 +67,22 @@ def pendant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     w, _, h = size
     r, kind = w / 2, str(look.get("kind", "dome"))
     body = min(h * 0.45, w * {"dome": 0.55, "drum": 0.6, "globe": 1.0, "cone": 0.75}[kind])
-    canopy = [lathe([(0, h - 0.03), (0.05, h - 0.03), (0.055, h - 0.02), (0.055, h), (0, h)], 20)]
     cord = tube([(0, 0, body - 0.01), (0, 0, h - 0.02)], 0.003, 6)
     socket = lathe([(0, body - 0.045), (0.02, body - 0.045), (0.022, body), (0.012, body + 0.03), (0, body + 0.03)], 16)
-    rim = metal(look, finish, "black")
+    rim, mount = metal(look, finish, "black"), [_canopy(h), cord, socket]
     if kind == "globe":
-        return parts_of((rim, [*canopy, cord, socket]), (OPAL, moved(ball(r, 28, 17), 0, 0, r)))
+        return parts_of((rim, mount), (OPAL, moved(ball(r, 28, 17), 0, 0, r)))
     if kind == "drum":
-        ring = tube(
-            [(r * 0.97 * np.cos(t), r * 0.97 * np.sin(t), 0.006) for t in np.linspace(0, 6.283, 33)[:-1]],
-            0.003,
-            5,
-            closed=True,
-        )
-        return parts_of(
-            (rim, [*canopy, cord, socket, ring]),
-            (_cloth(look, finish), _drum(r, r * 0.96, 0, body)),
-            (GLOW, _bulb(body * 0.5)),
-        )
+        around = [(r * 0.97 * np.cos(t), r * 0.97 * np.sin(t), 0.006) for t in np.linspace(0, 6.283, 33)[:-1]]
+        ring, shade = tube(around, 0.003, 5, closed=True), _drum(r, r * 0.96, 0, body)
+        return parts_of((rim, [*mount, ring]), (_cloth(look, finish), shade), (GLOW, _bulb(body * 0.5)))
     t = np.linspace(0, 1, 12)
-    outer = (
-        np.stack([r * np.cos(t * 1.42), body * np.sin(t * np.pi / 2)], 1)
-        if kind == "dome"
-        else np.stack([r * (1 - 0.82 * t), body * t], 1)
-    )
+    outer = np.stack([r * (1 - 0.82 * t), body * t], 1)
+    if kind == "dome":
+        outer = np.stack([r * np.cos(t * 1.42), body * np.sin(t * np.pi / 2)], 1)
     shell = lathe([*outer, (0.0, body)], 32, 0.9)
     inner = lathe([(0.0, body - 0.004), *(outer[::-1] * [0.985, 0.985])], 32, 0.9)
-    return parts_of(
-        (rim, [*canopy, cord, socket, shell]), (plain((0.95, 0.94, 0.90), 0.5), inner), (GLOW, _bulb(body * 0.45))
-    )
+    return parts_of((rim, [*mount, shell]), (plain((0.95, 0.94, 0.90), 0.5), inner), (GLOW, _bulb(body * 0.45)))
 
 
 def flush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -99,10 +92,8 @@ def flush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     base = lathe([(0, h - 0.02), (r * 0.92, h - 0.02), (r * 0.94, h), (0, h)], 32)
     if look.get("kind") == "drum":
         glass = lathe([(0, 0.012), (r * 0.97, 0.012), (r * 0.97, 0.018), (0, 0.018)], 36)
-        hoops = [
-            lathe([(r * 0.985, z), (r, z), (r, z + 0.006), (r * 0.985, z + 0.006), (r * 0.985, z)], 36)
-            for z in (0.0, h - 0.010)
-        ]
+        hoop = lambda z: [(r * 0.985, z), (r, z), (r, z + 0.006), (r * 0.985, z + 0.006), (r * 0.985, z)]
+        hoops = [lathe(hoop(z), 36) for z in (0.0, h - 0.010)]
         nut = lathe([(0, 0.002), (0.010, 0.003), (0.013, 0.008), (0.008, 0.012), (0, 0.012)], 16, 0.9)
         shade = _drum(r * 0.995, r * 0.995, 0.002, h - 0.006, 36)
         return parts_of(
@@ -110,21 +101,11 @@ def flush(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
         )
     t = np.linspace(0, np.pi / 2, 10)
     low = 0.012
-    bowl = lathe(
-        [
-            *np.stack([r * 0.96 * np.sin(t), low + (h - 0.02 - low) * (1 - np.cos(t))], 1),
-            (r * 0.96, h - 0.012),
-            (0, h - 0.012),
-        ],
-        36,
-        0.6,
-    )
-    rim = lathe(
-        [(r * 0.93, h - 0.03), (r * 0.985, h - 0.03), (r, h - 0.022), (r, h - 0.004), (r * 0.93, h - 0.002)], 36
-    )
-    nut = lathe(
-        [(0, 0), (0.006, 0.001), (0.009, 0.006), (0.007, 0.011), (0.016, 0.014), (0.016, 0.017), (0, 0.017)], 16, 0.9
-    )
+    curve = np.stack([r * 0.96 * np.sin(t), low + (h - 0.02 - low) * (1 - np.cos(t))], 1)
+    bowl = lathe([*curve, (r * 0.96, h - 0.012), (0, h - 0.012)], 36, 0.6)
+    lip = [(r * 0.93, h - 0.03), (r * 0.985, h - 0.03), (r, h - 0.022), (r, h - 0.004), (r * 0.93, h - 0.002)]
+    turn = [(0, 0), (0.006, 0.001), (0.009, 0.006), (0.007, 0.011), (0.016, 0.014), (0.016, 0.017), (0, 0.017)]
+    rim, nut = lathe(lip, 36), lathe(turn, 16, 0.9)
     return parts_of((metal(look, finish, "steel"), [base, rim, nut]), (OPAL, bowl))
 
 
@@ -160,18 +141,16 @@ def bar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     rim = metal(look, finish, "black")
     wood = box([-w / 2 + r * 0.5, -0.014, beam], [w / 2 - r * 0.5, 0.014, beam + 0.03], 0.003)
     rod = tube([(0, 0, beam + 0.02), (0, 0, h - 0.02)], 0.006, 8)
-    canopy = lathe([(0, h - 0.03), (0.05, h - 0.03), (0.055, h - 0.02), (0.055, h), (0, h)], 20)
     t = np.linspace(0, 1, 9)
     bell = np.stack([r * (1 - 0.72 * t**1.6), high * t], 1)
     shade = two_sided(lathe([*bell, (0.02, high + 0.004)], 24, 0.9))
     lip = lathe([(r * 0.97, 0), (r, 0), (r, 0.004), (r * 0.97, 0.004), (r * 0.97, 0)], 24)
-    cap = lathe(
-        [(0, high - 0.01), (r * 0.34, high - 0.01), (r * 0.34, high + 0.02), (0.012, high + 0.04), (0, beam)], 16
-    )
+    crown = [(0, high - 0.01), (r * 0.34, high - 0.01), (r * 0.34, high + 0.02), (0.012, high + 0.04), (0, beam)]
+    cap = lathe(crown, 16)
     places = (-w / 2 + r, 0.0, w / 2 - r)
     return parts_of(
         (material(look, "wood", finish, "walnut/0"), wood),
-        (rim, [rod, canopy, *(moved(s, x) for x in places for s in (cap, lip))]),
+        (rim, [rod, _canopy(h), *(moved(s, x) for x in places for s in (cap, lip))]),
         (OPAL, [moved(shade, x) for x in places]),
         (GLOW, [moved(_bulb(high * 0.45, r * 0.34), x) for x in places]),
     )
@@ -193,7 +172,7 @@ def sconce(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     w, d, h = size
     r = min(w / 2, d * 0.4)
     back, y = d / 2, -d / 2 + r
-    plate = moved(turned(cylinder(0.05, 0, 0.015, 0.004, 20), np.pi / 2, "x"), 0, back, h * 0.35)
+    plate = hung(cylinder(0.05, 0, 0.015, 0.004, 20), 0, back, h * 0.35)
     s = np.linspace(0, 1, 8)
     arm = tube(np.stack([0 * s, back - (back - y) * s, h * 0.35 - 0.25 * h * np.sin(np.pi * s) * 0.5], 1), 0.007, 8)
     rim = metal(look, finish, "brass")
@@ -232,31 +211,17 @@ def standing(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
 def _stem(kind: str, r: float, top: float, tall: bool) -> Shape:
     """What carries a shade of radius `r` that begins at the height `top`: 'tripod', 'ceramic' or 'stem' on a foot."""
     if kind == "tripod":
-        angles = [2 * np.pi * k / 3 + 0.5 for k in range(3)]
-        legs = [
-            tube(
-                [(0.02 * np.cos(a), 0.02 * np.sin(a), top + 0.02), (r * 0.92 * np.cos(a), r * 0.92 * np.sin(a), 0.0)],
-                [0.010, 0.014],
-                8,
-            )
-            for a in angles
-        ]
+        ways = [(np.cos(a), np.sin(a)) for a in (2 * np.pi * k / 3 + 0.5 for k in range(3))]
+        feet = [[(0.02 * c, 0.02 * s, top + 0.02), (r * 0.92 * c, r * 0.92 * s, 0.0)] for c, s in ways]
+        legs = [tube(leg, [0.010, 0.014], 8) for leg in feet]
         return joined(*legs, moved(cylinder(0.035, 0, 0.03, 0.006, 16), 0, 0, top - 0.005))
     if kind == "ceramic":
         t = np.linspace(0, 1, 12)
         belly = np.stack([r * (0.28 + 0.30 * np.sin(np.pi * t**0.8)), t * (top - 0.03)], 1)
-        return joined(lathe([(0, 0), *belly, (0.012, top - 0.01), (0.012, top + 0.03), (0, top + 0.03)], 28, 0.9))
+        return lathe([(0, 0), *belly, (0.012, top - 0.01), (0.012, top + 0.03), (0, top + 0.03)], 28, 0.9)
     foot = min(0.15 if tall else 0.075, r * 0.75)
-    profile = [
-        (0, 0),
-        (foot, 0),
-        (foot, 0.012),
-        (foot * 0.9, 0.02),
-        (0.012, 0.03),
-        (0.011, top + 0.05),
-        (0, top + 0.05),
-    ]
-    return joined(lathe(profile, 28, 0.8))
+    stem = [(0.012, 0.03), (0.011, top + 0.05), (0, top + 0.05)]
+    return lathe([(0, 0), (foot, 0), (foot, 0.012), (foot * 0.9, 0.02), *stem], 28, 0.8)
 
 
 def desk_lamp(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -264,12 +229,8 @@ def desk_lamp(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Genera
     w, d, h = size
     foot = moved(cylinder(min(0.09, d * 0.45), 0, 0.022, 0.006, 24), -w * 0.22, 0, 0)
     a, b, c = np.array([-w * 0.22, 0, 0.02]), np.array([-w * 0.38, 0, h * 0.55]), np.array([w * 0.12, 0, h * 0.97])
-    arms = [
-        tube([a, b], 0.006, 8),
-        tube([b, c], 0.006, 8),
-        moved(ball(0.012, 10, 7), *b),
-        moved(ball(0.012, 10, 7), *c),
-    ]
+    hinge = ball(0.012, 10, 7)
+    arms = [tube([a, b], 0.006, 8), tube([b, c], 0.006, 8), moved(hinge, *b), moved(hinge, *c)]
     head = lathe([(0.075, -0.085), (0.055, -0.03), (0.028, 0.0), (0.022, 0.03), (0, 0.03)], 24, 0.9)
     inner = lathe([(0, -0.002), (0.026, -0.004), (0.053, -0.033), (0.073, -0.085)], 24, 0.9)
     tilt = 0.35

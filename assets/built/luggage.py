@@ -20,9 +20,8 @@ def rucksack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     body = moved(_stuffed(bw, bd, 0.94 * h, 0.24 * h), 0, y)
     front_y = y - bd / 2
     pocket = moved(_stuffed(0.66 * w, 0.26 * d, 0.44 * h, 0.09 * h), 0, front_y - 0.045 * d, 0.03 * h)
-    sides = [
-        moved(_stuffed(0.20 * w, 0.34 * d, 0.36 * h, 0.05 * h), s * (bw / 2 + 0.01 * w), y, 0.02 * h) for s in (-1, 1)
-    ]
+    bag = _stuffed(0.20 * w, 0.34 * d, 0.36 * h, 0.05 * h)
+    sides = [moved(bag, s * (bw / 2 + 0.01 * w), y, 0.02 * h) for s in (-1, 1)]
     foot = moved(_stuffed(bw * 1.02, bd * 1.02, 0.14 * h, 0.01 * h), 0, y)
     a = np.linspace(0.04, 0.96, 17) * np.pi
     ridge = np.stack([0.93 * bw / 2 * np.cos(a), np.full(17, y - 0.30 * bd), 0.60 * h + 0.285 * h * np.sin(a)], 1)
@@ -33,9 +32,8 @@ def rucksack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
         for p in (ridge[4], mouth[12])
     ]
     t = np.linspace(0, np.pi, 11)
-    loop = tube(
-        np.stack([0.11 * w * np.cos(t), np.full(11, y + 0.12 * d), 0.915 * h + 0.085 * h * np.sin(t)], 1), 0.008, 7
-    )
+    arch = np.stack([0.11 * w * np.cos(t), np.full(11, y + 0.12 * d), 0.915 * h + 0.085 * h * np.sin(t)], 1)
+    loop = tube(arch, 0.008, 7)
     straps = [_strap(s * 0.19 * w, y + bd / 2, d / 2, h) for s in (-1, 1)]
     label = box([-0.05 * w, front_y - 0.178 * d, 0.17 * h], [0.05 * w, front_y - 0.160 * d, 0.25 * h], 0.003)
     cloth = material(look, "cloth", finish, "denim/0")
@@ -51,12 +49,9 @@ def rucksack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
 def _stuffed(w: float, d: float, h: float, shoulder: float) -> Shape:
     """A stuffed bag on the floor, round-cornered from above, its top domed from `shoulder` below it."""
     cols, t = 28, np.linspace(0, 1, 6)
-    up = np.concatenate(
-        [[0.0, 0.02], np.linspace(0.12, 1, 5) * (h - shoulder) / h, 1 - shoulder / h * (1 - np.sin(t[1:] * np.pi / 2))]
-    )
-    wide = np.concatenate(
-        [[0.86, 0.95], 1 - 0.05 * np.linspace(0.12, 1, 5), 0.95 * np.cos(t[1:-1] * np.pi / 2) ** 0.55, [0.0]]
-    )
+    side, dome = np.linspace(0.12, 1, 5), t[1:] * np.pi / 2
+    up = np.concatenate([[0.0, 0.02], side * (h - shoulder) / h, 1 - shoulder / h * (1 - np.sin(dome))])
+    wide = np.concatenate([[0.86, 0.95], 1 - 0.05 * side, 0.95 * np.cos(dome[:-1]) ** 0.55, [0.0]])
     angle = np.linspace(0, 2 * np.pi, cols + 1)
     c, s = np.cos(angle), np.sin(angle)
     x, y = np.sign(c) * np.abs(c) ** 0.55 * w / 2, np.sign(s) * np.abs(s) ** 0.55 * d / 2

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.built.primitives import Shape, box, fitted, joined, lathe, moved, part, quads, tube, turned
+from assets.built.primitives import Shape, between, box, fitted, frame, hung, joined, lathe, moved, part, tube
 from assets.records import Asset, Color, Finish, MeshPart, SupportSurface
 
 Size = tuple[float, float, float]
@@ -131,13 +131,8 @@ def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "fl
     rail = min(0.06, (x1 - x0) * 0.28, (z1 - z0) * 0.3)
     if style != "shaker" or z1 - z0 < 0.13:
         return box([x0, y, z0], [x1, y + thick, z1], 0.0018)
-    return joined(
-        box([x0, y, z0], [x0 + rail, y + thick, z1], 0.0015),
-        box([x1 - rail, y, z0], [x1, y + thick, z1], 0.0015),
-        box([x0 + rail, y, z1 - rail], [x1 - rail, y + thick, z1], 0.0015),
-        box([x0 + rail, y, z0], [x1 - rail, y + thick, z0 + rail], 0.0015),
-        box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + thick, z1 - rail + 0.002]),
-    )
+    panel = box([x0 + rail - 0.002, y + 0.009, z0 + rail - 0.002], [x1 - rail + 0.002, y + thick, z1 - rail + 0.002])
+    return joined(*frame(x0, x1, z0, z1, (y, y + thick), rail, 0.0015), panel)
 
 
 def joints(fronts: Sequence[Shape]) -> list[Shape]:
@@ -146,33 +141,31 @@ def joints(fronts: Sequence[Shape]) -> list[Shape]:
     for shape in fronts:
         (x0, y, z0), (x1, _, z1) = shape.vertices.min(0), shape.vertices.max(0)
         y, out, into = y + 0.003, 0.003, 0.006
-        outer = [(x0 - out, z0 - out), (x1 + out, z0 - out), (x1 + out, z1 + out), (x0 - out, z1 + out)]
-        inner = [(x0 + into, z0 + into), (x1 - into, z0 + into), (x1 - into, z1 - into), (x0 + into, z1 - into)]
-        sides = [(outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]) for k in range(4)]
-        frames.append(quads([[(x, y, z) for x, z in side] for side in sides]))
+        outer = [(x0 - out, y, z0 - out), (x1 + out, y, z0 - out), (x1 + out, y, z1 + out), (x0 - out, y, z1 + out)]
+        inner = [
+            (x0 + into, y, z0 + into),
+            (x1 - into, y, z0 + into),
+            (x1 - into, y, z1 - into),
+            (x0 + into, y, z1 - into),
+        ]
+        frames.append(between(outer, inner))
     return frames
 
 
 def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = False, length: float = 0.14) -> Shape:
     """A handle on a front at y: 'bar', 'knob' or 'cup'."""
     if style == "knob":
-        knob = lathe(
-            [(0, 0), (0.006, 0), (0.0055, 0.012), (0.014, 0.018), (0.015, 0.024), (0.011, 0.029), (0, 0.03)], 12
-        )
-        return moved(turned(knob, np.pi / 2, "x"), x, y, z)
+        knob = [(0, 0), (0.006, 0), (0.0055, 0.012), (0.014, 0.018), (0.015, 0.024), (0.011, 0.029), (0, 0.03)]
+        return hung(lathe(knob, 12), x, y, z)
     if style == "cup":
         t = np.linspace(0, np.pi, 9)
         half = np.stack([np.cos(t) * 0.045, 0 * t, np.sin(t) * 0.02], 1)
         return moved(tube(half + [0, -0.012, -0.008], 0.007, 6), x, y, z)
     h = length / 2
-    a = (
-        [(0, 0, -h), (0, -0.028, -h), (0, -0.028, h), (0, 0, h)]
-        if upright
-        else [(-h, 0, 0), (-h, -0.028, 0), (h, -0.028, 0), (h, 0, 0)]
-    )
-    ends = [tube(np.array(p) + [x, y, z], 0.0042, 6) for p in (a[:2], a[2:])]
-    lift = np.array([0, 0, 0.014]) if upright else np.array([0.014, 0, 0])
-    grip = tube(np.array([np.array(a[1]) - lift, np.array(a[2]) + lift]) + [x, y, z], 0.0055, 8)
+    along, out = np.array([0, 0, 1.0] if upright else [1.0, 0, 0]), np.array([0, -0.028, 0])
+    low, high = -h * along, h * along
+    ends = [tube(np.array(p) + [x, y, z], 0.0042, 6) for p in ([low, low + out], [high + out, high])]
+    grip = tube(np.array([low + out - 0.014 * along, high + out + 0.014 * along]) + [x, y, z], 0.0055, 8)
     return joined(*ends, grip)
 
 

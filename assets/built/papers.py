@@ -23,17 +23,22 @@ from assets.built.primitives import (
     Shape,
     ball,
     bar,
+    between,
     box,
     cylinder,
+    frame,
+    hung,
     joined,
     lathe,
     moved,
     quads,
+    rim,
     scaled,
     sheet,
     tube,
     turned,
     two_sided,
+    upright,
 )
 from assets.records import Finish, MeshPart
 
@@ -183,19 +188,10 @@ def magazine(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     """A magazine lying flat, its leaves rising a little at the open side."""
     w, d, h = size
     x, y = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(-d / 2, d / 2, 5))
-    z = h * (0.55 + 0.45 * ((x + w / 2) / w) ** 2)
+    grid = np.stack([x, y, h * (0.55 + 0.45 * ((x + w / 2) / w) ** 2)], -1)
     cover = material(look, "cover", finish, "magazine_cover/0")
-    top = whole_image(sheet(np.stack([x, y, z], -1)), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
-    rim = np.concatenate(
-        [
-            np.stack([x[0], y[0], z[0]], 1),
-            np.stack([x[:, -1], y[:, -1], z[:, -1]], 1)[1:],
-            np.stack([x[-1], y[-1], z[-1]], 1)[::-1][1:],
-            np.stack([x[:, 0], y[:, 0], z[:, 0]], 1)[::-1][1:-1],
-        ]
-    )
-    low = rim * [1, 1, 0]
-    edge = quads(np.stack([low, np.roll(low, -1, 0), np.roll(rim, -1, 0), rim], 1))
+    top = whole_image(sheet(grid), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
+    edge = between(rim(grid) * [1, 1, 0], rim(grid))
     base = quads([[(-w / 2, d / 2, 0), (w / 2, d / 2, 0), (w / 2, -d / 2, 0), (-w / 2, -d / 2, 0)]])
     return parts_of((cover, top), (PAPER, [edge, base]))
 
@@ -205,16 +201,9 @@ def papers(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     w, d, h = size
     leaves = []
     for k, z in enumerate(np.linspace(0, h * 0.92, 6)):
-        leaves.append(
-            moved(
-                turned(
-                    box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16]), rng.normal(0, 0.05) if k else 0.0
-                ),
-                rng.normal(0, 0.004),
-                rng.normal(0, 0.004),
-                z,
-            )
-        )
+        leaf = box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16])
+        leaf = turned(leaf, rng.normal(0, 0.05) if k else 0.0)
+        leaves.append(moved(leaf, rng.normal(0, 0.004), rng.normal(0, 0.004), z))
     return parts_of((PAPER, leaves))
 
 
@@ -222,26 +211,15 @@ def photo_frame(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
     """A small standing frame with a photograph."""
     w, _, h = size
     f, tilt = 0.016, 0.22
-    boards = [
-        box([-w / 2, 0, 0], [-w / 2 + f, 0.012, h], 0.002),
-        box([w / 2 - f, 0, 0], [w / 2, 0.012, h], 0.002),
-        box([-w / 2 + f, 0, h - f], [w / 2 - f, 0.012, h], 0.002),
-        box([-w / 2 + f, 0, 0], [w / 2 - f, 0.012, f], 0.002),
-    ]
+    boards = frame(-w / 2, w / 2, 0, h, (0, 0.012), f, 0.002)
     art = material(look, "art", finish, "art_sea/0")
-    image = whole_image(
-        quads([[(-w / 2 + f, 0.004, f), (w / 2 - f, 0.004, f), (w / 2 - f, 0.004, h - f), (-w / 2 + f, 0.004, h - f)]]),
-        art,
-        -w / 2 + f,
-        w / 2 - f,
-        f,
-        h - f,
-    )
+    inside = -w / 2 + f, w / 2 - f, f, h - f
+    image = whole_image(upright(*inside, 0.004), art, *inside)
     back = box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
     leg = bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
-    frame = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(str(look.get("frame", "oak"))) or finish("oak/0")
+    wood = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(str(look.get("frame", "oak"))) or finish("oak/0")
     lean = [turned(s, -tilt, "x") for s in (joined(*boards), image, back)]
-    return parts_of((frame, lean[0]), (art, lean[1]), (BLACK, [lean[2], leg]))
+    return parts_of((wood, lean[0]), (art, lean[1]), (BLACK, [lean[2], leg]))
 
 
 def alarm_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -249,27 +227,17 @@ def alarm_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
     w, d, h = size
     r = w * 0.46
     zc = h * 0.43
-    case = [
-        (0, 0),
-        (r * 0.86, 0),
-        (r * 0.97, d * 0.12),
-        (r, d * 0.3),
-        (r, d * 0.62),
-        (r * 0.94, d * 0.7),
-        (r * 0.9, d * 0.62),
-    ]
-    rim = [(r * 0.90, d * 0.62), (r * 0.90, d * 0.73), (r * 0.96, d * 0.75), (r * 1.0, d * 0.7), (r * 1.0, d * 0.62)]
-    shell, ring = (
-        moved(turned(lathe(profile, 36, 0.9), np.pi / 2, "x"), 0, d * 0.4, zc) for profile in (case, rim[::-1])
-    )
+    back = [(0, 0), (r * 0.86, 0), (r * 0.97, d * 0.12), (r, d * 0.3)]
+    case = [*back, (r, d * 0.62), (r * 0.94, d * 0.7), (r * 0.9, d * 0.62)]
+    around = [(r * 0.90, d * 0.62), (r * 0.90, d * 0.73), (r * 0.96, d * 0.75), (r * 1.0, d * 0.7), (r * 1.0, d * 0.62)]
+    shell, ring = (hung(lathe(profile, 36, 0.9), 0, d * 0.4, zc) for profile in (case, around[::-1]))
     face = finish("clock_face/0")
-    disc = moved(turned(cylinder(r * 0.9, 0, 0.001, 0, 36), np.pi / 2, "x"), 0, d * 0.4 - d * 0.66, zc)
+    disc = hung(cylinder(r * 0.9, 0, 0.001, 0, 36), 0, d * 0.4 - d * 0.66, zc)
     disc = whole_image(disc, face, -r * 0.9, r * 0.9, zc - r * 0.9, zc + r * 0.9)
     t = np.linspace(0, np.pi / 2, 6)
     cap = lathe([(0, -0.002), (r * 0.36, -0.002), *np.stack([r * 0.38 * np.cos(t), r * 0.30 * np.sin(t)], 1)], 20, 0.9)
-    pin = lathe(
-        [(0, -r * 0.3), (r * 0.05, -r * 0.3), (r * 0.05, r * 0.36), (r * 0.09, r * 0.38), (0, r * 0.42)], 8, 0.9
-    )
+    nail = [(0, -r * 0.3), (r * 0.05, -r * 0.3), (r * 0.05, r * 0.36), (r * 0.09, r * 0.38), (0, r * 0.42)]
+    pin = lathe(nail, 8, 0.9)
     bells = [
         moved(turned(s, side * 0.55, "y"), side * r * 0.56, 0, zc + r * 0.98) for side in (-1, 1) for s in (cap, pin)
     ]
@@ -310,14 +278,8 @@ def remote(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
 def keys(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A ring with three keys fanned out and a leather tag."""
     _, d, h = size
-    ring = moved(
-        tube(
-            [(0.016 * np.cos(t), 0.016 * np.sin(t), 0) for t in np.linspace(0, 6.283, 19)[:-1]], 0.0011, 6, closed=True
-        ),
-        0,
-        d * 0.3,
-        h * 0.5,
-    )
+    around = [(0.016 * np.cos(t), 0.016 * np.sin(t), 0) for t in np.linspace(0, 6.283, 19)[:-1]]
+    ring = moved(tube(around, 0.0011, 6, closed=True), 0, d * 0.3, h * 0.5)
     made = []
     for k, a in enumerate((-2.1, -1.5, -1.0)):
         bow = moved(lathe([(0.004, 0), (0.011, 0), (0.011, 0.002), (0.004, 0.002), (0.004, 0)], 16), 0.013)
@@ -355,10 +317,6 @@ def pencil_cup(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
         foot = np.array([-0.5 * r * np.cos(a), -0.5 * r * np.sin(a), 0.006])
         pens.append((plain(tints[k % 5], 0.4), tube([foot, tip], 0.0037, 6)))
         pens.append((plain((0.82, 0.68, 0.48), 0.7), tube([tip, tip + (tip - foot) * 0.07], [0.0037, 0.0006], 6)))
-    return parts_of(
-        (
-            material(look, "skin", finish, "leather/2") if "skin" in look else plain((0.10, 0.10, 0.105), 0.5),
-            lathe([(0, 0), (r * 0.98, 0), (r, high), (r - 0.003, high), (r * 0.98 - 0.003, 0.004), (0, 0.004)], 24),
-        ),
-        *pens,
-    )
+    skin = material(look, "skin", finish, "leather/2") if "skin" in look else plain((0.10, 0.10, 0.105), 0.5)
+    wall = [(0, 0), (r * 0.98, 0), (r, high), (r - 0.003, high), (r * 0.98 - 0.003, 0.004), (0, 0.004)]
+    return parts_of((skin, lathe(wall, 24)), *pens)

@@ -29,11 +29,8 @@ def plant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     kind = str(look.get("kind", "broad"))
     pr, ph = (0.26 * w, 0.30 * h) if kind != "rubber" else (0.24 * w, 0.22 * h)
     pot = lathe([(0, 0), (pr * 0.78, 0), (pr, ph), (pr * 0.92, ph), (pr * 0.9, ph * 0.86), (0, ph * 0.86)], 28, 0.6)
-    soil = lathe([(0, ph * 0.87), (pr * 0.9, ph * 0.87)][::-1], 20)
+    soil = lathe([(pr * 0.9, ph * 0.87), (0, ph * 0.87)], 20)
     soil = Shape(soil.vertices, soil.faces, np.tile([0.0, 0, 1.0], (len(soil.vertices), 1)), soil.uv)
-    f = soil.vertices[soil.faces[0]]
-    if np.cross(f[1] - f[0], f[2] - f[0])[2] < 0:
-        soil = Shape(soil.vertices, soil.faces[:, ::-1], soil.normals, soil.uv)
     leaves, stems = _leaves(kind, size, ph, rng=rng)
     dark, light = GREENS[kind]
     return parts_of(
@@ -54,27 +51,11 @@ def _leaves(kind: str, size: Size, ph: float, *, rng: np.random.Generator) -> tu
         a = k * 2.39996 + rng.normal(0, 0.25)
         q = (k + 0.5) / count
         if kind == "grass":
-            leaves.append(
-                _blade(
-                    a,
-                    rng.uniform(0.2, 0.48) * w,
-                    ph,
-                    ph + (h - ph) * rng.uniform(0.6, 1.0),
-                    0.012 * w / 0.3,
-                    rng.uniform(0.1, 0.5),
-                )
-            )
+            reach, z = rng.uniform(0.2, 0.48) * w, ph + (h - ph) * rng.uniform(0.6, 1.0)
+            leaves.append(_blade(a, reach, ph, z, 0.012 * w / 0.3, rng.uniform(0.1, 0.5)))
         elif kind == "trailing":
-            leaves.append(
-                _leaf(
-                    a,
-                    0.15 * w + 0.33 * w * q,
-                    ph + (h - ph) * (1 - q * 0.9) * rng.uniform(0.8, 1.0),
-                    0.20 * w,
-                    0.10 * w,
-                    -0.4 - 0.8 * q,
-                )
-            )
+            reach, z = 0.15 * w + 0.33 * w * q, ph + (h - ph) * (1 - q * 0.9) * rng.uniform(0.8, 1.0)
+            leaves.append(_leaf(a, reach, z, 0.20 * w, 0.10 * w, -0.4 - 0.8 * q))
         elif kind == "rubber":
             z = ph + (h - ph) * (0.22 + 0.70 * q)
             leaves.append(_leaf(a, 0.07 * w, z, 0.40 * w * (1.05 - 0.5 * q), 0.16 * w, 0.55 - 0.2 * q))

@@ -68,6 +68,11 @@ def turned(shape: Shape, angle: float, axis: str = "z") -> Shape:
     return Shape(shape.vertices @ m.T, shape.faces, shape.normals @ m.T, shape.uv)
 
 
+def hung(shape: Shape, x: float, y: float, z: float) -> Shape:
+    """What stands on the floor, standing on a front at y instead: what was up looks along -y."""
+    return moved(turned(shape, np.pi / 2, "x"), x, y, z)
+
+
 def scaled(shape: Shape, x: float, y: float, z: float) -> Shape:
     """Scaled along the axes; a negative factor mirrors and keeps faces outward."""
     factors = np.array([x, y, z])
@@ -121,6 +126,18 @@ def quads(corners: ArrayLike, uv: np.ndarray | None = None) -> Shape:
     return Shape(vertices, faces, normals, uv)
 
 
+def upright(x0: float, x1: float, z0: float, z1: float, y: float) -> Shape:
+    """A flat upright rectangle at y that looks along -y, or along +y where x1 is less than x0."""
+    return quads([[(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]])
+
+
+def between(low: ArrayLike, high: ArrayLike, uv: np.ndarray | None = None) -> Shape:
+    """Faces between two closed lines of as many points (k, 3), seen from outside where they run counter-clockwise;
+    uv (k, 4, 2) as for `quads`."""
+    a, b = np.asarray(low, float), np.asarray(high, float)
+    return quads(np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], axis=1), uv)
+
+
 def projected_uv(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """uv (n, 2) in metres by projection along the axis each normal is closest to, z upward as v."""
     axis = np.abs(normals).argmax(axis=1)
@@ -160,13 +177,17 @@ def extruded(polygon: shapely.Polygon, z0: float, z1: float) -> Shape:
 
 def wall_band(ring: np.ndarray, z0: float, z1: float) -> Shape:
     """Vertical band under a closed ring (k, 2), facing outward for a counter-clockwise ring."""
-    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1))])
     a, b = (np.column_stack([ring, np.full(len(ring), z)]) for z in (z0, z1))
-    corners = np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], axis=1)
+    return between(a, b, unrolled_uv(ring, z0, z1))
+
+
+def unrolled_uv(ring: np.ndarray, v0: float, v1: float) -> np.ndarray:
+    """uv (k, 4, 2) of the faces over a closed ring (k, 2): u is metres along it, v runs from v0 to v1."""
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.roll(ring, -1, 0) - ring, axis=1))])
     uv = np.empty((len(ring), 4, 2))
     uv[:, [0, 3], 0], uv[:, [1, 2], 0] = along[:-1, None], along[1:, None]
-    uv[:, :2, 1], uv[:, 2:, 1] = z0, z1
-    return quads(corners, uv)
+    uv[:, :2, 1], uv[:, 2:, 1] = v0, v1
+    return uv
 
 
 # ------------------------------------------------------------------ boxes
@@ -250,6 +271,28 @@ def bar(a: ArrayLike, b: ArrayLike, width: float, height: float, bevel: float = 
     m = np.stack([x, side, np.cross(x, side)], axis=1)
     s = box([0, -width / 2, -height / 2], [length, width / 2, height / 2], bevel)
     return Shape(s.vertices @ m.T + start, s.faces, s.normals @ m.T, s.uv)
+
+
+def frame(
+    x0: float,
+    x1: float,
+    z0: float,
+    z1: float,
+    depth: tuple[float, float],
+    width: float,
+    bevel: float = 0.0,
+    foot: float | None = None,
+) -> list[Shape]:
+    """Four boards `width` wide inside an upright rectangle, left, right, top and bottom, from depth[0] to depth[1];
+    `foot` is the height of the bottom one."""
+    y0, y1 = depth
+    foot = width if foot is None else foot
+    return [
+        box([x0, y0, z0], [x0 + width, y1, z1], bevel),
+        box([x1 - width, y0, z0], [x1, y1, z1], bevel),
+        box([x0 + width, y0, z1 - width], [x1 - width, y1, z1], bevel),
+        box([x0 + width, y0, z0], [x1 - width, y1, z0 + foot], bevel),
+    ]
 
 
 # ------------------------------------------------------------------ round things
@@ -379,13 +422,12 @@ def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:
         return front
     q = p - normals * thickness
     back = reversed_shape(_grid(q, normals, uv))
-    r, c = p.shape[:2]
-    rim = [(0, j) for j in range(c)] + [(i, c - 1) for i in range(1, r)]
-    rim += [(r - 1, j) for j in range(c - 2, -1, -1)] + [(i, 0) for i in range(r - 2, 0, -1)]
-    i, j = np.array(rim).T
-    a, b = q[i, j], p[i, j]
-    edge = quads(np.stack([a, np.roll(a, -1, 0), np.roll(b, -1, 0), b], axis=1))
-    return joined(front, back, edge)
+    return joined(front, back, between(rim(q), rim(p)))
+
+
+def rim(grid: np.ndarray) -> np.ndarray:
+    """The border of a grid of points (r, c, 3) as a closed line: the first row, the last column and back."""
+    return np.concatenate([grid[0], grid[1:, -1], grid[-1, -2::-1], grid[-2:0:-1, 0]])
 
 
 def _grid_normals(p: np.ndarray) -> np.ndarray:

@@ -37,25 +37,22 @@ def rug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     fringe = 0.045 if look.get("fringe") else 0.0
     w0 = w / 2 - fringe
     body = box([-w0, -d / 2, 0], [w0, d / 2, h], min(0.004, h * 0.4))
-    body = (
-        whole_image(body, pattern, -w0, w0, -d / 2, d / 2, "xy", keep_aspect=False) if name.startswith("rug_") else body
-    )
+    if name.startswith("rug_"):
+        body = whole_image(body, pattern, -w0, w0, -d / 2, d / 2, "xy", keep_aspect=False)
     tassels = []
     if fringe:
         y = np.arange(-d / 2 + 0.008, d / 2 - 0.008, 0.014)
         for side in (-1, 1):
             reach = rng.uniform(0.7, 1.0, len(y)) * fringe
             sway = rng.normal(0, 0.003, len(y))
-            a, b = side * w0, side * (w0 + reach)
-            c = np.stack(
-                [
-                    np.stack([np.full_like(y, a), y - 0.004, np.full_like(y, 0.004)], 1),
-                    np.stack([b, y - 0.003 + sway, np.full_like(y, 0.002)], 1),
-                    np.stack([b, y + 0.003 + sway, np.full_like(y, 0.002)], 1),
-                    np.stack([np.full_like(y, a), y + 0.004, np.full_like(y, 0.004)], 1),
-                ],
-                1,
+            a, b = side * w0 + 0 * y, side * (w0 + reach)
+            corners = (
+                (a, y - 0.004, 0.004),
+                (b, y - 0.003 + sway, 0.002),
+                (b, y + 0.003 + sway, 0.002),
+                (a, y + 0.004, 0.004),
             )
+            c = np.stack([np.stack([u, v, np.full_like(y, up)], 1) for u, v, up in corners], 1)
             tassels.append(quads(c if side > 0 else c[:, ::-1]))
         tassels += [box([-w / 2, -0.004, 0], [-w0, 0.004, 0.003]), box([w0, -0.004, 0], [w / 2, 0.004, 0.003])]
     return parts_of((pattern, body), (plain((0.80, 0.75, 0.64), 0.95, specular=0.05), tassels))
@@ -78,6 +75,8 @@ def curtain(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     open_to = float(look.get("drawn", 0.30))
     panel = w * open_to * 0.5 + 0.10
     parts, hooks = [], []
+    around = [(0, 0.019 * np.cos(t), 0.019 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 12, endpoint=False)]
+    ring = tube(around, 0.0022, 5, closed=True)
     for side in (-1, 1):
         width = panel * rng.uniform(0.94, 1.06)
         count = max(4, round(width / PLEAT))
@@ -86,12 +85,6 @@ def curtain(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
         # Cloth is gathered: the pattern runs on over the folds, as measured along the sheet.
         parts.append(moved(cloth_sheet, side * (w / 2 - 0.05 - width / 2), -0.01, 0.0))
         for x in np.linspace(-0.46, 0.46, max(4, count // 2)) * width:
-            ring = tube(
-                [(0, 0.019 * np.cos(t), 0.019 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 12, endpoint=False)],
-                0.0022,
-                5,
-                closed=True,
-            )
             hooks.append(moved(ring, side * (w / 2 - 0.05 - width / 2) + x, -0.01, rod_z - 0.008))
     rod = tube([(-w / 2 + 0.03, -0.01, rod_z), (w / 2 - 0.03, -0.01, rod_z)], 0.011, 10)
     ends = [moved(scaled(ball(0.022, 12, 8), 1.4, 1, 1), s * (w / 2 - 0.031), -0.01, rod_z) for s in (-1, 1)]
@@ -120,14 +113,8 @@ def roller_blind(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     roll = moved(turned(cylinder(r * 0.85, -w / 2 + 0.02, w / 2 - 0.02, 0, 16), np.pi / 2, "y"), 0, 0, h - r)
     cloth = box([-w / 2 + 0.025, -0.001, 0.014], [w / 2 - 0.025, 0.001, h - r])
     foot = box([-w / 2 + 0.022, -0.006, 0], [w / 2 - 0.022, 0.006, 0.022], 0.003)
-    ends = [
-        box(
-            [s * w / 2 - (0.02 if s > 0 else 0), -d / 2, h - 2 * r],
-            [s * w / 2 + (0 if s > 0 else 0.02), d / 2, h],
-            0.003,
-        )
-        for s in (-1, 1)
-    ]
+    spans = ((-w / 2, -w / 2 + 0.02), (w / 2 - 0.02, w / 2))
+    ends = [box([a, -d / 2, h - 2 * r], [b, d / 2, h], 0.003) for a, b in spans]
     chain = tube([(w / 2 - 0.01, -d / 2 + 0.006, h - r), (w / 2 - 0.01, -d / 2 + 0.006, h * 0.35)], 0.002, 5)
     return parts_of((material(look, "cloth", finish, "screen/0"), [roll, cloth]), (WHITE, [foot, *ends, chain]))
 
@@ -172,13 +159,8 @@ def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Ge
     angle = np.linspace(-np.pi / 2, -3 * np.pi / 2, 9)
     low = np.linspace(back[0], front, 4)[:-1]
     high = np.linspace(front, back[1], 4)[1:]
-    line = np.concatenate(
-        [
-            np.stack([low, 0 * low - bend], 1),
-            np.stack([front + bend * np.cos(angle), bend * np.sin(angle)], 1),
-            np.stack([high, 0 * high + bend], 1),
-        ]
-    )
+    arc = np.stack([front + bend * np.cos(angle), bend * np.sin(angle)], 1)
+    line = np.concatenate([np.stack([low, 0 * low - bend], 1), arc, np.stack([high, 0 * high + bend], 1)])
     along = np.gradient(line, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     out = np.stack([-along[:, 1], along[:, 0]], 1)  # towards the inside of the bend
@@ -189,19 +171,11 @@ def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Ge
     share = np.array([-1, -0.985, -0.95, -0.6, -0.2, 0.2, 0.6, 0.95, 0.985, 1])
     plump = np.array([0.05, 0.6, 1, 1, 1, 1, 1, 1, 0.6, 0.05])[:, None, None]
     section = core + (ring - core) * plump
-    sag = (
-        0.05
-        * t
-        * np.sin(2.5 * share[:, None] + rng.uniform(0, 6))
-        * np.sin(9 * core[None, :, 0] / d + rng.uniform(0, 6))
-    )
+    along_x, along_y = 2.5 * share[:, None] + rng.uniform(0, 6), 9 * core[None, :, 0] / d + rng.uniform(0, 6)
+    sag = 0.05 * t * np.sin(along_x) * np.sin(along_y)
     x = share[:, None] * w / 2 + 0.004 * np.sin(14 * core[None, :, 0] / d + rng.uniform(0, 6)) * np.abs(share[:, None])
     grid = np.stack(np.broadcast_arrays(x, section[..., 0], section[..., 1] + t / 2 + sag), -1)
     leaf = sheet(grid)
-    middle = np.mean(leaf.vertices, axis=0)
-    volume = np.einsum(
-        "ij,ij->",
-        leaf.vertices[leaf.faces[:, 0]] - middle,
-        np.cross(leaf.vertices[leaf.faces[:, 1]] - middle, leaf.vertices[leaf.faces[:, 2]] - middle),
-    )
+    a, b, c = (leaf.vertices - np.mean(leaf.vertices, axis=0))[leaf.faces.T]
+    volume = np.einsum("ij,ij->", a, np.cross(b, c))
     return leaf if volume > 0 else reversed_shape(leaf)

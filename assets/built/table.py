@@ -39,21 +39,14 @@ from assets.rows import (
     check_row,
     is_number,
     is_text,
+    made_in,
     merged,
     variant,
 )
 
-MODULES = (
+BUILDS: Mapping[str, Build] = made_in(
     *(appliances, basics, bath, decor, entry, everyday, fittings, kitchen),
     *(lamps, luggage, papers, plants, soft, storage, tableware),
-)
-BUILDS: Mapping[str, Build] = MappingProxyType(
-    {
-        f"{module.__name__.rpartition('.')[2]}.{name}": build
-        for module in MODULES
-        for name, build in vars(module).items()
-        if callable(build) and getattr(build, "__module__", "") == module.__name__ and not name.startswith("_")
-    }
 )
 """Every builder by '<module>.<function>'."""
 SURFACES: Mapping[str, Callable[..., tuple[SupportSurface, ...]]] = MappingProxyType(

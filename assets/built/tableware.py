@@ -9,22 +9,19 @@ from assets.built.maker import BLACK, BRASS, GLASS, STEEL, FinishOf, Look, Size,
 from assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, moved, scaled, tube, turned
 from assets.records import MeshPart
 
+MUGS = {
+    "white": plain((0.91, 0.90, 0.88), 0.18),
+    "blue": plain((0.22, 0.34, 0.48), 0.18),
+    "green": plain((0.40, 0.50, 0.42), 0.18),
+    "red": plain((0.62, 0.18, 0.15), 0.18),
+    "yellow": plain((0.86, 0.68, 0.28), 0.18),
+    "black": plain((0.09, 0.09, 0.10), 0.18),
+}
+
 
 def cup(r: float, h: float, taper: float = 0.92, wall: float = 0.004) -> Shape:
-    return lathe(
-        [
-            (0, 0),
-            (r * taper * 0.95, 0),
-            (r * taper, 0.004),
-            (r, h - 0.002),
-            (r - wall * 0.5, h),
-            (r - wall, h - 0.002),
-            (r * taper - wall, 0.008),
-            (0, 0.007),
-        ],
-        28,
-        0.6,
-    )
+    outside = [(0, 0), (r * taper * 0.95, 0), (r * taper, 0.004), (r, h - 0.002), (r - wall * 0.5, h)]
+    return lathe([*outside, (r - wall, h - 0.002), (r * taper - wall, 0.008), (0, 0.007)], 28, 0.6)
 
 
 def mug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -33,25 +30,12 @@ def mug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     r = d / 2
     cx = -(w - d) / 2
     t = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 10)
-    ear = tube(
-        np.stack([cx + r * 0.94 + (w / 2 - cx - r - 0.005) * np.cos(t), 0 * t, h * 0.5 + h * 0.30 * np.sin(t)], 1),
-        0.0055,
-        8,
-    )
-    color = plain(
-        {
-            "white": (0.91, 0.90, 0.88),
-            "blue": (0.22, 0.34, 0.48),
-            "green": (0.40, 0.50, 0.42),
-            "red": (0.62, 0.18, 0.15),
-            "yellow": (0.86, 0.68, 0.28),
-            "black": (0.09, 0.09, 0.10),
-        }[str(look.get("colour", "white"))],
-        0.18,
-    )
+    bow = np.stack([cx + r * 0.94 + (w / 2 - cx - r - 0.005) * np.cos(t), 0 * t, h * 0.5 + h * 0.30 * np.sin(t)], 1)
+    ear = tube(bow, 0.0055, 8)
     drink = [moved(lathe([(r * 0.9, 0), (0, 0.0001)], 24), cx, 0, h * 0.8)] if look.get("coffee") else []
-    drink = [s if s.normals[:, 2].mean() > 0 else Shape(s.vertices, s.faces[:, ::-1], -s.normals, s.uv) for s in drink]
-    return parts_of((color, [moved(cup(r, h), cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink))
+    return parts_of(
+        (MUGS[str(look.get("colour", "white"))], [moved(cup(r, h), cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink)
+    )
 
 
 def tumbler(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -67,27 +51,10 @@ def plates(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     w, _, h = size
     r, count = w / 2, int(look.get("count", 5))
     step = (h - 0.022) / max(count - 1, 1)
-    one = lathe(
-        [
-            (0, 0),
-            (r * 0.58, 0),
-            (r * 0.62, 0.004),
-            (r * 0.98, 0.018),
-            (r, 0.021),
-            (r * 0.985, 0.022),
-            (r * 0.64, 0.008),
-            (r * 0.56, 0.005),
-            (0, 0.005),
-        ],
-        36,
-        0.6,
-    )
-    color = plain(
-        {"white": (0.92, 0.91, 0.89), "blue": (0.32, 0.43, 0.52), "sand": (0.80, 0.73, 0.63)}[
-            str(look.get("colour", "white"))
-        ],
-        0.15,
-    )
+    below = [(0, 0), (r * 0.58, 0), (r * 0.62, 0.004), (r * 0.98, 0.018), (r, 0.021)]
+    one = lathe([*below, (r * 0.985, 0.022), (r * 0.64, 0.008), (r * 0.56, 0.005), (0, 0.005)], 36, 0.6)
+    tints = {"white": (0.92, 0.91, 0.89), "blue": (0.32, 0.43, 0.52), "sand": (0.80, 0.73, 0.63)}
+    color = plain(tints[str(look.get("colour", "white"))], 0.15)
     return parts_of((color, [moved(one, 0, 0, k * step) for k in range(count)]))
 
 
@@ -128,20 +95,8 @@ def bottle(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
         "blue": plain((0.24, 0.42, 0.60), 0.3),
     }[str(look.get("colour", "green"))]
     neck = float(look.get("neck", 0.36))
-    body = lathe(
-        [
-            (0, 0),
-            (r * 0.94, 0),
-            (r, 0.006),
-            (r, h * 0.58),
-            (r * 0.86, h * 0.66),
-            (r * neck, h * 0.78),
-            (r * neck, h * 0.95),
-            (0, h * 0.95),
-        ],
-        26,
-        0.75,
-    )
+    shoulder = [(r, h * 0.58), (r * 0.86, h * 0.66), (r * neck, h * 0.78), (r * neck, h * 0.95), (0, h * 0.95)]
+    body = lathe([(0, 0), (r * 0.94, 0), (r, 0.006), *shoulder], 26, 0.75)
     label = lathe([(r * 1.004, h * 0.2), (r * 1.004, h * 0.48)], 26)
     cap = lathe([(0, h * 0.90), (r * (neck + 0.06), h * 0.90), (r * (neck + 0.06), h), (0, h)], 18)
     tint = ((0.88, 0.84, 0.74), (0.72, 0.22, 0.18), (0.93, 0.92, 0.90), (0.22, 0.30, 0.40))[int(rng.integers(4))]
@@ -156,18 +111,8 @@ def candle(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     """A pillar candle on a saucer, its rim melted."""
     w, _, h = size
     r, top = w / 2, h * 0.93
-    wax = lathe(
-        [
-            (0, 0.006),
-            (r * 0.72, 0.006),
-            (r * 0.72, top - 0.004),
-            (r * 0.68, top),
-            (r * 0.58, top - 0.005),
-            (0, top - 0.008),
-        ],
-        24,
-        0.8,
-    )
+    melted = [(r * 0.72, top - 0.004), (r * 0.68, top), (r * 0.58, top - 0.005), (0, top - 0.008)]
+    wax = lathe([(0, 0.006), (r * 0.72, 0.006), *melted], 24, 0.8)
     dish = lathe([(0, 0), (r * 0.7, 0), (r, 0.008), (r * 0.96, 0.010), (r * 0.7, 0.005), (0, 0.005)], 28, 0.8)
     wick = tube([(0, 0, top - 0.01), (0.001, 0, h)], 0.0012, 5)
     return parts_of(
@@ -178,10 +123,8 @@ def candle(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
 def paper_towel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, _, h = size
     r = w / 2
-    foot, rod = (
-        cylinder(r, 0, 0.014, 0.003, 32),
-        lathe([(0, 0.01), (0.007, 0.01), (0.007, h - 0.012), (0.012, h - 0.008), (0.010, h), (0, h)], 12, 0.8),
-    )
+    foot = cylinder(r, 0, 0.014, 0.003, 32)
+    rod = lathe([(0, 0.01), (0.007, 0.01), (0.007, h - 0.012), (0.012, h - 0.008), (0.010, h), (0, h)], 12, 0.8)
     roll = lathe([(0.02, 0.015), (r * 0.78, 0.015), (r * 0.78, h * 0.84), (0.02, h * 0.84), (0.02, 0.015)], 32)
     return parts_of(
         (finish("oak/0") if look.get("wood") else STEEL, [foot, rod]),
@@ -191,7 +134,6 @@ def paper_towel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
 
 def board(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A chopping board with a grip hole, lying flat."""
-
     w, d, h = size
     plate = shapely.box(-w / 2, -d / 2, w / 2, d / 2).buffer(-0.02).buffer(0.02, quad_segs=4)
     hole = shapely.Point(w / 2 - 0.035, 0).buffer(0.012, quad_segs=4)
@@ -206,15 +148,9 @@ def knife_block(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
     handles, bolsters = [], []
     for x in np.linspace(-0.3, 0.3, 3) * w:
         for y, s in ((-0.18 * d, 1.0), (0.1 * d, 0.85)):
-            handles.append(
-                turned(
-                    box([x - 0.007, y - 0.011, h * 0.73], [x + 0.007, y + 0.011, h * 0.73 + 0.10 * s], 0.004),
-                    -lean,
-                    "x",
-                )
-            )
-            bolsters.append(
-                turned(box([x - 0.005, y - 0.010, h * 0.69], [x + 0.005, y + 0.010, h * 0.735]), -lean, "x")
-            )
+            handle = box([x - 0.007, y - 0.011, h * 0.73], [x + 0.007, y + 0.011, h * 0.73 + 0.10 * s], 0.004)
+            bolster = box([x - 0.005, y - 0.010, h * 0.69], [x + 0.005, y + 0.010, h * 0.735])
+            handles.append(turned(handle, -lean, "x"))
+            bolsters.append(turned(bolster, -lean, "x"))
     foot = box([-w / 2, -d * 0.28, 0], [w / 2, d * 0.55, 0.018], 0.003)
     return parts_of((material(look, "wood", finish, "beech/0"), [body, foot]), (BLACK, handles), (STEEL, bolsters))

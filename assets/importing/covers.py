@@ -69,9 +69,8 @@ def _cloth(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
 
 
 def _bedding(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
-    return (_threads(n, rng, 0.02) * folds(n, tile, 0.18, 0.065, rng=rng) * folds(n, tile, 0.05, 0.025, rng=rng))[
-        ..., None
-    ]
+    cloth = _threads(n, rng, 0.02) * folds(n, tile, 0.18, 0.065, rng=rng) * folds(n, tile, 0.05, 0.025, rng=rng)
+    return cloth[..., None]
 
 
 def _leather(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:

@@ -230,10 +230,9 @@ class _Reader:
         nodes = self.header.get("nodes", [])
         self.matrices: dict[int, np.ndarray] = {}
         children = {c for n in nodes for c in n.get("children", ())}
-        scenes = self.header.get("scenes")
-        roots = (
-            scenes[self.header.get("scene", 0)].get("nodes", []) if scenes else sorted({*range(len(nodes))} - children)
-        )
+        roots, scenes = sorted({*range(len(nodes))} - children), self.header.get("scenes")
+        if scenes:
+            roots = scenes[self.header.get("scene", 0)].get("nodes", [])
         if scenes and len(scenes) > 1:
             self.tell(f"it has {len(scenes)} scenes, of which one is read")
         ways = [(root, np.eye(4)) for root in reversed(roots)]
@@ -278,13 +277,10 @@ class _Reader:
 
     def _faces(self, primitive: dict[str, Any]) -> np.ndarray:
         """(m, 3) int64; none for points and lines, which are told."""
-        mode, attributes = primitive.get("mode", 4), primitive["attributes"]
-        count = self.header["accessors"][attributes["POSITION"]]["count"]
-        if "bufferView" not in self.header["accessors"][attributes["POSITION"]] and DRACO in primitive.get(
-            "extensions", {}
-        ):
+        mode, positions = primitive.get("mode", 4), self.header["accessors"][primitive["attributes"]["POSITION"]]
+        if "bufferView" not in positions and DRACO in primitive.get("extensions", {}):
             raise RefusedError(f"{REFUSED[DRACO]} ({DRACO})")
-        corners = np.arange(count)
+        corners = np.arange(positions["count"])
         if "indices" in primitive:
             corners = self._accessor(primitive["indices"], 1)[:, 0].astype(np.int64)
         if mode == 4:
@@ -340,11 +336,8 @@ class _Reader:
     def _read_surface(self, material: dict[str, Any]) -> _Surface:
         core, more = material.get("pbrMetallicRoughness", {}), material.get("extensions", {})
         factor, picture = core.get("baseColorFactor", [1, 1, 1, 1]), core.get("baseColorTexture")
-        roughness, metallic, both = (
-            core.get("roughnessFactor", 1.0),
-            core.get("metallicFactor", 1.0),
-            core.get("metallicRoughnessTexture"),
-        )
+        roughness, metallic = core.get("roughnessFactor", 1.0), core.get("metallicFactor", 1.0)
+        both = core.get("metallicRoughnessTexture")
         name = material.get("name") or None
         if older := more.get("KHR_materials_pbrSpecularGlossiness"):
             factor, picture = older.get("diffuseFactor", [1, 1, 1, 1]), older.get("diffuseTexture")
@@ -382,10 +375,8 @@ class _Reader:
             return None
         texture = self.header["textures"][info["index"]]
         if "source" not in texture:
-            others = sorted(texture.get("extensions", {"no extension": {}}))
-            raise RefusedError(
-                next((f"{REFUSED[n]} ({n})" for n in others if n in REFUSED), f"a texture of {shown} has no picture")
-            )
+            known = (f"{REFUSED[n]} ({n})" for n in sorted(texture.get("extensions", ())) if n in REFUSED)
+            raise RefusedError(next(known, f"a texture of {shown} has no picture"))
         sampler = self.header["samplers"][texture["sampler"]] if "sampler" in texture else {}
         wraps = sampler.get("wrapS"), sampler.get("wrapT")
         picture = self._pictures[texture["source"]]

@@ -220,9 +220,8 @@ def project_uv(
     source = rows[tree.query(query.reshape(-1, 6))[1]]
     out = _affine_uv(vertices[faces[source]], uv[source], corners.reshape(-1, 3)).reshape(-1, 3, 2)
     middle = rows[tree.query(np.concatenate([centre[:, 0], 0.1 * size * own], axis=1))[1]]
-    whole = _affine_uv(vertices[faces[np.repeat(middle, 3)]], uv[np.repeat(middle, 3)], corners.reshape(-1, 3)).reshape(
-        -1, 3, 2
-    )
+    middle = np.repeat(middle, 3)
+    whole = _affine_uv(vertices[faces[middle]], uv[middle], corners.reshape(-1, 3)).reshape(-1, 3, 2)
     torn = np.ptp(out, axis=1).max(axis=1) > 3.0 * np.ptp(whole, axis=1).max(axis=1) + 0.02
     out[torn] = whole[torn]
     return out

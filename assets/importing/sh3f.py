@@ -18,7 +18,7 @@ from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from assets.cache import digest
-from assets.records import IDENTITY, Color
+from assets.records import IDENTITY
 
 CATALOGUE = "PluginFurnitureCatalog.properties"
 MAX_ENTRY = 64 * 2**20
@@ -33,34 +33,17 @@ class PackError(ValueError):
 
 
 @dataclass(frozen=True)
-class LightSource:
-    """Where a lamp shines from, in the model's own frame (z up, front along -y), metres."""
-
-    position: tuple[float, float, float]
-    color: tuple[float, float, float]
-    diameter: float | None
-
-
-@dataclass(frozen=True)
 class Entry:
-    """One model as its library describes it."""
+    """One model as its library describes it: what the import needs, words and licences are those of our catalogue."""
 
     key: str
     """'<folder>/<model>', e.g. 'scopia/bed1'."""
-    name: str
     model: str
     """Path of the OBJ file inside the zip."""
     size: tuple[float, float, float]
     """Width, depth, height, metres."""
-    elevation: float
-    """Base height above the floor, metres."""
     rotation: tuple[float, ...]
     """Row-major 3x3 rotation applied to the OBJ's own (y up) axes before it is sized."""
-    category: str = ""
-    tags: tuple[str, ...] = ()
-    creator: str = ""
-    licence: str = ""
-    lights: tuple[LightSource, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -70,7 +53,6 @@ class Pack:
     path: Path
     digest: str
     """Hex digest of the table of contents (names, sizes, CRC-32 sums)."""
-    licence: str
     entries: Mapping[str, Entry]
 
     def read(self, name: str) -> bytes:
@@ -118,12 +100,11 @@ def open_pack(path: Path) -> Pack:
         raise PackError(f"{path} is not a .sh3f library ({e}); install it again or name another file") from e
     _check_contents(path, infos)
     toc = digest([[i.filename, i.file_size, i.CRC] for i in infos])
-    bare = Pack(path, toc, "", MappingProxyType({}))
+    bare = Pack(path, toc, MappingProxyType({}))
     if CATALOGUE not in {i.filename for i in infos}:
         raise PackError(f"{path.name} has no {CATALOGUE}; it is not a furniture library of Sweet Home 3D")
     fields = parse_properties(bare.read(CATALOGUE).decode("latin-1"))
-    licence = fields.get("license", "")
-    return Pack(path, toc, licence, MappingProxyType(_entries(path, fields, licence)))
+    return Pack(path, toc, MappingProxyType(_entries(path, fields)))
 
 
 def parse_properties(text: str) -> dict[str, str]:
@@ -165,7 +146,7 @@ def _safe_name(path: Path, name: str) -> str:
     return name
 
 
-def _entries(path: Path, fields: Mapping[str, str], licence: str) -> dict[str, Entry]:
+def _entries(path: Path, fields: Mapping[str, str]) -> dict[str, Entry]:
     rows: dict[int, dict[str, str]] = {}
     for key, value in fields.items():
         if m := re.fullmatch(r"(\w+)#(\d+)", key):
@@ -173,7 +154,7 @@ def _entries(path: Path, fields: Mapping[str, str], licence: str) -> dict[str, E
     entries = {}
     for number in sorted(rows):
         try:
-            entry = _entry(path, number, rows[number], licence)
+            entry = _entry(path, number, rows[number])
         except PackError:
             raise
         except ValueError as e:
@@ -182,7 +163,7 @@ def _entries(path: Path, fields: Mapping[str, str], licence: str) -> dict[str, E
     return entries
 
 
-def _entry(path: Path, number: int, row: Mapping[str, str], licence: str) -> Entry:
+def _entry(path: Path, number: int, row: Mapping[str, str]) -> Entry:
     where = f"{path.name}: model {number}"
     if not row.get("model"):
         raise PackError(f"{where} names no model file; the library is damaged")
@@ -195,44 +176,11 @@ def _entry(path: Path, number: int, row: Mapping[str, str], licence: str) -> Ent
         rotation = tuple(float(x) for x in row["modelRotation"].split())
         if len(rotation) != 9 or not all(math.isfinite(x) for x in rotation):
             raise PackError(f"{where} should have a modelRotation of nine numbers, got {row['modelRotation']!r}")
-    return Entry(
-        key=key_of(model),
-        name=row.get("name", ""),
-        model=model,
-        size=(width, depth, height),
-        elevation=_number(where, row, "elevation", 0.0) / 100.0,
-        rotation=rotation,
-        category=row.get("category", ""),
-        creator=row.get("creator", ""),
-        licence=row.get("license", licence),
-        tags=tuple(t.strip() for t in row.get("tags", "").split(",") if t.strip()),
-        lights=_lights(row, (width, depth, height)),
-    )
+    return Entry(key_of(model), model, (width, depth, height), rotation)
 
 
-def _lights(row: Mapping[str, str], size: tuple[float, float, float]) -> tuple[LightSource, ...]:
-    """Sources given as cm from the left, the front and the floor, brought into the asset frame."""
-    columns = [row.get(f"lightSource{f}", "").split() for f in ("X", "Y", "Z", "Color", "Diameter")]
-    diameters = columns[4] or [""] * len(columns[0])
-    return tuple(
-        LightSource(
-            (float(x) / 100.0 - size[0] / 2, float(y) / 100.0 - size[1] / 2, float(z) / 100.0),
-            _rgb(int(color.lstrip("#"), 16)),
-            float(d) / 100.0 if d else None,
-        )
-        for x, y, z, color, d in zip(*columns[:4], diameters)
-    )
-
-
-def _rgb(color: int) -> Color:
-    red, green, blue = ((color >> shift & 255) / 255 for shift in (16, 8, 0))
-    return red, green, blue
-
-
-def _number(where: str, row: Mapping[str, str], name: str, default: float | None = None) -> float:
+def _number(where: str, row: Mapping[str, str], name: str) -> float:
     text = row.get(name, "")
-    if not text and default is not None:
-        return default
     try:
         value = float(text)
     except ValueError:

@@ -7,15 +7,8 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from assets.materials.maps import Colors, Maps, fbm, mix, noise, rgb, smooth_step
+from assets.materials.maps import Colors, Maps, fbm, maps_of, mix, noise, rgb, smooth_step
 from assets.records import Color
-
-
-def _flat(color: np.ndarray, rough: float = 0.6) -> Maps:
-    n = len(color)
-    return Maps(
-        np.clip(color, 0.01, 0.98).astype(np.float32), np.zeros((n, n), np.float32), np.full((n, n), rough, np.float32)
-    )
 
 
 def _canvas(n: int, color: Color, *, rng: np.random.Generator, grain: float = 0.015) -> np.ndarray:
@@ -32,9 +25,8 @@ def _stroke(
 ) -> np.ndarray:
     """A line through points (k, 2) of `width` in [0, 1], painted into `image`."""
     thick = max(1, round(width * len(image)))
-    return _ink(
-        image, points, width, color, alpha, lambda mask, p: cv2.polylines(mask, [p], False, 255, thick, cv2.LINE_AA, 4)
-    )
+    draw = lambda mask, p: cv2.polylines(mask, [p], False, 255, thick, cv2.LINE_AA, 4)
+    return _ink(image, points, width, color, alpha, draw)
 
 
 def _ink(
@@ -56,6 +48,10 @@ def _ink(
     draw(mask, np.round((points * n - low) * 16).astype(np.int32))
     image[y0:y1, x0:x1] = mix(image[y0:y1, x0:x1], rgb(color), mask.astype(np.float32) / 255 * alpha)
     return image
+
+
+def _rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
+    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
 
 
 def _blob(
@@ -81,14 +77,10 @@ def shapes(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.random
     for _ in range(3):
         t = np.linspace(0, 1, 40)
         start, swing = rng.uniform(0.2, 0.8, 2), rng.uniform(-0.3, 0.3, (3, 2))
-        line = (
-            start
-            + swing[0] * t[:, None]
-            + swing[1] * np.sin(np.pi * t)[:, None]
-            + swing[2] * np.sin(2 * np.pi * t)[:, None]
-        )
+        bends = (t, np.sin(np.pi * t), np.sin(2 * np.pi * t))
+        line = start + sum(s * bend[:, None] for s, bend in zip(swing, bends))
         image = _stroke(image, line, 0.006, (0.12, 0.12, 0.13))
-    return _flat(image * (1 + 0.02 * fbm(n, 8, 120, 1.0, rng=rng))[..., None], 0.85)
+    return maps_of(image * (1 + 0.02 * fbm(n, 8, 120, 1.0, rng=rng))[..., None], 0.0, 0.85)
 
 
 def fields(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> Maps:
@@ -103,7 +95,7 @@ def fields(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> 
         inside = smooth_step(np.minimum(y + warp - top, bottom - y - warp), -0.012, 0.02)
         inside *= smooth_step(np.minimum(x + warp - 0.08, 0.92 - x - warp), -0.012, 0.02)
         image = mix(image, rgb(c) * (1 + 0.05 * fbm(n, 2, 90, 1.2, rng=rng))[..., None], inside * 0.93)
-    return _flat(image, 0.8)
+    return maps_of(image, 0.0, 0.8)
 
 
 def hills(
@@ -136,7 +128,7 @@ def hills(
         haze = np.clip((y - ridge[None]) * 2.2, 0, 1)
         shade = mix(rgb(c, (n, n)), np.minimum(rgb(c) * 0.75 + rgb(sky[1]) * 0.25, 1.0), haze.astype(np.float32))
         image = mix(image, shade * (1 + 0.03 * noise(n, 1.5, 1.5, rng=rng))[..., None], inside)
-    return _flat(image, 0.5)
+    return maps_of(image, 0.0, 0.5)
 
 
 def sea(n: int, tile: float, sky: Colors, water: Colors, *, rng: np.random.Generator) -> Maps:
@@ -149,7 +141,7 @@ def sea(n: int, tile: float, sky: Colors, water: Colors, *, rng: np.random.Gener
     path = np.exp(-(((x - 0.55) / (0.05 + 0.25 * depth)) ** 2))
     down = mix(rgb(water[0], (n, n)), rgb(water[1]), depth) * (1 + 0.08 * waves)[..., None]
     down = mix(down, rgb((0.98, 0.93, 0.83)), 0.5 * path * smooth_step(waves, 0.4, 1.6))
-    return _flat(np.where((y < 0.55)[..., None], up, down), 0.45)
+    return maps_of(np.where((y < 0.55)[..., None], up, down), 0.0, 0.45)
 
 
 def botanical(n: int, tile: float, ground: Color, ink: Color, fern: bool = True, *, rng: np.random.Generator) -> Maps:
@@ -167,21 +159,15 @@ def botanical(n: int, tile: float, ground: Color, ink: Color, fern: bool = True,
             length = (0.24 if fern else 0.22) * np.sin(np.pi * (0.22 + 0.72 * (1 - f)) ** 0.9) * rng.uniform(0.92, 1.05)
             angle = -np.pi / 2 + side * (0.95 - 0.35 * f) + rng.normal(0, 0.04)
             shade = rgb(ink) * rng.uniform(0.85, 1.25)
+            d = np.array([np.cos(angle), np.sin(angle)])
             if fern:
-                s = np.linspace(0, 1, 9)[1:]
-                d = np.array([np.cos(angle), np.sin(angle)])
                 image = _stroke(image, at + np.linspace(0, 1, 6)[:, None] * d * length, 0.002, shade)
-                for q in s:
+                for q in np.linspace(0, 1, 9)[1:]:
                     for w in (-1, 1):
-                        image = _fill(
-                            image,
-                            _leaf_shape(at + d * length * q, angle + w * 1.0, 0.055 * (1.05 - q), 0.010),
-                            shade,
-                            0.9,
-                        )
+                        pinna = _leaf_shape(at + d * length * q, angle + w * 1.0, 0.055 * (1.05 - q), 0.010)
+                        image = _fill(image, pinna, shade, 0.9)
             else:
                 image = _fill(image, _leaf_shape(at, angle, length, 0.24 * length), shade, 0.9)
-                d = np.array([np.cos(angle), np.sin(angle)])
                 image = _stroke(image, at + np.linspace(0, 0.92, 6)[:, None] * d * length, 0.002, rgb(ground) * 0.92)
     pen = 0.40
     while pen < 0.60:
@@ -189,7 +175,7 @@ def botanical(n: int, tile: float, ground: Color, ink: Color, fern: bool = True,
         line = np.stack([np.linspace(pen, pen + word, 8), 0.925 + rng.normal(0, 0.004, 8)], 1)
         image = _stroke(image, line, 0.0025, (0.25, 0.23, 0.2), 0.8)
         pen += word + 0.008
-    return _flat(image, 0.85)
+    return maps_of(image, 0.0, 0.85)
 
 
 def _leaf_shape(at: np.ndarray, angle: float, length: float, half: float) -> np.ndarray:
@@ -210,37 +196,25 @@ def brushwork(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.ran
         long, wide = rng.uniform(0.15, 0.42), rng.uniform(0.03, 0.10)
         u = (x - at[0]) * np.cos(angle) + (y - at[1]) * np.sin(angle)
         v = -(x - at[0]) * np.sin(angle) + (y - at[1]) * np.cos(angle) + 0.25 * u * u
-        bristles = (
-            np.interp(v.reshape(-1), np.linspace(-wide, wide, 60), rng.normal(0, 1, 60))
-            .reshape(n, n)
-            .astype(np.float32)
-        )
+        bristles = np.interp(v, np.linspace(-wide, wide, 60), rng.normal(0, 1, 60)).astype(np.float32)
         ragged = 0.25 * long * bristles * 0.35
         inside = smooth_step(wide - np.abs(v), 0.0, 0.008) * smooth_step(long - np.abs(u) + ragged, 0.0, 0.05)
         c = rgb(colors[rng.integers(len(colors))]) * (1 + 0.09 * bristles)[..., None]
         image = mix(image, c, inside * 0.92)
         height = height * (1 - inside) + inside * (4e-4 + 2e-4 * bristles)
-    done = _flat(image, 0.55)
-    return Maps(done.color, height, done.roughness)
+    return maps_of(image, height, 0.55)
 
 
 def still_life(n: int, tile: float, ground: Color, table: Color, fruit: Colors, *, rng: np.random.Generator) -> Maps:
     """A bowl of fruit against a dark wall, in soft paint."""
     y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
-    image = mix(
-        rgb(ground, (n, n)), rgb(ground) * 1.6 + 0.03, np.exp(-(((x - 0.35) / 0.4) ** 2) - ((y - 0.35) / 0.4) ** 2)
-    )
-    image = mix(
-        image,
-        rgb(table) * (1.1 - 0.4 * x)[..., None],
-        smooth_step(y + 0.004 * fbm(n, 3, 40, 1.4, rng=rng), 0.66, 0.668),
-    )
+    lit = np.exp(-(((x - 0.35) / 0.4) ** 2) - ((y - 0.35) / 0.4) ** 2)
+    image = mix(rgb(ground, (n, n)), rgb(ground) * 1.6 + 0.03, lit)
+    below = smooth_step(y + 0.004 * fbm(n, 3, 40, 1.4, rng=rng), 0.66, 0.668)
+    image = mix(image, rgb(table) * (1.1 - 0.4 * x)[..., None], below)
     for k in range(7):
-        cx, cy, r = (
-            0.28 + 0.075 * k + rng.normal(0, 0.015),
-            0.56 - 0.06 * (k % 2) + rng.normal(0, 0.012),
-            rng.uniform(0.06, 0.085),
-        )
+        cx, cy = 0.28 + 0.075 * k + rng.normal(0, 0.015), 0.56 - 0.06 * (k % 2) + rng.normal(0, 0.012)
+        r = rng.uniform(0.06, 0.085)
         d = np.hypot(x - cx, y - cy) / r
         light = np.clip(0.35 + 0.75 * (1 - np.hypot(x - cx + 0.4 * r, y - cy + 0.45 * r) / (1.5 * r)), 0.15, 1.2)
         c = rgb(fruit[k % len(fruit)])
@@ -249,7 +223,7 @@ def still_life(n: int, tile: float, ground: Color, table: Color, fruit: Colors, 
     inside = (1 - smooth_step(bowl, 0.97, 1.03)) * smooth_step(y, 0.60, 0.606)
     image = mix(image, rgb((0.62, 0.66, 0.70)) * (1.05 - 0.9 * np.abs(x - 0.42))[..., None], inside)
     image = image * (1 + 0.03 * fbm(n, 10, 200, 0.9, rng=rng))[..., None]
-    return _flat(image, 0.5)
+    return maps_of(image, 0.0, 0.5)
 
 
 def poster(n: int, tile: float, ground: Color, ink: Color, accent: Color, *, rng: np.random.Generator) -> Maps:
@@ -259,41 +233,25 @@ def poster(n: int, tile: float, ground: Color, ink: Color, accent: Color, *, rng
     a = np.linspace(0, 2 * np.pi, 100)
     if kind == 0:
         for r in np.linspace(0.30, 0.06, 5):
-            image = _fill(
-                image,
-                np.stack([0.5 + r * np.cos(a), 0.40 + r * np.sin(a)], 1),
-                accent if round(r * 100) % 12 < 6 else ink,
-            )
+            ring = np.stack([0.5 + r * np.cos(a), 0.40 + r * np.sin(a)], 1)
+            image = _fill(image, ring, accent if round(r * 100) % 12 < 6 else ink)
     elif kind == 1:
         for k in range(6):
-            image = _fill(
-                image,
-                np.array(
-                    [
-                        (0.2 + 0.1 * k, 0.14),
-                        (0.26 + 0.1 * k, 0.14),
-                        (0.26 + 0.1 * k, 0.2 + 0.08 * k),
-                        (0.2 + 0.1 * k, 0.2 + 0.08 * k),
-                    ]
-                ),
-                accent if k % 2 else ink,
-            )
+            bar = _rectangle(0.2 + 0.1 * k, 0.14, 0.26 + 0.1 * k, 0.2 + 0.08 * k)
+            image = _fill(image, bar, accent if k % 2 else ink)
     else:
         half = np.linspace(0, np.pi, 50)
         for k in range(4):
-            image = _fill(
-                image,
-                np.stack([0.5 + 0.28 * np.cos(half), 0.22 + 0.13 * k + 0.12 - 0.12 * np.sin(half)], 1),
-                accent if k % 2 else ink,
-            )
+            arch = np.stack([0.5 + 0.28 * np.cos(half), 0.22 + 0.13 * k + 0.12 - 0.12 * np.sin(half)], 1)
+            image = _fill(image, arch, accent if k % 2 else ink)
     for row, (h, w) in enumerate(((0.05, 0.62), (0.012, 0.4), (0.012, 0.46), (0.012, 0.33))):
         top = 0.78 + (0.075 if row else 0) + 0.026 * row
         x = 0.19
         while x < 0.19 + w:
             step = h * rng.uniform(0.5, 0.8)
-            image = _fill(image, np.array([(x, top), (x + step, top), (x + step, top + h), (x, top + h)]), ink)
+            image = _fill(image, _rectangle(x, top, x + step, top + h), ink)
             x += step + h * (0.28 if rng.random() < 0.8 else 0.8)
-    return _flat(image, 0.75)
+    return maps_of(image, 0.0, 0.75)
 
 
 # ------------------------------------------------------------------ rugs, seen from above, u along the length
@@ -327,13 +285,8 @@ def oriental(
     corner = np.hypot(ax - 0.8, ay - 0.76) * (1 + 0.10 * np.cos(8 * np.arctan2(ay - 0.76, ax - 0.8)))
     image = mix(image, tints[0], 1 - smooth_step(corner, 0.25, 0.265))
     edge = np.minimum(1 - ax, 1 - ay)
-    for outer, inner, c in (
-        (0.0, 0.24, tints[2]),
-        (0.012, 0.05, tints[1]),
-        (0.055, 0.185, tints[0]),
-        (0.19, 0.23, tints[3]),
-    ):
-        image = np.where(((edge > outer) & (edge < inner))[..., None], c, image)
+    for outer, inner, k in ((0.0, 0.24, 2), (0.012, 0.05, 1), (0.055, 0.185, 0), (0.19, 0.23, 3)):
+        image = np.where(((edge > outer) & (edge < inner))[..., None], tints[k], image)
     along = np.where(1 - ax < 1 - ay, y, x)
     motif = np.cos(along * np.pi * 13) * 0.04 - np.abs(edge - 0.12)
     image = mix(image, tints[3], (motif > -0.012).astype(np.float32) * (np.abs(edge - 0.12) < 0.05))
@@ -396,9 +349,8 @@ def modern(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> 
     """Large overlapping arcs and fields in a few muted colours."""
     image = rgb(colors[0], (n, n))
     for k in range(6):
-        image = _fill(
-            image, _blob(rng.uniform(0, 1, 2), rng.uniform(0.18, 0.4), 0.2, rng=rng), colors[1 + k % (len(colors) - 1)]
-        )
+        blob = _blob(rng.uniform(0, 1, 2), rng.uniform(0.18, 0.4), 0.2, rng=rng)
+        image = _fill(image, blob, colors[1 + k % (len(colors) - 1)])
     return _pile(image, 0.09, rng=rng)
 
 
@@ -424,11 +376,7 @@ def _pile(image: np.ndarray, depth: float, *, rng: np.random.Generator) -> Maps:
     n = len(image)
     tuft, fine, wear = noise(n, 2.2, 1.4, rng=rng), noise(n, 0.8, 0.8, rng=rng), fbm(n, 2, 30, 1.2, rng=rng)
     out = image * (1 + depth * (0.5 * tuft + 0.5 * fine) + 0.02 * wear)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.97).astype(np.float32),
-        (1.2e-3 * tuft).astype(np.float32),
-        np.full((n, n), 0.96, np.float32),
-    )
+    return maps_of(out, 1.2e-3 * tuft, 0.96, 0.01, 0.97)
 
 
 # ------------------------------------------------------------------ dials and covers
@@ -446,61 +394,39 @@ def dial(
 ) -> Maps:
     """A clock face with hands."""
     image = rgb(face, (n, n))
+    font, scale, thick = cv2.FONT_HERSHEY_SIMPLEX, n / 500, max(1, n // 170)
     for k in range(60):
         a = k * np.pi / 30
         d = np.array([np.sin(a), -np.cos(a)])
         big = k % 5 == 0
-        image = _stroke(
-            image, 0.5 + np.array([0.44, 0.385 if big else 0.42])[:, None] * d, 0.010 if big else 0.004, ink
-        )
+        tick = 0.5 + np.array([0.44, 0.385 if big else 0.42])[:, None] * d
+        image = _stroke(image, tick, 0.010 if big else 0.004, ink)
         if big and numerals:
             text = str(k // 5 or 12)
-            (w, h), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, n / 500, max(1, n // 170))
+            (w, h), _ = cv2.getTextSize(text, font, scale, thick)
             p = 0.5 + 0.32 * d
             mask = np.zeros((n, n), np.uint8)
-            cv2.putText(
-                mask,
-                text,
-                (round(p[0] * n - w / 2), round(p[1] * n + h / 2)),
-                cv2.FONT_HERSHEY_SIMPLEX,
-                n / 500,
-                255,
-                max(1, n // 170),
-                cv2.LINE_AA,
-            )
+            at = round(p[0] * n - w / 2), round(p[1] * n + h / 2)
+            cv2.putText(mask, text, at, font, scale, 255, thick, cv2.LINE_AA)
             image = mix(image, rgb(ink), mask.astype(np.float32) / 255)
     for turn, long, wide in ((hour / 12, 0.22, 0.022), (hour % 1, 0.34, 0.014)):
         a = 2 * np.pi * turn
         d = np.array([np.sin(a), -np.cos(a)])
         image = _stroke(image, 0.5 + np.array([-0.05, long])[:, None] * d, wide, ink)
-    return _flat(image, 0.4)
+    return maps_of(image, 0.0, 0.4)
 
 
 def cover(n: int, tile: float, ground: Color, ink: Color, picture: Color, *, rng: np.random.Generator) -> Maps:
     """A magazine cover: a title, a photograph of sorts, teasers."""
-    sky = mix(
-        rgb(picture, (n, n)),
-        rgb(picture) * 0.45,
-        np.linspace(0, 1, n, dtype=np.float32)[:, None] * np.ones((n, n), np.float32),
-    )
+    down = np.linspace(0, 1, n, dtype=np.float32)[:, None] * np.ones((n, n), np.float32)
+    sky = mix(rgb(picture, (n, n)), rgb(picture) * 0.45, down)
     image = sky * (1 + 0.10 * fbm(n, 1.5, 60, 1.5, rng=rng))[..., None]
     image = _fill(image, _blob((0.5, 0.62), 0.26, 0.15, rng=rng), ground, 0.85)
     for x, w in ((0.08, 0.13), (0.23, 0.11), (0.36, 0.14), (0.52, 0.10), (0.64, 0.12), (0.78, 0.13)):
-        image = _fill(image, np.array([(x, 0.06), (x + w, 0.06), (x + w, 0.19), (x, 0.19)]), ink)
-        image = _fill(
-            image, np.array([(x + 0.03, 0.10), (x + w - 0.03, 0.10), (x + w - 0.03, 0.15), (x + 0.03, 0.15)]), picture
-        )
+        image = _fill(image, _rectangle(x, 0.06, x + w, 0.19), ink)
+        image = _fill(image, _rectangle(x + 0.03, 0.10, x + w - 0.03, 0.15), picture)
     for k in range(5):
-        image = _fill(
-            image,
-            np.array(
-                [
-                    (0.08, 0.72 + 0.04 * k),
-                    (0.08 + rng.uniform(0.15, 0.3), 0.72 + 0.04 * k),
-                    (0.08 + 0.2, 0.735 + 0.04 * k),
-                    (0.08, 0.735 + 0.04 * k),
-                ]
-            ),
-            ink,
-        )
-    return _flat(image, 0.3)
+        high, low = 0.72 + 0.04 * k, 0.735 + 0.04 * k
+        teaser = [(0.08, high), (0.08 + rng.uniform(0.15, 0.3), high), (0.08 + 0.2, low), (0.08, low)]
+        image = _fill(image, np.array(teaser), ink)
+    return maps_of(image, 0.0, 0.3)

@@ -28,6 +28,18 @@ class Maps:
     """(n, n) float32 in [0, 1]."""
 
 
+def maps_of(
+    color: np.ndarray,
+    height: np.ndarray | float,
+    roughness: np.ndarray | float,
+    darkest: float = 0.01,
+    brightest: float = 0.98,
+) -> Maps:
+    """Maps of a colour (n, n, 3) kept between two limits; height and roughness may be one number for all of it."""
+    height, roughness = (np.full(color.shape[:2], given, np.float32) for given in (height, roughness))
+    return Maps(np.clip(color, darkest, brightest).astype(np.float32), height, roughness)
+
+
 # ------------------------------------------------------------------ noise
 
 
@@ -47,11 +59,8 @@ def fbm(
 
     def band(fx: np.ndarray, fy: np.ndarray) -> np.ndarray:
         f = np.hypot(fx * stretch, fy) * n
-        return (
-            np.where(f > 0, np.maximum(f, 1e-3) ** -slope, 0)
-            * (1 - np.exp(-((f / low) ** 4)))
-            * np.exp(-((f / high) ** 2))
-        )
+        falling = np.where(f > 0, np.maximum(f, 1e-3) ** -slope, 0)
+        return falling * (1 - np.exp(-((f / low) ** 4))) * np.exp(-((f / high) ** 2))
 
     return filtered(n, band, rng=rng)
 
@@ -139,13 +148,8 @@ class Layout:
 
 def _layout(codes: np.ndarray, along: np.ndarray, across: np.ndarray, edge: np.ndarray) -> Layout:
     names, piece = np.unique(codes, return_inverse=True)
-    return Layout(
-        piece.reshape(codes.shape),
-        along.astype(np.float32),
-        across.astype(np.float32),
-        edge.astype(np.float32),
-        len(names),
-    )
+    along, across, edge = (a.astype(np.float32) for a in (along, across, edge))
+    return Layout(piece.reshape(codes.shape), along, across, edge, len(names))
 
 
 def planks(

@@ -19,6 +19,7 @@ from assets.materials.maps import (
     coordinates,
     fbm,
     look_up,
+    maps_of,
     mix,
     noise,
     rgb,
@@ -67,11 +68,7 @@ class Tiles:
         lie = self.waviness * (tilt[pieces.piece, 0] * pieces.along + tilt[pieces.piece, 1] * pieces.across) / 0.1
         height = inside * (height + lie) + 0.0012 * slope
         rough = np.where(inside > 0.5, self.gloss + rough, 0.88)
-        return Maps(
-            np.clip(color, 0.01, 0.98).astype(np.float32),
-            height.astype(np.float32),
-            np.clip(rough, 0.05, 1).astype(np.float32),
-        )
+        return maps_of(color, height, np.clip(rough, 0.05, 1))
 
 
 def checker(n: int, tile: float, *, rng: np.random.Generator) -> Maps:
@@ -193,11 +190,7 @@ def slab(n: int, tile: float, surface: Callable[..., Face], gloss: float, *, rng
     """One endless face of stone."""
     u, v = coordinates(n, tile)
     color, rough, height = surface(u / tile, v / tile, n, rng=rng)
-    return Maps(
-        np.clip(color, 0.01, 0.98).astype(np.float32),
-        np.asarray(height, np.float32) + np.zeros((n, n), np.float32),
-        np.clip(gloss + rough, 0.05, 1).astype(np.float32),
-    )
+    return maps_of(color, height, np.clip(gloss + rough, 0.05, 1))
 
 
 def granite(
@@ -221,7 +214,7 @@ def granite(
         best = np.maximum(best, f)
     cloud = fbm(n, 3, 12, 1.0, rng=rng)
     color *= (1 + 0.03 * cloud)[..., None]
-    return Maps(np.clip(color, 0.01, 0.97), np.zeros((n, n), np.float32), np.full((n, n), gloss, np.float32))
+    return maps_of(color, 0.0, gloss, 0.01, 0.97)
 
 
 def terrazzo(
@@ -243,11 +236,8 @@ def terrazzo(
             break
         r = size / pixel * float(np.clip(rng.lognormal(-0.5, 0.55), 0.15, 1.8))
         angle = np.sort(rng.random(rng.integers(4, 8))) * 2 * np.pi
-        shape = (
-            np.stack([np.cos(angle), np.sin(angle) * rng.uniform(0.6, 1.0)], 1)
-            * r
-            * rng.uniform(0.7, 1.0, (len(angle), 1))
-        )
+        shape = np.stack([np.cos(angle), np.sin(angle) * rng.uniform(0.6, 1.0)], 1) * r
+        shape = shape * rng.uniform(0.7, 1.0, (len(angle), 1))
         spin = rng.uniform(0, 6.28)
         shape = shape @ np.array([[np.cos(spin), -np.sin(spin)], [np.sin(spin), np.cos(spin)]])
         at = rng.random(2) * n
@@ -262,7 +252,7 @@ def terrazzo(
         placed += 1.6 * r * r
     fine = noise(n, 0.8, 0.8, rng=rng)
     out = color.astype(np.float32) / 255 * (1 + 0.02 * fine)[..., None]
-    return Maps(np.clip(out, 0.01, 0.98), np.zeros((n, n), np.float32), np.full((n, n), 0.22, np.float32))
+    return maps_of(out, 0.0, 0.22)
 
 
 def concrete(
@@ -279,15 +269,10 @@ def concrete(
     sweep = fbm(n, 3, 40, 1.5, 2.5, rng=rng)
     grain = noise(n, 0.8, 0.8, rng=rng)
     holes = smooth_step(noise(n, 2.2, 2.2, rng=rng), 3.15, 3.5)
-    color = (
-        rgb(base)
-        * (1 + contrast * cloud + 0.6 * contrast * sweep + 0.018 * grain)[..., None]
-        * (1 - 0.45 * holes)[..., None]
-    )
+    color = rgb(base) * (1 + contrast * cloud + 0.6 * contrast * sweep + 0.018 * grain)[..., None]
+    color = color * (1 - 0.45 * holes)[..., None]
     height = 1e-4 * cloud + 3e-5 * grain - 1e-3 * holes
-    return Maps(
-        np.clip(color, 0.02, 0.97).astype(np.float32), height, np.clip(gloss + 0.06 * sweep, 0.1, 1).astype(np.float32)
-    )
+    return maps_of(color, height, np.clip(gloss + 0.06 * sweep, 0.1, 1), 0.02, 0.97)
 
 
 @dataclass(frozen=True)
@@ -327,11 +312,7 @@ class Brick:
         if self.painted:
             shade = 1 - 0.13 * (1 - smooth_step(blurred(face, 2.0), 0.2, 0.9))
             mixed = rgb(self.color) * (shade * (1 + 0.012 * cloud))[..., None]
-        return Maps(
-            np.clip(mixed, 0.02, 0.97).astype(np.float32),
-            relief.astype(np.float32),
-            np.full((n, n), 0.6 if self.painted else 0.88, np.float32),
-        )
+        return maps_of(mixed, relief, 0.6 if self.painted else 0.88, 0.02, 0.97)
 
 
 def rubble(
@@ -346,13 +327,8 @@ def rubble(
     """Natural stone walling: cells of jittered points, flat courses, each stone its own shade."""
     rows = int(across * 1.7)
     py, px = np.meshgrid(np.arange(rows), np.arange(across), indexing="ij")
-    points = np.stack(
-        [
-            (px + 0.5 * (py % 2) + rng.uniform(-0.28, 0.28, px.shape)) / across,
-            (py + rng.uniform(-0.2, 0.2, px.shape)) / rows,
-        ],
-        -1,
-    ).reshape(-1, 2)
+    at_x, at_y = px + 0.5 * (py % 2) + rng.uniform(-0.28, 0.28, px.shape), py + rng.uniform(-0.2, 0.2, px.shape)
+    points = np.stack([at_x / across, at_y / rows], -1).reshape(-1, 2)
     u, v = coordinates(n, tile)
     bend = fbm(n, 4, 60, 1.5, rng=rng)
     x, y = u / tile + 0.0025 * bend, v / tile + 0.0025 * np.roll(bend, n // 3, 0)
@@ -374,8 +350,4 @@ def rubble(
     stone = rgb(base) * (1 + tone[owner] + 0.07 * cloud + 0.03 * grain)[..., None] * (1 + hue[owner])
     color = rgb(mortar) * (1 + 0.05 * cloud)[..., None] * (1 - face)[..., None] + stone * face[..., None]
     dome = smooth_step(edge, 0.0, 0.03)
-    return Maps(
-        np.clip(color, 0.02, 0.97).astype(np.float32),
-        (0.012 * dome + 0.0012 * cloud * face).astype(np.float32),
-        np.full((n, n), 0.9, np.float32),
-    )
+    return maps_of(color, 0.012 * dome + 0.0012 * cloud * face, 0.9, 0.02, 0.97)

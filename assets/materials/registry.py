@@ -10,16 +10,22 @@ from typing import Any
 
 from assets.materials import art, maps, mineral, surface, textile, wood
 from assets.materials.material import ROLES, Material, Recipe
-from assets.rows import DATA, WORD, WORDS, CatalogueError, Field, Row, check_row, is_list, is_number, merged, read_json
-
-PAINTERS: Mapping[str, Any] = MappingProxyType(
-    {
-        f"{module.__name__.rpartition('.')[2]}.{name}": painter
-        for module in (art, maps, mineral, surface, textile, wood)
-        for name, painter in vars(module).items()
-        if callable(painter) and getattr(painter, "__module__", "") == module.__name__ and not name.startswith("_")
-    }
+from assets.rows import (
+    DATA,
+    WORD,
+    WORDS,
+    CatalogueError,
+    Field,
+    Row,
+    check_row,
+    is_list,
+    is_number,
+    made_in,
+    merged,
+    read_json,
 )
+
+PAINTERS = made_in(art, maps, mineral, surface, textile, wood)
 """What a row may name with "by", as '<module>.<name>': recipes, and the layouts, faces, motifs and cloths they take."""
 MATERIAL_FIELDS = {
     "family": WORD,

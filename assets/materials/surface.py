@@ -7,7 +7,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from assets.materials.maps import Colors, Maps, blurred, coordinates, fbm, mix, noise, rgb, smooth_step
+from assets.materials.maps import Colors, Maps, blurred, coordinates, fbm, maps_of, mix, noise, rgb, smooth_step
 from assets.records import Color
 
 
@@ -18,22 +18,14 @@ def paint(
     peel = fbm(n, 40, 220, 0.6, rng=rng)
     cloud = fbm(n, 4, 12, 1.0, rng=rng)
     out = rgb(color) * (1 + 0.004 * nap * peel + 0.002 * cloud)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.98).astype(np.float32),
-        (6e-5 * nap * peel).astype(np.float32),
-        np.clip(rough + 0.02 * peel, 0.1, 1).astype(np.float32),
-    )
+    return maps_of(out, 6e-5 * nap * peel, np.clip(rough + 0.02 * peel, 0.1, 1))
 
 
 def gloss_paint(n: int, tile: float, color: Color, rough: float = 0.35, *, rng: np.random.Generator) -> Maps:
     """Satin paint on joinery, with faint brush marks along u."""
     brush = noise(n, 40, 1.2, rng=rng)
     out = rgb(color) * (1 + 0.0022 * brush)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.98).astype(np.float32),
-        (1e-5 * brush).astype(np.float32),
-        np.clip(rough + 0.02 * brush, 0.05, 1).astype(np.float32),
-    )
+    return maps_of(out, 1e-5 * brush, np.clip(rough + 0.02 * brush, 0.05, 1))
 
 
 def plaster(
@@ -43,11 +35,7 @@ def plaster(
     sweep = fbm(n, 5, 90, 1.2, 1.6, rng=rng)
     grain = noise(n, 1.6, 1.6, rng=rng)
     out = rgb(color) * (1 + mottle * sweep + 0.012 * relief * grain)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.98).astype(np.float32),
-        (relief * (3e-4 * sweep + 1.2e-4 * grain)).astype(np.float32),
-        np.full((n, n), 0.92, np.float32),
-    )
+    return maps_of(out, relief * (3e-4 * sweep + 1.2e-4 * grain), 0.92)
 
 
 def metal(
@@ -66,11 +54,7 @@ def metal(
     if stain:
         cloud = fbm(n, 3, 80, 1.2, rng=rng)
         out = mix(out, rgb(color) * 0.55, stain * smooth_step(cloud, -0.5, 2.0))
-    return Maps(
-        np.clip(out, 0.01, 0.98).astype(np.float32),
-        (4e-6 * brushed * lines).astype(np.float32),
-        np.clip(rough + 0.05 * brushed * lines, 0.04, 1).astype(np.float32),
-    )
+    return maps_of(out, 4e-6 * brushed * lines, np.clip(rough + 0.05 * brushed * lines, 0.04, 1))
 
 
 def wicker(n: int, tile: float, color: Color, strands: int = 24, *, rng: np.random.Generator) -> Maps:
@@ -85,11 +69,7 @@ def wicker(n: int, tile: float, color: Color, strands: int = 24, *, rng: np.rand
     fibre = noise(n, 12, 0.8, rng=rng)
     tone = rng.normal(0, 0.05, strands)[j % strands]
     out = rgb(color) * (0.5 + 0.42 * bulge * (0.72 + 0.28 * over) + tone + 0.06 * fibre)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.97).astype(np.float32),
-        (0.004 * bulge * (0.6 + 0.4 * over)).astype(np.float32),
-        np.full((n, n), 0.7, np.float32),
-    )
+    return maps_of(out, 0.004 * bulge * (0.6 + 0.4 * over), 0.7, 0.01, 0.97)
 
 
 # ------------------------------------------------------------------ wallpaper
@@ -112,11 +92,7 @@ def wallpaper(
     for mask, ink in zip(motif(n, rng=rng), inks):
         out = mix(out, rgb(ink, (n, n)), np.clip(mask, 0, 1))
     out = out * (1 + 0.008 * grain + 0.012 * woven * thread)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.98).astype(np.float32),
-        (2e-5 * grain + 2e-5 * woven * thread).astype(np.float32),
-        np.full((n, n), 0.85, np.float32),
-    )
+    return maps_of(out, 2e-5 * grain + 2e-5 * woven * thread, 0.85)
 
 
 def stripes(n: int, count: int, share: float = 0.5, pin: bool = False, *, rng: np.random.Generator) -> list[np.ndarray]:
@@ -146,10 +122,8 @@ class _Print:
         """A stroke of `width` tiles that thins out towards its ends."""
         d = np.gradient(points, axis=0)
         d /= np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9)
-        side = (
-            np.stack([-d[:, 1], d[:, 0]], 1)
-            * (width / 2 * (0.35 + 0.65 * np.sin(np.linspace(0.15, np.pi - 0.15, len(points)))))[:, None]
-        )
+        half = width / 2 * (0.35 + 0.65 * np.sin(np.linspace(0.15, np.pi - 0.15, len(points))))
+        side = np.stack([-d[:, 1], d[:, 0]], 1) * half[:, None]
         self.fill(np.concatenate([points + side, (points - side)[::-1]]), level)
 
     def done(self) -> np.ndarray:
@@ -176,10 +150,8 @@ def floral(n: int, stems: int = 5, scale: float = 1.0, *, rng: np.random.Generat
         for i in range(2, 60, 6):
             side = 1 if (i // 6) % 2 else -1
             angle = -np.pi / 2 + side * rng.uniform(0.7, 1.2)
-            green.fill(
-                _leaf(stem[i], angle, scale * rng.uniform(0.05, 0.075), 0.013 * scale, side * 0.25),
-                rng.uniform(0.6, 1.0),
-            )
+            leaf = _leaf(stem[i], angle, scale * rng.uniform(0.05, 0.075), 0.013 * scale, side * 0.25)
+            green.fill(leaf, rng.uniform(0.6, 1.0))
         for i in rng.choice(np.arange(4, 58), 2, replace=False):
             centre = stem[i] + rng.normal(0, 0.02, 2)
             r, spin = scale * rng.uniform(0.028, 0.042), rng.uniform(0, 6)
@@ -242,11 +214,8 @@ def scallops(n: int, columns: int = 8, *, rng: np.random.Generator) -> list[np.n
 def trellis(n: int, columns: int = 6, width: float = 0.09, *, rng: np.random.Generator) -> list[np.ndarray]:
     """A rounded lattice: level sets of a sum of cosines."""
     u, v = coordinates(n, 1.0)
-    f = (
-        np.cos(2 * np.pi * columns * u)
-        + np.cos(2 * np.pi * columns * v)
-        + 0.35 * np.cos(4 * np.pi * columns * u) * np.cos(4 * np.pi * columns * v)
-    )
+    across, up = 2 * np.pi * columns * u, 2 * np.pi * columns * v
+    f = np.cos(across) + np.cos(up) + 0.35 * np.cos(2 * across) * np.cos(2 * up)
     slope = np.hypot(*np.gradient(f)) * n / columns / 6.28
     return [1 - smooth_step(np.abs(f) / np.maximum(slope, 0.25), width * 0.7, width)]
 
@@ -265,16 +234,8 @@ def leaves(n: int, count: int = 60, *, rng: np.random.Generator) -> list[np.ndar
             layer.line(at + np.linspace(0, 1, 8)[:, None] * d * reach, 0.006)
             for k in range(1, 6):
                 for s in (-1, 1):
-                    layer.fill(
-                        _leaf(
-                            at + d * reach * k / 6,
-                            angle + s * 0.75,
-                            reach * 0.42 * (1 - 0.08 * k),
-                            reach * 0.085,
-                            s * 0.15,
-                        ),
-                        0.9,
-                    )
+                    start, long = at + d * reach * k / 6, reach * 0.42 * (1 - 0.08 * k)
+                    layer.fill(_leaf(start, angle + s * 0.75, long, reach * 0.085, s * 0.15), 0.9)
             layer.fill(_leaf(at + d * reach * 0.9, angle, reach * 0.32, reach * 0.08), 0.9)
     return [pale.done(), dark.done()]
 
@@ -286,8 +247,4 @@ def grasscloth(n: int, tile: float, color: Color, *, rng: np.random.Generator) -
     knots = smooth_step(noise(n, 3, 1, rng=rng), 2.6, 3.2)
     shade = 1 + 0.06 * long + 0.045 * fine + 0.02 * upright - 0.12 * knots
     height = 1.5e-4 * (long + fine)
-    return Maps(
-        np.clip(rgb(color) * shade[..., None], 0.01, 0.97).astype(np.float32),
-        blurred(height.astype(np.float32), 0.6),
-        np.full((n, n), 0.9, np.float32),
-    )
+    return maps_of(rgb(color) * shade[..., None], blurred(height.astype(np.float32), 0.6), 0.9, 0.01, 0.97)

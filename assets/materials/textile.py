@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.materials.maps import Colors, Maps, coordinates, fbm, mix, noise, rgb, smooth_step
+from assets.materials.maps import Colors, Maps, coordinates, fbm, maps_of, mix, noise, rgb, smooth_step
 from assets.records import Color
 
 LIGHT_FROM = (0.55, 0.83)
@@ -61,16 +61,11 @@ class Weave:
         tone_warp, tone_weft = rng.normal(0, self.irregular, self.threads), rng.normal(0, self.irregular, self.threads)
         fibre_up, fibre_level = noise(n, 0.6, 9, rng=rng), noise(n, 9, 0.6, rng=rng)
         thick_up, thick_level = noise(n, 1.5, 40, rng=rng), noise(n, 40, 1.5, rng=rng)
-        lift_warp = np.cos(np.pi * fy * (1 if self.over == 1 else 0.6))
-        lift_weft = np.cos(np.pi * fx * (1 if self.over == 1 else 0.6))
-        a = (
-            _cycle(self.warp)[i % len(_cycle(self.warp))]
-            * (1 + tone_warp[i] + self.fuzz * fibre_up + 0.10 * self.slubs * thick_up)[..., None]
-        )
-        b = (
-            _cycle(self.weft)[j % len(_cycle(self.weft))]
-            * (1 + tone_weft[j] + self.fuzz * fibre_level + 0.10 * self.slubs * thick_level)[..., None]
-        )
+        span = 1 if self.over == 1 else 0.6
+        lift_warp, lift_weft = np.cos(np.pi * fy * span), np.cos(np.pi * fx * span)
+        grain_warp = 1 + tone_warp[i] + self.fuzz * fibre_up + 0.10 * self.slubs * thick_up
+        grain_weft = 1 + tone_weft[j] + self.fuzz * fibre_level + 0.10 * self.slubs * thick_level
+        a, b = _turns(self.warp, i) * grain_warp[..., None], _turns(self.weft, j) * grain_weft[..., None]
         shade_a = 0.62 + 0.38 * round_warp * (0.7 + 0.3 * lift_warp)
         shade_b = 0.62 + 0.38 * round_weft * (0.7 + 0.3 * lift_weft)
         color = np.where(up[..., None], a * shade_a[..., None], b * shade_b[..., None])
@@ -78,16 +73,13 @@ class Weave:
         if self.creases:
             color = color * folds(n, tile, 0.1, self.creases, rng=rng)[..., None]
         height = height * 0.35 * tile / self.threads + 0.02 * tile / self.threads * (fibre_up + fibre_level)
-        return Maps(
-            np.clip(color, 0.01, 0.97).astype(np.float32),
-            height.astype(np.float32),
-            np.full((n, n), self.rough, np.float32),
-        )
+        return maps_of(color, height, self.rough, 0.01, 0.97)
 
 
-def _cycle(color: Color | Colors) -> np.ndarray:
-    c = np.asarray(color, np.float32)
-    return c[None] if c.ndim == 1 else c
+def _turns(colors: Color | Colors, thread: np.ndarray) -> np.ndarray:
+    """(n, n, 3) colours of threads by number; several take turns."""
+    cycle = np.atleast_2d(np.asarray(colors, np.float32))
+    return cycle[thread % len(cycle)]
 
 
 @dataclass(frozen=True)
@@ -115,29 +107,20 @@ class Pile:
             base = mix(base, rgb(self.second), smooth_step(noise(n, size * 0.8, size * 0.8, rng=rng), -0.3, 0.9))
         out = base * (1 + self.depth * (0.6 * tuft + 0.55 * fine) / 1.6 + self.tracks * brushed)[..., None]
         height = self.loop * 0.25 * (tuft + 0.5 * fine)
-        return Maps(
-            np.clip(out, 0.01, 0.97).astype(np.float32),
-            height.astype(np.float32),
-            np.full((n, n), self.rough, np.float32),
-        )
+        return maps_of(out, height, self.rough, 0.01, 0.97)
 
 
 def sisal(n: int, tile: float, color: Color = (0.70, 0.61, 0.47), ribs: int = 64, *, rng: np.random.Generator) -> Maps:
     """Boucle of plant fibre in level ribs."""
     u, v = coordinates(n, tile)
-    bumps = ribs * 1
     swing = fbm(n, 4, 60, 1.2, rng=rng)
     row = v / tile * ribs + 0.10 * swing
     j = np.floor(row).astype(int)
-    x = u / tile * bumps + 0.5 * (j % 2) + 0.15 * np.roll(swing, n // 3, 0)
+    x = u / tile * ribs + 0.5 * (j % 2) + 0.15 * np.roll(swing, n // 3, 0)
     lump = np.cos(np.pi * (row - j - 0.5)) ** 0.6 * (0.6 + 0.4 * np.cos(2 * np.pi * x))
     tone = rng.normal(0, 0.02, ribs)[j % ribs] + 0.06 * noise(n, 3, 1, rng=rng)
     out = rgb(color) * (0.6 + 0.45 * lump + tone)[..., None]
-    return Maps(
-        np.clip(out, 0.02, 0.97).astype(np.float32),
-        (0.002 * lump).astype(np.float32),
-        np.full((n, n), 0.95, np.float32),
-    )
+    return maps_of(out, 0.002 * lump, 0.95, 0.02, 0.97)
 
 
 def felt(
@@ -156,11 +139,7 @@ def felt(
     out = rgb(color) * (1 + 0.05 * nap + mottle * cloud)[..., None]
     if creases:
         out = out * folds(n, tile, 0.1, creases, rng=rng)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.97).astype(np.float32),
-        (1.2e-4 * nap).astype(np.float32),
-        np.full((n, n), rough, np.float32),
-    )
+    return maps_of(out, 1.2e-4 * nap, rough, 0.01, 0.97)
 
 
 def leather(n: int, tile: float, color: Color, gloss: float = 0.45, *, rng: np.random.Generator) -> Maps:
@@ -169,11 +148,7 @@ def leather(n: int, tile: float, color: Color, gloss: float = 0.45, *, rng: np.r
     crease = np.exp(-((np.abs(a) / 0.16) ** 1.2)) + np.exp(-((np.abs(b) / 0.16) ** 1.2))
     cloud = fbm(n, 6, 60, 1.1, rng=rng)
     out = rgb(color) * (1 - 0.11 * np.clip(crease, 0, 1) + 0.018 * cloud)[..., None]
-    return Maps(
-        np.clip(out, 0.01, 0.97).astype(np.float32),
-        (-1.6e-4 * crease).astype(np.float32),
-        np.clip(gloss + 0.12 * crease + 0.03 * cloud, 0.1, 1).astype(np.float32),
-    )
+    return maps_of(out, -1.6e-4 * crease, np.clip(gloss + 0.12 * crease + 0.03 * cloud, 0.1, 1), 0.01, 0.97)
 
 
 def printed(
@@ -189,11 +164,7 @@ def printed(
     base = cloth(n, tile, rng=rng)
     shade = base.color.mean(-1, keepdims=True) / max(float(base.color.mean()), 1e-6)
     t = motif(n)[..., None]
-    return Maps(
-        np.clip(base.color * (1 - t) + rgb(color) * shade * t, 0.01, 0.97).astype(np.float32),
-        base.height,
-        base.roughness,
-    )
+    return maps_of(base.color * (1 - t) + rgb(color) * shade * t, base.height, base.roughness, 0.01, 0.97)
 
 
 def stripes_motif(n: int, count: int, share: float = 0.5, upright: bool = True) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.materials.maps import Layout, Maps, fbm, look_up, mix, noise, planks, rgb, smooth_step
+from assets.materials.maps import Layout, Maps, coordinates, fbm, look_up, maps_of, mix, noise, planks, rgb, smooth_step
 
 
 @dataclass(frozen=True)
@@ -81,15 +81,13 @@ def furniture(
     rng: np.random.Generator,
 ) -> Maps:
     """Glued panels without grooves, the grain along u running on over the tile's border."""
-    t = (np.arange(n) + 0.5) / n * tile
-    u, v = np.meshgrid(t, t[::-1])
+    u, v = coordinates(n, tile)
     width = tile / strips
     # Half a strip up: the tile's border lies within a strip, not on a joint.
     k = np.floor(v / width + 0.5).astype(int)
     across = v - k * width
-    layout = Layout(
-        k % strips, u.astype(np.float32), across.astype(np.float32), np.full((n, n), 1.0, np.float32), strips
-    )
+    edge = np.full((n, n), 1.0, np.float32)
+    layout = Layout(k % strips, u.astype(np.float32), across.astype(np.float32), edge, strips)
     kind = SPECIES[species]
     calm = dataclasses.replace(kind, tone=kind.tone * 0.25, knots=0.0)
     maps = boards(n, tile, layout, calm, gloss, 0.0, endless=True, rng=rng)
@@ -137,11 +135,7 @@ def boards(
         color = color * (1 - 0.55 * cut)[..., None]
         rough = rough + 0.25 * cut
         height = height - 6e-4 * cut + rng.normal(0, 5e-5, layout.count)[piece] * (1 - cut)
-    return Maps(
-        np.clip(color, 0.01, 0.98).astype(np.float32),
-        height.astype(np.float32),
-        np.clip(rough, 0.08, 1).astype(np.float32),
-    )
+    return maps_of(color, height, np.clip(rough, 0.08, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,9 +158,8 @@ def _sawn(n: int, tile: float, layout: Layout, species: Species, endless: bool, 
     near the pith that draws cathedrals, far from it straight lines."""
     count, pixel, piece = layout.count, tile / n, layout.piece
     plain = rng.random(count) < 0.6
-    pith_across = np.where(
-        plain, rng.normal(0, 0.035, count), rng.choice([-1, 1], count) * rng.uniform(0.10, 0.35, count)
-    )
+    beside, away = rng.normal(0, 0.035, count), rng.choice([-1, 1], count) * rng.uniform(0.10, 0.35, count)
+    pith_across = np.where(plain, beside, away)
     pith_depth = np.where(plain, rng.uniform(0.015, 0.07, count), rng.uniform(0.0, 0.05, count))
     slope = np.zeros(count) if endless else rng.normal(0, 0.02, count)
     flip = rng.choice([-1.0, 1.0], count)
@@ -181,9 +174,8 @@ def _sawn(n: int, tile: float, layout: Layout, species: Species, endless: bool, 
     radius = np.hypot(layout.across * flip[piece] - pith_across[piece], depth)
     phase = radius / ring[piece] + 0.10 * fine
     drift = np.abs(np.gradient(phase, axis=1)) + np.abs(np.gradient(phase, axis=0))
-    visible = np.clip(1.5 - 2.6 * drift, 0.0, 1) * np.clip(
-        1.35 - 0.5 * drift / max(pixel / species.ring, 1e-6), 0.35, 1
-    )
+    visible = np.clip(1.5 - 2.6 * drift, 0.0, 1)
+    visible = visible * np.clip(1.35 - 0.5 * drift / max(pixel / species.ring, 1e-6), 0.35, 1)
     f = phase - np.floor(phase)
     dark = np.where(f < 0.85, (f / 0.85) ** 2.4, 1 - (f - 0.85) / 0.15)
     each = look_up(noise(n, 1, 1, rng=rng), np.floor(phase) * 0.137 + lane[piece], lane[piece] * np.ones_like(phase))

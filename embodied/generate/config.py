@@ -5,11 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from embodied.generate.novelty import styles_of
-from embodied.house.house import LANDSCAPES, SEASONS, HouseError
+from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS, HouseError
 from embodied.house.validation import STYLES
 from embodied.novelty import NOVELTIES
 
 SHAPES = ("rectangle", "L", "T", "U", "cross")
+CHOICES = {
+    "weather": WEATHERS,
+    "landscape": LANDSCAPES,
+    "season": SEASONS,
+    "style": STYLES,
+    "novelty": NOVELTIES,
+    "shape": SHAPES,
+}
+"""Field of a HouseConfig to the words it may be."""
 AREAS = (32.0, 700.0)
 """Smallest and largest total area, square metres."""
 
@@ -85,22 +94,13 @@ class HouseConfig:
         _within("disorder", self.disorder, 0, 1)
         if self.hour is not None and not 0 <= self.hour < 24:
             raise HouseError(f"hour should lie in [0, 24), got {self.hour}")
-        if self.weather not in (None, "clear", "hazy", "overcast"):
-            raise HouseError(f"weather should be 'clear', 'hazy' or 'overcast', got {self.weather!r}")
-        if self.landscape not in (None, *LANDSCAPES):
-            raise HouseError(f"landscape should be one of {LANDSCAPES}, got {self.landscape!r}")
-        if self.season not in (None, *SEASONS):
-            raise HouseError(f"season should be one of {SEASONS}, got {self.season!r}")
-        if self.style is not None and self.style not in STYLES:
-            raise HouseError(f"style should be one of {STYLES}, got {self.style!r}")
-        if self.novelty not in (None, *NOVELTIES):
-            raise HouseError(f"novelty should be one of {NOVELTIES}, got {self.novelty!r}")
+        for name, known in CHOICES.items():
+            if (value := getattr(self, name)) not in (None, *known):
+                raise HouseError(f"{name} should be one of {known}, got {value!r}")
         if self.style is not None and self.style not in styles_of(self.novelty):
             raise HouseError(
                 f"{self.novelty} houses have the styles {styles_of(self.novelty)}, got {self.style!r}; leave style out"
             )
-        if self.shape not in (None, *SHAPES):
-            raise HouseError(f"shape should be one of {SHAPES}, got {self.shape!r}")
         if self.storeys != 1:
             raise HouseError(
                 f"storeys={self.storeys} cannot be built yet: the generator draws single-storey houses; use storeys=1"

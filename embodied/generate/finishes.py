@@ -15,11 +15,11 @@ import shapely
 from embodied.generate.kinds import BEDROOMS
 from embodied.generate.novelty import styles_of, taste_of
 from embodied.generate.tastes import TABLE
-from embodied.house.house import House, HouseError, Room
-from embodied.house.validation import STYLES
+from embodied.house.house import House, Room
 
 WET = ("bathroom", "toilet", "laundry_room")
-TALK = ("living_room", "dining_room", "family_room", "hall", "corridor", "library", "study")
+MOVING = ("hall", "corridor")
+TALK = ("living_room", "dining_room", "family_room", *MOVING, "library", "study")
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,7 @@ class Palette:
 
 
 def draw_palette(style: str | None, novelty: str | None = None, *, rng: np.random.Generator) -> Palette:
-    """The palette of one house in `style`, or in a style drawn from those of its novelty.
-
-    Raises:
-      HouseError: an unknown style.
-    """
-    if style is not None and style not in STYLES:
-        raise HouseError(f"style should be one of {STYLES}, got {style!r}")
+    """The palette of one house in `style`, or in a style drawn from those of its novelty."""
     name = style or str(rng.choice(styles_of(novelty)))
     taste = taste_of(name, novelty)
     floor, stone = _one(taste.woods, rng), _one(taste.stones, rng)
@@ -93,17 +87,16 @@ def dressed(house: House, palette: Palette, *, rng: np.random.Generator) -> Hous
     nth: dict[str, int] = {}
     for room in house.rooms:
         nth[room.kind] = nth.get(room.kind, -1) + 1
-        floor, wall = _floor(room, house, palette), _wall(room, palette, nth[room.kind], rng)
+        plain, floor = room.kind in (*WET, "garage"), _floor(room, house, palette)
+        wall = _wall(room, palette, nth[room.kind], rng)
         accent, accent_finish = _accent(room, house, palette, rng)
-        skirting = palette.skirting if room.kind not in (*WET, "garage") else floor
-        ceiling = "paint_white/0" if room.kind in (*WET, "garage") else palette.ceiling
         rooms.append(
             dataclasses.replace(
                 room,
                 floor_finish=floor,
                 wall_finish=wall,
-                ceiling_finish=ceiling,
-                skirting_finish=skirting,
+                ceiling_finish="paint_white/0" if plain else palette.ceiling,
+                skirting_finish=floor if plain else palette.skirting,
                 accent_wall=accent,
                 accent_finish=accent_finish,
             )
@@ -125,29 +118,16 @@ def _floor(room: Room, house: House, palette: Palette) -> str:
         return palette.wet_floors[0 if kind != "laundry_room" else -1]
     if kind in ("garage", "workshop"):
         return palette.rough_floor
-    if kind in ("kitchen", "pantry"):
+    if kind in ("kitchen", "pantry", "sun_room"):
         return palette.kitchen_floor
-    if kind in ("hall", "corridor"):
+    if kind in MOVING:
         return palette.hall_floor
-    if kind == "sun_room":
-        return palette.kitchen_floor
     if kind == "closet":
-        inside = next(
-            (
-                o.rooms[1] if o.rooms[0] == room.id else o.rooms[0]
-                for o in house.openings
-                if room.id in o.rooms and o.rooms[1] is not None
-            ),
-            None,
+        beside = next(
+            (r for o in house.openings if room.id in o.rooms for r in o.rooms if r not in (room.id, None)), None
         )
-        other = house.room_by_id[inside].kind if inside else "corridor"
-        return (
-            palette.private_floor
-            if other in BEDROOMS
-            else palette.hall_floor
-            if other in ("hall", "corridor")
-            else (palette.floor)
-        )
+        other = house.room_by_id[beside].kind if beside else "corridor"
+        return palette.private_floor if other in BEDROOMS else palette.hall_floor if other in MOVING else palette.floor
     return palette.private_floor if kind in (*BEDROOMS, "playroom", "gym") else palette.floor
 
 

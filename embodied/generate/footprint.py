@@ -19,16 +19,35 @@ Rect = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True)
-class Strip:
-    """A row of rooms on one side of a corridor; u runs along it from the public end, v away from the corridor."""
+class Stretch:
+    """A stretch along the spine."""
 
     axis: str
-    """'x' or 'y': the world axis u runs along."""
+    """'x' or 'y': the world axis it runs along."""
     start: int
-    """World coordinate on `axis` where u = 0."""
+    """World coordinate on `axis` where it starts."""
     way: int
-    """+1 or -1: the sense of u on `axis`."""
+    """+1 or -1: in which sense it runs on `axis`."""
     length: int
+
+    def between(self, s0: int, s1: int, low: int, high: int) -> Rect:
+        """From s0 to s1 along it, and between two world coordinates across."""
+        a, b = sorted((self.start + self.way * s0, self.start + self.way * s1))
+        return (a, low, b, high) if self.axis == "x" else (low, a, high, b)
+
+    def strip(self, base: int, out: int, depth: int, *, rank: float, band: int, u_band: int) -> Strip:
+        """A row of rooms along it; see the fields of Strip."""
+        return Strip(self.axis, self.start, self.way, self.length, base, out, depth, rank, band, u_band)
+
+    def corridor(self, low: int, high: int, free: tuple[bool, bool]) -> Band:
+        """A corridor along it; see the fields of Band."""
+        return Band(self.axis, self.start, self.way, self.length, low, high, free)
+
+
+@dataclass(frozen=True)
+class Strip(Stretch):
+    """A row of rooms on one side of a corridor; u runs along it from the public end, v away from the corridor."""
+
     base: int
     """World coordinate, across, of the corridor's edge, v = 0."""
     out: int
@@ -42,19 +61,13 @@ class Strip:
     """Spine coordinate, on that band, of u = 0."""
 
     def rect(self, u0: int, u1: int, v0: int, v1: int) -> Rect:
-        a, b = sorted((self.start + self.way * u0, self.start + self.way * u1))
-        c, d = sorted((self.base + self.out * v0, self.base + self.out * v1))
-        return (a, c, b, d) if self.axis == "x" else (c, a, d, b)
+        return self.between(u0, u1, *sorted((self.base + self.out * v0, self.base + self.out * v1)))
 
 
 @dataclass(frozen=True)
-class Band:
+class Band(Stretch):
     """The corridor of one wing: a strip of its own along the spine."""
 
-    axis: str
-    start: int
-    way: int
-    length: int
     low: int
     high: int
     """World coordinates across."""
@@ -62,15 +75,13 @@ class Band:
     """Whether its start and its end lie on an outer wall, so that a room may take them over."""
 
     def rect(self, s0: int, s1: int) -> Rect:
-        a, b = sorted((self.start + self.way * s0, self.start + self.way * s1))
-        return (a, self.low, b, self.high) if self.axis == "x" else (self.low, a, self.high, b)
+        return self.between(s0, s1, self.low, self.high)
 
 
 @dataclass(frozen=True)
 class Cap:
     """The full depth of a wing's free end, for one or two rooms that the corridor runs into."""
 
-    band: int
     at_start: bool
     axis: str
     """The axis across the wing, along which rooms are stacked."""
@@ -80,37 +91,7 @@ class Cap:
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A stretch along the spine: the axis it runs along, where on it it starts, in which sense, and how long it is."""
-
-    axis: str
-    start: int
-    way: int
-    length: int
-
-    def strip(self, base: int, out: int, depth: int, *, rank: float, band: int, u_band: int) -> Strip:
-        """A row of rooms along it; see the fields of Strip."""
-        return Strip(
-            axis=self.axis,
-            start=self.start,
-            way=self.way,
-            length=self.length,
-            base=base,
-            out=out,
-            depth=depth,
-            rank=rank,
-            band=band,
-            u_band=u_band,
-        )
-
-    def corridor(self, low: int, high: int, free: tuple[bool, bool]) -> Band:
-        """A corridor along it; see the fields of Band."""
-        return Band(axis=self.axis, start=self.start, way=self.way, length=self.length, low=low, high=high, free=free)
-
-
-@dataclass(frozen=True)
 class Footprint:
-    shape: str
     strips: tuple[Strip, ...]
     bands: tuple[Band, ...]
     caps: tuple[Cap, ...]
@@ -202,7 +183,7 @@ def _flat(area: float, rng: np.random.Generator) -> Footprint:
         Stretch("x", 0, 1, length).strip(bottom, 1, top, rank=0.0, band=0, u_band=0),
         Stretch("x", 0, 1, length).strip(bottom, -1, bottom, rank=0.0, band=0, u_band=0),
     )
-    return Footprint(shape="rectangle", strips=strips, bands=(), caps=(), corridor=0)
+    return Footprint(strips, bands=(), caps=(), corridor=0)
 
 
 def _bar(area: float, rng: np.random.Generator) -> Footprint:
@@ -210,11 +191,11 @@ def _bar(area: float, rng: np.random.Generator) -> Footprint:
     corridor = int(rng.integers(12, 15)) + (area > 180)
     scale = float(np.interp(area, (60, 110, 200, 400, 600), (0, 0.4, 1.0, 2.4, 3.2)))
     wing = _draw_wing(corridor, int(30 + 9 * scale), int(36 + 12 * scale), rng)
-    return _one_wing("rectangle", round(area * 100 / wing.depth), wing, (), area, rng)
+    return _one_wing(round(area * 100 / wing.depth), wing, (), area, rng)
 
 
 def _one_wing(
-    shape: str, length: int, wing: Wing, bumps: tuple[tuple[int, int, int], ...], area: float, rng: np.random.Generator
+    length: int, wing: Wing, bumps: tuple[tuple[int, int, int], ...], area: float, rng: np.random.Generator
 ) -> Footprint:
     """A wing along x; `bumps` are (x0, x1, extra depth) of the bottom row, sorted."""
     left = right = 0
@@ -237,20 +218,17 @@ def _one_wing(
         extra = next((e for b0, b1, e in bumps if b0 <= x0 and x1 <= b1), 0)
         strips.append(Stretch("x", x0, 1, x1 - x0).strip(bottom, -1, bottom + extra, rank=x0, band=0, u_band=x0 - left))
     band = Stretch("x", left, 1, length - left - right).corridor(bottom, bottom + corridor, (left == 0, right == 0))
-    caps = []
-    if left:
-        caps.append(Cap(band=0, at_start=True, axis="y", rect=(0, 0, left, depth), passage=(bottom, bottom + corridor)))
-    if right:
-        caps.append(
-            Cap(
-                band=0,
-                at_start=False,
-                axis="y",
-                rect=(length - right, 0, length, depth),
-                passage=(bottom, bottom + corridor),
-            )
-        )
-    return Footprint(shape=shape, strips=tuple(strips), bands=(band,), caps=tuple(caps), corridor=corridor)
+    passage = (bottom, bottom + corridor)
+    caps = _caps(
+        (left, Cap(True, "y", (0, 0, left, depth), passage)),
+        (right, Cap(False, "y", (length - right, 0, length, depth), passage)),
+    )
+    return Footprint(tuple(strips), (band,), caps, corridor)
+
+
+def _caps(*ends: tuple[int, Cap]) -> tuple[Cap, ...]:
+    """Of (length, cap) the caps that are there."""
+    return tuple(cap for length, cap in ends if length)
 
 
 def _bumped(area: float, shape: str, rng: np.random.Generator) -> Footprint:
@@ -270,7 +248,7 @@ def _bumped(area: float, shape: str, rng: np.random.Generator) -> Footprint:
         bumps = ((x0, x0 + wide, extra),)
     else:
         bumps = ((0, wide, extra), (length - wide, length, extra))
-    return _one_wing(shape, length, wing, bumps, area, rng)
+    return _one_wing(length, wing, bumps, area, rng)
 
 
 def _winged(area: float, shape: str, rng: np.random.Generator) -> Footprint:
@@ -325,22 +303,11 @@ def _l_or_t(
             xb + corridor, 1, right, rank=xb + bottom, band=1, u_band=bottom
         )
         strips = (a_top, a_left, a_right, b_left, b_right)
-    caps = []
-    if cap:
-        caps.append(
-            Cap(band=0, at_start=True, axis="y", rect=(0, 0, cap, bar.depth), passage=(bottom, bottom + corridor))
-        )
-    if foot:
-        caps.append(
-            Cap(
-                band=1,
-                at_start=False,
-                axis="x",
-                rect=(x0, -drop, x0 + wing.depth, foot - drop),
-                passage=(xb, xb + corridor),
-            )
-        )
-    return Footprint(shape=shape, strips=strips, bands=(band_a, band_b), caps=tuple(caps), corridor=corridor)
+    caps = _caps(
+        (cap, Cap(True, "y", (0, 0, cap, bar.depth), (bottom, bottom + corridor))),
+        (foot, Cap(False, "x", (x0, -drop, x0 + wing.depth, foot - drop), (xb, xb + corridor))),
+    )
+    return Footprint(strips, (band_a, band_b), caps, corridor)
 
 
 def _u(long: int, bar: Wing, public: tuple[Wing, int], private: tuple[Wing, int]) -> Footprint:
@@ -364,7 +331,7 @@ def _u(long: int, bar: Wing, public: tuple[Wing, int], private: tuple[Wing, int]
             xb + corridor, 1, right, rank=far + xb - xa, band=2, u_band=-corridor
         ),
     )
-    return Footprint(shape="U", strips=strips, bands=(band_p, band_a, band_q), caps=(), corridor=corridor)
+    return Footprint(strips, (band_p, band_a, band_q), (), corridor)
 
 
 def _crossed(area: float, rng: np.random.Generator) -> Footprint:
@@ -425,15 +392,11 @@ def _cross(c: CrossShape, day: int, night: int, foot: int, head: int) -> Footpri
         Stretch("y", bottom, -1, bottom + c.below - foot).corridor(xb, beyond_b, (False, foot == 0)),
         Stretch("y", roof, 1, top + c.above - head).corridor(xc, beyond_c, (False, head == 0)),
     )
-    caps = []
-    if day:
-        caps.append(Cap(band=0, at_start=True, axis="y", rect=(0, 0, day, deep), passage=(bottom, roof)))
-    if head:
-        rect = (c.x_above, deep + c.above - head, c.x_above + c.north.depth, deep + c.above)
-        caps.append(Cap(band=2, at_start=True, axis="x", rect=rect, passage=(xc, beyond_c)))
-    if night:
-        caps.append(Cap(band=0, at_start=False, axis="y", rect=(stop, 0, c.long, deep), passage=(bottom, roof)))
-    if foot:
-        rect = (c.x_below, -c.below, c.x_below + c.south.depth, foot - c.below)
-        caps.append(Cap(band=1, at_start=False, axis="x", rect=rect, passage=(xb, beyond_b)))
-    return Footprint(shape="cross", strips=strips, bands=bands, caps=tuple(caps), corridor=corridor)
+    up, down = deep + c.above - head, foot - c.below
+    caps = _caps(
+        (day, Cap(True, "y", (0, 0, day, deep), (bottom, roof))),
+        (head, Cap(True, "x", (c.x_above, up, c.x_above + c.north.depth, deep + c.above), (xc, beyond_c))),
+        (night, Cap(False, "y", (stop, 0, c.long, deep), (bottom, roof))),
+        (foot, Cap(False, "x", (c.x_below, -c.below, c.x_below + c.south.depth, down), (xb, beyond_b))),
+    )
+    return Footprint(strips, bands, caps, corridor)

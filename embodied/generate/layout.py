@@ -102,13 +102,7 @@ def draw_plan(
 
 def _random_genome(footprints: int, spaces: int, rng: np.random.Generator) -> Genome:
     modules, rows, cuts = rng.integers(2**31, size=3).tolist()
-    return Genome(
-        footprint=int(rng.integers(footprints)),
-        modules=modules,
-        rows=rows,
-        cuts=cuts,
-        privacy=tuple(rng.normal(0, 0.45, spaces).tolist()),
-    )
+    return Genome(int(rng.integers(footprints)), modules, rows, cuts, tuple(rng.normal(0, 0.45, spaces).tolist()))
 
 
 def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genome:
@@ -184,13 +178,11 @@ def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
 
     rects = [move(c.rect) for c in plan.cells]
     dx, dy = min(r[0] for r in rects), min(r[1] for r in rects)
-    cells = tuple(
-        Cell(c.kind, (r[0] - dx, r[1] - dy, r[2] - dx, r[3] - dy), c.area, c.owner) for c, r in zip(plan.cells, rects)
-    )
+    rects = [(r[0] - dx, r[1] - dy, r[2] - dx, r[3] - dy) for r in rects]
+    cells = tuple(replace(c, rect=r) for c, r in zip(plan.cells, rects))
     walls = walls_between(list(cells))
-    links = tuple(
-        Link(k.child, k.parent, walls[min(k.child, k.parent), max(k.child, k.parent)], k.tree) for k in plan.links
-    )
+    between = ((min(k.child, k.parent), max(k.child, k.parent)) for k in plan.links)
+    links = tuple(replace(k, wall=walls[pair]) for k, pair in zip(plan.links, between))
     return Plan(cells, links, plan.score)
 
 
@@ -203,9 +195,8 @@ def _candidate(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Gen
         if chosen is None:
             return None
         modules = [m for m in modules if m not in chosen]
-    rows = _assign(
-        footprint, modules, {id(s): p for s, p in zip(spaces, genome.privacy)}, np.random.default_rng(genome.rows)
-    )
+    privacy = {id(s): p for s, p in zip(spaces, genome.privacy)}
+    rows = _assign(footprint, modules, privacy, np.random.default_rng(genome.rows))
     if rows is None:
         return None
     return _lay(footprint, rows, cells, np.random.default_rng(genome.cuts))
@@ -264,9 +255,8 @@ def _stack(cap: Cap, parts: list[WantedRoom], owned: bool, first: int, rng: np.r
     a, b = (x0, x1) if cap.axis == "y" else (y0, y1)
     mid = a + round(across * parts[1].area / (parts[1].area + parts[2].area))
     for s, (p, q) in zip(parts[1:], ((a, mid), (mid, b))):
-        cells.append(
-            Cell(s.kind, (p, rest[0], q, rest[1]) if cap.axis == "y" else (rest[0], p, rest[1], q), s.area, owner)
-        )
+        beside = (p, rest[0], q, rest[1]) if cap.axis == "y" else (rest[0], p, rest[1], q)
+        cells.append(Cell(s.kind, beside, s.area, owner))
     return cells
 
 
@@ -283,9 +273,7 @@ def _assign(
     noise = rng.exponential(14.0, (len(modules), len(rows))).tolist()
     for k in order:
         m = modules[k]
-        by_depth = {
-            d: (width(m, d, corridor), _slimness(m, d + (corridor if m.main.kind == "hall" else 0))) for d in depths
-        }
+        by_depth = {d: (width(m, d, corridor), _slimness(m, d)) for d in depths}
         best: int | None = None
         least = 1e9
         for i, s in enumerate(strips):

@@ -160,12 +160,11 @@ def _with_niche(module: Module, slot: Slot, edge: int, first: int) -> list[Cell]
     rest = h - deep
     niche = WantedRoom(filler or "closet", rest * (end - edge) / 100)
     if module.owned:
-        cells = [slot.cell(alone, edge, end, rest, h, first)]
-        return cells + (
-            [slot.cell(niche, edge, end, 0, rest, None if alone.kind == "pantry" else first)] if rest else []
-        )
-    cells = [slot.cell(alone, edge, end, 0, deep)]
-    return cells + ([slot.cell(niche, edge, end, deep, h, first)] if rest else [])
+        owner = None if alone.kind == "pantry" else first
+        cells = [slot.cell(alone, edge, end, rest, h, first), slot.cell(niche, edge, end, 0, rest, owner)]
+    else:
+        cells = [slot.cell(alone, edge, end, 0, deep), slot.cell(niche, edge, end, deep, h, first)]
+    return cells if rest else cells[:1]
 
 
 def _side_by_side(module: Module, slot: Slot, edge: int, first: int) -> list[Cell] | None:

@@ -94,22 +94,9 @@ class _Openings:
         angle: float = 0.0,
     ) -> None:
         self.counts[kind] += 1
-        a, b = rounded(jambs[0]), rounded(jambs[1])
-        leaf, name = self.leaves.of(kind), f"{kind}_{self.counts[kind]}"
-        self.found.append(
-            Opening(
-                id=name,
-                kind=kind,
-                rooms=rooms,
-                a=a,
-                b=b,
-                sill=rounded(sill),
-                head=rounded(head),
-                leaf_finish=leaf,
-                hinge=hinge,
-                angle=rounded(angle),
-            )
-        )
+        name, leaf = f"{kind}_{self.counts[kind]}", self.leaves.of(kind)
+        a, b, sill, head, angle = rounded((*jambs, sill, head, angle))
+        self.found.append(Opening(name, kind, rooms, a, b, sill, head, leaf, hinge, angle))
 
     def add_outer(
         self,
@@ -212,7 +199,7 @@ def _passage(made: _Openings, link: Link, height: float, open_plan: bool, rng: n
     middle = (kinds <= CIRCULATION or open_plan) and not tight
     start = low + NIB + slack * (0.5 if middle else round(where) if tight else where)
     head = round(min(height - 0.15, float(rng.choice([2.2, 2.3, 2.4]))), 2)
-    made.zones += _fronts(axis, across, start, start + width)
+    made.zones.append(_front(axis, across, start, start + width))
     ends = (made.names[link.child], made.names[link.parent])
     made.add("passage", ends, _jambs(a, axis, across, start, start + width), 0.0, head)
 
@@ -242,24 +229,26 @@ def _area(cell: Cell) -> float:
     return (x1 - x0) * (y1 - y0)
 
 
-def _swing(axis: str, across: float, low: float, high: float, side: int) -> Rectangle:
-    """The square a leaf sweeps on `side` of its wall."""
-    c, d = sorted((across, across + side * (high - low)))
+def _beside(axis: str, low: float, high: float, across: float, other: float) -> Rectangle:
+    """From low to high along a wall, between two coordinates across it."""
+    c, d = sorted((across, other))
     return (low, c, high, d) if axis == "x" else (c, low, d, high)
 
 
-def _fronts(axis: str, across: float, low: float, high: float) -> list[Rectangle]:
+def _swing(axis: str, across: float, low: float, high: float, side: int) -> Rectangle:
+    """The square a leaf sweeps on `side` of its wall."""
+    return _beside(axis, low, high, across, across + side * (high - low))
+
+
+def _front(axis: str, across: float, low: float, high: float) -> Rectangle:
     """The floor half a metre before and behind a way through."""
-    low, high = low + 0.12, high - 0.12
-    c, d = across - 0.55, across + 0.55
-    return [(low, c, high, d) if axis == "x" else (c, low, d, high)]
+    return _beside(axis, low + 0.12, high - 0.12, across - 0.55, across + 0.55)
 
 
 def _open_leaf(axis: str, across: float, low: float, high: float, side: int, at_low: bool) -> Rectangle:
     """Where the leaf stands when open at a right angle, with a little air."""
     a, b = (low - 0.05, low + 0.1) if at_low else (high - 0.1, high + 0.05)
-    c, d = sorted((across + side * 0.06, across + side * (high - low + 0.3)))
-    return (a, c, b, d) if axis == "x" else (c, a, d, b)
+    return _beside(axis, a, b, across + side * 0.06, across + side * (high - low + 0.3))
 
 
 def _overlap(a: Rectangle, b: Rectangle) -> float:
@@ -276,8 +265,8 @@ def _door(made: _Openings, link: Link, rng: np.random.Generator) -> None:
     for start in (low + NIB, high - NIB - width, (low + high - width) / 2):
         corner = min(start - own[0], own[1] - start - width)
         crowd = sum(_overlap(_swing(axis, across, start, start + width, side), s) for s in made.swings)
-        fronts = _fronts(axis, across, start, start + width)
-        shut = sum(_overlap(f, s) for f in fronts for s in made.stands)
+        front = _front(axis, across, start, start + width)
+        shut = sum(_overlap(front, s) for s in made.stands)
         near_low = start - own[0] <= own[1] - start - width
         for at_low in (True, False):
             leaf = _open_leaf(axis, across, start, start + width, side, at_low)
@@ -290,7 +279,7 @@ def _door(made: _Openings, link: Link, rng: np.random.Generator) -> None:
     start, end = best.start, best.start + width
     made.swings.append(_swing(axis, across, start, end, side))
     made.stands.append(_open_leaf(axis, across, start, end, side, best.at_low))
-    made.zones += _fronts(axis, across, start, end)
+    made.zones.append(_front(axis, across, start, end))
     jambs = _jambs(cell, axis, across, start, end)
     open_by = math.radians(float(rng.uniform(82, 95)) if rng.random() < 0.8 else float(rng.uniform(60, 80)))
     ends = (made.names[link.child], made.names[link.parent])
@@ -342,7 +331,7 @@ def _folded_door(made: _Openings, link: Link, rng: np.random.Generator) -> bool:
     _, _, start, at_low = min(spots)
     jambs = _jambs(outer, axis, across, start, start + width)
     made.swings.append(_swing(axis, across, start, start + width, side))
-    made.zones += _fronts(axis, across, start, start + width)
+    made.zones.append(_front(axis, across, start, start + width))
     open_by = math.radians(float(rng.uniform(164, 174)))
     ends = (made.names[link.parent], made.names[link.child])
     made.add("door", ends, jambs, 0.0, 2.05, _hinge(jambs, at_low), open_by)

@@ -198,10 +198,8 @@ class _Sheet:
 
     def hatch(self, room: Room) -> None:
         """Faint tiles."""
-        base = ROOM_COLOURS.get(room.kind, PAPER)
-        pale = _darker(base, 9)
-        x0, y0, x1, y1 = shapely.Polygon(room.polygon).bounds
-        inside = shapely.Polygon(room.polygon)
+        pale, inside = _darker(ROOM_COLOURS.get(room.kind, PAPER), 9), shapely.Polygon(room.polygon)
+        x0, y0, x1, y1 = inside.bounds
         for k in range(1, math.ceil((x1 - x0) / 0.4)):
             self._clipped(((x0 + 0.4 * k, y0), (x0 + 0.4 * k, y1)), inside, pale)
         for k in range(1, math.ceil((y1 - y0) / 0.4)):
@@ -229,13 +227,8 @@ def _draw_walls(sheet: _Sheet, house: House, rooms: list[Room]) -> None:
 def _frame(house: House, o: Opening) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:
     """Jambs a and b, the unit normal into the first room, and the wall's extent along it."""
     half = house.inner_wall / 2
-    return (
-        np.asarray(o.a, float),
-        np.asarray(o.b, float),
-        inward(house, o),
-        -(half if o.rooms[1] is not None else house.outer_wall - half),
-        half,
-    )
+    low = -(half if o.rooms[1] is not None else house.outer_wall - half)
+    return np.asarray(o.a, float), np.asarray(o.b, float), inward(house, o), low, half
 
 
 def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
@@ -247,21 +240,20 @@ def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
     if o.kind in ("window", "french_window"):
         for v in (low, high):
             sheet.line((a + v * n, b + v * n), 0.03)
-        for v in (low * 0.45 + high * 0.55,):
-            sheet.line((a + v * n, b + v * n), 0.05 if o.kind == "window" else 0.03, (96, 140, 168))
+        middle = (low * 0.45 + high * 0.55) * n
+        sheet.line((a + middle, b + middle), 0.05 if o.kind == "window" else 0.03, (96, 140, 168))
         if o.kind == "french_window":
-            mid = (a + b) / 2
+            mid, width = (a + b) / 2, float(np.linalg.norm(b - a))
             sheet.line((mid + low * n, mid + high * n), 0.03)
             for end, sign in ((a, 1), (b, -1)):
-                width = float(np.linalg.norm(b - a))
                 _arc(sheet, end + high * n, (b - a) / width * sign, n, width / 2, 1.4, GLASS)
     elif o.kind == "garage_door":
         for v in np.linspace(low, high, 4):
             sheet.line((a + v * n, b + v * n), 0.02, SOFT)
     elif o.kind in ("door", "front_door", "back_door"):
         hinge, other = (a, b) if o.hinge == "a" else (b, a)
-        across = (other - hinge) / np.linalg.norm(other - hinge)
         width = float(np.linalg.norm(other - hinge))
+        across = (other - hinge) / width
         shown = o.angle if o.kind == "door" else math.pi / 2
         _arc(sheet, hinge + high * n, across, n, width, max(shown, math.radians(60)), SOFT)
         leaf = math.cos(shown) * across + math.sin(shown) * n
@@ -424,11 +416,8 @@ def _label(sheet: _Sheet, house: House, room: Room) -> None:
         width = max(sheet.draw.textlength(name, font=face), 0.8 * sheet.draw.textlength(area, font=face))
         if width < 0.94 * (x1 - x0) * sheet.scale:
             break
-        if (
-            y1 - y0 > 1.5 * (x1 - x0)
-            and width < 0.94 * (y1 - y0) * sheet.scale
-            and 2.4 * size < (x1 - x0) * sheet.scale
-        ):
+        high = y1 - y0 > 1.5 * (x1 - x0) and width < 0.94 * (y1 - y0) * sheet.scale
+        if high and 2.4 * size < (x1 - x0) * sheet.scale:
             turned = True
             break
         size *= 0.92
@@ -445,20 +434,16 @@ def _label(sheet: _Sheet, house: House, room: Room) -> None:
     if turned:
         tile = tile.rotate(90, expand=True)
     x, y = sheet.xy(centre)
-    x = (
-        float(np.clip(x, sheet.xy((x0, 0))[0] + tile.width / 2, sheet.xy((x1, 0))[0] - tile.width / 2))
-        if (tile.width < (x1 - x0) * sheet.scale)
-        else sheet.xy(((x0 + x1) / 2, 0))[0]
-    )
+    left, middle, right = (sheet.xy((at, 0))[0] for at in (x0, (x0 + x1) / 2, x1))
+    room_for_it = tile.width < (x1 - x0) * sheet.scale
+    x = float(np.clip(x, left + tile.width / 2, right - tile.width / 2)) if room_for_it else middle
     sheet.image.paste(tile, (round(x - tile.width / 2), round(y - tile.height / 2)), tile)
 
 
 def _calm_spot(house: House, room: Room, inside: shapely.Polygon) -> tuple[float, float]:
     """Near the middle, but off furniture where the room leaves a choice."""
-    things = shapely.union_all(
-        [footprint(p) for p in house.placements if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7]
-        or [shapely.Point(1e6, 1e6)]
-    )
+    low = (p for p in house.placements if p.room == room.id and p.size[2] > 0.04 and p.position[2] < 1.7)
+    things = shapely.union_all([footprint(p) for p in low])
     x0, y0, x1, y1 = inside.bounds
     best, least = ((x0 + x1) / 2, (y0 + y1) / 2), math.inf
     for u in np.linspace(0.5, 0.15, 5):
@@ -479,24 +464,19 @@ def _legend(sheet: _Sheet, house: House, titles: bool) -> None:
     small = font(float(np.clip(0.22 * s, 8, 16)))
     base = height - 0.55 * s
     length = 5 if (sheet.high - sheet.low)[0] > 9 else 2
+    at = lambda k: 0.6 * s + k * s
     for k in range(length):
-        sheet.draw.rectangle(
-            (0.6 * s + k * s, base, 0.6 * s + (k + 1) * s, base + 0.1 * s),
-            fill=INK if k % 2 == 0 else PAPER,
-            outline=INK,
-        )
-    for k in (0, length):
-        sheet.draw.text(
-            (0.6 * s + k * s, base - 0.08 * s), f"{k}" + (" m" if k else ""), font=small, fill=INK, anchor="md"
-        )
+        fill = INK if k % 2 == 0 else PAPER
+        sheet.draw.rectangle((at(k), base, at(k + 1), base + 0.1 * s), fill=fill, outline=INK)
+    for k, text in ((0, "0"), (length, f"{length} m")):
+        sheet.draw.text((at(k), base - 0.08 * s), text, font=small, fill=INK, anchor="md")
     x, y, r = width - 1.0 * s, height - 0.85 * s, 0.5 * s
     d = np.array([math.cos(house.sky.north), -math.sin(house.sky.north)])
     n = np.array([-d[1], d[0]])
     c = np.array([x, y])
-    sheet.draw.polygon([tuple(c + r * d), tuple(c - 0.6 * r * d + 0.45 * r * n), tuple(c - 0.3 * r * d)], fill=INK)
-    sheet.draw.polygon(
-        [tuple(c + r * d), tuple(c - 0.6 * r * d - 0.45 * r * n), tuple(c - 0.3 * r * d)], outline=INK, fill=PAPER
-    )
+    for side, fill in ((1, INK), (-1, PAPER)):
+        half = [c + r * d, c - 0.6 * r * d + side * 0.45 * r * n, c - 0.3 * r * d]
+        sheet.draw.polygon([tuple(p) for p in half], fill=fill, outline=INK)
     sheet.draw.text(tuple(c + 1.35 * r * d), "N", font=small, fill=INK, anchor="mm")
     if titles:
         floor = sum(house.floor(r).area for r in house.rooms)

@@ -371,14 +371,8 @@ def _check_numbers(house: House) -> None:
 
 
 def _check_ids(house: House) -> None:
-    for what, named in (
-        ("rooms", house.rooms),
-        ("openings", house.openings),
-        ("placements", house.placements),
-        ("lights", house.lights),
-        ("stairs", house.stairs),
-    ):
-        ids = [x.id for x in named]
+    for what in ("rooms", "openings", "placements", "lights", "stairs"):
+        ids = [x.id for x in getattr(house, what)]
         if len(set(ids)) < len(ids):
             twice = sorted({i for i in ids if ids.count(i) > 1})
             raise HouseError(f"{what} share the ids {twice}; every id must be unique")

@@ -40,15 +40,9 @@ def check_known(house: House, catalogue: Catalogue) -> None:
     """
     if house.style not in STYLES:
         raise HouseError(f"the house has the unknown style {house.style!r}; use one of {STYLES}")
-    for room in house.rooms:
-        for finish in (
-            room.floor_finish,
-            room.wall_finish,
-            room.ceiling_finish,
-            room.skirting_finish,
-            room.accent_finish,
-        ):
-            _check_material(f"room {room.id!r}", finish)
+    for r in house.rooms:
+        for finish in (r.floor_finish, r.wall_finish, r.ceiling_finish, r.skirting_finish, r.accent_finish):
+            _check_material(f"room {r.id!r}", finish)
     for opening in house.openings:
         _check_material(f"opening {opening.id!r}", opening.leaf_finish)
     for p in house.placements:

@@ -91,19 +91,17 @@ def paint_land(canvas: Canvas, place: Scenery, light: FarLight, *, rng: np.rando
     paint_ground(canvas, place, light, rng=rng)
     things: Things = []
     for far in place.table.far:
-        things += (
-            ridge(canvas, far, place, light, rng=rng)
-            if isinstance(far, Ridge)
-            else town(canvas, far, place, light, rng=rng)
-        )
+        if isinstance(far, Ridge):
+            things += ridge(canvas, far, place, light, rng=rng)
+        else:
+            things += town(canvas, far, place, light, rng=rng)
     shore = place.table.water
     count, nearest, farthest = place.table.scatter
     for _ in range(count):
-        even = place.landscape == "forest"
         t = rng.random()
-        away = float(
-            np.sqrt(nearest**2 + t * (farthest**2 - nearest**2)) if even else nearest * (farthest / nearest) ** t
-        )
+        away = nearest * (farthest / nearest) ** t
+        if place.landscape == "forest":  # as dense everywhere
+            away = float(np.sqrt(nearest**2 + t * (farthest**2 - nearest**2)))
         yaw = float(rng.uniform(-np.pi, np.pi))
         one = tree(canvas, away, yaw, place, light, rng=rng)
         if shore is None or np.cos(yaw - place.outlook) < DRY:

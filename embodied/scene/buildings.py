@@ -116,31 +116,15 @@ def _add_roof(add: Add, b: Building, detail: bool) -> None:
     for s in (1, -1):
         add(ROOF, (-u * s, -v * s, low), (u * s, -v * s, low), (u * s, 0, top), (-u * s, 0, top))
         if detail:
-            add(
-                TRIM,
-                (-u * s, -v * s, low - 0.16),
-                (u * s, -v * s, low - 0.16),
-                (u * s, -v * s, low),
-                (-u * s, -v * s, low),
-            )
-            add(
-                TRIM,
-                (u * s, 0, top - 0.16),
-                (u * s, -v * s, low - 0.16),
-                (-u * s, -v * s, low - 0.16),
-                (-u * s, 0, top - 0.16),
-            )
+            p, q, y, foot, head = -u * s, u * s, -v * s, low - 0.16, top - 0.16
+            add(TRIM, (p, y, foot), (q, y, foot), (q, y, low), (p, y, low))
+            add(TRIM, (q, 0, head), (q, y, foot), (p, y, foot), (p, 0, head))
             for e in (u, -u):  # the verge
-                side = ((e, -v * s, low - 0.16), (e, 0, top - 0.16), (e, 0, top), (e, -v * s, low))
+                side = ((e, y, foot), (e, 0, head), (e, 0, top), (e, y, low))
                 add(TRIM, *(side if e * s < 0 else side[::-1]))
     cx, half, height = 0.27 * b.wide, 0.35, top + 0.7
     for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1)):
-        p, q = (cx - half * (c - s), -half * (c + s)), (cx + half * (c + s), half * (s - c))
-        add(WALL, (*p, top - 1.2), (*q, top - 1.2), (*q, height), (*p, height))
-    add(
-        DOOR,
-        (cx - half, -half, height),
-        (cx + half, -half, height),
-        (cx + half, half, height),
-        (cx - half, half, height),
-    )
+        left, right = (cx - half * (c - s), -half * (c + s)), (cx + half * (c + s), half * (s - c))
+        add(WALL, (*left, top - 1.2), (*right, top - 1.2), (*right, height), (*left, height))
+    x0, x1 = cx - half, cx + half
+    add(DOOR, (x0, -half, height), (x1, -half, height), (x1, half, height), (x0, half, height))

@@ -170,9 +170,8 @@ def levels(parts: Sequence[MeshPart], share: float = 0.1) -> tuple[float, ...]:
     sides = np.where(normals[flat, 2] > 0, 1, -1)
     keys, group = np.unique(np.stack([np.rint(heights / 0.004), sides]), axis=1, return_inverse=True)
     areas = np.bincount(group.ravel(), np.abs(normals[flat, 2]), keys.shape[1])
-    mean = np.bincount(group.ravel(), heights, keys.shape[1]) / np.maximum(
-        np.bincount(group.ravel(), minlength=keys.shape[1]), 1
-    )
+    many = np.bincount(group.ravel(), minlength=keys.shape[1])
+    mean = np.bincount(group.ravel(), heights, keys.shape[1]) / np.maximum(many, 1)
     outline = np.prod(np.ptp(corners.reshape(-1, 3), axis=0)[:2])
     large = np.argsort(-areas)[:8]
     return tuple(float(mean[i] + 1e-5 * keys[1, i]) for i in large if areas[i] > share * outline)

@@ -75,13 +75,10 @@ def ridge(canvas: Canvas, r: Ridge, place: Scenery, light: FarLight, *, rng: np.
         cover = (np.clip(y - top[None] + 0.5, 0, 1) * np.clip(bottom - y + 1.5, 0, 1)).astype(np.float32)[..., None]
         e = light.on_leaves(canvas.yaw)
         slope = np.gradient(height) * canvas.w / (2 * np.pi * r.distance)
-        sunny = 1 + 0.5 * np.clip(
-            slope * np.sin(canvas.yaw - np.arctan2(light.towards[1], light.towards[0])), -0.8, 0.8
-        ) * float(light.sun.any())
-        own = (
-            _cover_of(canvas, r, y0, y1, top, place, np.random.default_rng(noise))
-            * (e * sunny[:, None]).astype(np.float32)[None]
-        )
+        to_sun = np.sin(canvas.yaw - np.arctan2(light.towards[1], light.towards[0]))
+        sunny = 1 + 0.5 * np.clip(slope * to_sun, -0.8, 0.8) * float(light.sun.any())
+        own = _cover_of(canvas, r, y0, y1, top, place, np.random.default_rng(noise))
+        own = own * (e * sunny[:, None]).astype(np.float32)[None]
         clear = clearness(r.distance, light.visibility).astype(np.float32)
         canvas.blend(0, y0, own * clear + light.air[None].astype(np.float32) * (1 - clear), cover)
 
@@ -93,9 +90,8 @@ def paint_water(
 ) -> None:
     """A lake on the side that the house looks at: the sky and the far shore, mirrored in small waves."""
     turn = np.abs(np.angle(np.exp(1j * (canvas.yaw - place.outlook))))
-    near = (
-        shore[0] * (1 + 0.25 * (_wave(canvas.w, 14, rng=rng) - 0.5)) / np.maximum(np.cos(np.minimum(turn, 1.45)), 0.12)
-    )
+    near = shore[0] * (1 + 0.25 * (_wave(canvas.w, 14, rng=rng) - 0.5))
+    near = near / np.maximum(np.cos(np.minimum(turn, 1.45)), 0.12)
     near = np.where(np.cos(turn) > DRY, near, np.inf)
     first = int(np.searchsorted(-canvas.elevation, canvas.eye / shore[1]))
     last = int(np.searchsorted(-canvas.elevation, canvas.eye / (0.8 * shore[0])))
@@ -103,19 +99,15 @@ def paint_water(
     away = canvas.eye / np.tan(down)
     step = away**2 / canvas.eye * np.pi / 1800
     cover = np.clip((away[:, None] - near[None]) / step[:, None] + 0.5, 0, 1).astype(np.float32)[..., None]
-    waves = cv2.resize(
-        rng.standard_normal((last - first, canvas.w // 24)).astype(np.float32),
-        (canvas.w, last - first),
-        interpolation=cv2.INTER_CUBIC,
-    )
+    waves = rng.standard_normal((last - first, canvas.w // 24)).astype(np.float32)
+    waves = cv2.resize(waves, (canvas.w, last - first), interpolation=cv2.INTER_CUBIC)
     tilt = 0.012 + 0.03 * np.clip(40 / away, 0, 1)[:, None]
     mirrored = canvas.rows(down[:, None] + np.abs(0.006 + tilt * waves)).astype(np.float32)
     across = np.tile(np.arange(canvas.w, dtype=np.float32), (last - first, 1))
     seen = cv2.remap(canvas.picture, across, mirrored, cv2.INTER_LINEAR)
     fresnel = (0.02 + 0.98 * (1 - np.sin(down + 0.09)) ** 5).astype(np.float32)[:, None, None]
-    deep = (np.array([0.012, 0.03, 0.032]) * (light.ambient + light.sun * max(light.towards[2], 0.0))).astype(
-        np.float32
-    )
+    level = light.ambient + light.sun * max(light.towards[2], 0.0)
+    deep = (np.array([0.012, 0.03, 0.032]) * level).astype(np.float32)
     clear = clearness(away, light.visibility).astype(np.float32)[:, None]
     own = (seen * fresnel + deep * (1 - fresnel)) * clear + light.air[None].astype(np.float32) * (1 - clear)
     canvas.blend(0, first, own, cover)
@@ -145,9 +137,8 @@ def _field_tile(place: Scenery, *, rng: np.random.Generator, side: int = 256) ->
     y, x = np.mgrid[:side, :side]
     stretch = np.array([1.0, 1.7])
     near, which = cKDTree(every * stretch).query(np.column_stack([x.ravel(), y.ravel()]) * stretch, k=2)
-    colours = np.array(FIELDS[place.season])[rng.integers(5, size=len(points))] * rng.uniform(
-        0.85, 1.15, (len(points), 1)
-    )
+    colours = np.array(FIELDS[place.season])[rng.integers(5, size=len(points))]
+    colours = colours * rng.uniform(0.85, 1.15, (len(points), 1))
     angle = rng.uniform(0, np.pi, len(points))
     mine = which[:, 0] % len(points)
     rows = 1 + 0.05 * np.sin((x.ravel() * np.cos(angle[mine]) + y.ravel() * np.sin(angle[mine])) * 2.2)

@@ -41,24 +41,11 @@ def town(canvas: Canvas, t: Town, place: Scenery, light: FarLight, *, rng: np.ra
         storeys, flat = int(rng.integers(t.storeys[0], t.storeys[1] + 1)), rng.random() < t.flat
         tower = t.storeys[1] > 3 and rng.random() < 0.006 and np.hypot(x, y) > 250
         storeys, flat, wide = (int(rng.integers(9, 17)), True, 22.0) if tower else (storeys, flat, wide)
-        b = Building(
-            (x, y),
-            yaw,
-            wide,
-            float(rng.uniform(8.0, 11.0)),
-            2.9 * storeys + 0.3,
-            0.0 if flat else float(rng.uniform(2.6, 4.2)),
-            int(rng.integers(100)),
-            int(rng.integers(100)),
-        )
-        things.append(
-            (
-                float(np.hypot(x, y)),
-                functools.partial(
-                    _paint_building, canvas, b, place, light, np.random.default_rng(int(rng.integers(1 << 30)))
-                ),
-            )
-        )
+        deep, ridge = float(rng.uniform(8.0, 11.0)), 0.0 if flat else float(rng.uniform(2.6, 4.2))
+        paint, tiles = int(rng.integers(100)), int(rng.integers(100))
+        b = Building((x, y), yaw, wide, deep, 2.9 * storeys + 0.3, ridge, paint, tiles)
+        own = np.random.default_rng(int(rng.integers(1 << 30)))
+        things.append((float(np.hypot(x, y)), functools.partial(_paint_building, canvas, b, place, light, own)))
     return things
 
 
@@ -69,10 +56,8 @@ def street_lamps(canvas: Canvas, light: FarLight, *, rng: np.random.Generator) -
         x, y = int(canvas.columns(yaw)) % canvas.w, int(round(float(canvas.rows(np.arctan2(7.0 - canvas.eye, away)))))
         size = 2 if away < 250 else 1
         colour = np.array([1.0, 0.68, 0.36]) if rng.random() < 0.7 else np.array([0.9, 0.95, 1.0])
-        left = clearness(away, light.visibility)
-        canvas.picture[y : y + size, x : x + size] += (colour * left * light.lamps * min(2.5, 160 / away)).astype(
-            np.float32
-        )
+        shine = colour * clearness(away, light.visibility) * light.lamps * min(2.5, 160 / away)
+        canvas.picture[y : y + size, x : x + size] += shine.astype(np.float32)
 
 
 def _scattered(t: Town, *, rng: np.random.Generator) -> list[tuple[float, float, float, float]]:
@@ -106,9 +91,8 @@ def _streets(t: Town, *, rng: np.random.Generator) -> list[tuple[float, float, f
             a += rng.uniform(0, 0.09)
             d = away * rng.uniform(0.97, 1.04)
             turn = grid + 0.5 * np.sin(3 * a) + float(rng.integers(4)) * np.pi / 2
-            out.append(
-                (float(d * np.cos(a)), float(d * np.sin(a)), turn, float(rng.uniform(10, 20)) * (1 + away / 2500))
-            )
+            wide = float(rng.uniform(10, 20)) * (1 + away / 2500)
+            out.append((float(d * np.cos(a)), float(d * np.sin(a)), turn, wide))
     return out
 
 
@@ -151,8 +135,7 @@ def _plain(b: Building, base: float, *, rng: np.random.Generator) -> Faces:
         side = corners[int(rng.integers(4))]
         u, v = rng.uniform(0.1, 0.8), rng.uniform(0.3, 0.8)
         at = lambda u, v: side[0] + u * (side[1] - side[0]) + v * (side[3] - side[0])
-        corners = np.concatenate(
-            [corners, np.array([at(u, v), at(u + 0.12, v), at(u + 0.12, v + 0.1), at(u, v + 0.1)])[None]]
-        )
+        window = np.array([at(u, v), at(u + 0.12, v), at(u + 0.12, v + 0.1), at(u, v + 0.1)])
+        corners = np.concatenate([corners, window[None]])
         made = np.append(made, LIT)
     return Faces(corners, made)

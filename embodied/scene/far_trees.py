@@ -46,9 +46,8 @@ def tree(
         wide = int(round(tall * sprite.shape[1] / sprite.shape[0] / away * canvas.w / (2 * np.pi)))
         if high < 2 or wide < 2:
             return
-        small = cv2.resize(
-            sprite, (wide, high), interpolation=cv2.INTER_AREA if high < sprite.shape[0] else cv2.INTER_LINEAR
-        )
+        how = cv2.INTER_AREA if high < sprite.shape[0] else cv2.INTER_LINEAR
+        small = cv2.resize(sprite, (wide, high), interpolation=how)
         small = small[:, ::-1] if flip else small
         x0, y0 = int(canvas.columns(yaw) - wide / 2), int(round(tip))
         small = small[max(-y0, 0) : canvas.h - y0]
@@ -56,12 +55,8 @@ def tree(
         clear = clearness(away, light.visibility)
         air = light.air[int(canvas.columns(yaw)) % canvas.w] * (1 - clear)
         own = small[..., :3] / np.maximum(cover, 1e-3)
-        canvas.blend(
-            x0,
-            max(y0, 0),
-            (own * (light.on_leaves(np.array(yaw)) * hue * clear).astype(np.float32) + air.astype(np.float32)),
-            cover,
-        )
+        own = own * (light.on_leaves(np.array(yaw)) * hue * clear).astype(np.float32) + air.astype(np.float32)
+        canvas.blend(x0, max(y0, 0), own, cover)
 
     return paint
 
@@ -101,15 +96,9 @@ class _Brush:
         self.draw(corners, BARK * rng.uniform(0.8, 1.3))
         if level > 0:
             for _ in range(3 if level > 1 else 4):
-                t = rng.uniform(0.45, 1.0)
-                self.branch(
-                    x + t * (x1 - x),
-                    y + t * (y1 - y),
-                    angle * 0.8 + rng.normal(0, 0.55),
-                    length * rng.uniform(0.5, 0.78),
-                    max(width * 0.58, 1.1),
-                    level - 1,
-                )
+                t, turn = rng.uniform(0.45, 1.0), angle * 0.8 + rng.normal(0, 0.55)
+                far, thin = length * rng.uniform(0.5, 0.78), max(width * 0.58, 1.1)
+                self.branch(x + t * (x1 - x), y + t * (y1 - y), turn, far, thin, level - 1)
 
 
 def _fir(brush: _Brush, season: str) -> None:
@@ -153,7 +142,6 @@ def _leafy(brush: _Brush, leaf: np.ndarray, *, bare: bool) -> None:
     for i in rng.permutation(len(spots)):
         x, y, shade, s = spots[i]
         turn = rng.uniform(0, 2 * np.pi) + np.arange(5) * 2 * np.pi / 5
-        shape = np.column_stack(
-            [x + np.cos(turn) * s * rng.uniform(0.5, 1.2, 5), y + np.sin(turn) * s * rng.uniform(0.5, 1.1, 5)]
-        )
+        across, down = s * rng.uniform(0.5, 1.2, 5), s * rng.uniform(0.5, 1.1, 5)
+        shape = np.column_stack([x + np.cos(turn) * across, y + np.sin(turn) * down])
         brush.draw(shape, leaf * max(0.25, shade + rng.normal(0, 0.16)) * rng.uniform(0.9, 1.1, 3))

@@ -57,9 +57,8 @@ def glb_scene(parts: Sequence[Part]) -> trimesh.Scene:
         if finish not in materials:
             materials[finish] = pbr_material(finish)
         visual = trimesh.visual.TextureVisuals(uv=part.mesh.uv, material=materials[finish])
-        mesh = trimesh.Trimesh(
-            part.mesh.vertices, part.mesh.faces, vertex_normals=part.mesh.normals, visual=visual, process=False
-        )
+        m = part.mesh
+        mesh = trimesh.Trimesh(m.vertices, m.faces, vertex_normals=m.normals, visual=visual, process=False)
         scene.add_geometry(mesh, node_name=node, geom_name=part.mesh_key, transform=upright @ pose)
     return scene
 

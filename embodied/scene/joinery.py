@@ -13,7 +13,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.built.primitives import Shape, box, cylinder, joined, moved, part, quads, scaled, tube, turned, two_sided
+from assets.built.primitives import (
+    Shape,
+    between,
+    box,
+    cylinder,
+    frame,
+    joined,
+    moved,
+    part,
+    quads,
+    scaled,
+    tube,
+    turned,
+    two_sided,
+    upright,
+)
 from assets.records import Finish
 from embodied.house.house import House, Opening
 from embodied.house.shapes import inward
@@ -126,15 +141,11 @@ def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable
     strip = hole.world(quads(np.array([[(0, y0, 0), (hole.length, y0, 0), (hole.length, y1, 0), (0, y1, 0)]])))
     strip = Shape(strip.vertices, strip.faces, strip.normals, strip.vertices[:, :2].copy())
     owner = f"{o.id}/threshold"
-    parts = [
-        Part(owner, "floor", first.id, part(finish(second.floor_finish), turned_uv(strip, floor_turn(house))), owner)
-    ]
+    floor = part(finish(second.floor_finish), turned_uv(strip, floor_turn(house)))
+    parts = [Part(owner, "floor", first.id, floor, owner)]
     if first.floor_finish != second.floor_finish:
-        bar = box(
-            [LINING if o.kind != "passage" else 0, y1 - 0.028, -0.001],
-            [hole.length - (LINING if o.kind != "passage" else 0), y1 - 0.002, 0.0035],
-            0.0015,
-        )
+        lining = LINING if o.kind != "passage" else 0
+        bar = box([lining, y1 - 0.028, -0.001], [hole.length - lining, y1 - 0.002, 0.0035], 0.0015)
         parts.append(Part(owner, "floor", first.id, part(METAL, hole.world(bar)), owner + "#bar"))
     return parts
 
@@ -156,21 +167,22 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[
     y0 = hole.outside + (0.10 if outdoors else 0.025)
     y1 = y0 + 0.07
     french = o.kind == "french_window" or o.sill < 0.05
-    frame, panes, handles = _sashes(house, hole, y0, y1, french)
+    sashes, panes, handles = _sashes(house, hole, y0, y1, french)
     parts = [_part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, y1 - 0.01, hole.inside, False))]
     outer = finish(facade_finish(house)) if outdoors else finish(room.wall_finish)
     parts.append(_part(hole, "reveal", "wall", outer, _tunnel(hole, hole.outside, y0, True), tag="#outer"))
-    parts.append(_part(hole, "frame", "opening", frame_finish, frame))
+    parts.append(_part(hole, "frame", "opening", frame_finish, sashes))
     parts.append(_part(hole, "glass", "opening", GLASS, panes))
     if handles:
         parts.append(_part(hole, "handle", "opening", METAL, *handles))
     if french:
         parts += _threshold(house, hole, y1, hole.inside, finish)
     else:
-        board = [box([0.0, y1, o.sill - 0.002], [hole.length, hole.inside, o.sill + 0.022])]
-        board.append(
-            box([-0.035, hole.inside, o.sill - 0.002], [hole.length + 0.035, hole.inside + 0.04, o.sill + 0.022], 0.005)
-        )
+        w, inside, low, top = hole.length, hole.inside, o.sill - 0.002, o.sill + 0.022
+        board = [
+            box([0.0, y1, low], [w, inside, top]),
+            box([-0.035, inside, low], [w + 0.035, inside + 0.04, top], 0.005),
+        ]
         stone = stream(house.seed, "joinery", "sill").random() < 0.4
         parts.append(_part(hole, "sill", "opening", STONE_SILL if stone else frame_finish, *board))
     return parts
@@ -183,55 +195,31 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
     outer, sash = 0.045, 0.055
     count = max(1, min(6, round(w / (0.85 if french else 0.95))))
     bars = stream(house.seed, "joinery", "bars").random() < 0.3
-    frame = _ring(0, w, z0, z1, outer, (y0, y1), 0.0)
+    boards = frame(0, w, z0, z1, (y0, y1), outer)
+    foot = 0.12 if french else sash
     cells = np.linspace(outer, w - outer, count + 1)
     panes, handles = [], []
     for i in range(count):
         x0, x1 = cells[i] + 0.002, cells[i + 1] - 0.002
         b0, b1 = z0 + outer + 0.002, z1 - outer - 0.002
-        frame += _ring(x0, x1, b0, b1, sash, (y0 + 0.012, y1 + 0.012), 0.006, low=0.12 if french else sash)
-        gx0, gx1, gz0, gz1 = (
-            x0 + sash - 0.006,
-            x1 - sash + 0.006,
-            b0 + (0.12 if french else sash) - 0.006,
-            b1 - sash + 0.006,
-        )
+        boards += frame(x0, x1, b0, b1, (y0 + 0.012, y1 + 0.012), sash, 0.006, foot)
+        gx0, gx1 = x0 + sash - 0.006, x1 - sash + 0.006
+        gz0, gz1 = b0 + foot - 0.006, b1 - sash + 0.006
         ym = (y0 + y1) / 2
-        pane = quads(np.array([[(gx1, ym, gz0), (gx0, ym, gz0), (gx0, ym, gz1), (gx1, ym, gz1)]]))
-        panes.append(two_sided(pane))
+        panes.append(two_sided(upright(gx1, gx0, gz0, gz1, ym)))
         if bars:
-            for k in range(1, max(1, round((gz1 - gz0) / 0.5))):
-                zb = gz0 + (gz1 - gz0) * k / max(1, round((gz1 - gz0) / 0.5))
-                frame.append(box([gx0, ym - 0.012, zb - 0.011], [gx1, ym + 0.012, zb + 0.011], 0.003))
+            rows = max(1, round((gz1 - gz0) / 0.5))
+            for k in range(1, rows):
+                zb = gz0 + (gz1 - gz0) * k / rows
+                boards.append(box([gx0, ym - 0.012, zb - 0.011], [gx1, ym + 0.012, zb + 0.011], 0.003))
             if gx1 - gx0 > 0.45:
                 xb = (gx0 + gx1) / 2
-                frame.append(box([xb - 0.011, ym - 0.0125, gz0], [xb + 0.011, ym + 0.0125, gz1], 0.003))
+                boards.append(box([xb - 0.011, ym - 0.0125, gz0], [xb + 0.011, ym + 0.0125, gz1], 0.003))
         if i % 2 == 0:
             xh = x1 - sash / 2
             zh = min(max(1.05, z0 + 0.25), (z0 + z1) / 2 + 0.25) if french else (z0 + z1) / 2
             handles.append(_window_handle(xh, y1 + 0.012, zh))
-    return joined(*frame), joined(*panes), handles
-
-
-def _ring(
-    x0: float,
-    x1: float,
-    z0: float,
-    z1: float,
-    width: float,
-    depth: tuple[float, float],
-    bevel: float,
-    low: float | None = None,
-) -> list[Shape]:
-    """Four boards around a rectangle, from depth[0] to depth[1]; `low` is the height of the bottom one."""
-    y0, y1 = depth
-    low = width if low is None else low
-    return [
-        box([x0, y0, z0], [x0 + width, y1, z1], bevel),
-        box([x1 - width, y0, z0], [x1, y1, z1], bevel),
-        box([x0 + width, y0, z1 - width], [x1 - width, y1, z1], bevel),
-        box([x0 + width, y0, z0], [x1 - width, y1, z0 + low], bevel),
-    ]
+    return joined(*boards), joined(*panes), handles
 
 
 def _window_handle(x: float, y: float, z: float) -> Shape:
@@ -248,17 +236,10 @@ def _door(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Pa
     wood = finish(o.leaf_finish or "paint_white/0")
     outdoors = o.rooms[1] is None
     y0 = hole.inside - 0.10 if outdoors else hole.outside
-    parts = [
-        _part(
-            hole,
-            "frame",
-            "opening",
-            wood,
-            *_lining(hole, y0, hole.inside),
-            *_casing(hole, hole.inside, 1.0),
-            *([] if outdoors else _casing(hole, hole.outside, -1.0)),
-        )
-    ]
+    boards = [*_lining(hole, y0, hole.inside), *_casing(hole, hole.inside, 1.0)]
+    if not outdoors:
+        boards += _casing(hole, hole.outside, -1.0)
+    parts = [_part(hole, "frame", "opening", wood, *boards)]
     if outdoors:
         parts.append(_part(hole, "reveal", "wall", finish(facade_finish(house)), _tunnel(hole, hole.outside, y0, True)))
     parts += _threshold(house, hole, y0, hole.inside, finish)
@@ -294,16 +275,9 @@ def _casing(hole: _Hole, y: float, side: float) -> list[Shape]:
     i = 0.006  # the casing leaves a small step on the lining
     inner = np.array([(i, 0), (i, head - i), (w - i, head - i), (w - i, 0)])
     outer = np.array([(-wide, 0), (-wide, head + wide), (w + wide, head + wide), (w + wide, 0)])
-    ridge = inner + (outer - inner) * 0.72
-    lip = inner + (outer - inner) * 0.06
-    lines = [
-        (inner, 0.0),
-        (inner, thick * 0.55),
-        (lip, thick * 0.7),
-        (ridge, thick),
-        (outer, thick * 0.9),
-        (outer, 0.0),
-    ]
+    lip, ridge = inner + (outer - inner) * 0.06, inner + (outer - inner) * 0.72
+    low = [(inner, 0.0), (inner, thick * 0.55), (lip, thick * 0.7)]
+    lines = [*low, (ridge, thick), (outer, thick * 0.9), (outer, 0.0)]
     corners = []
     for (a, ya), (b, yb) in itertools.pairwise(lines):
         for k in range(3):
@@ -331,9 +305,8 @@ def _leaves(house: House, hole: _Hole, wood: Finish) -> list[Part]:
     wood_shape, panes = _leaf(width, height, thick, "glazed" if glazed else style)
     handle = _lever(width - 0.06, thick)
     parts = []
-    for n, at_origin in enumerate(
-        (hole.hinge_at_origin, not hole.hinge_at_origin) if pair else (hole.hinge_at_origin,)
-    ):
+    hinges = (hole.hinge_at_origin, not hole.hinge_at_origin)
+    for n, at_origin in enumerate(hinges if pair else hinges[:1]):
         side = 1.0 if at_origin else -1.0
         x = LINING + 0.003 if at_origin else hole.length - LINING - 0.003
         pivot = hole.point(x, hole.inside + CASING[1], 0.006)
@@ -378,7 +351,7 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
         for x0, x1 in columns:
             if style == "glazed" and r == 1:
                 ym = -thick / 2
-                panes.append(two_sided(quads(np.array([[(x1, ym, z0), (x0, ym, z0), (x0, ym, z1), (x1, ym, z1)]]))))
+                panes.append(two_sided(upright(x1, x0, z0, z1, ym)))
             else:
                 shapes.append(_panel(x0, x1, z0, z1, thick))
     return joined(*shapes), joined(*panes) if panes else None
@@ -390,15 +363,12 @@ def _panel(x0: float, x1: float, z0: float, z1: float, thick: float) -> Shape:
     # The moulding starts a little inside the rounded edges of the stiles, so that no gap shows.
     outer = [(x0 - lip, z0 - lip), (x1 + lip, z0 - lip), (x1 + lip, z1 + lip), (x0 - lip, z1 + lip)]
     inner = [(x0 + slope, z0 + slope), (x1 - slope, z0 + slope), (x1 - slope, z1 - slope), (x0 + slope, z1 - slope)]
-    corners = []
+    shapes = []
     for face, side in ((0.0, -1.0), (-thick, 1.0)):
-        high, low = face + side * lip, face + side * sunk
-        rings = [[(x, low, z) for x, z in inner]]
-        for k in range(4):
-            (ax, az), (bx, bz), (cx, cz), (dx, dz) = outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]
-            rings.append([(ax, high, az), (bx, high, bz), (cx, low, cz), (dx, low, dz)])
-        corners += rings if side > 0 else [r[::-1] for r in rings]
-    return _grain_up(quads(np.asarray(corners, float)))
+        rim = [(x, face + side * lip, z) for x, z in outer]
+        bed = [(x, face + side * sunk, z) for x, z in inner]
+        shapes += [quads([bed]), between(rim, bed)] if side > 0 else [quads([bed[::-1]]), between(bed, rim)]
+    return _grain_up(joined(*shapes))
 
 
 def _lever(x: float, thick: float) -> Shape:
@@ -406,12 +376,8 @@ def _lever(x: float, thick: float) -> Shape:
     z, shapes = 1.03, []
     for y, out in ((0.0, 1.0), (-thick, -1.0)):
         rose = moved(turned(cylinder(0.025, 0, 0.009, 0.003, 14), -out * math.pi / 2, "x"), x, y, z)
-        path = [
-            (x, y + out * 0.004, z),
-            (x, y + out * 0.045, z),
-            (x - 0.012, y + out * 0.055, z),
-            (x - 0.12, y + out * 0.055, z),
-        ]
+        near, far = y + out * 0.045, y + out * 0.055
+        path = [(x, y + out * 0.004, z), (x, near, z), (x - 0.012, far, z), (x - 0.12, far, z)]
         key = moved(turned(cylinder(0.018, 0, 0.006, 0.0, 12), -out * math.pi / 2, "x"), x, y, z - 0.09)
         shapes += [rose, tube(path, 0.0095, 10), key]
     return joined(*shapes)

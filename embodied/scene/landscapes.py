@@ -214,9 +214,8 @@ def near_buildings(house: House, place: Scenery) -> list[Building]:
         t = -half - 2.0
         while t < half + 2.0:
             b, gap = _neighbour(kind, k == 0, rng=rng)
-            reach = NEAREST[kind] + (
-                rng.uniform(0.0, 4.0) if kind == "villas" else rng.uniform(0.0, 0.8) * (kind == "cottages")
-            )
+            stray = rng.uniform(0.0, 4.0) if kind == "villas" else rng.uniform(0.0, 0.8) * (kind == "cottages")
+            reach = NEAREST[kind] + stray
             if kind != "villas" and k:
                 reach += 3.0 + 7.0 * (kind == "cottages")
             at = middle + along * (t + b.wide / 2) + away * (reach + b.deep / 2)
@@ -239,7 +238,5 @@ def _neighbour(kind: str, front: bool, *, rng: np.random.Generator) -> tuple[Bui
     else:
         storeys = 1 if rng.random() < 0.3 else 2
         size, ridge, storey, gap = (rng.uniform(9.5, 13.0), 8.5), rng.uniform(2.4, 4.0), 2.75, rng.uniform(7.0, 12.0)
-    eaves = storeys * storey + 0.25
-    return Building(
-        (0, 0), 0.0, float(size[0]), size[1], float(eaves), float(ridge), paint, tiles, float(storey)
-    ), float(gap)
+    wide, deep, eaves = float(size[0]), size[1], float(storeys * storey + 0.25)
+    return Building((0, 0), 0.0, wide, deep, eaves, float(ridge), paint, tiles, float(storey)), float(gap)

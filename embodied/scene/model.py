@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from assets.archives import read_picture
 from embodied import gl
@@ -222,23 +222,11 @@ def _light(spec: mujoco.MjSpec) -> None:
 
 def _add_sky(spec: mujoco.MjSpec, house: House, cache: Path | None) -> None:
     """The far landscape on a dome, as lit houses have it; behind it a gradient, for who looks from beyond."""
-    add_texture(spec, "landscape", backdrop.kept_picture(scenery_of(house), house.seed, cache))
-    material = spec.add_material(name="landscape", rgba=[1, 1, 1, 1], specular=0.0, shininess=0.0)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "landscape"
+    _add_picture(spec, "landscape", backdrop.kept_picture(scenery_of(house), house.seed, cache))
     vertices, faces, uv = backdrop.dome(house)
     below = np.tile(np.array([0, 0, -1], np.float32), (len(vertices), 1))  # one normal, so that all of it is lit alike
     _add_mesh(spec, "landscape", vertices, below, uv, faces)
-    spec.worldbody.add_geom(
-        name=f"{backdrop.DOME}#0",
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname="landscape",
-        material="landscape",
-        rgba=[1, 1, 1, 1],
-        group=VISUAL,
-        contype=0,
-        conaffinity=0,
-        mass=0,
-    )
+    _draw(spec.worldbody, f"{backdrop.DOME}#0", "landscape", "landscape", (1, 1, 1, 1))
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
@@ -283,18 +271,23 @@ def _add_parts(spec: mujoco.MjSpec, parts: Sequence[Part], bodies: Mapping[str, 
         material, rgba = looks.of(part.mesh.finish)
         body = bodies.get(part.owner)
         pose = {} if body is not None else {"pos": part.position, "quat": yaw_quat(part.yaw)}
-        (body or spec.worldbody).add_geom(
-            name=f"{part.owner}#{k}",
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=meshes[part.mesh_key],
-            material=material,
-            rgba=rgba,
-            group=VISUAL,
-            contype=0,
-            conaffinity=0,
-            mass=0,
-            **pose,
-        )
+        _draw(body or spec.worldbody, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose)
+
+
+def _draw(body: mujoco.MjsBody, name: str, mesh: str, material: str, rgba: Sequence[float], **pose: Any) -> None:
+    """A visual geom: it touches nothing and weighs nothing."""
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=mesh,
+        material=material,
+        rgba=rgba,
+        group=VISUAL,
+        contype=0,
+        conaffinity=0,
+        mass=0,
+        **pose,
+    )
 
 
 def _is_drawable(mesh: MeshPart) -> bool:
@@ -368,6 +361,13 @@ def add_texture(spec: mujoco.MjSpec, name: str, image: np.ndarray) -> None:
     texture.data = np.ascontiguousarray(image).tobytes()
 
 
+def _add_picture(spec: mujoco.MjSpec, name: str, image: np.ndarray, emission: float = 0.0) -> None:
+    """A texture and a matt material of one name that shows it."""
+    add_texture(spec, name, image)
+    material = spec.add_material(name=name, rgba=[1, 1, 1, 1], emission=emission, specular=0.0, shininess=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+
+
 @functools.lru_cache(maxsize=64)
 def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
     """(h, w, 3) uint8 RGB, or (h, w, 4) where the picture has holes; at most `largest` pixels a side."""
@@ -387,25 +387,13 @@ def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
 
 def _add_pages(spec: mujoco.MjSpec, lit: LitPages, house: House) -> None:
     for i, page in enumerate(lit.pages):
-        add_texture(spec, f"page_{i}", page)
-        material = spec.add_material(name=f"page_{i}", rgba=[1, 1, 1, 1], emission=1.0, specular=0.0, shininess=0.0)
-        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = f"page_{i}"
+        _add_picture(spec, f"page_{i}", page, emission=1.0)
     count: dict[str, int] = {}
     for i, m in drawn_meshes(lit, house):
         k = count[m.owner] = count.get(m.owner, -1) + 1
         name = f"{i:04d}_{k}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
         _add_mesh(spec, name, m.vertices, None, m.uv, m.faces)
-        spec.worldbody.add_geom(
-            name=f"{m.owner}#{k}",
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=name,
-            material=f"page_{m.page}",
-            rgba=[1, 1, 1, m.alpha],
-            group=VISUAL,
-            contype=0,
-            conaffinity=0,
-            mass=0,
-        )
+        _draw(spec.worldbody, f"{m.owner}#{k}", name, f"page_{m.page}", (1, 1, 1, m.alpha))
 
 
 def drawn_meshes(lit: LitPages, house: House) -> Iterator[tuple[int, LitMesh]]:
@@ -474,12 +462,9 @@ def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
 def placement_boxes(catalogue: Catalogue, p: Placement) -> tuple[collision.CollisionBox, ...]:
     """The collision boxes of a placement, in the asset frame; kept where the catalogue has a cache."""
     asset, parts = catalogue.assets[p.asset], catalogue.mesh(p.asset, p.size, p.params)
-    cache = getattr(catalogue, "cache", None)
-    return (
-        collision.object_boxes(asset, parts, p.size)
-        if cache is None
-        else collision.kept_boxes(asset, parts, p.size, cache)
-    )
+    if (cache := getattr(catalogue, "cache", None)) is None:
+        return collision.object_boxes(asset, parts, p.size)
+    return collision.kept_boxes(asset, parts, p.size, cache)
 
 
 def _add_boxes(

@@ -26,7 +26,7 @@ from assets.built.primitives import (
 )
 from assets.records import Finish
 from embodied.house.house import House
-from embodied.house.shapes import room_union
+from embodied.house.shapes import inward, room_union
 from embodied.scene.buildings import DOOR, LIT, PANE, ROOF, TRIM, WALL, Faces, faces_of
 from embodied.scene.landscapes import (
     GROUND_DROP,
@@ -66,19 +66,8 @@ NEIGHBOURS = (
     "render_white/0", "render_white/1", "brick_red/0", "render_white/2", "brick_yellow/0", "render_white/1",
 )  # fmt: skip
 
-HEDGE = np.array(
-    [
-        (0.42, -0.2),
-        (0.45, 0.5),
-        (0.42, 1.2),
-        (0.28, 1.52),
-        (0.0, 1.6),
-        (-0.28, 1.52),
-        (-0.42, 1.2),
-        (-0.45, 0.5),
-        (-0.42, -0.2),
-    ]
-)
+_HALF = [(0.42, -0.2), (0.45, 0.5), (0.42, 1.2), (0.28, 1.52)]
+HEDGE = np.array([*_HALF, (0.0, 1.6), *((-x, up) for x, up in reversed(_HALF))])
 """Its profile: across and up, metres."""
 
 FACADES = ("render_white/0", "render_white/1", "brick_red/0", "render_white/2")
@@ -245,20 +234,13 @@ def _terraces(house: House, place: Scenery) -> tuple[list[Shape], list[Shape]]:
         if o.rooms[1] is not None or o.kind not in ("front_door", "back_door", "french_window", "garage_door"):
             continue
         a, b = np.asarray(o.a), np.asarray(o.b)
-        d = (b - a) / np.linalg.norm(b - a)
-        room = house.room_by_id[o.rooms[0]]
-        n = np.array([-d[1], d[0]])
-        if shapely.Polygon(room.polygon).contains(shapely.Point((a + b) / 2 + 0.03 * n)):
-            n = -n
+        d, room = (b - a) / np.linalg.norm(b - a), house.room_by_id[o.rooms[0]]
+        n = -inward(house, o)
         upstairs = room.storey > 0 or place.height > 1.0
         side, deep = (0.5, 1.3) if upstairs or o.kind in ("front_door", "garage_door") else (1.2, 3.0)
         near = house.outer_wall - house.inner_wall / 2
-        ring = [
-            a - side * d + near * n,
-            b + side * d + near * n,
-            b + side * d + (near + deep) * n,
-            a - side * d + (near + deep) * n,
-        ]
+        start, end, far = a - side * d, b + side * d, near + deep
+        ring = [start + near * n, end + near * n, end + far * n, start + far * n]
         area = shapely.geometry.polygon.orient(shapely.Polygon(ring)).difference(footprint(house, room.storey))
         z = house.storey_of(room).elevation
         for piece in shapely.get_parts(area):
@@ -299,18 +281,16 @@ def _trees(edge: Bounds, place: Scenery, finish: Callable[[str], Finish], *, rng
     parts = []
     x0, y0, x1, y1 = edge
     leafy, firs = place.table.trees
-    kinds = [(k, False, leafy // 3 + (k < leafy % 3)) for k in range(3)] + [
-        (k, True, firs // 2 + (k < firs % 2)) for k in range(2)
-    ]
+    kinds = [(k, False, leafy // 3 + (k < leafy % 3)) for k in range(3)]
+    kinds += [(k, True, firs // 2 + (k < firs % 2)) for k in range(2)]
     water = round(place.outlook / (math.pi / 2)) % 4 if place.table.water is not None else None
     for k, fir, count in kinds:
         if not count:
             continue
         if fir:
-            meshes = [
-                part(BARK, *_fir_trunk(6.0 + 2.5 * k)),
-                part(finish(f"foliage/{FIRS}"), _fir(6.0 + 2.5 * k, rng=rng)),
-            ]
+            tall = 6.0 + 2.5 * k
+            trunk = tube([(0, 0, -0.2), (0, 0, tall * 0.5)], [0.16, 0.08], 7)
+            meshes = [part(BARK, trunk), part(finish(f"foliage/{FIRS}"), _fir(tall, rng=rng))]
         elif place.season == "winter":
             meshes = [part(BARK, _bare(3.8 + 1.6 * k, rng=rng))]
         else:
@@ -318,11 +298,8 @@ def _trees(edge: Bounds, place: Scenery, finish: Callable[[str], Finish], *, rng
             meshes = [part(BARK, trunk), part(finish(f"foliage/{LEAFY[place.season][k % 2]}"), crown)]
         for _ in range(count):
             side, t = int(rng.integers(4)), rng.random()
-            away = (
-                rng.uniform(-3.0, 7.0)
-                if place.landscape == "forest"
-                else rng.uniform(-3.5, -0.8 if place.table.neighbours else 4.0)
-            )
+            usual = (-3.5, -0.8 if place.table.neighbours else 4.0)
+            away = rng.uniform(*((-3.0, 7.0) if place.landscape == "forest" else usual))
             if side == water:
                 side = (side + 1) % 4
             middle, along, out, half = side_frame(edge, side * math.pi / 2)
@@ -334,10 +311,6 @@ def _trees(edge: Bounds, place: Scenery, finish: Callable[[str], Finish], *, rng
                 for i, m in enumerate(meshes)
             ]
     return parts
-
-
-def _fir_trunk(height: float) -> list[Shape]:
-    return [tube([(0, 0, -0.2), (0, 0, height * 0.5)], [0.16, 0.08], 7)]
 
 
 def _fir(height: float, *, rng: np.random.Generator) -> Shape:
@@ -373,13 +346,8 @@ def _bare(height: float, *, rng: np.random.Generator) -> Shape:
         shapes.append(tube([tuple(a), tuple(b)], [thick, 0.5 * thick], 4 if level else 3, caps=False))
         for _ in range((5, 4, 0)[2 - level]):
             to = way + rng.normal(0, 0.55, 3) + [0, 0, 0.25]
-            grow(
-                a + way * length * rng.uniform(0.45, 1.0),
-                to / np.linalg.norm(to),
-                length * rng.uniform(0.45, 0.7),
-                0.5 * thick,
-                level - 1,
-            )
+            fork = a + way * length * rng.uniform(0.45, 1.0)
+            grow(fork, to / np.linalg.norm(to), length * rng.uniform(0.45, 0.7), 0.5 * thick, level - 1)
 
     for i in range(8):
         yaw, level = 2.4 * i + rng.uniform(-0.4, 0.4), 0.34 + 0.3 * i / 8

@@ -75,7 +75,6 @@ def stair_parts(house: House, stair: Stair, finish: Callable[[str], Finish]) -> 
     low = house.storey_of(room).elevation + house.storey_of(room).height
     high = house.storey_of(upper).elevation
     ring = np.asarray(shapely.geometry.polygon.orient(well(stair)).exterior.coords)[:-1]
-    nxt = np.roll(ring, -1, axis=0)
-    edge = [[(*b, low), (*a, low), (*a, high), (*b, high)] for a, b in zip(ring, nxt)]
+    edge = [[(*b, low), (*a, low), (*a, high), (*b, high)] for a, b in zip(ring, np.roll(ring, -1, axis=0))]
     parts.append(Part(owner, "opening", room.id, part(paint, quads(np.asarray(edge))), owner + "#well"))
     return parts

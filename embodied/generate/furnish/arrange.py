@@ -292,7 +292,7 @@ def wall_poses(
         spots = [low, high, wall.length / 2]
         edges = [0.0, *(e for d in doors for e in d), wall.length]
         spots += [(a + b) / 2 for a, b in zip(edges[::2], edges[1::2])]
-        spots += [e + half if i % 2 else e - half for i, e in enumerate(edges[1:-1], start=1) for e in (e,)]
+        spots += [e + half if i % 2 else e - half for i, e in enumerate(edges[1:-1], start=1)]
         spots += [(s0 + s1) / 2 for s0, s1, o in wall.openings if o.kind == "window"]
         spots += list(np.arange(low, high, step))
         for s in sorted({round(float(s), 3) for s in spots}):

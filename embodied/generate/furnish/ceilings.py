@@ -37,11 +37,9 @@ def ceiling_lamps(ctx: Context) -> None:
         pendant = ctx.pick("fine pendant", most=(1.4, 1.4, 1.8)) or lamp
         if hang_from_ceiling(ctx, pendant, table.x, table.y, table.z + table.size[2] + 0.7):
             spots.append((table.x, table.y))
-    centre = (
-        space.polygon.representative_point()
-        if not space.polygon.contains(space.polygon.centroid)
-        else space.polygon.centroid
-    )
+    centre = space.polygon.centroid
+    if not space.polygon.contains(centre):
+        centre = space.polygon.representative_point()
     for i in range(nx):
         for j in range(ny):
             x, y = x0 + (i + 0.5) * wx / nx, y0 + (j + 0.5) * wy / ny
@@ -97,11 +95,8 @@ def hang_from_ceiling(ctx: Context, asset: Asset, x: float, y: float, underside:
     """
     w, d, h = asset.size
     flat = asset.object_class == "ceiling lamp"
-    top = (
-        ctx.space.bottom
-        + ctx.space.height
-        - asset.elevation * (asset.support == "ceiling" and asset.object_class not in LUMENS)
-    )
+    hangs_low = asset.support == "ceiling" and asset.object_class not in LUMENS
+    top = ctx.space.bottom + ctx.space.height - asset.elevation * hangs_low
     if underside is not None and not flat:
         scale = min(max((top - underside) / h, 0.6), 1.35)
         if scale < 1 or asset.object_class != "chandelier":

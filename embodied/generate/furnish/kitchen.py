@@ -87,16 +87,8 @@ def _kitchen_set(ctx: Context, tag: str) -> KitchenSet | None:
         hob = ctx.pick("cooktop", most=(0.6, 0.56, 0.1), avoid=())
         cooker = next((a for a in base if a.object_class == "base cabinet" and a.size[0] > 0.55), base[0])
     hood = ctx.pick("range hood", where=lambda a: tag in a.tags, avoid=()) or ctx.pick("range hood", avoid=())
-    return KitchenSet(
-        unit=unit,
-        base=base,
-        sink=sinks[0],
-        cooker=cooker,
-        hob=hob,
-        upper=upper,
-        hood=hood,
-        depth=max(a.size[1] for a in (*base, sinks[0])),
-    )
+    depth = max(a.size[1] for a in (*base, sinks[0]))
+    return KitchenSet(unit, base, sink=sinks[0], cooker=cooker, hob=hob, upper=upper, hood=hood, depth=depth)
 
 
 def free_runs(space: RoomSpace, wall: Wall, depth: float, height: float) -> list[tuple[float, float]]:
@@ -186,9 +178,8 @@ def _best_runs(ctx: Context, kit: KitchenSet) -> list[tuple[Wall, float, float]]
 
 def _fridge(ctx: Context, widest: float) -> Asset | None:
     """A fridge as tall as people are, if there is one; at most so wide, metres."""
-    return ctx.pick("fridge", most=(widest, 1.0, 2.1), least=(0.0, 0.0, 1.5), avoid=()) or ctx.pick(
-        "fridge", most=(widest, 1.0, 2.1), avoid=()
-    )
+    most = (widest, 1.0, 2.1)
+    return ctx.pick("fridge", most=most, least=(0.0, 0.0, 1.5), avoid=()) or ctx.pick("fridge", most=most, avoid=())
 
 
 def _tall_block(ctx: Context, kit: KitchenSet, done: Sequence[Thing]) -> tuple[Thing, ...]:
@@ -208,17 +199,9 @@ def _tall_block(ctx: Context, kit: KitchenSet, done: Sequence[Thing]) -> tuple[T
         items, x = [], -width / 2
         for asset in row:
             role = "fridge" if asset is fridge else "counter" if asset in low else "tall cabinet"
-            items.append(
-                Item(
-                    asset,
-                    x + asset.size[0] / 2,
-                    -asset.size[1] / 2,
-                    params=ctx.looks(asset) if asset is fridge else (),
-                    clear=0.5,
-                    role=role,
-                )
-            )
-            x += asset.size[0] + 0.004
+            (w, d, _), looks = asset.size, ctx.looks(asset) if asset is fridge else ()
+            items.append(Item(asset, x + w / 2, -d / 2, params=looks, clear=0.5, role=role))
+            x += w + 0.004
 
         def near(wall: Wall, s: float, width: float = width) -> float:
             return -min(_gap(wall.point(s), t) for t in done) + 1.5 * at_corner(wall, s, width)
@@ -295,10 +278,8 @@ def _run(
         items = _run_items(ctx, line, _slots(ctx, line, count, start, view))
         if fridge is not None:
             s = (b - fridge.size[0] / 2 - 0.005) if at_end else (a + fridge.size[0] / 2 + 0.005)
-            clear = free - 0.05
-            items.append(
-                (s, Item(fridge, 0.0, -fridge.size[1] / 2, params=ctx.looks(fridge), clear=clear, role="fridge"))
-            )
+            looks, clear = ctx.looks(fridge), free - 0.05
+            items.append((s, Item(fridge, 0.0, -fridge.size[1] / 2, params=looks, clear=clear, role="fridge")))
         found = _put_line(ctx, wall, items)
         if found:
             return found
@@ -397,10 +378,8 @@ def _base_items(ctx: Context, line: UnitLine, slot: UnitSlot, first: int) -> lis
     if wide and n > 1 and ctx.chance(0.7):
         return [unit(wide[0], s, n * line.width, "counter")]
     single = [a for a in kit.base if kit.units(a) == 1] or list(kit.base)
-    return [
-        unit(single[int(ctx.rng.integers(len(single)))], s + (k - (n - 1) / 2) * line.width, line.width, "counter")
-        for k in range(n)
-    ]
+    places = (s + (k - (n - 1) / 2) * line.width for k in range(n))
+    return [unit(single[int(ctx.rng.integers(len(single)))], at, line.width, "counter") for at in places]
 
 
 def _hood(ctx: Context, line: UnitLine, slot: UnitSlot) -> list[tuple[float, Item]]:
@@ -435,9 +414,8 @@ def _upper_items(ctx: Context, line: UnitLine, slot: UnitSlot) -> list[tuple[flo
 
 def _more_runs(ctx: Context, kit: KitchenSet, done: list[Thing]) -> None:
     """More cabinets, round the corner or opposite, until the kitchen has the worktop its size deserves."""
-    want = min(max(0.36 * ctx.space.area, 2.4), 6.5) - sum(
-        t.size[0] for t in done if t.role != "fridge" and _on_floor(ctx, t)
-    )
+    there = sum(t.size[0] for t in done if t.role != "fridge" and _on_floor(ctx, t))
+    want = min(max(0.36 * ctx.space.area, 2.4), 6.5) - there
     for _ in range(3):
         if want < 0.8 * kit.unit:
             return

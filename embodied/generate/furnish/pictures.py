@@ -145,9 +145,7 @@ def _image(key: str) -> str:
 
 def mirrors(ctx: Context) -> None:
     """A tall mirror where one dresses or goes out."""
-    if ctx.kind not in MIRRORED or ctx.roles("mirror"):
-        return
-    if ctx.kind == "bedroom" and ctx.chance(0.5):
+    if ctx.kind not in MIRRORED or ctx.roles("mirror") or (ctx.kind == "bedroom" and ctx.chance(0.5)):
         return
     mirror = ctx.pick("mirror", most=(2.5, 0.2, 2.2))
     if mirror is None:

@@ -401,9 +401,7 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
     steps = np.roll(ring, -1, axis=0) - ring
     lengths = np.hypot(*steps.T)
     units = steps / lengths[:, None]
-    convex = [
-        bool(units[i - 1][0] * units[i][1] - units[i - 1][1] * units[i][0] > 0) for i in range(n)
-    ]  # whether corner i turns left
+    lefts = [bool(units[i - 1][0] * units[i][1] - units[i - 1][1] * units[i][0] > 0) for i in range(n)]  # of corners
     walls = []
     for i in range(n):
         along, inward = units[i], np.array([-units[i][1], units[i][0]])
@@ -427,7 +425,7 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
                 length=float(lengths[i]),
                 outer=outer,
                 openings=tuple(found),
-                corners=(convex[i], convex[(i + 1) % n]),
+                corners=(lefts[i], lefts[(i + 1) % n]),
             )
         )
     return tuple(walls)
@@ -445,11 +443,8 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
     if o.kind == "window":
         return [before(s0 - 0.05, s1 + 0.05, 0.3, o.sill, o.head)]
     swings_here = o.rooms[0] == room.id and o.kind in ("door", "front_door", "back_door")
-    depth = {"passage": 0.6 if area > 9.0 else 0.4, "french_window": 0.6, "garage_door": 1.2}.get(
-        o.kind, 0.6 if area > 3.0 else 0.4
-    )
-    if o.kind in ("front_door",):
-        depth = 1.0
+    usual = {"passage": 0.6 if area > 9.0 else 0.4, "french_window": 0.6, "garage_door": 1.2, "front_door": 1.0}
+    depth = usual.get(o.kind, 0.6 if area > 3.0 else 0.4)
     if swings_here:
         depth = max(depth, width + 0.05)
     found = [before(s0 - 0.1, s1 + 0.1, depth, 0.0, o.head + 0.08)]
@@ -461,8 +456,7 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
 
 def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:
     """The open leaf of a door that swings into the room."""
-    hinge = o.a if o.hinge == "a" else o.b
-    at = (hinge[0] - wall.start[0]) * wall.along[0] + (hinge[1] - wall.start[1]) * wall.along[1]
+    at = wall.along_of(*(o.a if o.hinge == "a" else o.b))
     width, sign = s1 - s0, 1.0 if abs(at - s0) < abs(at - s1) else -1.0
     u, v = sign * math.cos(o.angle), math.sin(o.angle)
     dx, dy = u * wall.along[0] + v * wall.inward[0], u * wall.along[1] + v * wall.inward[1]
@@ -471,17 +465,14 @@ def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:
 
 
 def _stair_keepouts(stair: Stair, z: float, height: float) -> list[Box]:
-    boxes = []
-    path = stair.path
-    foot, head = path[0], path[-1]
+    boxes, path = [], stair.path
     for (ax, ay, _), (bx, by, _) in itertools.pairwise(path):
         length = math.hypot(bx - ax, by - ay)
         if length < 1e-6:
             continue
         yaw = math.atan2(by - ay, bx - ax)
         boxes.append(box((ax + bx) / 2, (ay + by) / 2, length, stair.width + 0.06, yaw, z, z + height))
-    ends = ((foot, path[1]), (head, path[-2]))
-    for end, next_ in ends:
+    for end, next_ in ((path[0], path[1]), (path[-1], path[-2])):
         length = math.hypot(next_[0] - end[0], next_[1] - end[1]) or 1.0
         ux, uy = (end[0] - next_[0]) / length, (end[1] - next_[1]) / length
         boxes.append(box(end[0] + 0.45 * ux, end[1] + 0.45 * uy, 0.9, stair.width, math.atan2(uy, ux), z, z + 2.1))
