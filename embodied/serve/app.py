@@ -319,7 +319,10 @@ class Server:
         if do == "moved":
             event.body["candidate"] = int(message["candidate"])
         elif do == "asked":
-            event.body["question"] = self._question(game, words(message["text"]))
+            text, part = words(message["text"]), game.table.part
+            if not (part.free_question or game.practice) and text not in [q.text for q in part.questions]:
+                raise ActionError("choose one of the questions")
+            event.body["question"] = text
         elif do == "answered":
             part, picture = game.table.part, message.get("picture")
             if picture is not None:
@@ -331,12 +334,6 @@ class Server:
             event.body["reply"] = parse(to_json(reply))
         await self.happen(event)
         return [self.sessions.people[p] for p in game.people.values()]
-
-    def _question(self, game: Game, text: str) -> str:
-        part = game.table.part
-        if not (part.free_question or game.practice) and text not in [q.text for q in part.questions]:
-            raise ActionError("choose one of the questions")
-        return text
 
     async def _send_house(self, person: Person) -> None:
         if person.game is None:

@@ -13,13 +13,13 @@ from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-import cv2
 import numpy as np
 
 from embodied.envs.continuous import Body, Grounds
 from embodied.errors import UnableError
 from embodied.interface import Place, Pose
 from embodied.render.camera import camera_at
+from embodied.render.jpeg import jpeg
 from embodied.world import World
 
 ACTIONS = ("Go ahead", "Turn left", "Turn right")
@@ -110,5 +110,4 @@ class Live:
         if name not in self._worlds:
             self._worlds[name] = self._open(name)
         rgb = self._worlds[name].renderer.rgb(camera_at((x, y, z), yaw, 0.0, VFOV), SIZE)
-        bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
-        return cv2.imencode(".jpg", bgr, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))[1].tobytes()
+        return jpeg(rgb, QUALITY)

@@ -149,7 +149,7 @@ def assistant_of(game: Game, pictures: Pictures) -> Screen:
 def judge_of(sessions: Sessions, person: Person, pictures: Pictures) -> Screen:
     """An episode to be watched, with what is asked about it."""
     assert person.viewing is not None
-    part, episode = sessions.part(person.viewing[0]), sessions.viewed_episode(person)
+    part, episode = sessions.part(person.viewing[0]), sessions.episode_of(*person.viewing)
     return {
         "screen": "judge",
         "kind": part.kind,

@@ -31,7 +31,6 @@ class Person:
     id: str
     key: str
     """Digest of the token in their link."""
-    joined: float
     consented: bool = False
     ended: str | None = None
     """'done', 'left': asked to stop, 'nothing': no task was left."""
@@ -93,7 +92,7 @@ class Sessions:
             self.people[event.person].messages.add(event.message)
 
     def _joined(self, event: Event) -> None:
-        person = Person(event.body["person"], event.body["key"], event.time)
+        person = Person(event.body["person"], event.body["key"])
         self.people[person.id] = self.by_key[person.key] = person
         if event.body.get("invitation"):
             self.used.add(event.body["invitation"])
@@ -191,11 +190,6 @@ class Sessions:
         if part.episodes:
             return [(str(i), e) for i, e in enumerate(self.viewed[part.name])]
         return [(unit, game.episode) for unit, game in self._episodes[part.of]]
-
-    def viewed_episode(self, person: Person) -> Episode:
-        """What a person judges now."""
-        assert person.viewing is not None
-        return self.episode_of(*person.viewing)
 
     def episode_of(self, part: str, unit: str) -> Episode:
         """What a part judges under the name `unit`."""
