@@ -90,7 +90,7 @@ def compare(
         for quality in BAKES:
             forget(cache, house, catalogue, quality)
         bakes.append({quality: bake(house, catalogue, cache, quality) for quality in BAKES})
-        chosen = viewpoints(house, catalogue, VIEWS, kinds)
+        chosen = viewpoints(house, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
         shots += draw(house, catalogue, bakes[-1], chosen)
     facts = measure(shots, bakes)
@@ -101,10 +101,8 @@ def compare(
     return Report(facts, table(facts))
 
 
-def viewpoints(
-    house: House, catalogue: Catalogue, count: int, shown: Sequence[str] = ()
-) -> list[tuple[str, np.ndarray, float]]:
-    """Rooms of different kinds: id, eye, and the yaw with the longest view.
+def viewpoints(house: House, shown: Sequence[str] = ()) -> list[tuple[str, np.ndarray, float]]:
+    """VIEWS rooms of different kinds: id, eye, and the yaw with the longest view.
 
     Args:
       shown: kinds of rooms that other houses have shown, each as often as it was; the rarest come first, then the
@@ -116,7 +114,7 @@ def viewpoints(
     kinds: set[str] = set()
     for room in sorted(house.rooms, key=lambda r: (shown.count(r.kind), -area[r.id])):
         nodes = [i for i, r in enumerate(graph.room_of_node) if r == room.id]
-        if not nodes or room.kind in kinds or len(found) == count:
+        if not nodes or room.kind in kinds or len(found) == VIEWS:
             continue
         kinds.add(room.kind)
         corner = np.array(max(room.polygon, key=lambda c: min(np.hypot(*(graph.positions[i][:2] - c)) for i in nodes)))

@@ -73,8 +73,8 @@ forward, left, right: 1 for what an expert does there. `lerobot-eval` judges pol
 FPS = 10
 """Frames a second of videos."""
 
-Chosen = Callable[[ContinuousEnv, int], int]
-"""(the body, what the expert does here) -> what is done."""
+Chosen = Callable[[int], int]
+"""From what the expert does to what is done."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,20 +95,20 @@ class Taught:
 def wandering(share: float, rng: np.random.Generator) -> Chosen:
     """The expert plays, but this share of its steps and turns is drawn among steps and turns instead."""
 
-    def chosen(env: ContinuousEnv, label: int) -> int:
+    def chosen(label: int) -> int:
         return int(rng.integers(1, 4)) if label != Move.STOP and rng.random() < share else label
 
     return chosen
 
 
-def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = lambda env, label: label) -> Taught:
+def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = lambda label: label) -> Taught:
     """Play an episode, as the expert does unless told otherwise, and write down what the expert does at each of its
     states (Ross et al. 2011)."""
     env.reset(excursion, world)
     expert, labels = Follower(env, along=bool(excursion.reference)), []
     while not env.ended:
         labels.append(expert.action())
-        env.step(chosen(env, labels[-1]))
+        env.step(chosen(labels[-1]))
     return Taught(env.walk(), tuple(labels), world, env.body)
 
 

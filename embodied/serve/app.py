@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import hashlib
 import hmac
 import json
@@ -101,8 +102,8 @@ class Server:
         self._open = 0
         self._joining = Bucket(JOIN_RATE, JOIN_BURST)
         self._machines: dict[str, asyncio.Task[None]] = {}
-        self._plans: dict[str, dict[str, Any]] = {}
-        self._houses = houses_of(sessions)
+        houses = houses_of(sessions)
+        self._plan = functools.cache(lambda house: plan_of(houses[house], pictures))
         self.failed = False
         """Whether something could not be written down; nothing is acknowledged any more."""
 
@@ -341,18 +342,15 @@ class Server:
         game = self.sessions.games[person.game]
         if game.people.get("assistant") != person.id:
             raise ActionError("only the assistant sees the plan")
-        name = game.task.world
-        if name not in self._plans:
-            self._plans[name] = plan_of(self._houses[name], self.pictures)
         socket = self._sockets.get(person.id)
         if socket is not None:
-            await socket.send_text(json.dumps({"plan": self._plans[name]}))
+            await socket.send_text(json.dumps({"plan": self._plan(game.task.world)}))
 
     async def _admin(self, socket: WebSocket, word: str) -> None:
         if not hmac.compare_digest(word.encode(), self.token("results").encode()):
             raise Refused("This link is not valid.")
         while True:
-            await socket.send_text(json.dumps({"screen": "results", **summary(self.sessions, time.time())}))
+            await socket.send_text(json.dumps({"screen": "results", **summary(self.sessions)}))
             await asyncio.sleep(5)
 
     async def _tell_partners(self, person: Person) -> None:

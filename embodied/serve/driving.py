@@ -7,6 +7,7 @@ go straight to. Assistants, measures and learners need not know how people moved
 from __future__ import annotations
 
 import asyncio
+import functools
 import math
 import time
 from collections import OrderedDict
@@ -78,7 +79,7 @@ class Live:
 
     def __init__(self, open_world: Callable[[str], World]) -> None:
         """`open_world`: gives a house that can be drawn, by name."""
-        self._open, self._worlds = open_world, dict[str, World]()
+        self._world = functools.cache(open_world)
         self._thread = ThreadPoolExecutor(1, "live")
         self._drawn: OrderedDict[str, asyncio.Future[bytes]] = OrderedDict()
 
@@ -107,7 +108,5 @@ class Live:
 
     def _draw(self, eye: Eye) -> bytes:
         name, x, y, z, yaw = eye
-        if name not in self._worlds:
-            self._worlds[name] = self._open(name)
-        rgb = self._worlds[name].renderer.rgb(camera_at((x, y, z), yaw, 0.0, VFOV), SIZE)
+        rgb = self._world(name).renderer.rgb(camera_at((x, y, z), yaw, 0.0, VFOV), SIZE)
         return jpeg(rgb, QUALITY)

@@ -164,15 +164,11 @@ class Sessions:
         for role, pid in game.people.items():
             person = self.people[pid]
             person.game, person.ready = None, False
-            person.last = "broken"
-            if game.broken is None:
-                person.last = "found" if found(game) else "missed"
-                if game.practice:
-                    person.practised.add(role)
-                else:
-                    person.done[part.name] += 1
-            elif game.practice:
+            person.last = "broken" if game.broken is not None else "found" if found(game) else "missed"
+            if game.practice:
                 person.practised.add(role)
+            elif game.broken is None:
+                person.done[part.name] += 1
         if not game.practice:
             if game.broken is None:
                 self._episodes[part.name].append((game.id, game))

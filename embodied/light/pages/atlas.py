@@ -208,16 +208,10 @@ def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:
 def _page(
     things: Sequence[UnwrappedThing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]
 ) -> Page:
-    finishes: list[Finish] = []
-    known: dict[Finish, int] = {}
+    finishes: dict[Finish, int] = {}
     which, owner, luxels = [], [], []
     for t, place in zip(things, places):
-        local = []
-        for f in t.finishes:
-            if f not in known:
-                known[f] = len(finishes)
-                finishes.append(f)
-            local.append(known[f])
+        local = [finishes.setdefault(f, len(finishes)) for f in t.finishes]
         which.append(np.array(local, np.int32)[t.flat.part])
         owner.append(np.full(len(t.flat.part), number[t.owner], np.int32))
         luxels.append(t.flat.luxels + place.astype(np.float32))
