@@ -33,5 +33,5 @@ def test_every_model_is_drawn_in_its_own_tile(catalogue):
 
 
 def test_sheets_are_written_as_png(catalogue, tmp_path):
-    (path,) = draw_sheets(catalogue, ["mine/blue"], tmp_path / "out", surfaces=True)
+    (path,) = draw_sheets(catalogue, ["mine/blue"], tmp_path / "out")
     assert path.read_bytes().startswith(b"\x89PNG")

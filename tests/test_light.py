@@ -60,7 +60,7 @@ def closed_box(size: float, finish: Finish, lights: tuple[Light, ...] = ()):
     atlas = atlas_of(things_of([part], density=8.0, budget=100, cache=None))
     lamps = lamps_of(house, atlas)
     lux = luxels.with_glow(luxels.luxels_of(atlas, ColourMaps()), house, atlas, lamps)
-    space = radiosity.space_of(atlas, lux.texels, DARK.picture)
+    space = radiosity.with_env(radiosity.space_of(atlas, lux.texels), DARK.picture)
     settings = dataclasses.replace(TINY, bounce_rays=16, seen_rays=32, lamp_rays=24)
     return lux, solve.solve(solve.Problem(house, atlas, lux, space, DARK, lamps, settings))
 
@@ -94,7 +94,8 @@ def test_sky_through_a_hole_matches_the_form_factor_of_a_rectangle():
     assert portal.normal == pytest.approx([0, 0, -1])
     far_below = box_mesh((-1, -1, -9), (1, 1, -8), (0.5, 0.5, 0.5, 1.0))
     atlas = atlas_of(things_of([Part("a/b", "wall", "a", far_below, "x")], density=1.0, budget=100, cache=None))
-    space = radiosity.space_of(atlas, [rasterise(p, 1) for p in atlas.pages], np.full((64, 128, 3), 3.0, np.float32))
+    space = radiosity.space_of(atlas, [rasterise(p, 1) for p in atlas.pages])
+    space = radiosity.with_env(space, np.full((64, 128, 3), 3.0, np.float32))
     up = np.tile([[0.0, 0.0, 1.0]], (64, 1))
     p = radiosity.points_of(np.zeros((64, 3)), up, up, np.zeros(64, bool))
     e = array(radiosity.sky_light(space, p, portal, 256)).mean(0) / (3.0 * GLASS)

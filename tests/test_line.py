@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun as rr
+import rerun.blueprint as rrb
 
 from agents.vision import features
 from agents.vision.config import PLAIN
@@ -33,7 +34,7 @@ from embodied.render.pictures import PictureSettings
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
 from viz import recording
-from viz.blueprint import episode_blueprint, sees_title
+from viz.blueprint import blueprint_of, sees_title
 from viz.recording import Pictures, camera_axes, record
 from viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
 from viz.video import camera_track, write_video
@@ -63,7 +64,7 @@ def test_a_seed_becomes_a_house_a_walk_and_a_recording(world, tmp_path):
     rrd = tmp_path / "episode.rrd"
     frames = list(rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0))
     with open_recording(
-        Sinks(rrd), episode_blueprint(world.house), name="test", properties={"renderer": "any"}
+        Sinks(rrd), blueprint_of(world.house, frames[-1].episode), name="test", properties={"renderer": "any"}
     ) as recording:
         passed_on = list(record(recording, world, task, (f.step for f in frames), pictures=Pictures((48, 64), 32)))
     assert [s.pose for s in passed_on] == [f.step.pose for f in frames]
@@ -145,7 +146,7 @@ def test_a_broken_recording_leaves_no_file(world, tmp_path):
     rrd = tmp_path / "episode.rrd"
     with (
         pytest.raises(RuntimeError, match="stopped half-way"),
-        open_recording(Sinks(rrd), episode_blueprint(world.house), name="test", properties={}),
+        open_recording(Sinks(rrd), rrb.Blueprint(), name="test", properties={}),
     ):
         raise RuntimeError("stopped half-way")
     assert not list(tmp_path.iterdir())
@@ -168,9 +169,7 @@ def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
         with open_viewers(connect=f"rerun+http://127.0.0.1:{port}/proxy") as viewers:
             steps = [f.step for f in rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)]
             for _ in range(2):  # a second recording follows the first into the same viewer
-                with open_recording(
-                    Sinks(None, viewers), episode_blueprint(world.house), name="sent", properties={}
-                ) as recording:
+                with open_recording(Sinks(None, viewers), rrb.Blueprint(), name="sent", properties={}) as recording:
                     list(record(recording, world, task, steps, pictures=Pictures((48, 64), 32)))
 
         def held() -> int:

@@ -159,7 +159,7 @@ def test_the_state_after_a_restart_is_that_before(data):
         person.connected = 1
     for name in ("eve", "bob"):
         assert again.screen(name) == play.screen(name)
-    assert summary(again.sessions, 0.0)["parts"] == summary(play.sessions, 0.0)["parts"]
+    assert summary(again.sessions)["parts"] == summary(play.sessions)["parts"]
 
 
 def test_every_task_gets_as_many_answers_as_wanted_and_nobody_plays_one_twice(data):

@@ -24,55 +24,24 @@ def sees_title(seen: PictureSettings | None) -> str:
 def blueprint_of(
     house: House, episode: Episode, seen: PictureSettings | None = None, *, shown: bool = False
 ) -> rrb.Blueprint:
-    """The layout for a finished episode: shows an assistant's image and probabilities where it has them.
-
-    Args:
-      seen: how the pictures are drawn that the agent looks at; None if it looks at none.
-      shown: the recording also holds pictures for people.
-    """
-    asked = any(isinstance(s.action, Ask) for s in episode.steps)
-    pictured = any(s.reply is not None and s.reply.image is not None for s in episode.steps)
-    thought = any(s.action.thought is not None and s.action.thought.asks for s in episode.steps)
-    return episode_blueprint(
-        house,
-        dialogue=asked or episode.task.kind != "find",
-        target=pictured,
-        probabilities=thought,
-        stack=episode.task.kind == "hari",
-        sees=sees_title(seen),
-        lit=shown,
-        monocular=episode.task.kind == "vnla",
-    )
-
-
-def episode_blueprint(
-    house: House,
-    *,
-    dialogue: bool = True,
-    target: bool = False,
-    probabilities: bool = False,
-    stack: bool = False,
-    sees: str = "What the agent sees",
-    lit: bool = False,
-    monocular: bool = False,
-) -> rrb.Blueprint:
-    """The house in 3D on the left, what the agent sees and hears on the right, plots below.
+    """The layout for a finished episode: the house in 3D on the left, what the agent sees and hears on the right, plots
+    below; with an assistant's image and probabilities where it has them.
 
     Args:
       house: decides where the eye starts.
-      dialogue: show who said what.
-      target: show the image that an assistant sent.
-      probabilities: plot the policy's own probabilities.
-      stack: show HARI's goals and costs.
-      sees: name of the picture along the agent's gaze.
-      lit: show the same view as people are to see it.
-      monocular: it sees one view only, and its requests are counted (VNLA).
+      seen: how the pictures are drawn that the agent looks at; None if it looks at none.
+      shown: the recording also holds pictures for people.
     """
+    kind, steps = episode.task.kind, episode.steps
+    dialogue = kind != "find" or any(isinstance(s.action, Ask) for s in steps)
+    target = any(s.reply is not None and s.reply.image is not None for s in steps)
+    thought = any(s.action.thought is not None and s.action.thought.asks for s in steps)
+    stack, monocular = kind == "hari", kind == "vnla"  # goals and costs; one view only, and requests are counted
     world = _house_view(house)
-    ahead = rrb.Spatial2DView(origin="/agent/camera/image", name=sees)
+    ahead = rrb.Spatial2DView(origin="/agent/camera/image", name=sees_title(seen))
     around = "Around it, which it does not see" if monocular else "Panorama, gaze in the middle"
     panorama = rrb.Spatial2DView(origin="/view/panorama", name=around)
-    for_people = [rrb.Spatial2DView(origin="/view/lit", name="The same, lit, for you")] if lit else []
+    for_people = [rrb.Spatial2DView(origin="/view/lit", name="The same, lit, for you")] if shown else []
     sent = [rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else []
     texts = [
         rrb.TextDocumentView(origin="/text/request", name="Request"),
@@ -83,7 +52,7 @@ def episode_blueprint(
             rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
             rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
         ]
-    plots = _plots(probabilities, stack, monocular)
+    plots = _plots(thought, stack, monocular)
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
         rrb.Horizontal(ahead, *(for_people or sent)),

@@ -36,24 +36,13 @@ class LightMesh:
     """(n, 3) float32."""
     faces: np.ndarray
     """(m, 3) uint32."""
-    colors: np.ndarray
+    colors: np.ndarray | None = None
     """(n, 4) uint8 sRGB."""
-    normals: np.ndarray | None
+    normals: np.ndarray | None = None
     """(n, 3) float32, or None where the colours already hold the light."""
-
-
-@dataclass(frozen=True, eq=False)
-class LitSurface:
-    """A wall or floor with its light as a picture."""
-
-    path: str
-    positions: np.ndarray
-    """(n, 3) float32, metres, world."""
-    faces: np.ndarray
-    """(m, 3) uint32."""
-    uv: np.ndarray
-    """(n, 2) float32, v down."""
-    picture: np.ndarray
+    uv: np.ndarray | None = None
+    """(n, 2) float32, v down, of a wall or floor with its light as a picture."""
+    picture: np.ndarray | None = None
     """(h, w, 3) uint8 sRGB."""
 
 
@@ -79,42 +68,27 @@ def light_meshes(
     return tuple(meshes)
 
 
-def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh | LitSurface]) -> None:
+def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh]) -> None:
     """Log the house once, for all times."""
     for mesh in meshes:
-        if isinstance(mesh, LitSurface):
-            recording.log(
-                mesh.path,
-                rr.Mesh3D(
-                    vertex_positions=mesh.positions,
-                    triangle_indices=mesh.faces,
-                    vertex_texcoords=mesh.uv,
-                    albedo_texture=mesh.picture,
-                ),
-                static=True,
-            )
-            continue
-        recording.log(
-            mesh.path,
-            rr.Mesh3D(
-                vertex_positions=mesh.positions,
-                triangle_indices=mesh.faces,
-                vertex_colors=mesh.colors,
-                vertex_normals=mesh.normals,
-            ),
-            static=True,
+        drawn = rr.Mesh3D(
+            vertex_positions=mesh.positions,
+            triangle_indices=mesh.faces,
+            vertex_colors=mesh.colors,
+            vertex_normals=mesh.normals,
+            vertex_texcoords=mesh.uv,
+            albedo_texture=mesh.picture,
         )
+        recording.log(mesh.path, drawn, static=True)
 
 
-def lit_meshes(
-    lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int = 2 * BUDGET
-) -> tuple[LightMesh | LitSurface, ...]:
+def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int = 2 * BUDGET) -> tuple[LightMesh, ...]:
     """The same from baked pages: objects with colours in their vertices, walls and floors with light as a picture."""
     by_owner: dict[tuple[str, str, bool], list[LitMesh]] = {}
     for mesh in lit.meshes:
         if mesh.kind not in ("ceiling", "outdoor") and mesh.owner not in hidden:
             by_owner.setdefault((mesh.room, mesh.owner, mesh.kind in ("floor", "wall")), []).append(mesh)
-    found: list[LightMesh | LitSurface] = []
+    found: list[LightMesh] = []
     for (room, owner, flat), group in by_owner.items():
         path = f"house/{room or 'shared'}/{owner.split('/')[-1]}"
         if flat:
@@ -125,7 +99,7 @@ def lit_meshes(
     return tuple(found)
 
 
-def _surface(path: str, mesh: LitMesh, page: np.ndarray) -> LitSurface:
+def _surface(path: str, mesh: LitMesh, page: np.ndarray) -> LightMesh:
     """A wall or floor with its own part of the page, at most PICTURE pixels wide or high."""
     height, width = page.shape[:2]
     low = np.floor(mesh.uv.min(axis=0) * [width, height]).astype(int).clip(0)
@@ -134,13 +108,8 @@ def _surface(path: str, mesh: LitMesh, page: np.ndarray) -> LitSurface:
     scale = min(PICTURE / max(part.shape[:2]), 1.0)
     size = tuple(max(round(n * scale), 1) for n in part.shape[1::-1])
     uv = (mesh.uv * [width, height] - low) / (high - low)
-    return LitSurface(
-        path,
-        mesh.vertices,
-        mesh.faces.astype(np.uint32),
-        uv.astype(np.float32),
-        cv2.resize(part, size, interpolation=cv2.INTER_AREA),
-    )
+    picture = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
+    return LightMesh(path, mesh.vertices, mesh.faces.astype(np.uint32), uv=uv.astype(np.float32), picture=picture)
 
 
 def _share(owner: str, budget: int, meshes: int) -> int:
@@ -167,9 +136,7 @@ def _lit_piece(mesh: LitMesh, page: np.ndarray, budget: int) -> tuple:
     sums = np.stack([np.bincount(corner, np.repeat(of_face[:, c], 3), len(mesh.vertices)) for c in range(3)], 1)
     colors = np.full((len(mesh.vertices), 4), round(255 * mesh.alpha), np.uint8)
     colors[:, :3] = np.round(sums / count[:, None])
-    normals = np.zeros_like(mesh.vertices)
-    points, normals, colors, faces = _simplified(mesh.vertices, normals, colors, mesh.faces, budget)
-    return points, normals, colors, faces
+    return _simplified(mesh.vertices, np.zeros_like(mesh.vertices), colors, mesh.faces, budget)
 
 
 def _placed(positions: np.ndarray, normals: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray]:

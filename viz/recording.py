@@ -15,15 +15,15 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import rerun as rr
 from scipy.spatial.transform import Rotation
 
-from embodied.geometry import rotation
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Step, Stop, Task
 from embodied.language.prose import prose
 from embodied.navigation.free_space import EYE
+from embodied.render.camera import camera_at
+from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama
 from embodied.render.photograph import PhotoCamera
 from embodied.world import World
@@ -224,7 +224,8 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     recording.log("plot/requests", rr.Scalars(state.requests))
     if state.left is not None:
         recording.log("plot/budget/left", rr.Scalars(state.left))
-    recording.log("events", rr.TextLog(event_text(world, step), level=event_level(step)))
+    level = "WARN" if isinstance(step.action, Ask) else "INFO"  # asking stands out
+    recording.log("events", rr.TextLog(event_text(world, step), level=level))
     recording.log("text/dialogue", markdown(state.told()))
     log_aim(recording, world, state, views)
 
@@ -249,10 +250,8 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     panorama = world.panorama(pose.node)
     height, width = sizes.view
     eye = world.graph.positions[pose.node]
-    recording.log(
-        "agent/camera",
-        rr.Transform3D(translation=eye, quaternion=rr.Quaternion(xyzw=camera_turn(pose.yaw, pose.pitch))),
-    )
+    turn = Rotation.from_matrix(camera_axes(pose.yaw, pose.pitch)).as_quat()
+    recording.log("agent/camera", rr.Transform3D(translation=eye, quaternion=rr.Quaternion(xyzw=turn)))
     recording.log(
         "agent/camera/image",
         rr.Pinhole(
@@ -369,29 +368,12 @@ def event_text(world: World, step: Step) -> str:
     return f"asks {WANTED[step.action.intention]} in the {room}"
 
 
-def event_level(step: Step) -> str:
-    """Asking stands out in the log."""
-    return "WARN" if isinstance(step.action, Ask) else "INFO"
-
-
-def camera_turn(yaw: float, pitch: float) -> np.ndarray:
-    """(4,) quaternion x y z w that turns the camera's frame (x right, y down, z forward) into the world's."""
-    return Rotation.from_matrix(camera_axes(yaw, pitch)).as_quat()
-
-
 def camera_axes(yaw: float, pitch: float) -> np.ndarray:
-    """(3, 3) with the camera's right, down and forward axes as columns, in the world's frame."""
-    ahead = rotation(yaw) @ [1.0, 0.0]
-    forward = np.array([*(ahead * np.cos(pitch)), np.sin(pitch)])
-    right = np.array([ahead[1], -ahead[0], 0.0])
-    return np.stack([right, np.cross(forward, right), forward], axis=1)
+    """(3, 3) with the camera's right (x), down (y) and forward (z) axes as columns, in the world's frame."""
+    camera = camera_at((0, 0, 0), yaw, pitch)
+    return np.stack([camera.right, -np.array(camera.up), camera.forward], axis=1)
 
 
 def encoded(rgb: np.ndarray, quality: int) -> rr.EncodedImage:
     """An RGB picture as JPEG."""
-    ok, data = cv2.imencode(".jpg", cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality])
-    if not ok:
-        raise ValueError(
-            f"a picture of shape {rgb.shape} and type {rgb.dtype} cannot be encoded; expected (h, w, 3) uint8"
-        )
-    return rr.EncodedImage(contents=data.tobytes(), media_type="image/jpeg")
+    return rr.EncodedImage(contents=jpeg(rgb, quality), media_type="image/jpeg")

@@ -147,14 +147,11 @@ def _plots(found: Sequence[Listed], agents: Sequence[str], success: Mapping[str,
             range(len(agents)), [100 * sum(x.arrived for x in of[a]) / len(of[a]) for a in agents], color="#2a9d8f"
         )
         axes[0].set(title="stopped at a goal node, %", xlim=(0, 100))
-    axes[1].boxplot(
-        [[len(x.episode.steps) for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents))
-    )
-    axes[1].set(title="steps")
-    axes[2].boxplot(
-        [[x.episode.requests for x in of[a]] for a in agents], orientation="horizontal", positions=range(len(agents))
-    )
-    axes[2].set(title="requests for help")
+    steps = [[len(x.episode.steps) for x in of[a]] for a in agents]
+    requests = [[x.episode.requests for x in of[a]] for a in agents]
+    for axis, title, counts in ((axes[1], "steps", steps), (axes[2], "requests for help", requests)):
+        axis.boxplot(counts, orientation="horizontal", positions=range(len(agents)))
+        axis.set(title=title)
     axes[0].set_yticks(range(len(agents)), agents)
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=110)

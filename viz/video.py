@@ -131,14 +131,13 @@ def captioned(rgb: np.ndarray, caption: str) -> np.ndarray:
     return np.asarray(frame)
 
 
-def write_video(path: Path, frames: Iterator[np.ndarray], size: tuple[int, int], fps: int = FPS) -> int:
+def write_video(path: Path, frames: Iterator[np.ndarray], size: tuple[int, int]) -> int:
     """Encode RGB frames as H.264 in an .mp4 that appears complete or not at all.
 
     Args:
       path: where to write.
       frames: (height, width, 3) uint8 each.
       size: height and width, both even.
-      fps: frames per second.
 
     Returns:
       The number of frames.
@@ -147,7 +146,7 @@ def write_video(path: Path, frames: Iterator[np.ndarray], size: tuple[int, int],
         raise ValueError(f"a video needs an even height and width, got {size}")
     count = 0
     with atomic_path(Path(path)) as temporary, av.open(str(temporary), "w", format="mp4") as container:
-        stream = container.add_stream("libx264", rate=fps, options={"crf": "21", "preset": "veryfast"})
+        stream = container.add_stream("libx264", rate=FPS, options={"crf": "21", "preset": "veryfast"})
         stream.height, stream.width, stream.pix_fmt = size[0], size[1], "yuv420p"
         for frame in frames:
             container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24")))

@@ -29,6 +29,7 @@ from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 from embodied.render.filament import FilamentPainter
+from embodied.render.jpeg import jpeg
 from embodied.world import gloss_of
 
 if TYPE_CHECKING:
@@ -89,23 +90,19 @@ def compare(
         for quality in BAKES:
             forget(cache, house, catalogue, quality)
         bakes.append({quality: bake(house, catalogue, cache, quality) for quality in BAKES})
-        chosen = viewpoints(house, catalogue, VIEWS, kinds)
+        chosen = viewpoints(house, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
-        shots += draw(house, catalogue, bakes[-1], chosen, SIZE, RAYS)
+        shots += draw(house, catalogue, bakes[-1], chosen)
     facts = measure(shots, bakes)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(
-        out / "light.jpg", cv2.imencode(".jpg", sheet(shots)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 74])[1].tobytes()
-    )
+    write_bytes(out / "light.jpg", jpeg(sheet(shots), 74))
     write_json(out / "light.json", facts, indent=1)
     return Report(facts, table(facts))
 
 
-def viewpoints(
-    house: House, catalogue: Catalogue, count: int, shown: Sequence[str] = ()
-) -> list[tuple[str, np.ndarray, float]]:
-    """Rooms of different kinds: id, eye, and the yaw with the longest view.
+def viewpoints(house: House, shown: Sequence[str] = ()) -> list[tuple[str, np.ndarray, float]]:
+    """VIEWS rooms of different kinds: id, eye, and the yaw with the longest view.
 
     Args:
       shown: kinds of rooms that other houses have shown, each as often as it was; the rarest come first, then the
@@ -117,7 +114,7 @@ def viewpoints(
     kinds: set[str] = set()
     for room in sorted(house.rooms, key=lambda r: (shown.count(r.kind), -area[r.id])):
         nodes = [i for i, r in enumerate(graph.room_of_node) if r == room.id]
-        if not nodes or room.kind in kinds or len(found) == count:
+        if not nodes or room.kind in kinds or len(found) == VIEWS:
             continue
         kinds.add(room.kind)
         corner = np.array(max(room.polygon, key=lambda c: min(np.hypot(*(graph.positions[i][:2] - c)) for i in nodes)))
@@ -127,44 +124,37 @@ def viewpoints(
 
 
 def draw(
-    house: House,
-    catalogue: Catalogue,
-    baked: Mapping[str, Bake],
-    views: Sequence[tuple[str, np.ndarray, float]],
-    size: tuple[int, int],
-    rays: int,
+    house: House, catalogue: Catalogue, baked: Mapping[str, Bake], views: Sequence[tuple[str, np.ndarray, float]]
 ) -> list[Shot]:
     """Every view in every way; the milliseconds of the renderers are medians of five 256 x 256 cube faces."""
-    shots = []
+    shots, best, hour = [], baked[BAKES[-1]], house.sky.hour
     for way in WAYS:
         if way in DRAWN:
-            lit = None if way == "unlit" else baked.get(way, baked[BAKES[-1]]).lit
-            best = baked[BAKES[-1]]
+            lit = None if way == "unlit" else baked.get(way, best).lit
             painter = FilamentPainter(house, catalogue, best.lit) if way == "filament" else None
             overlay = gloss_of(best, detail=False) if way == "gloss" else None
             with Renderer(house, catalogue, lit=lit, painter=painter, overlay=overlay) as r:
-                hour = house.sky.hour
-                shots += [_drawn(r, way, v, hour, size) for v in views]
+                shots += [_drawn(r, way, v, hour) for v in views]
         else:
-            tracer = Tracer(baked[BAKES[-1]], house, quality=way, rays=16 if way == "glossy" else rays)
-            shots += [_traced(tracer, way, v, house.sky.hour, size) for v in views]
+            tracer = Tracer(best, house, quality=way, rays=16 if way == "glossy" else RAYS)
+            shots += [_traced(tracer, way, v, hour) for v in views]
     return shots
 
 
-def _drawn(r: Renderer, way: str, view: tuple[str, np.ndarray, float], hour: float, size: tuple[int, int]) -> Shot:
+def _drawn(r: Renderer, way: str, view: tuple[str, np.ndarray, float], hour: float) -> Shot:
     room, eye, yaw = view
-    rgb = r.view(eye, yaw, -0.1, VFOV, size).rgb
+    rgb = r.view(eye, yaw, -0.1, VFOV, SIZE).rgb
     return Shot(room, hour, way, rgb, _median_ms(functools.partial(r.rgb, camera_at(eye, yaw), (256, 256))))
 
 
-def _traced(t: Tracer, way: str, view: tuple[str, np.ndarray, float], hour: float, size: tuple[int, int]) -> Shot:
+def _traced(t: Tracer, way: str, view: tuple[str, np.ndarray, float], hour: float) -> Shot:
     room, eye, yaw = view
     camera = camera_at(eye, yaw, -0.1, VFOV)
     start, used = time.perf_counter(), time.process_time()
-    rgb, _, _ = t.picture(eye, camera.forward, camera.up, VFOV, size)
-    ms = 1e3 * (time.perf_counter() - start) * 256 * 256 / (size[0] * size[1])
+    rgb, _, _ = t.picture(eye, camera.forward, camera.up, VFOV, SIZE)
+    ms = 1e3 * (time.perf_counter() - start) * 256 * 256 / (SIZE[0] * SIZE[1])
     used = time.process_time() - used
-    plain = t.plain(eye, camera.forward, camera.up, VFOV, size) if way == "diffuse" else None
+    plain = t.plain(eye, camera.forward, camera.up, VFOV, SIZE) if way == "diffuse" else None
     return Shot(room, hour, way, rgb, ms, plain, used)
 
 
@@ -254,21 +244,16 @@ def sheet(shots: Sequence[Shot]) -> np.ndarray:
     rows = []
     for room, hour in views:
         row = [by[room, hour, way].copy() for way in WAYS]
-        cv2.putText(row[0], f"{room} {hour:g} h", (6, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (20, 20, 20), 1, cv2.LINE_AA)
+        _write(row[0], f"{room} {hour:g} h", 6)
         rows.append(np.concatenate(row, axis=1))
     head = np.full((20, rows[0].shape[1], 3), 255, np.uint8)
     for k, way in enumerate(WAYS):
-        cv2.putText(
-            head,
-            way,
-            (6 + k * rows[0].shape[1] // len(WAYS), 14),
-            cv2.FONT_HERSHEY_SIMPLEX,
-            0.45,
-            (0, 0, 0),
-            1,
-            cv2.LINE_AA,
-        )
+        _write(head, way, 6 + k * rows[0].shape[1] // len(WAYS))
     return np.concatenate([head, *rows])
+
+
+def _write(picture: np.ndarray, text: str, column: int) -> None:
+    cv2.putText(picture, text, (column, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0), 1, cv2.LINE_AA)
 
 
 def psnr(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float:

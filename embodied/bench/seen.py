@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from assets.catalogue import Catalogue
-from embodied.bench.timing import Measure, measure, one_core, ratio
+from embodied.bench.timing import Measure, measure, one_core, share
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.gym.env import HelpGymEnv, make
@@ -63,9 +63,10 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
         yield measure(f"steps, {name}", walk, "1/s", per=steps, aim=aim)
     plain = _env(world, tasks, CameraSensor(store, ("rgb",), ViewSettings()))
     resampled = measure("steps, rgb, 128 x 128, again", lambda: _walk(plain, STEPS, seed), "1/s", per=STEPS)
-    naive = measure("the naive way: a picture drawn per step", lambda: _draw(plain, world, 40, seed), "1/s", per=40)
+    draw = functools.partial(_draw, plain, world)
+    naive = measure("the naive way: a picture drawn per step", lambda: _walk(plain, 40, seed, draw), "1/s", per=40)
     yield naive
-    yield ratio("resampled against drawn", resampled, naive)
+    yield share("resampled against drawn", resampled, naive, "x")
 
 
 def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
@@ -84,7 +85,7 @@ def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
     together = measure(name, _Together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
     envs.close()
     yield together
-    yield ratio(f"{name} against one", together, alone)
+    yield share(f"{name} against one", together, alone, "x")
 
 
 class _Alone:
@@ -115,25 +116,19 @@ def _env(world: World, tasks: list[Task], sensor: Sensor) -> HelpGymEnv:
     return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks, sensor, layout=SpaceLayout())
 
 
-def _walk(env: HelpGymEnv, steps: int, seed: int) -> None:
-    """Random moves, a new task when one ends; never stops of its own."""
+def _walk(env: HelpGymEnv, steps: int, seed: int, look: Callable[[], object] = lambda: None) -> None:
+    """Random moves, a `look` after each, a new task when one ends; never stops of its own."""
     rng = stream(seed, "bench", "walk")
     o, _ = env.reset(seed=seed)
     for _ in range(steps):
         possible = np.flatnonzero(o["action_mask"][: SpaceLayout().candidates])
         o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
+        look()
         if terminated or truncated:
             o, _ = env.reset()
 
 
-def _draw(env: HelpGymEnv, world: World, steps: int, seed: int) -> None:
-    """The same walk, but every view is drawn from the model."""
-    rng = stream(seed, "bench", "walk")
-    o, _ = env.reset(seed=seed)
-    for _ in range(steps):
-        possible = np.flatnonzero(o["action_mask"][: SpaceLayout().candidates])
-        o, _, terminated, truncated, _ = env.step(int(rng.choice(possible)))
-        pose = env._env.pose
-        world.renderer.view(world.graph.positions[pose.node], pose.yaw, pose.pitch, ViewSettings().vfov, (128, 128))
-        if terminated or truncated:
-            o, _ = env.reset()
+def _draw(env: HelpGymEnv, world: World) -> None:
+    """What the agent sees, drawn from the model."""
+    pose = env._env.pose
+    world.renderer.view(world.graph.positions[pose.node], pose.yaw, pose.pitch, ViewSettings().vfov, (128, 128))

@@ -92,17 +92,11 @@ def from_values(name: str, values: Sequence[float], unit: str, *, aim: float | N
     return Measure(name, float(middle), unit, float(low), float(high), len(values), aim)
 
 
-def ratio(name: str, slow: Measure, fast: Measure) -> Measure:
-    """How many times `fast` is faster than `slow`, both from one run."""
-    value = slow.value / fast.value
-    repeats = min(slow.repeats, fast.repeats)
-    return Measure(name, value, "x", slow.low / fast.high, slow.high / fast.low, repeats)
-
-
-def share(name: str, part: Measure, whole: Measure, *, aim: float | None = None) -> Measure:
-    """`part` over `whole`, both from one run: of times, the share of the first; of rates, that of the second's time."""
+def share(name: str, part: Measure, whole: Measure, unit: str = "share", *, aim: float | None = None) -> Measure:
+    """`part` over `whole`, both from one run: of times, the share of the first; of rates, that of the second's time.
+    In 'x', how many times as fast: of times, the second; of rates, the first."""
     repeats = min(part.repeats, whole.repeats)
-    return Measure(name, part.value / whole.value, "share", part.low / whole.high, part.high / whole.low, repeats, aim)
+    return Measure(name, part.value / whole.value, unit, part.low / whole.high, part.high / whole.low, repeats, aim)
 
 
 def machine() -> dict[str, object]:

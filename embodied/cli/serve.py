@@ -13,7 +13,6 @@ import importlib.util
 import json
 import os
 import sys
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,7 +87,7 @@ def run(args: Options) -> int:
     if args.summary:
         from embodied.serve.results import as_text, summary
 
-        facts = summary(opened.server.sessions, time.time())
+        facts = summary(opened.server.sessions)
         show(args, facts, as_text(facts))
         return 0
     links = opened.links(address, args.invitations or 0)

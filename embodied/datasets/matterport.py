@@ -35,7 +35,6 @@ from embodied.interface import STEP, TURNS, VIEW_PITCHES, VIEW_YAWS, VIEWS, Pose
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
-    from embodied.render.panorama import Panorama
 
 _LETTERS = read_toml(Path(__file__).with_name("regions.toml"))
 REGIONS = {kind: letter for letter, region in _LETTERS.items() for kind in region["kinds"]}
@@ -73,15 +72,6 @@ VIEW_OF_INDEX = np.array([view_index(v) for v in range(VIEWS)])
 def in_matterport_order(features: np.ndarray) -> np.ndarray:
     """(..., 36, D) features with row k for viewIndex k, from rows in our order; its own inverse."""
     return features[..., VIEW_OF_INDEX, :]
-
-
-def views36(panorama: Panorama, size: int = 224) -> np.ndarray:
-    """(36, size, size, 3) uint8: Panorama.views36 with picture k for viewIndex k.
-
-    ViewIndex k looks at heading 30 (k % 12) degrees, clockwise from +y, and at elevation
-    30 (k // 12 - 1) degrees (Matterport3DSimulator).
-    """
-    return panorama.views36(size)[VIEW_OF_INDEX]
 
 
 def heading(pose: Pose) -> float:

@@ -23,6 +23,7 @@ import pyarrow.parquet as pq
 
 from assets.cache import atomic_path, write_bytes
 from embodied.datasets.checks import DatasetError
+from embodied.datasets.folders import filled
 from embodied.interface import Ask, Episode, Move
 from embodied.records import load_lines, to_json
 
@@ -159,7 +160,6 @@ def _write(folder: Path, table: str, name: str, items: Iterable[tuple[object, ..
 
 def card(data: Dataset, files: Sequence[Path]) -> str:
     """The card of the data set, with the front matter that Hugging Face reads."""
-    text = (Path(__file__).parent / "readmes" / "card.md").read_text(encoding="utf-8")
     tables = sorted({f.parts[0] for f in files}, key=list(TABLES).index)
     configs = "\n".join(
         f"- config_name: {t}\n"
@@ -168,19 +168,15 @@ def card(data: Dataset, files: Sequence[Path]) -> str:
         + "\n".join(f"  - split: {f.stem}\n    path: {f.as_posix()}" for f in files if f.parts[0] == t)
         for t in tables
     )
-    fields = "\n".join(f"| `{t}` | {', '.join(f'`{n}`' for n in TABLES[t])} |" for t in tables)
-    facts = {
-        "CONFIGS": configs,
-        "KIND": data.kind,
-        "SEED": str(data.config.seed),
-        "DIGEST": data.digest[:16],
-        "TABLE": data.table().strip(),
-        "FIELDS": fields,
-        "AREA": "{:g} to {:g}".format(*data.config.area),
-        "LANGUAGE": data.config.language,
-        "SIZE": size_category(sum(row.tasks for row in data.index.splits.values())),
-    }
-    return re.sub(r"\$([A-Z]+)\$", lambda m: facts[m.group(1)], text)
+    return filled(
+        "card",
+        data,
+        CONFIGS=configs,
+        FIELDS="\n".join(f"| `{t}` | {', '.join(f'`{n}`' for n in TABLES[t])} |" for t in tables),
+        AREA="{:g} to {:g}".format(*data.config.area),
+        LANGUAGE=data.config.language,
+        SIZE=size_category(sum(row.tasks for row in data.index.splits.values())),
+    )
 
 
 def size_category(rows: int) -> str:

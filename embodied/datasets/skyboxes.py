@@ -41,13 +41,10 @@ def write_skyboxes(panoramas: Path, ids: Sequence[str], folder: Path) -> list[Pa
     """Write the skyboxes of a house; returns their files.
 
     Args:
-      panoramas: the house's panorama file.
+      panoramas: the house's panorama file, which has to be there (`drawn`).
       ids: viewpoint id of each node.
-
-    Raises:
-      ValueError: there are no panoramas.
     """
-    with PanoramaFile(drawn(panoramas)) as file:
+    with PanoramaFile(panoramas) as file:
         return [path for node, key in enumerate(ids) for path in write_skybox(file.read(node), key, folder)]
 
 

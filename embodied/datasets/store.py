@@ -138,7 +138,12 @@ class Dataset:
     def place(self, name: str) -> StoredPlace:
         """House and graph by name."""
         if name not in self._places:
-            self._places[name] = self._read_place(name)
+            home = self.folder / "houses" / name
+            for file in ("house.json", "connectivity.json"):
+                self._content(name, file)
+            house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
+            check_place(home / "connectivity.json", house, graph, name)
+            self._places[name] = StoredPlace(house, graph)
         return self._places[name]
 
     def place_of(self, episode: Episode) -> StoredPlace:
@@ -154,14 +159,6 @@ class Dataset:
             )
         check_episode(episode, self.place(name))
         return self.place(name)
-
-    def _read_place(self, name: str) -> StoredPlace:
-        home = self.folder / "houses" / name
-        for file in ("house.json", "connectivity.json"):
-            self._content(name, file)
-        house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
-        check_place(home / "connectivity.json", house, graph, name)
-        return StoredPlace(house, graph)
 
     def places(self, split: str) -> dict[str, StoredPlace]:
         return {name: self.place(name) for name in self.names(split)}
@@ -243,13 +240,12 @@ class Dataset:
         """
         tasks: list[Task] = []
         for name in self.names(split):
-            mine, file = self._lines(name, f"tasks_{split}.jsonl", Task), f"tasks_{split}.jsonl"
-            place = self.place(name)
+            file, place = f"tasks_{split}.jsonl", self.place(name)
+            mine = self._lines(name, file, Task)
             check_tasks(self._path(name, file), mine, self.kind, place.house, place.graph)
             tasks += mine
         if self.kind == "vnla" and split != "train":
-            limits = self._vnla_limits
-            tasks = [self._with_limit(t, limits) for t in tasks]
+            tasks = [self._with_limit(t) for t in tasks]
         return tuple(tasks)
 
     def split(
@@ -323,11 +319,11 @@ class Dataset:
         ]
         return time_limits(lengths, VnlaConfig().most_actions)
 
-    def _with_limit(self, task: Task, limits: Mapping[tuple[str, str], int]) -> Task:
+    def _with_limit(self, task: Task) -> Task:
         assert isinstance(task.goal, FindObject), "VNLA tasks look for objects"
         config = VnlaConfig()
         key = limit_key(self.place(task.world), task.start.node, task.goal)
-        horizon = max(task.horizon, limits.get(key, config.most_actions))
+        horizon = max(task.horizon, self._vnla_limits.get(key, config.most_actions))
         return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
 
 

@@ -24,7 +24,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from PIL import Image
 
-from assets.cache import write_bytes, write_json
+from assets.cache import write_json
+from embodied.datasets.folders import write_lines
 from embodied.datasets.habitat import with_experts, write_vlnce
 from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
 from embodied.envs.continuous import (
@@ -58,7 +59,6 @@ AHEAD = 4
 """Actions of an answer, and steps between two questions of a walk."""
 PITCHES = (0, 30)
 """Degrees that InternData-N1's cameras look down."""
-SETTINGS = {pitch: "{}cm_" + f"{pitch}deg" for pitch in PITCHES}
 HIDDEN = 0.15
 """A pixel goal is seen where nothing is nearer than it by more than this, metres."""
 NO_GOAL = (-1, -1)
@@ -73,8 +73,8 @@ forward, left, right: 1 for what an expert does there. `lerobot-eval` judges pol
 FPS = 10
 """Frames a second of videos."""
 
-Chosen = Callable[[ContinuousEnv, int], int]
-"""(the body, what the expert does here) -> what is done."""
+Chosen = Callable[[int], int]
+"""From what the expert does to what is done."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,20 +95,20 @@ class Taught:
 def wandering(share: float, rng: np.random.Generator) -> Chosen:
     """The expert plays, but this share of its steps and turns is drawn among steps and turns instead."""
 
-    def chosen(env: ContinuousEnv, label: int) -> int:
+    def chosen(label: int) -> int:
         return int(rng.integers(1, 4)) if label != Move.STOP and rng.random() < share else label
 
     return chosen
 
 
-def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = lambda env, label: label) -> Taught:
+def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = lambda label: label) -> Taught:
     """Play an episode, as the expert does unless told otherwise, and write down what the expert does at each of its
     states (Ross et al. 2011)."""
     env.reset(excursion, world)
     expert, labels = Follower(env, along=bool(excursion.reference)), []
     while not env.ended:
         labels.append(expert.action())
-        env.step(chosen(env, labels[-1]))
+        env.step(chosen(labels[-1]))
     return Taught(env.walk(), tuple(labels), world, env.body)
 
 
@@ -178,7 +178,7 @@ def _samples(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
             facts = {"episode": t.walk.excursion.id, "world": t.walk.excursion.world, "step": k, "image": image}
             facts |= {"instruction": t.walk.excursion.instruction, "taken": t.walk.actions[k], "action": t.labels[k]}
             lines.append(json.dumps(facts))
-    _lines(folder / "samples.jsonl", lines)
+    write_lines(folder / "samples.jsonl", lines)
     return len(lines)
 
 
@@ -263,8 +263,8 @@ def _internnav(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
 
 def _intern_episode(home: Path, number: int, first: int, t: Taught, lens: Lens) -> dict[str, Any]:
     n, columns = len(t.labels), {}
-    for pitch, form in SETTINGS.items():
-        setting = form.format(round(100 * t.body.eye))
+    for pitch in PITCHES:
+        setting = f"{round(100 * t.body.eye)}cm_{pitch}deg"
         depths, where = [], home / "videos" / "chunk-000"
         for k, (rgb, depth) in enumerate(frames(t, lens, pitch)):
             _jpeg(where / f"observation.images.rgb.{setting}" / f"episode_{number:06d}_{k}.jpg", rgb)
@@ -293,14 +293,12 @@ def _intern_episode(home: Path, number: int, first: int, t: Taught, lens: Lens) 
 
 
 def _intern_meta(meta: Path, episodes: list[dict[str, Any]], lens: Lens) -> None:
-    schema = episodes[0].pop("columns")
-    for e in episodes[1:]:
-        e.pop("columns")
-    _lines(meta / "episodes.jsonl", [json.dumps(e) for e in episodes])
+    schema = [e.pop("columns") for e in episodes][0]
+    write_lines(meta / "episodes.jsonl", [json.dumps(e) for e in episodes])
     tasks = [{"task_index": e["episode_index"], "task": e["tasks"][0]} for e in episodes]
-    _lines(meta / "tasks.jsonl", [json.dumps(x) for x in tasks])
+    write_lines(meta / "tasks.jsonl", [json.dumps(x) for x in tasks])
     counts = [{"episode_index": e["episode_index"], "stats": {"action": {"count": [e["length"]]}}} for e in episodes]
-    _lines(meta / "episodes_stats.jsonl", [json.dumps(c) for c in counts])
+    write_lines(meta / "episodes_stats.jsonl", [json.dumps(c) for c in counts])
     shapes = {"pose": [4, 4], "goal": [2]}
     features: dict[str, Any] = {}
     for field in schema:
@@ -385,7 +383,3 @@ def write_film(path: Path, pictures: Iterable[np.ndarray], fps: int) -> None:
                 film.height, film.width, film.pix_fmt = *rgb.shape[:2], "yuv420p"
             container.mux(film.encode(av.VideoFrame.from_ndarray(rgb, "rgb24")))
         container.mux(film.encode())
-
-
-def _lines(path: Path, lines: Iterable[str]) -> None:
-    write_bytes(path, "".join(line + "\n" for line in lines).encode())

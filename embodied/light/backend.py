@@ -255,6 +255,16 @@ def fraction(u: Array) -> Array:
     return u - drjit().floor(u)
 
 
+def bilinear(x: Array, y: Array) -> tuple[Array, Array, tuple[tuple[int, int, Array], ...]]:
+    """Column and row of the first of the four pixels around places, and how far to the right and down each of the four
+    lies, with its weight."""
+    dr = drjit()
+    x0, y0 = dr.floor(x), dr.floor(y)
+    fx, fy = x - x0, y - y0
+    across, down = ((0, 1 - fx), (1, fx)), ((0, 1 - fy), (1, fy))
+    return x0, y0, tuple((dx, dy, wx * wy) for dx, wx in across for dy, wy in down)
+
+
 def number(x: int) -> Array:
     """A whole number that kernels read as data, so that changing it compiles nothing anew."""
     return drjit().opaque(mitsuba().UInt32, int(x))

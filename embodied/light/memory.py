@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 T = TypeVar("T")
-
-
-class Memory:
-    """Keeps results by name; owned by those who light a house several times."""
-
-    def __init__(self) -> None:
-        self._known: dict[Hashable, Any] = {}
-
-    def once(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What `make` returned when `key` was first asked for."""
-        if key not in self._known:
-            self._known[key] = make()
-        known: T = self._known[key]
-        return known
-
-    def known(self, key: Hashable) -> Any:
-        """What is kept under `key`; None if nothing is."""
-        return self._known.get(key)
+Memory: TypeAlias = dict[Hashable, Any]
+"""Results by name; owned by those who light a house several times."""
 
 
 def once(memory: Memory | None, key: Hashable, make: Callable[[], T]) -> T:
-    """`make`, remembered where there is a memory."""
-    return make() if memory is None else memory.once(key, make)
+    """What `make` returned when `key` was first asked for; `make` itself where there is no memory."""
+    if memory is None:
+        return make()
+    if key not in memory:
+        memory[key] = make()
+    known: T = memory[key]
+    return known

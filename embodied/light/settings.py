@@ -68,7 +68,6 @@ QUALITIES = {
         other_rays=8,
         sun_rays=4,
         patches=48,
-        seen_rays=16,
         sharpness=0.45,
         tolerance=0.2,
         jpeg=88,

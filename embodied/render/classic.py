@@ -19,7 +19,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.render import raster, visibility
-from embodied.render.camera import FAR, NEAR, Camera, View, camera_at, face_cameras
+from embodied.render.camera import Camera, View, camera_at, face_cameras
 from embodied.render.geoms import Geoms
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
@@ -38,38 +38,11 @@ BARE: tuple[np.ndarray, ...] = (np.zeros((1, 1, 3), np.uint8),)
 """Pages of a house that is drawn without colours."""
 
 
-class Drawing(Protocol):
-    """A house on the graphics side. Its methods are called within gl.drawing(); their pictures have the bottom row
-    first, and show the geoms `chosen` (k,), `whole` or with fewer triangles where that cannot be seen."""
-
-    middles: np.ndarray
-    reaches: np.ndarray
-    """(geoms, 3) metres: of the boxes along the world's axes that hold the geoms, and half their sizes."""
-
-    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool) -> np.ndarray:
-        """(h, w, 3 or 4) uint8."""
-        ...
-
-    def depth_and_ids(
-        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(h, w) float32 metres along the optical axis and (h, w) int32."""
-        ...
-
-    def view(
-        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray, *, whole: bool
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """`rgb` of the size `drawn`, and `depth_and_ids` of `size`."""
-        ...
-
-    def close(self) -> None: ...
-
-
 class Painter(Protocol):
     """Draws the colours of a house in the classic renderer's place."""
 
-    def rgb(self, camera: Camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
-        """(h, w, 3) uint8 as `camera` sees it, top row first, between two planes."""
+    def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
+        """(h, w, 3) uint8 as `camera` sees it, top row first, from camera.NEAR to FAR."""
         ...
 
     def close(self) -> None: ...
@@ -124,7 +97,7 @@ class Renderer:
         """
         check_size(size)
         self.house, self.size = house, size
-        self._drawing: Drawing | None = None
+        self._drawing: Geoms | raster.Raster | None = None
         self._painter, self._overlay = painter, overlay
         self._software = gl.info().software
         if (lit is not None or not colours) and painter is None and self._software and raster.able():
@@ -136,13 +109,13 @@ class Renderer:
             number = {name: i + 1 for i, name in enumerate(self.owners)}
             ids = np.array([number.get(m.owner, 0) for m in meshes], np.int32)
             kinds, rooms = [m.kind for m in meshes], [m.room for m in meshes]
-            self._drawing = raster.Raster(meshes, ids, pages, (NEAR, FAR), copied=lit is not None)
+            self._drawing = raster.Raster(meshes, ids, pages, copied=lit is not None)
         else:
             scene = compile_scene(house, catalogue, collisions=False, lit=lit)
             self.owners, ids = scene.owners, scene.owner_of_geom
             kinds, rooms = list(scene.kind_of_geom), list(scene.room_of_geom)
             samples = 0 if self._software else MULTISAMPLES
-            self._drawing = Geoms(scene, self._drawn_size((size, size)), samples, (NEAR, FAR))
+            self._drawing = Geoms(scene, self._drawn_size((size, size)), samples)
         self._is_visual = np.array([k != "collision" for k in kinds])
         self._portals = visibility.portals_of(house)
         self._geoms_of_room = _geoms_by_room(house, [self.owners[i - 1] if i else "" for i in ids], kinds, rooms)
@@ -154,29 +127,26 @@ class Renderer:
         pitch: float = 0.0,
         vfov: float = math.pi / 3,
         size: tuple[int, int] = (480, 640),
-        *,
-        cull: bool = True,
     ) -> View:
         """The picture from `position` (x, y, z) along (yaw, pitch).
 
         Args:
           vfov: vertical field of view, radians.
           size: (height, width), pixels.
-          cull: False draws everything, for comparison.
         """
-        return self.through(camera_at(position, yaw, pitch, vfov), size, cull=cull)
+        return self.through(camera_at(position, yaw, pitch, vfov), size)
 
     @gl.drawing()
-    def through(self, camera: Camera, size: tuple[int, int], *, cull: bool = True) -> View:
-        """The picture of (height, width) that `camera` takes; `cull` as in `view`.
+    def through(self, camera: Camera, size: tuple[int, int]) -> View:
+        """The picture of (height, width) that `camera` takes.
 
         Where the CPU draws a lit house, an id is of a point up to a third of a pixel beside the middle: it tells at
         edges.
         """
-        drawing, chosen = self._open(), self._chosen(camera, size, cull)
+        drawing, chosen = self._open(), self._chosen(camera, size)
         if self._painter is not None:
             return View(self._rgb(camera, size, chosen), *self._seen(camera, size, chosen))
-        picture, depth, ids = drawing.view(camera, size, self._drawn_size(size), chosen, whole=not cull)
+        picture, depth, ids = drawing.view(camera, size, self._drawn_size(size), chosen)
         return View(self._overlaid(averaged(picture, size), camera), cv2.flip(depth, 0), cv2.flip(ids, 0))
 
     @gl.drawing()
@@ -226,14 +196,14 @@ class Renderer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _open(self) -> Drawing:
+    def _open(self) -> Geoms | raster.Raster:
         if self._drawing is None:
             raise RuntimeError("the renderer is closed; make a new one")
         return self._drawing
 
-    def _chosen(self, camera: Camera, size: tuple[int, int], cull: bool = True) -> np.ndarray:
+    def _chosen(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """The numbers of the geoms to draw."""
-        return np.flatnonzero(self._in_view(camera, size) if cull else self._is_visual)
+        return np.flatnonzero(self._in_view(camera, size))
 
     def _in_view(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(ngeom,) bool: what may be seen: through doors and windows, with its box in the field of view."""
@@ -267,15 +237,15 @@ class Renderer:
 
     def _rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
         if self._painter is not None:
-            return self._overlaid(self._painter.rgb(camera, size, NEAR, FAR), camera)
-        picture = self._open().rgb(camera, self._drawn_size(size), chosen, whole=False)
+            return self._overlaid(self._painter.rgb(camera, size), camera)
+        picture = self._open().rgb(camera, self._drawn_size(size), chosen)
         return self._overlaid(averaged(picture, size), camera)
 
     def _overlaid(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
         return rgb if self._overlay is None else self._overlay.over(rgb, camera)
 
     def _seen(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        depth, ids = self._open().depth_and_ids(camera, size, chosen, whole=False)
+        depth, ids = self._open().depth_and_ids(camera, size, chosen)
         return cv2.flip(depth, 0), cv2.flip(ids, 0)
 
 

@@ -33,12 +33,11 @@ FRONT, BACK, ELEVATION = 62.0, 242.0, -24.0
 """Azimuths and elevation of the cameras, degrees: three quarters from the front, and from behind."""
 
 
-def draw_sheets(catalogue: Catalogue, keys: Sequence[str], out: Path, *, surfaces: bool = False) -> tuple[Path, ...]:
+def draw_sheets(catalogue: Catalogue, keys: Sequence[str], out: Path) -> tuple[Path, ...]:
     """Write PNGs of 24 models each to the folder `out`, in the order of `keys`.
 
     A red arrow on the floor points where the front looks; the grid has 10 cm squares for small
-    things and 50 cm squares for large ones, beside which a figure of 1.7 m stands. With `surfaces`
-    the support surfaces lie on the models as blue sheets.
+    things and 50 cm squares for large ones, beside which a figure of 1.7 m stands.
     """
     per_sheet = COLUMNS * ROWS
     groups = [keys[i : i + per_sheet] for i in range(0, len(keys), per_sheet)]
@@ -46,14 +45,14 @@ def draw_sheets(catalogue: Catalogue, keys: Sequence[str], out: Path, *, surface
     for i, group in enumerate(tqdm(groups, desc="drawing sheets", unit="sheet")):
         path = Path(out) / f"sheet_{i:02d}.png"
         with atomic_path(path) as temporary:
-            sheet(catalogue, group, surfaces=surfaces).save(temporary, format="PNG")
+            sheet(catalogue, group).save(temporary, format="PNG")
         paths.append(path)
     return tuple(paths)
 
 
-def sheet(catalogue: Catalogue, keys: Sequence[str], *, surfaces: bool = False) -> Image.Image:
+def sheet(catalogue: Catalogue, keys: Sequence[str]) -> Image.Image:
     """One picture of up to 24 models."""
-    model = _model(catalogue, keys, surfaces)
+    model = _model(catalogue, keys)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     page = Image.new("RGB", (COLUMNS * TILE, math.ceil(len(keys) / COLUMNS) * (TILE + LABEL)), "white")
@@ -76,7 +75,7 @@ def sheet(catalogue: Catalogue, keys: Sequence[str], *, surfaces: bool = False) 
     return page
 
 
-def _model(catalogue: Catalogue, keys: Sequence[str], surfaces: bool) -> mujoco.MjModel:
+def _model(catalogue: Catalogue, keys: Sequence[str]) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.visual.global_.offwidth = spec.visual.global_.offheight = TILE
     spec.visual.quality.shadowsize = 0
@@ -98,15 +97,6 @@ def _model(catalogue: Catalogue, keys: Sequence[str], surfaces: bool) -> mujoco.
         for j, mesh in enumerate(catalogue.mesh(key)):
             parts.append(Part(key, "object", "", mesh, f"{i}_{j}", (SPACING * i, 0.0, 0.0), 0.0))
         _measure(spec, catalogue.assets[key], SPACING * i)
-        for s in catalogue.assets[key].surfaces if surfaces else ():
-            spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[SPACING * i + (s.x0 + s.x1) / 2, (s.y0 + s.y1) / 2, s.z + 0.004],
-                size=[(s.x1 - s.x0) / 2, (s.y1 - s.y0) / 2, 0.003],
-                rgba=[0.1, 0.3, 1.0, 0.7],
-                contype=0,
-                conaffinity=0,
-            )
     scene._add_parts(spec, parts, {})
     return spec.compile()
 

@@ -23,8 +23,6 @@ SOFTER = 0.4
 """Halvings by which the tile is read coarser than a pixel asks for: frames of a video shimmer less."""
 GRAZING = 0.15
 """Cosine of the view below which surfaces are read no coarser."""
-NO_AXIS = 3
-"""Axis of a face whose texture has no direction."""
 
 
 class Detail:

@@ -26,7 +26,7 @@ from embodied.errors import UnableError
 from embodied.house.house import House
 from embodied.house.shapes import room_at
 from embodied.navigation.free_space import EYE
-from embodied.render.camera import Camera
+from embodied.render.camera import FAR, NEAR, Camera
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import build_spec, compile_spec
 
@@ -88,14 +88,14 @@ class FilamentPainter:
         self._lights_of_room: dict[str, tuple] = {}
         self._room: str | None = None
 
-    def rgb(self, camera: Camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
+    def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         """(h, w, 3) uint8 as an embodied.render.classic.Camera sees it, top row first."""
         room = room_at(self._house, camera.position)
         if room != self._room:
-            self._reflect(room, near, far)
-        return self._draw(camera, size, near, far)
+            self._reflect(room)
+        return self._draw(camera, size)
 
-    def _reflect(self, room: str | None, near: float, far: float) -> None:
+    def _reflect(self, room: str | None) -> None:
         """Exchange the image light for that of `room`; made on first need. None takes it away."""
         mjrf = self._mjrf
         if self._room is not None:
@@ -105,7 +105,7 @@ class FilamentPainter:
             return
         if room not in self._lights_of_room:
             eye = middle_of(self._house, room)
-            faces = [self._draw(Camera(eye, forward, up), (PROBE, PROBE), near, far)[:, ::-1] for forward, up in CUBE]
+            faces = [self._draw(Camera(eye, forward, up), (PROBE, PROBE))[:, ::-1] for forward, up in CUBE]
             texture = self._context.create_texture(
                 mjrf.TextureConfig(
                     width=PROBE,
@@ -125,7 +125,7 @@ class FilamentPainter:
         self._scene.add_light(self._lights_of_room[room][0])
         self._room = room
 
-    def _draw(self, camera: Camera, size: tuple[int, int], near: float, far: float) -> np.ndarray:
+    def _draw(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
         mjrf = self._mjrf
         if size not in self._targets:
             config = mjrf.RenderTargetConfig(color_format=mjrf.PixelFormat.PIXEL_FORMAT_RGB8)
@@ -134,7 +134,7 @@ class FilamentPainter:
         picture = np.empty((*size, 3), np.uint8)
         read = mjrf.ReadRequest(target=self._targets[size])
         read.set_buffer(picture)
-        top = near * np.tan(camera.vfov / 2)
+        top = NEAR * np.tan(camera.vfov / 2)
         request = mjrf.RenderRequest()
         request.scene, request.target = self._scene, self._targets[size]
         request.camera = mjrf.Camera(
@@ -143,8 +143,8 @@ class FilamentPainter:
             up=camera.up,
             frustum_bottom=-top,
             frustum_top=top,
-            frustum_near=near,
-            frustum_far=far,
+            frustum_near=NEAR,
+            frustum_far=FAR,
         )
         request.viewport.left = request.viewport.bottom = 0
         request.viewport.width, request.viewport.height = size[1], size[0]
@@ -226,28 +226,13 @@ def _context(pid: int) -> Any:
     return context
 
 
-class _InstanceInfo(ctypes.Structure):
-    """VkInstanceCreateInfo of the Vulkan specification."""
-
-    _fields_ = [
-        ("kind", ctypes.c_int),
-        ("next", ctypes.c_void_p),
-        ("flags", ctypes.c_uint32),
-        ("application", ctypes.c_void_p),
-        ("layers", ctypes.c_uint32),
-        ("layer_names", ctypes.c_void_p),
-        ("extensions", ctypes.c_uint32),
-        ("extension_names", ctypes.c_void_p),
-    ]
-
-
 def _vulkan_works() -> bool:
     """Whether Vulkan finds a device. Asked beforehand, because Filament ends the process where it does not."""
     name = ctypes.util.find_library("vulkan")
     if name is None:
         return False
     vulkan, instance, count = ctypes.CDLL(name), ctypes.c_void_p(), ctypes.c_uint32()
-    info = _InstanceInfo(kind=1)
+    info = (ctypes.c_uint64 * 8)(1)  # a VkInstanceCreateInfo, 64 bytes: its type, which is 1, and nothing asked for
     if vulkan.vkCreateInstance(ctypes.byref(info), None, ctypes.byref(instance)) != 0:
         return False
     found = vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None) == 0 and count.value > 0

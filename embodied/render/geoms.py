@@ -12,7 +12,7 @@ import cv2
 import mujoco
 import numpy as np
 
-from embodied.render.camera import Camera
+from embodied.render.camera import FAR, NEAR, Camera
 from embodied.scene.model import VISUAL, Scene
 
 HIDDEN = 5
@@ -22,16 +22,15 @@ NUMBERS = [mujoco.mjtRndFlag.mjRND_SEGMENT.value, mujoco.mjtRndFlag.mjRND_IDCOLO
 
 
 class Geoms:
-    """Owns the textures and display lists of a compiled house until `close`."""
+    """Owns the textures and display lists of a compiled house until `close`. Has what `raster.Raster` has."""
 
-    def __init__(self, scene: Scene, buffer: tuple[int, int], samples: int, planes: tuple[float, float]) -> None:
+    def __init__(self, scene: Scene, buffer: tuple[int, int], samples: int) -> None:
         """
         Args:
           buffer: (height, width), pixels, of the first off-screen buffer; it grows when needed.
           samples: of a pixel.
-          planes: nothing nearer or farther is drawn, metres.
         """
-        self._scene, self._buffer, self._planes = scene, buffer, planes
+        self._scene, self._buffer = scene, buffer
         model = scene.model
         self._data = mujoco.MjData(model)
         mujoco.mj_forward(model, self._data)
@@ -48,17 +47,15 @@ class Geoms:
         self._groups = model.geom_group.copy()
         self.middles, self.reaches = world_boxes(model, self._data)
 
-    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool) -> np.ndarray:
-        """(h, w, 3) uint8, bottom row first, of the geoms `chosen` (k,), which are always drawn whole."""
+    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
+        """(h, w, 3) uint8, bottom row first, of the geoms `chosen` (k,)."""
         self._choose(camera, size, chosen)
         rect, rgb = mujoco.MjrRect(0, 0, size[1], size[0]), np.empty((*size, 3), np.uint8)
         mujoco.mjr_render(rect, self._drawn, self._mjr)
         mujoco.mjr_readPixels(rgb, None, rect, self._mjr)
         return rgb
 
-    def depth_and_ids(
-        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def depth_and_ids(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis and (h, w) int32, bottom row first; as in `rgb`."""
         self._choose(camera, size, chosen)
         flags = self._drawn.flags
@@ -72,16 +69,16 @@ class Geoms:
         owner_of_number[1:] = self._scene.owner_of_geom[chosen]
         packed = cv2.cvtColor(numbers, cv2.COLOR_RGB2RGBA).view("<u4")[..., 0] & 0xFFFFFF
         ids = owner_of_number.take(packed)
-        depth = depth_of_reversed_z(reversed_z, *self._planes)
+        depth = depth_of_reversed_z(reversed_z)
         depth[ids == 0] = np.inf  # a painted sky is no thing
         return depth, ids
 
     def view(
-        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray, *, whole: bool
+        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`rgb` of the size `drawn`, and `depth_and_ids` of `size`."""
-        picture = self.rgb(camera, drawn, chosen, whole=whole)
-        return picture, *self.depth_and_ids(camera, size, chosen, whole=whole)
+        picture = self.rgb(camera, drawn, chosen)
+        return picture, *self.depth_and_ids(camera, size, chosen)
 
     def close(self) -> None:
         """Free what lies on the graphics side."""
@@ -104,11 +101,10 @@ class Geoms:
 
     def _aim(self, camera: Camera, size: tuple[int, int]) -> None:
         """Write `camera` into both eyes of the scene."""
-        near, far = self._planes
-        top = near * math.tan(camera.vfov / 2)
+        top = NEAR * math.tan(camera.vfov / 2)
         for eye in self._drawn.camera:
             eye.pos, eye.forward, eye.up = camera.position, camera.forward, camera.up
-            eye.frustum_near, eye.frustum_far = near, far
+            eye.frustum_near, eye.frustum_far = NEAR, FAR
             eye.frustum_bottom, eye.frustum_top = -top, top
             eye.frustum_center, eye.frustum_width = 0.0, top * size[1] / size[0]
 
@@ -120,12 +116,12 @@ def world_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray,
     return middles, np.einsum("gij,gj->gi", np.abs(axes), model.geom_aabb[:, 3:])
 
 
-def depth_of_reversed_z(z: np.ndarray, near: float, far: float) -> np.ndarray:
-    """Metres along the optical axis (float32) from a depth buffer that is 1 at `near` and 0 at `far`; inf at 0.
+def depth_of_reversed_z(z: np.ndarray) -> np.ndarray:
+    """Metres along the optical axis (float32) from a depth buffer that is 1 at NEAR and 0 at FAR; inf at 0.
 
     Source: the inverse of glFrustum's mapping with both ends exchanged (OpenGL 2.1 reference, glFrustum).
     """
-    depth = near * far / (near + z * np.float32(far - near))
+    depth = NEAR * FAR / (NEAR + z * np.float32(FAR - NEAR))
     depth[z <= 0] = np.inf
     return depth
 

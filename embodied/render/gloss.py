@@ -106,6 +106,8 @@ class _Faces:
     """(m, 3) float32."""
     outer: np.ndarray
     """(m,) bool, beyond the windows."""
+    detail: np.ndarray
+    """(m,) uint8, as of `Shine`; 0 for none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +145,7 @@ class Gloss:
         self._base = np.cumsum(texels) - texels
         self._light = np.concatenate([s.reshape(-1, 3) for s in small])
         self._middle = shine.middle
-        self._detail = Detail(self._faces.corners, self._faces.normal, _details_of(lit, shine.detail))
+        self._detail = Detail(self._faces.corners, self._faces.normal, self._faces.detail)
 
     def over(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
         """The picture (h, w, 3) uint8 that `camera` drew, with what its surfaces mirror; matte pixels stay."""
@@ -492,7 +494,10 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     outer = each(lambda i, m: m.kind == "outdoor")
-    gloss = np.concatenate([_or_zeros(shine.gloss[i], m) for i, m in solid]).astype(np.float32) / 255
+    known = lambda of, *shape: np.concatenate(
+        [np.zeros((len(m.faces), *shape), np.uint8) if not len(of) or of[i] is None else of[i] for i, m in solid]
+    )
+    gloss = known(shine.gloss, 3).astype(np.float32) / 255
     gloss[outer] = 0
     gloss[each(lambda i, m: m.alpha < 0.9)] = 0
     gloss[np.concatenate([_glowing(m, shine.glow[m.page]) for _, m in solid])] = 0
@@ -503,16 +508,10 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
         each(lambda i, m: m.page).astype(np.int32),
         each(lambda i, m: i).astype(np.int32),
         gloss,
-        np.concatenate([_or_zeros(shine.tint[i], m) for i, m in solid]).astype(np.float32),
+        known(shine.tint, 3).astype(np.float32),
         outer,
+        known(shine.detail),
     )
-
-
-def _details_of(lit: LitPages, detail: Sequence[np.ndarray | None]) -> np.ndarray:
-    """(m,) uint8 for the faces of `_faces_of`."""
-    solid = [(i, m) for i, m in enumerate(lit.meshes) if m.alpha >= CLOUDY and len(m.faces)]
-    known = [(m, detail[i] if detail else None) for i, m in solid]
-    return np.concatenate([np.zeros(len(m.faces), np.uint8) if d is None else d for m, d in known])
 
 
 def _glowing(mesh: LitMesh, glow: np.ndarray | None) -> np.ndarray:
@@ -535,10 +534,6 @@ def _panes_of(lit: LitPages, rays_among: Callable[[np.ndarray], Rays]) -> _Panes
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     surfaces = np.concatenate([np.full(len(m.faces), glass_surfaces(m), np.float32) for m in clear])
     return _Panes(rays_among(corners), normal, surfaces)
-
-
-def _or_zeros(values: np.ndarray | None, mesh: LitMesh) -> np.ndarray:
-    return np.zeros((len(mesh.faces), 3), np.float32) if values is None else values
 
 
 def _coarse(page: np.ndarray, glow: np.ndarray | None, gain: np.ndarray | None) -> np.ndarray:

@@ -21,7 +21,7 @@ import numpy as np
 from OpenGL import GL
 
 from embodied.render import atlas, coarser, shaders
-from embodied.render.camera import Camera
+from embodied.render.camera import FAR, NEAR, Camera
 from embodied.render.supersampling import nearest, step_of
 from embodied.scene.lit_pages import LitMesh
 
@@ -50,25 +50,18 @@ of 33.5 dB against one drawn eight times as large; at 2.5 one sees gaps between 
 
 
 class Raster:
-    """Owns the triangles and the pages of a house until `close`. Its methods are called within gl.drawing()."""
+    """Owns the triangles and the pages of a house until `close`. Its methods are called within gl.drawing(); their
+    pictures have fewer triangles where that cannot be seen."""
 
     def __init__(
-        self,
-        meshes: Sequence[LitMesh],
-        ids: np.ndarray,
-        pages: Sequence[np.ndarray],
-        planes: tuple[float, float],
-        *,
-        copied: bool = True,
+        self, meshes: Sequence[LitMesh], ids: np.ndarray, pages: Sequence[np.ndarray], *, copied: bool = True
     ) -> None:
         """
         Args:
           ids: (meshes,) of their owners, below 65536.
           pages: (h, w, 3) uint8 each.
-          planes: nothing nearer or farther is drawn, metres.
           copied: whether things get coarser copies; without, all is drawn whole.
         """
-        self._planes = planes
         self._is_clear = np.array([m.alpha < 1 for m in meshes])
         lows, highs = (np.array([f(m.vertices, axis=0) for m in meshes], float) for f in (np.min, np.max))
         self.middles, self.reaches = (lows + highs) / 2, (highs - lows) / 2
@@ -93,31 +86,28 @@ class Raster:
         GL.glUseProgram(0)
         self._size = (0, 0)
 
-    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool) -> np.ndarray:
+    def rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
         """(h, w, 4) uint8, bottom row first.
 
         Args:
           size: (height, width), pixels.
           chosen: (k,) numbers of the meshes to draw.
-          whole: draw no copies, however small things are.
         """
-        picture = self._coloured("places", camera, size, *self._sorted(camera, size, chosen, whole))
+        picture = self._coloured("places", camera, size, *self._sorted(camera, size, chosen))
         self._end()
         return picture
 
-    def depth_and_ids(
-        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, *, whole: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def depth_and_ids(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(h, w) float32 metres along the optical axis, inf where no owner is, and (h, w) int32, bottom row first; as
         in `rgb`."""
         self._begin("numbers", size)
-        self._draw("numbers", self._matrix(camera, size), self._ranges(camera, size, chosen, whole))
+        self._draw("numbers", self._matrix(camera, size), self._ranges(camera, size, chosen))
         ids, near = (_read("numbers", name, size) for name in FRAMES["numbers"])
         self._end()
         return _metres(near), ids
 
     def view(
-        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray, *, whole: bool
+        self, camera: Camera, size: tuple[int, int], drawn: tuple[int, int], chosen: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`rgb` of the size `drawn`, and `depth_and_ids` of `size`; from one pass where the pixels come out even.
 
@@ -126,9 +116,9 @@ class Raster:
         """
         step = step_of(size, drawn)
         if step is None:
-            picture = self.rgb(camera, drawn, chosen, whole=whole)
-            return picture, *self.depth_and_ids(camera, size, chosen, whole=whole)
-        solid, clear, panes = self._sorted(camera, drawn, chosen, whole)
+            picture = self.rgb(camera, drawn, chosen)
+            return picture, *self.depth_and_ids(camera, size, chosen)
+        solid, clear, panes = self._sorted(camera, drawn, chosen)
         program = self._programs["all"][0]
         GL.glProgramUniform3f(program, GL.glGetUniformLocation(program, "drawn"), step, 1 / step, step / (step - 1))
         picture = self._coloured("all", camera, drawn, solid, clear, panes)
@@ -150,19 +140,17 @@ class Raster:
             GL.glDeleteProgram(program)
 
     def _sorted(
-        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, whole: bool
+        self, camera: Camera, size: tuple[int, int], chosen: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`_ranges` of what is opaque, the nearest first, and of what shines through, the farthest first; and the
         meshes of the latter."""
         order = chosen[((self.middles[chosen] - np.array(camera.position)) ** 2).sum(1).argsort()]
         clear = self._is_clear[order]
-        ranges = self._ranges(camera, size, order, whole)
+        ranges = self._ranges(camera, size, order)
         return ranges[~clear], ranges[clear][::-1], order[clear]
 
-    def _ranges(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray, whole: bool) -> np.ndarray:
+    def _ranges(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
         """(k, 2) first and number of the triangles to draw of the meshes `chosen` (k,)."""
-        if whole:
-            return np.stack([self._starts[0, chosen], self._counts[0, chosen]], axis=1)
         forward = np.array(camera.forward)
         near = (self.middles[chosen] - np.array(camera.position)) @ forward - self.reaches[chosen] @ np.abs(forward)
         widest = COARSE * 2 * math.tan(camera.vfov / 2) / size[0] * np.maximum(near, 0)
@@ -213,7 +201,7 @@ class Raster:
         """`projection` to the depths that this OpenGL takes at present; MuJoCo leaves it with 0 to 1."""
         mode = np.ravel(GL.glGetIntegerv(GL.GL_CLIP_DEPTH_MODE))[0]
         lowest = 0.0 if mode == GL.GL_ZERO_TO_ONE else -1.0
-        return projection(camera, self._planes, size, lowest)
+        return projection(camera, size, lowest)
 
     def _begin(self, frame: str, size: tuple[int, int]) -> None:
         if any(n > s for n, s in zip(size, self._size, strict=True)):
@@ -277,17 +265,15 @@ def able() -> bool:
     return (GL.glGetIntegerv(GL.GL_MAJOR_VERSION), GL.glGetIntegerv(GL.GL_MINOR_VERSION)) >= VERSION
 
 
-def projection(camera: Camera, planes: tuple[float, float], size: tuple[int, int], lowest: float) -> np.ndarray:
-    """(4, 4) float32 from metres of the world to clip space, with a depth of 1 at the near plane and `lowest` at the
-    far."""
-    near, far = planes
+def projection(camera: Camera, size: tuple[int, int], lowest: float) -> np.ndarray:
+    """(4, 4) float32 from metres of the world to clip space, with a depth of 1 at NEAR and `lowest` at FAR."""
     forward, up = np.array(camera.forward), np.array(camera.up)
     tall = math.tan(camera.vfov / 2)
     rows = np.empty((4, 4))
     rows[0, :3], rows[1, :3] = camera.right / (tall * size[1] / size[0]), up / tall
-    rows[2, :3], rows[3, :3] = forward * ((lowest * far - near) / (far - near)), forward
+    rows[2, :3], rows[3, :3] = forward * ((lowest * FAR - NEAR) / (FAR - NEAR)), forward
     rows[:, 3] = -rows[:, :3] @ np.array(camera.position)
-    rows[2, 3] += (1 - lowest) * near * far / (far - near)
+    rows[2, 3] += (1 - lowest) * NEAR * FAR / (FAR - NEAR)
     return rows.astype(np.float32)
 
 

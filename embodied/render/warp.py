@@ -25,7 +25,7 @@ import numpy as np
 
 from embodied.errors import UnableError
 from embodied.house.house import House
-from embodied.render.camera import View
+from embodied.render.camera import FAR, NEAR, View
 from embodied.render.panorama import FACES, Panorama
 from embodied.render.pictures import check_size
 from embodied.scene.house_meshes import owners
@@ -45,8 +45,6 @@ except ImportError as e:
 if TYPE_CHECKING:
     from assets.catalogue import Catalogue
 
-NEAR, FAR = 0.03, 200.0
-"""Nothing nearer or farther is seen, metres; part of the compiled kernel, so one for all houses."""
 SEEN = ("rgb", "depth", "ids")
 APART = 5e-4
 """How far the two faces of a thin thing are moved apart, metres: of two faces in one place a ray meets either."""
@@ -155,15 +153,11 @@ class WarpRenderer:
             raise ValueError(f"sees is {tuple(sees)}; name some of {SEEN}" + (f", not {unknown}" if sees else ""))
         colours, rest = "rgb" in sees, "depth" in sees or "ids" in sees
         with wp.ScopedDevice(self.device):
-            at, turned, tilted = (
-                x if isinstance(x, wp.array) else wp.array(np.asarray(x, np.float32), dtype=kind)
-                for x, kind in (
-                    (positions, wp.vec3),
-                    (yaws, float),
-                    (np.zeros(n) if pitches is None else pitches, float),
-                )
-            )
-            wp.launch(_aim, n, inputs=[at, turned, tilted], outputs=[self._data.cam_xpos, self._data.cam_xmat])
+            poses = (positions, wp.vec3), (yaws, float), (np.zeros(n) if pitches is None else pitches, float)
+            given = [
+                x if isinstance(x, wp.array) else wp.array(np.asarray(x, np.float32), dtype=kind) for x, kind in poses
+            ]
+            wp.launch(_aim, n, inputs=given, outputs=[self._data.cam_xpos, self._data.cam_xmat])
             self._data.nworld = n
             through = colours and self._behind is not None
             mjw.render(self._model, self._data, self._passes[colours, rest or through])
@@ -260,7 +254,7 @@ def _context(model: mujoco.MjModel, worlds: int, size: tuple[int, int]) -> Any:
     )
     context.use_textures, context.textures_registry = True, [_texture(model, t) for t in range(model.ntex)]
     context.textures = wp.array(context.textures_registry, dtype=wp.Texture2D)
-    context.znear, context.zfar = NEAR, FAR
+    context.znear, context.zfar = NEAR, FAR  # part of the compiled kernel, so one for all houses
     return context
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import hashlib
 import hmac
 import json
@@ -101,8 +102,8 @@ class Server:
         self._open = 0
         self._joining = Bucket(JOIN_RATE, JOIN_BURST)
         self._machines: dict[str, asyncio.Task[None]] = {}
-        self._plans: dict[str, dict[str, Any]] = {}
-        self._houses = houses_of(sessions)
+        houses = houses_of(sessions)
+        self._plan = functools.cache(lambda house: plan_of(houses[house], pictures))
         self.failed = False
         """Whether something could not be written down; nothing is acknowledged any more."""
 
@@ -319,7 +320,10 @@ class Server:
         if do == "moved":
             event.body["candidate"] = int(message["candidate"])
         elif do == "asked":
-            event.body["question"] = self._question(game, words(message["text"]))
+            text, part = words(message["text"]), game.table.part
+            if not (part.free_question or game.practice) and text not in [q.text for q in part.questions]:
+                raise ActionError("choose one of the questions")
+            event.body["question"] = text
         elif do == "answered":
             part, picture = game.table.part, message.get("picture")
             if picture is not None:
@@ -332,30 +336,21 @@ class Server:
         await self.happen(event)
         return [self.sessions.people[p] for p in game.people.values()]
 
-    def _question(self, game: Game, text: str) -> str:
-        part = game.table.part
-        if not (part.free_question or game.practice) and text not in [q.text for q in part.questions]:
-            raise ActionError("choose one of the questions")
-        return text
-
     async def _send_house(self, person: Person) -> None:
         if person.game is None:
             raise ActionError("there is no plan to see now")
         game = self.sessions.games[person.game]
         if game.people.get("assistant") != person.id:
             raise ActionError("only the assistant sees the plan")
-        name = game.task.world
-        if name not in self._plans:
-            self._plans[name] = plan_of(self._houses[name], self.pictures)
         socket = self._sockets.get(person.id)
         if socket is not None:
-            await socket.send_text(json.dumps({"plan": self._plans[name]}))
+            await socket.send_text(json.dumps({"plan": self._plan(game.task.world)}))
 
     async def _admin(self, socket: WebSocket, word: str) -> None:
         if not hmac.compare_digest(word.encode(), self.token("results").encode()):
             raise Refused("This link is not valid.")
         while True:
-            await socket.send_text(json.dumps({"screen": "results", **summary(self.sessions, time.time())}))
+            await socket.send_text(json.dumps({"screen": "results", **summary(self.sessions)}))
             await asyncio.sleep(5)
 
     async def _tell_partners(self, person: Person) -> None:

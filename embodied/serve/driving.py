@@ -7,19 +7,20 @@ go straight to. Assistants, measures and learners need not know how people moved
 from __future__ import annotations
 
 import asyncio
+import functools
 import math
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
-import cv2
 import numpy as np
 
 from embodied.envs.continuous import Body, Grounds
 from embodied.errors import UnableError
 from embodied.interface import Place, Pose
 from embodied.render.camera import camera_at
+from embodied.render.jpeg import jpeg
 from embodied.world import World
 
 ACTIONS = ("Go ahead", "Turn left", "Turn right")
@@ -78,7 +79,7 @@ class Live:
 
     def __init__(self, open_world: Callable[[str], World]) -> None:
         """`open_world`: gives a house that can be drawn, by name."""
-        self._open, self._worlds = open_world, dict[str, World]()
+        self._world = functools.cache(open_world)
         self._thread = ThreadPoolExecutor(1, "live")
         self._drawn: OrderedDict[str, asyncio.Future[bytes]] = OrderedDict()
 
@@ -107,8 +108,5 @@ class Live:
 
     def _draw(self, eye: Eye) -> bytes:
         name, x, y, z, yaw = eye
-        if name not in self._worlds:
-            self._worlds[name] = self._open(name)
-        rgb = self._worlds[name].renderer.rgb(camera_at((x, y, z), yaw, 0.0, VFOV), SIZE)
-        bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
-        return cv2.imencode(".jpg", bgr, (cv2.IMWRITE_JPEG_QUALITY, QUALITY))[1].tobytes()
+        rgb = self._world(name).renderer.rgb(camera_at((x, y, z), yaw, 0.0, VFOV), SIZE)
+        return jpeg(rgb, QUALITY)

@@ -7,7 +7,6 @@ advisor says a sub-goal as a person did where somebody meant the same actions.
 from __future__ import annotations
 
 import dataclasses
-import json
 import shutil
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
@@ -17,13 +16,14 @@ from pathlib import Path
 from assets.cache import write_bytes
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.assistants.route_system import WORDINGS
-from embodied.datasets.build import UnitFacts, share, write_index
+from embodied.datasets.build import UnitFacts, save_facts, share, write_index
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import SUBGOALS, Dataset
 from embodied.evaluation.metrics import sdtw, without_repeats
-from embodied.interface import STEP, Episode, Pose, Route
+from embodied.interface import STEP, Episode, Pose, Route, Task
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import Said
+from embodied.navigation.graph import nearest
 from embodied.records import load_json, load_lines, save_lines
 from embodied.seeds import stream
 from embodied.serve.results import JUDGEMENTS, Judgement
@@ -70,8 +70,7 @@ def rated_by_people(folder: Path, source: Dataset) -> list[tuple[float, int]]:
     for told in load_lines(judged, Judgement) if judged.exists() else ():
         if told.stars is not None:
             task, graph = told.episode.task, source.place(told.episode.task.world).graph
-            goal = min(task.goal_nodes, key=lambda g: (graph.distance[task.start.node, g], g))
-            way = graph.path(task.start.node, goal)
+            way = graph.path(task.start.node, nearest(graph, task.start.node, task.goal_nodes))
             found.append((sdtw(without_repeats(told.episode.nodes), way, graph, max(task.radius, 1e-6)), told.stars))
     return found
 
@@ -137,15 +136,9 @@ def _write_house(source: Dataset, name: str, words: Sequence[Worded], home: Path
         for part in tasks:
             heard = held_out if part != "train" and facts.group == "train" else split
             file = home / f"tasks_{part}.jsonl"
-            old_tasks = [] if only else file.read_text(encoding="utf-8").splitlines()
-            new = [vln_task(name, r) for r in mine if r.split == heard]
-            save_lines(file, new)
-            text = "".join(line + "\n" for line in old_tasks) + file.read_text(encoding="utf-8")
-            write_bytes(file, text.encode())
-            tasks[part] = len(old_tasks) + len(new)
-    facts = dataclasses.replace(facts, routes=len(kept) + len(mine), tasks=tasks)
-    body = {**dataclasses.asdict(facts), "config": source.config.facts()}
-    write_bytes(home / "unit.json", (json.dumps(body, sort_keys=True, indent=1) + "\n").encode())
+            old_tasks = [] if only else list(load_lines(file, Task))
+            tasks[part] = save_lines(file, [*old_tasks, *(vln_task(name, r) for r in mine if r.split == heard)])
+    save_facts(home, dataclasses.replace(facts, routes=len(kept) + len(mine), tasks=tasks))
 
 
 def _routes(source: Dataset, name: str, words: Sequence[Worded], split: str, held_out: str) -> Iterator[Route]:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import cv2
 import numpy as np
 
+from embodied.render.jpeg import jpeg
 from embodied.render.panorama_file import PanoramaFile, beside
 
 SIZES = {"small": 128, "large": 768}
@@ -46,7 +47,4 @@ class Pictures:
         side = min(SIZES[size], faces.shape[1])
         if side != faces.shape[1]:
             faces = np.stack([cv2.resize(f, (side, side), interpolation=cv2.INTER_AREA) for f in faces])
-        colours = cv2.cvtColor(beside(faces), cv2.COLOR_RGB2BGR)
-        return cv2.imencode(".jpg", colours, (cv2.IMWRITE_JPEG_QUALITY, QUALITY[size], cv2.IMWRITE_JPEG_OPTIMIZE, 1))[
-            1
-        ].tobytes()
+        return jpeg(beside(faces), QUALITY[size], cv2.IMWRITE_JPEG_OPTIMIZE, 1)

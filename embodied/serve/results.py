@@ -102,7 +102,7 @@ def agreement(ratings: Iterable[tuple[str, float]]) -> float | None:
     return 1.0 if among == 0 else float(1 - within / among)
 
 
-def summary(sessions: Sessions, now: float) -> dict[str, Any]:
+def summary(sessions: Sessions) -> dict[str, Any]:
     """The figures of a study so far."""
     people = list(sessions.people.values())
     ends = Counter(p.ended for p in people)

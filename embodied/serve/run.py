@@ -37,23 +37,18 @@ class Opened:
     server: Server
 
     def links(self, address: str, invitations: int = 0) -> dict[str, list[str]]:
-        """The links to give away: for everybody, single-use ones, and the results.
+        """The links to give away: for everybody, single-use ones, and the results; asked again, the same ones.
 
         Args:
           address: of the page, 'https://study.example.org'.
         """
-        words = self.invite(invitations)
+        words = [self.server.token("invitation", str(i)) for i in range(invitations)]
+        self.server.invitations |= {key_of(w) for w in words}
         return {
             "join": [] if invitations else [f"{address}/#join={self.server.token('join')}"],
             "invitations": [f"{address}/#join={w}" for w in words],
             "results": [f"{address}/#results={self.server.token('results')}"],
         }
-
-    def invite(self, many: int) -> list[str]:
-        """The words of so many single-use links; asked again, the same ones."""
-        words = [self.server.token("invitation", str(i)) for i in range(many)]
-        self.server.invitations |= {key_of(w) for w in words}
-        return words
 
 
 def open_study(

@@ -33,7 +33,7 @@ def screen_of(sessions: Sessions, person: Person, pictures: Pictures, code: str)
         role = next(r for r, p in game.people.items() if p == person.id)
         there = [sessions.people[p].connected > 0 for r, p in game.people.items() if r != role]
         common = game_of(game, role, pictures) | {"partnerThere": all(there)}
-        return {**base, **common, **(agent_of if role == "agent" else assistant_of)(game, pictures)}
+        return {**base, **common, **(agent_of(game, pictures) if role == "agent" else assistant_of(game))}
     if person.viewing is not None:
         return {**base, **judge_of(sessions, person, pictures)}
     if person.waiting is not None:
@@ -132,7 +132,7 @@ def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> lis
     ]
 
 
-def assistant_of(game: Game, pictures: Pictures) -> Screen:
+def assistant_of(game: Game) -> Screen:
     """What the assistant sees."""
     part, s = game.table.part, game.situation
     show_way, show_goal = part.show_way or game.practice, part.show_goal or game.practice
@@ -149,7 +149,7 @@ def assistant_of(game: Game, pictures: Pictures) -> Screen:
 def judge_of(sessions: Sessions, person: Person, pictures: Pictures) -> Screen:
     """An episode to be watched, with what is asked about it."""
     assert person.viewing is not None
-    part, episode = sessions.part(person.viewing[0]), sessions.viewed_episode(person)
+    part, episode = sessions.part(person.viewing[0]), sessions.episode_of(*person.viewing)
     return {
         "screen": "judge",
         "kind": part.kind,

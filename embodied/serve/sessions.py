@@ -31,7 +31,6 @@ class Person:
     id: str
     key: str
     """Digest of the token in their link."""
-    joined: float
     consented: bool = False
     ended: str | None = None
     """'done', 'left': asked to stop, 'nothing': no task was left."""
@@ -93,7 +92,7 @@ class Sessions:
             self.people[event.person].messages.add(event.message)
 
     def _joined(self, event: Event) -> None:
-        person = Person(event.body["person"], event.body["key"], event.time)
+        person = Person(event.body["person"], event.body["key"])
         self.people[person.id] = self.by_key[person.key] = person
         if event.body.get("invitation"):
             self.used.add(event.body["invitation"])
@@ -165,15 +164,11 @@ class Sessions:
         for role, pid in game.people.items():
             person = self.people[pid]
             person.game, person.ready = None, False
-            person.last = "broken"
-            if game.broken is None:
-                person.last = "found" if found(game) else "missed"
-                if game.practice:
-                    person.practised.add(role)
-                else:
-                    person.done[part.name] += 1
-            elif game.practice:
+            person.last = "broken" if game.broken is not None else "found" if found(game) else "missed"
+            if game.practice:
                 person.practised.add(role)
+            elif game.broken is None:
+                person.done[part.name] += 1
         if not game.practice:
             if game.broken is None:
                 self._episodes[part.name].append((game.id, game))
@@ -191,11 +186,6 @@ class Sessions:
         if part.episodes:
             return [(str(i), e) for i, e in enumerate(self.viewed[part.name])]
         return [(unit, game.episode) for unit, game in self._episodes[part.of]]
-
-    def viewed_episode(self, person: Person) -> Episode:
-        """What a person judges now."""
-        assert person.viewing is not None
-        return self.episode_of(*person.viewing)
 
     def episode_of(self, part: str, unit: str) -> Episode:
         """What a part judges under the name `unit`."""

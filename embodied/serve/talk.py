@@ -120,10 +120,9 @@ class PathSpeaker:
         return (Intention.HELP,)
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
-        world, pose = situation.world, situation.pose
-        path = world.graph.path(pose.node, nearest(world.graph, pose.node, situation.task.goal_nodes))
-        text = "You are there." if len(path) == 1 else self._language.route(world, path, pose.yaw, rng=rng)
-        reply = spoken_reply(situation, text, None, 0)
+        path = way_to_goal(situation)
+        said = self._language.route(situation.world, path, situation.pose.yaw, rng=rng) if len(path) > 1 else None
+        reply = spoken_reply(situation, said or "You are there.", None, 0)
         return dataclasses.replace(reply, subtask=dataclasses.replace(required(reply.subtask, "way"), id="way"))
 
 

@@ -50,10 +50,9 @@ def compare(
     fit &= (s.light.sun < 1e-3) | (s.light.sun > 0.98 * np.clip(s.lux.normal @ s.outdoors.sun_direction, 0, 1))
     rng = stream(s.house.seed, "light", "check", name)
     pick = rng.choice(np.nonzero(fit)[0], min(luxels, int(fit.sum())), replace=False)
-    space = s.space
-    lights = paths.lights_of(space, lambda o: s.without.get(o, space), portals_of(s.house), s.lamps, s.outdoors)
+    lights = paths.lights_of(s.space.scene, s.without, portals_of(s.house), s.lamps, s.outdoors)
     p = subset(s.lux, np.repeat(pick, paths_each))
-    e = array(paths.irradiance(space, lights, paths.surfaces_of(s.lux), p, rng=rng))
+    e = array(paths.irradiance(s.space, lights, paths.surfaces_of(s.lux), p, rng=rng))
     traced = np.nan_to_num(e).reshape(len(pick), paths_each, 3) @ y
     return whole[pick] @ y, traced.mean(1), traced.std(1) / np.sqrt(paths_each), s.lux.position[pick]
 

@@ -32,7 +32,7 @@ from embodied.light.baking.solve import Radiosity
 from embodied.light.memory import Memory, once
 from embodied.light.pages.atlas import Atlas, Page
 from embodied.light.pages.colours import ColourMaps, colour_at, linear, paints_of, shown
-from embodied.light.pages.cover import Cover, Texels, cover, nearest, surface
+from embodied.light.pages.cover import Cover, Texels, cover, sources, surface
 from embodied.light.pages.files import Ingredients
 from embodied.light.pages.tone import Exposure, developed
 from embodied.light.settings import Settings
@@ -65,7 +65,7 @@ class Solved:
     exposure: Exposure
     space: Space
     """The house as rays meet it."""
-    without: Mapping[str, Space]
+    without: Mapping[str, RayScene]
     """As in `solve.Problem`."""
 
 
@@ -126,7 +126,7 @@ def page_of(number: int, composer: Composer) -> Ingredients:
     known = filled(composer.kept("filling", number, lambda: filling(coarse.index, good, coarse.shape)), light)
     soft, share = np.ascontiguousarray(known[..., :3]), known[..., 3]
     fine = lambda: cover(page, page.fineness, solved.lux.sheets[number])
-    c = coarse.cover if page.fineness == 1 else composer.kept("cover", number, fine)
+    c = coarse if page.fineness == 1 else composer.kept("cover", number, fine)
     sun = _sharp_sun(composer, page, coarse, c, share)
     nearest_luxel = composer.kept("luxels", number, lambda: sources(coarse.index, coarse.shape))
     gain = composer.gains[mine][nearest_luxel].reshape(*coarse.shape, 3)
@@ -301,7 +301,7 @@ def _mirrored(
         d = dr.normalize(straight + ball * spread_of)
         d = dr.select(dr.dot(d, p.normal) < 0.02, straight, d)
         near, hit = radiosity.hit_colour(space, table, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
-        return (dr.select(hit, near, radiosity.env_lookup(space, d, ~hit) * radiosity.GLASS),)
+        return (dr.select(hit, near, radiosity.env_lookup(space.env, d, ~hit) * radiosity.GLASS),)
 
     return np.minimum(array(added_up(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays, limit)
 
@@ -319,18 +319,6 @@ def evened(values: np.ndarray, index: np.ndarray, shape: tuple[int, int]) -> np.
     sum_.reshape(-1, values.shape[1])[index] = values
     blurred = lambda a: cv2.GaussianBlur(a, (5, 5), 1.2, borderType=cv2.BORDER_CONSTANT)
     return (blurred(sum_) / np.maximum(blurred(there), 1e-6)[..., None]).reshape(-1, values.shape[1])[index]
-
-
-def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(h * w,) int: which of the n covered texels at flat positions `index` each texel of a page shows: its own or
-    the nearest."""
-    if not len(index):
-        return np.zeros(shape[0] * shape[1], np.int64)
-    mask = np.zeros(shape[0] * shape[1], bool)
-    mask[index] = True
-    number = np.zeros(len(mask), np.int32)
-    number[index] = np.arange(len(index))
-    return number[nearest(mask.reshape(shape)).ravel()]
 
 
 HIDDEN = (2.0, 8.0)
@@ -413,6 +401,6 @@ def _sharp_sun(composer: Composer, page: Page, coarse: Texels, c: Cover, share: 
     if len(i):
         p = points_of(*surface(page, c, i), page.thin[c.face[i]])
         out[i] = np.asarray(
-            radiosity.sun_share(composer.space, p, composer.portals, towards, composer.settings.sun_rays)
+            radiosity.sun_share(composer.space.scene, p, composer.portals, towards, composer.settings.sun_rays)
         )
     return out

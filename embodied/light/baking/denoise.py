@@ -6,7 +6,7 @@ weighed by likeness of brightness.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -72,16 +72,19 @@ NOISES = 1.8
 
 def spatial_variance(e: np.ndarray, grid: Grid) -> np.ndarray:
     """(n,) variance of brightness among the 25 luxels around: noise where nothing else is known of it."""
+    dr, values = drjit(), floats(brightness(e))
+    mean, square = _means(grid, (values, lambda v: v), (values, dr.square))
+    return np.array(dr.maximum(square - dr.square(mean), 0.0))
+
+
+def _means(grid: Grid, *of: tuple[Array, Callable[[Array], Array]]) -> list[Array]:
+    """For each table of luxels, and what becomes of its values, the mean over the 25 around every luxel."""
     mi, dr = mitsuba(), drjit()
-    values = floats(brightness(e))
-    mean, square, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
+    sums, count = [mi.Float(0.0) for _ in of], mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
-        v = dr.gather(mi.Float, values, q, inside)
-        mean += v
-        square += dr.square(v)
+        sums = [total + made(dr.gather(mi.Float, table, q, inside)) for total, (table, made) in zip(sums, of)]
         count += dr.select(inside, 1.0, 0.0)
-    n = dr.maximum(count, 1.0)
-    return np.array(dr.maximum(square / n - dr.square(mean / n), 0.0))
+    return [total / dr.maximum(count, 1.0) for total in sums]
 
 
 def _relative_noise(grid: Grid, e: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -90,16 +93,10 @@ def _relative_noise(grid: Grid, e: np.ndarray, variance: np.ndarray) -> tuple[np
     And (n,) what to add before logarithms are taken, more where there is more noise: a luxel whose rays
     all missed is no shadow.
     """
-    mi, dr = mitsuba(), drjit()
-    values, squares = floats(brightness(e)), floats(variance)
-    mean, spread, count = mi.Float(0.0), mi.Float(0.0), mi.Float(0.0)
-    for _, _, q, inside in grid.around(1):
-        mean += dr.gather(mi.Float, values, q, inside)
-        spread += dr.gather(mi.Float, squares, q, inside)
-        count += dr.select(inside, 1.0, 0.0)
-    n = dr.maximum(count, 1.0)
-    relative = np.minimum(np.asarray(dr.sqrt(spread / n) / dr.maximum(mean / n, 1e-5)), 1.5)
-    return relative, np.asarray(mean / n) * np.minimum(relative, 1.0)
+    dr, own = drjit(), lambda v: v
+    mean, spread = _means(grid, (floats(brightness(e)), own), (floats(variance), own))
+    relative = np.minimum(np.asarray(dr.sqrt(spread) / dr.maximum(mean, 1e-5)), 1.5)
+    return relative, np.asarray(mean) * np.minimum(relative, 1.0)
 
 
 BENT, TURNED = 0.1, 0.9

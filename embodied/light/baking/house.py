@@ -33,25 +33,17 @@ from embodied.light.memory import Memory, once
 from embodied.light.pages import tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
 from embodied.light.pages.colours import ColourMaps
-from embodied.light.pages.files import (
-    Bake,
-    StaleBake,
-    open_bake,
-    packed_meshes,
-    page_files,
-    reopened,
-    write_jpeg,
-    write_page,
-)
+from embodied.light.pages.files import Bake, StaleBake, open_bake, packed_meshes, page_files, reopened, write_page
 from embodied.light.pages.meshes import meshes_of
 from embodied.light.pages.tone import expose
 from embodied.light.pages.unwrap import openness
 from embodied.light.settings import QUALITIES, Settings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
 from embodied.light.tracing.luxels import Luxels, luxels_of, with_glow
-from embodied.light.tracing.radiosity import space_of, spaces_without, with_env
+from embodied.light.tracing.radiosity import scenes_without, space_of, with_env
 from embodied.light.tracing.sky import outdoors as outdoors_of
 from embodied.locks import locked
+from embodied.render.jpeg import jpeg
 from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
@@ -127,12 +119,8 @@ def progress_bar(*, shown: bool = True) -> Iterator[Progress]:
         yield tell
 
 
-def key_of(house: House, catalogue: Catalogue, settings: Settings) -> str:
-    """What a bake is filed under: another catalogue, model or material makes another bake."""
-    return _key(house, looks_of(house_parts(house, catalogue)), settings)
-
-
-def _key(house: House, looks: str, settings: Settings) -> str:
+def key_of(house: House, looks: str, settings: Settings) -> str:
+    """What a bake is filed under: another catalogue, model or material makes another bake. `looks`: of its parts."""
     return digest("light", light_code(), house.digest, owners(house), looks, dataclasses.asdict(settings))[:24]
 
 
@@ -270,7 +258,7 @@ class Shared:
         self.atlas = atlas_of(coarsened(things, settings.texels))
         self.lux = luxels_of(self.atlas, self.maps)
         self.space = space_of(self.atlas, self.lux.texels)
-        self.memory = Memory() if several else None
+        self.memory: Memory | None = {} if several else None
         clock("luxels")
 
     @functools.cached_property
@@ -317,7 +305,7 @@ def solve_house(
     lux = with_glow(shared.lux, house, atlas, lamps)
     clock("luxels")
     bare = tuple(sorted({x.owner for x in lamps if x.owner in atlas.owners}))
-    without = once(shared.memory, ("without", bare), lambda: spaces_without(space, atlas, bare))
+    without = once(shared.memory, ("without", bare), lambda: scenes_without(space, atlas, bare))
     problem = Problem(house, atlas, lux, space, outdoors, lamps, settings, shared.memory, without)
     light = kept_light(folder, len(lux.position), lambda: solve(problem, progress, clock))
     clock("direct")
@@ -348,14 +336,14 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     first = len(s.atlas.pages)
     pictures = daylit(shared.outside, s.outdoors, s.exposure, settings.other_rays)
     for i, picture in enumerate(pictures, first):
-        write_jpeg(folder / f"page_{i:03d}.jpg", picture, settings.jpeg)
+        write_bytes(folder / f"page_{i:03d}.jpg", jpeg(picture, settings.jpeg))
     clock("surroundings")
     write_bytes(folder / "meshes.npz", shared.meshes_file)
     write_lamps(folder / "lamps.npz", s.lamps)
     clock("meshes")
     (folder / "stage_light.npz").unlink(missing_ok=True)
     manifest = {
-        **facts_of(s, shared.meshes[0], _probes(s), folder),
+        **facts_of(s, shared.meshes[0], folder),
         "settings": dataclasses.asdict(settings),
         "pages": first + len(pictures),
         "seconds": {k: round(v, 2) for k, v in took.items()},
@@ -415,12 +403,6 @@ def _warn_of_darkness(house: House, light: dict[str, np.ndarray]) -> None:
         warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
 
 
-def _probes(s: Solved) -> dict[str, list]:
-    from embodied.light.baking.probe import ambient_cubes
-
-    return {r.id: cube.round(4).tolist() for r, cube in zip(s.house.rooms, ambient_cubes(s))}
-
-
 def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:
     """Delete the bake of `house`, finished or not."""
     settings = settings_of(settings) if isinstance(settings, str) else settings
@@ -429,7 +411,7 @@ def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings |
 
 def _folder(cache: Path, house: House, looks: str, settings: Settings) -> Path:
     """Where the bake of `house` is, or will be; its name begins with the quality's. `looks`: of its parts."""
-    return Path(cache) / "light" / f"{_name_of(settings)}-{_key(house, looks, settings)}"
+    return Path(cache) / "light" / f"{_name_of(settings)}-{key_of(house, looks, settings)}"
 
 
 def _name_of(settings: Settings) -> str:

@@ -8,11 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.house.shapes import inward
-from embodied.light.arrays import Array
-from embodied.light.backend import added_up, array, brightness, drjit, floats, fraction, mitsuba
+from embodied.light.arrays import RayScene
+from embodied.light.backend import array, brightness, floats, mitsuba
 from embodied.light.baking import denoise
 from embodied.light.memory import Memory, once
 from embodied.light.pages.atlas import Atlas
@@ -20,7 +19,7 @@ from embodied.light.settings import Settings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, Portal, portals_of
 from embodied.light.tracing.luxels import AMBIENT, Luxels, points
-from embodied.light.tracing.radiosity import Met, Patches, Points, Space
+from embodied.light.tracing.radiosity import Met, Patches, Points, Space, Together
 from embodied.light.tracing.sky import Outdoors
 
 SPARKS = 0.01
@@ -65,9 +64,9 @@ class Problem:
     settings: Settings
     memory: Memory | None = None
     """Where the house is lit more than once."""
-    without: Mapping[str, Space] = field(default_factory=dict)
+    without: Mapping[str, RayScene] = field(default_factory=dict)
     """What the shadow rays of a bare bulb meet, by the owner that the bulb hangs in."""
-    _own: Memory = field(default_factory=Memory)
+    _own: Memory = field(default_factory=dict)
 
     @functools.cached_property
     def points(self) -> Points:
@@ -100,7 +99,8 @@ class Problem:
         free, units = self.free, self._units
         if not len(free):
             return free
-        some = (self.memory or self._own).once(("tried", tries), lambda: radiosity.tried(units, tries))
+        memory = self._own if self.memory is None else self.memory
+        some = once(memory, ("tried", tries), lambda: radiosity.tried(units, tries))
         return free[radiosity.reached(units, some, sees(free[some]))]
 
     @functools.cached_property
@@ -113,68 +113,36 @@ class Problem:
         return radiosity.only(self.points, luxels)
 
 
-@dataclass(frozen=True, eq=False)
-class Source:
-    """A light, as something that shines on luxels."""
-
-    shine: Callable
-    """From luxel numbers (m,), a number of rays, 0 for the settings', and a memory to e (m, 3)."""
-    id: str
-    lamp: Lamp | None = None
-
-
-def sources_of(problem: Problem) -> list[Source]:
+def sources_of(problem: Problem) -> tuple[Portal | Lamp, ...]:
     """Sky and lamps."""
-    space, settings = problem.space, problem.settings
-    found = []
-    for way in portals_of(problem.house):
-        found.append(Source(_sky_of(problem, way), way.id))
-    for x in problem.lamps:
-        own = problem.without.get(x.owner or "", space)
-        lamp = lambda i, rays, x=x, s=own: radiosity.lamp_light(s, problem.at(i), x, rays or settings.lamp_rays)
-        found.append(Source(lambda i, rays, memory=None, f=lamp: array(f(i, rays)), x.id, x))
-    return found
+    return *portals_of(problem.house), *problem.lamps
 
 
-def _sky_of(problem: Problem, way: Portal) -> Callable:
-    """`Source.shine` of the sky through a portal."""
-
-    def shine(i: np.ndarray, rays: int, memory: Memory | None = None) -> np.ndarray:
-        return array(radiosity.sky_light(problem.space, problem.at(i), way, rays or problem.settings.sky_rays, memory))
-
-    return shine
-
-
-@dataclass(frozen=True, eq=False)
-class Shone:
-    """What one light gives to luxels."""
-
-    which: np.ndarray
-    """Luxels that it may reach."""
-    e: np.ndarray
-    """(len(which), 3) float32."""
+def _shine(problem: Problem, source: Portal | Lamp, i: np.ndarray, rays: int | None = None) -> np.ndarray:
+    """(m, 3) e that a source gives to luxels (m,), by so many rays; by those of the settings, and remembered, without a
+    number."""
+    points, settings = problem.at(i), problem.settings
+    if isinstance(source, Portal):
+        memory = problem.memory if rays is None else None
+        return array(radiosity.sky_light(problem.space, points, source, rays or settings.sky_rays, memory))
+    scene = problem.without.get(source.owner or "", problem.space.scene)
+    return array(radiosity.lamp_light(scene, points, source, rays or settings.lamp_rays))
 
 
-def shone_on(problem: Problem, source: Source) -> Shone:
-    """The light of a source at the luxels; rooms that it reaches nowhere are left out."""
+def shone_on(problem: Problem, source: Portal | Lamp) -> tuple[np.ndarray, np.ndarray]:
+    """The light of a source: (k,) luxels that it may reach, rooms that it reaches nowhere left out, and (k, 3) e."""
+    radiance = np.asarray(source.radiance, np.float32) if isinstance(source, Lamp) else None
 
     def shone() -> tuple[np.ndarray, np.ndarray]:
-        seen = lambda: problem.reached(lambda i: source.shine(i, 4).sum(1) > 0)
+        seen = lambda: problem.reached(lambda i: _shine(problem, source, i, 4).sum(1) > 0)
         which = once(problem.memory, ("reached", source.id), seen)
-        e = source.shine(which, 0, problem.memory) if len(which) else np.zeros((0, 3), np.float32)
-        return which, e
+        e = _shine(problem, source, which) if len(which) else np.zeros((0, 3), np.float32)
+        return which, e if radiance is None or problem.memory is None else e / radiance
 
-    if source.lamp is None or problem.memory is None:
-        return Shone(*shone())
-    # of the same lamp with another colour or power
-    radiance = np.asarray(source.lamp.radiance, np.float32)
-    which, e = problem.memory.once(("shone", source.lamp.id), lambda: _per(radiance, *shone()))
-    return Shone(which, e * radiance)
-
-
-def _per(radiance: np.ndarray, which: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Light for each unit of a lamp's radiance."""
-    return which, e / radiance
+    if radiance is None or problem.memory is None:
+        return shone()
+    which, e = once(problem.memory, ("shone", source.id), shone)  # of the same lamp with another colour or power
+    return which, e * radiance
 
 
 def outer_light(problem: Problem, samples: int = 24) -> np.ndarray:
@@ -183,7 +151,6 @@ def outer_light(problem: Problem, samples: int = 24) -> np.ndarray:
     What faces the room takes none: its luxels at the frame's edge lie in the plane of the lintel, from where
     every second ray runs up inside the wall.
     """
-    mi, dr = mitsuba(), drjit()
     house, atlas, lux, space = problem.house, problem.atlas, problem.lux, problem.space
     e = np.zeros((len(lux.position), 3), np.float32)
     into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
@@ -194,41 +161,28 @@ def outer_light(problem: Problem, samples: int = 24) -> np.ndarray:
     mine = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
     if not len(mine):
         return e
-    p = problem.at(mine)
-    portals = radiosity.portal_scene(portals_of(house) or [_nowhere()])
-
-    def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k) + 1)
-        u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
-        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
-        ray = mi.Ray3f(p.position + p.face_normal * radiosity.LIFT, d)
-        free = ~space.scene.ray_test(ray) & ~portals.ray_test(ray)
-        return (dr.select(free, radiosity.env_lookup(space, d, free), mi.Color3f(0.0)),)
-
-    e[mine] = array(added_up(samples, one, dr.zeros(mi.Color3f, p.n))[0]) / samples
+    ways = portals_of(house)
+    scene = Together((space.scene, radiosity.portal_scene(ways))) if ways else space.scene
+    e[mine] = radiosity.open_sky(scene, space.env, problem.at(mine), samples, mitsuba().Color3f(0.0))
     return e
-
-
-def _nowhere() -> Portal:
-    return Portal("", "", np.array([0.0, 0.0, -1e4]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
 
 
 def _lit_by(problem: Problem, patches: Patches, which: np.ndarray) -> np.ndarray:
     """(k, 3) e of sunlit patches at some luxels; of none at none (a glint may reach no luxel)."""
     if not len(which):
         return np.zeros((0, 3), np.float32)
-    return radiosity.patch_light(problem.space, problem.at(which), patches)
+    return radiosity.patch_light(problem.space.scene, problem.at(which), patches)
 
 
 def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     """(n,) share of the sun at luxels, and (n, 3) e of its first bounce."""
-    lux, space, outdoors = problem.lux, problem.space, problem.outdoors
+    lux, scene, outdoors = problem.lux, problem.space.scene, problem.outdoors
     portals = portals_of(problem.house)
     share, e = np.zeros(len(lux.position), np.float32), np.zeros((len(lux.position), 3), np.float32)
     if not portals or not outdoors.sun.any():
         return share, e
     through, towards = radiosity.portal_scene(portals), outdoors.sun_direction
-    seen = lambda i, rays: np.asarray(radiosity.sun_share(space, problem.at(i), through, towards, rays))
+    seen = lambda i, rays: np.asarray(radiosity.sun_share(scene, problem.at(i), through, towards, rays))
     mine = problem.reached(lambda i: seen(i, 1) > 0, tries=1000)
     mine = mine[lux.thin[mine] | (lux.face_normal[mine] @ towards.astype(np.float32) > 0)]
     if len(mine):
@@ -361,8 +315,8 @@ def solve(
     sources, direct = sources_of(problem), np.zeros((len(lux.position), 3), np.float32)
     for k, source in enumerate(sources):
         tell("direct light", k / len(sources))
-        shone = shone_on(problem, source)
-        direct[shone.which] += shone.e
+        which, e = shone_on(problem, source)
+        direct[which] += e
     clock("direct")
     share, patches = sun_light(problem)
     clock("sun")

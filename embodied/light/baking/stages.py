@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from assets.archives import open_arrays
 from assets.cache import atomic_path, digest, write_bytes
 from embodied.light.backend import device, warn
 from embodied.light.baking.compose import Solved
 from embodied.light.baking.solve import Radiosity
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.files import checksum
+from embodied.light.pages.records import load_record
 from embodied.light.settings import light_code
 from embodied.scene.house_meshes import owners
 from embodied.scene.lit_pages import LitMesh
@@ -35,24 +34,21 @@ def same_atlas(folder: Path, atlas: Atlas) -> None:
 
 def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
     """What `work` returns, from disk if an interrupted run left it there whole."""
-    path = folder / "stage_light.npz" if folder else None
-    names = [f.name for f in dataclasses.fields(Radiosity)]
-    if path is not None and path.exists():
-        try:
-            with open_arrays(path) as z:
-                known = Radiosity(*(z[name] for name in names))
-            if all(len(getattr(known, name)) == n for name in names):
-                return known
-        except Exception as e:
-            warn(f"{path} is damaged ({type(e).__name__}); the stage is computed again")
+    if folder is None:
+        return work()
+    path = folder / "stage_light.npz"
+    known = load_record(Radiosity, path)
+    if known is not None and all(len(a) == n for a in vars(known).values()):
+        return known
+    if path.exists():
+        warn(f"{path} is damaged; the stage is computed again")
     made = work()
-    if path is not None:
-        with atomic_path(path) as temporary, open(temporary, "wb") as f:
-            np.savez(f, **{name: getattr(made, name) for name in names})
+    with atomic_path(path) as temporary, open(temporary, "wb") as f:
+        np.savez(f, **vars(made))  # quicker to write than what `save_record` packs
     return made
 
 
-def facts_of(s: Solved, meshes: Sequence[LitMesh], probes: Mapping[str, list], folder: Path) -> dict[str, object]:
+def facts_of(s: Solved, meshes: Sequence[LitMesh], folder: Path) -> dict[str, object]:
     """What the manifest says of a bake whose files are written, but how it was made."""
     written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
     return {
@@ -74,6 +70,5 @@ def facts_of(s: Solved, meshes: Sequence[LitMesh], probes: Mapping[str, list], f
             for m in meshes
         ],
         "lamps": [{"id": x.id, "room": x.room, "owner": x.owner} for x in s.lamps],
-        "probes": dict(probes),
         "files": {p.name: checksum(p) for p in written},
     }

@@ -10,18 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.geometry import r2
 from embodied.house.house import House
-from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import added_up, array, constant, drjit, floats, fraction, mitsuba, scene_of, vector
+from embodied.light.arrays import RayScene
+from embodied.light.backend import constant, drjit, floats, mitsuba, scene_of, vector
 from embodied.light.baking.compose import spread
 from embodied.light.pages.atlas import Atlas, atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps, albedo
 from embodied.light.pages.cover import Cover, Texels, cover, rasterise, sheets_of
 from embodied.light.pages.tone import Exposure, display
-from embodied.light.pages.unwrap import SPARSEST
+from embodied.light.pages.unwrap import SPARSEST, areas_of
 from embodied.light.tracing import radiosity
-from embodied.light.tracing.radiosity import ENV_ROWS, LIFT, Together, points_of, sky_alone
+from embodied.light.tracing.radiosity import LIFT, Together, points_of, small_sky
 from embodied.light.tracing.sky import Outdoors
 from embodied.scene.backdrop import DOME, dome
 from embodied.scene.far_towns import GLOW
@@ -83,8 +82,7 @@ def outside_of(
 
 def _area(parts: Sequence[Part]) -> float:
     """Of all faces, square metres."""
-    corners = [p.mesh.vertices[p.mesh.faces] for p in parts]
-    return sum(float(np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).sum()) / 2 for c in corners)
+    return sum(float(areas_of(p.mesh.vertices[p.mesh.faces]).sum()) for p in parts)
 
 
 def daylit(outside: Outside | None, outdoors: Outdoors, exposure: Exposure, rays: int) -> list[np.ndarray]:
@@ -124,19 +122,9 @@ def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndar
     """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
     mi, dr = mitsuba(), drjit()
     p = points_of(texels.position, texels.normal, texels.face_normal, thin)
-    rows = outdoors.picture.shape[0] // ENV_ROWS
-    small = outdoors.picture.reshape(ENV_ROWS, rows, 2 * ENV_ROWS, rows, 3).mean((1, 3)).astype(np.float32)
-    space = sky_alone(scene, floats(small))
+    small = small_sky(outdoors.picture).astype(np.float32)
     hidden = mi.Color3f(*(constant(float(x) / 3) for x in small.mean((0, 1))))
-
-    def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k) + 1)
-        u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
-        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
-        free = ~scene.ray_test(mi.Ray3f(p.position + p.face_normal * LIFT, d))
-        return (dr.select(free, radiosity.env_lookup(space, d, free), hidden),)
-
-    e = array(added_up(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays
+    e = radiosity.open_sky(scene, floats(small), p, rays, hidden)
     if outdoors.sun.any():
         cos, side, active = radiosity.facing(p, vector(np.tile(outdoors.sun_direction, (1, 1))))
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, vector(np.tile(outdoors.sun_direction, (p.n, 1))))

@@ -95,7 +95,7 @@ def things_of(
     """
     groups: dict[tuple, list] = {}
     for p in parts:
-        groups.setdefault((p.owner, p.room, p.kind, _is_glass(p.mesh.finish), p.position, p.yaw), []).append(p)
+        groups.setdefault((p.owner, p.room, p.kind, p.mesh.finish.color[3] < 0.9, p.position, p.yaw), []).append(p)
     things = []
     for done, ((owner, room, kind, glass, position, yaw), mine) in enumerate(groups.items()):
         progress(done, len(groups))
@@ -107,17 +107,8 @@ def things_of(
         if len(flat.corners):
             flat = _placed(flat, position, yaw)
             finishes = tuple(m.finish for m in meshes)
-            things.append(
-                UnwrappedThing(
-                    owner,
-                    room,
-                    kind,
-                    flat,
-                    finishes,
-                    min(finest, _fineness(kind, flat, finishes, density, sharpness)),
-                    glass,
-                )
-            )
+            fineness = min(finest, _fineness(kind, flat, finishes, density, sharpness))
+            things.append(UnwrappedThing(owner, room, kind, flat, finishes, fineness, glass))
     return tuple(things)
 
 
@@ -159,7 +150,7 @@ def atlas_of(things: Sequence[UnwrappedThing], widest: int = 4096, most: int = 3
             whole = min(sum(int(t.flat.size.prod()) for t in mine), most / fineness**2)
             sizes = np.array([t.flat.size for t in mine])
             widths = [int(min(limit, max(128, x * np.sqrt(whole)))) for x in (0.8, 0.9, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5)]
-            width, places = min(((w, pack(sizes, w)[0]) for w in widths), key=lambda x: _sheet(sizes, x[1]))
+            width, (places, _) = min(((w, pack(sizes, w)) for w in widths), key=lambda x: int(x[1][1].prod()))
             tall = min(limit, max(most / fineness**2 / width, max(int(t.flat.size[1]) for t in mine)))
             inside = [bool(y + t.flat.size[1] <= tall) for t, (_, y) in zip(mine, places)]
             if not any(inside):
@@ -169,15 +160,6 @@ def atlas_of(things: Sequence[UnwrappedThing], widest: int = 4096, most: int = 3
             pages.append(_page([t for t, ok in zip(mine, inside) if ok], places[inside], fineness, glass, number))
             mine = [t for t, ok in zip(mine, inside) if not ok]
     return Atlas(tuple(pages), owners, tuple(first[o].room for o in owners), tuple(first[o].kind for o in owners))
-
-
-def _sheet(sizes: np.ndarray, places: np.ndarray) -> int:
-    """Luxels of the rectangle that holds packed rectangles."""
-    return int((places + sizes).max(0).prod())
-
-
-def _is_glass(finish: Finish) -> bool:
-    return finish.color[3] < 0.9
 
 
 def _placed(flat: Unwrapped, position: Sequence[float], yaw: float) -> Unwrapped:
@@ -226,16 +208,10 @@ def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:
 def _page(
     things: Sequence[UnwrappedThing], places: np.ndarray, fineness: int, glass: bool, number: dict[str, int]
 ) -> Page:
-    finishes: list[Finish] = []
-    known: dict[Finish, int] = {}
+    finishes: dict[Finish, int] = {}
     which, owner, luxels = [], [], []
     for t, place in zip(things, places):
-        local = []
-        for f in t.finishes:
-            if f not in known:
-                known[f] = len(finishes)
-                finishes.append(f)
-            local.append(known[f])
+        local = [finishes.setdefault(f, len(finishes)) for f in t.finishes]
         which.append(np.array(local, np.int32)[t.flat.part])
         owner.append(np.full(len(t.flat.part), number[t.owner], np.int32))
         luxels.append(t.flat.luxels + place.astype(np.float32))

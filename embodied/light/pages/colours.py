@@ -15,7 +15,7 @@ from assets.archives import read_picture
 from assets.cache import atomic_path, digest
 from assets.closure import code_digest
 from embodied.light.arrays import Array
-from embodied.light.backend import array, drjit, floats, mitsuba, wholes
+from embodied.light.backend import array, bilinear, drjit, floats, mitsuba, wholes
 from embodied.light.pages.atlas import Page, flat_areas
 from embodied.light.pages.cover import Cover
 
@@ -65,18 +65,14 @@ class ColourMaps:
         if self._cache is None or not source.is_file():
             return make()
         stat = source.stat()
-        file = self._cache / f"{digest(maps_code(), str(source), stat.st_size, stat.st_mtime_ns)[:32]}.npy"
+        key = digest(code_digest(__name__, without=APART), str(source), stat.st_size, stat.st_mtime_ns)
+        file = self._cache / f"{key[:32]}.npy"
         with contextlib.suppress(OSError, ValueError, EOFError):
             return np.load(file, mmap_mode="r", allow_pickle=False)
         made = make()
         with atomic_path(file) as temporary, open(temporary, "wb") as f:
             np.save(f, made)
         return made
-
-
-def maps_code() -> str:
-    """Digest of the code and the libraries that halve colour maps."""
-    return code_digest(__name__, without=APART)
 
 
 def read_colours(path: str) -> np.ndarray:
@@ -93,14 +89,8 @@ def linear(srgb: np.ndarray) -> np.ndarray:
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-def gamma(x: np.ndarray) -> np.ndarray:
-    """Linear to sRGB in [0, 1] (IEC 61966-2-1)."""
-    x = np.clip(x, 0.0, 1.0)
-    return np.where(x <= 0.0031308, x * 12.92, 1.055 * x ** (1 / 2.4) - 0.055).astype(np.float32)
-
-
 def shown(x: Array) -> Array:
-    """`gamma` of a device colour or number."""
+    """Linear to sRGB in [0, 1] (IEC 61966-2-1), a device colour or number."""
     dr = drjit()
     x = dr.clip(x, 0.0, 1.0)
     return dr.select(x <= 0.0031308, x * 12.92, 1.055 * dr.power(dr.maximum(x, 1e-6), 1 / 2.4) - 0.055)
@@ -156,15 +146,13 @@ def colour_at(paints: Paints, face: Array, b1: Array, b2: Array) -> Array:
     mapped = w > 0
     x = (uv.x - dr.floor(uv.x)) * mi.Float(w) - 0.5
     y = (1 - uv.y - dr.floor(1 - uv.y)) * mi.Float(h) - 0.5
-    x0, y0 = dr.floor(x), dr.floor(y)
-    fx, fy = x - x0, y - y0
+    x0, y0, around = bilinear(x, y)
     column, row = mi.UInt32(x0 + mi.Float(w)), mi.UInt32(y0 + mi.Float(h))
     safe_w, safe_h = dr.maximum(w, 1), dr.maximum(h, 1)
     out = mi.Color3f(0.0)
-    for dx, wx in ((0, 1 - fx), (1, fx)):
-        for dy, wy in ((0, 1 - fy), (1, fy)):
-            spot = first + (row + dy) % safe_h * w + (column + dx) % safe_w
-            out += _decoded(dr.gather(mi.UInt32, paints.maps, spot, mapped)) * (wx * wy)
+    for dx, dy, weight in around:
+        spot = first + (row + dy) % safe_h * w + (column + dx) % safe_w
+        out += _decoded(dr.gather(mi.UInt32, paints.maps, spot, mapped)) * weight
     out = dr.select(mapped, out, dr.gather(mi.Color3f, paints.plain, face))
     return dr.clip(out, DARKEST, LIGHTEST)
 

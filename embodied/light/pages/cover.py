@@ -42,27 +42,14 @@ class Cover:
 
 
 @dataclass(frozen=True, eq=False)
-class Texels:
-    """The surface under the covered texels of one page; n of them."""
+class Texels(Cover):
+    """The covered texels of one page and the surface under them; n of them."""
 
-    cover: Cover
     position: np.ndarray
     """(n, 3) float32, metres, world."""
     normal: np.ndarray
     """(n, 3) float32, unit, shading."""
     face_normal: np.ndarray
-
-    @property
-    def index(self) -> np.ndarray:
-        return self.cover.index
-
-    @property
-    def face(self) -> np.ndarray:
-        return self.cover.face
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.cover.shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +96,7 @@ def cover(page: Page, fineness: int, sheet: Sheet | None = None) -> Cover:
 def rasterise(page: Page, fineness: int, sheet: Sheet | None = None) -> Texels:
     """The surface under every covered texel."""
     c = cover(page, fineness, sheet)
-    return Texels(c, *surface(page, c))
+    return Texels(c.index, c.face, c.b1, c.b2, c.shape, *surface(page, c))
 
 
 def surface(page: Page, c: Cover, i: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -137,6 +124,18 @@ def nearest(mask: np.ndarray) -> np.ndarray:
     at = np.zeros(len(flat) + 1, np.int32)
     at[labels.ravel()[flat]] = flat
     return at[labels]
+
+
+def sources(index: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """(h * w,) int: which of the n covered texels at flat positions `index` each texel of a page shows: its own or
+    the nearest."""
+    if not len(index):
+        return np.zeros(shape[0] * shape[1], np.int64)
+    mask = np.zeros(shape[0] * shape[1], bool)
+    mask[index] = True
+    number = np.zeros(len(mask), np.int32)
+    number[index] = np.arange(len(index))
+    return number[nearest(mask.reshape(shape)).ravel()]
 
 
 def _straight_down(

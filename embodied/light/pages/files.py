@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from assets.archives import open_arrays, read_picture
-from assets.cache import write_bytes, write_files
+from assets.cache import write_files
 from assets.json_file import read_json
 from embodied.house.house import House
 from embodied.light.backend import LightError, warn
@@ -25,6 +25,7 @@ from embodied.light.memory import Memory, once
 from embodied.light.pages.records import packed
 from embodied.light.pages.tone import Exposure
 from embodied.light.settings import light_code
+from embodied.render.jpeg import jpeg
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 
@@ -85,16 +86,6 @@ class Bake:
         """(h, w, 3) float16 radiance of what shines itself on a page; None where nothing does."""
         with open_arrays(self.folder / page_files(page)[0]) as z:
             return z["glow"] if z["glow"].size else None
-
-    def probe(self, room: str) -> np.ndarray:
-        """(6, 3) float32 light that reaches the middle of a room from +x, -x, +y, -y, +z, -z, as sRGB in [0, 1].
-
-        Multiply a moving thing's sRGB colour by the value of the side a face looks to.
-
-        Raises:
-          KeyError: no such room.
-        """
-        return np.array(self.manifest["probes"][room], np.float32)
 
     def albedo(self, page: int) -> np.ndarray:
         """(h, w, 3) uint8 sRGB of a page's own colours."""
@@ -161,22 +152,10 @@ def write_page(folder: Path, i: int, page: Ingredients, quality: int, memory: Me
     files = {
         light: packed({"soft": page.soft, "glow": page.glow}),
         sun: cv2.imencode(".png", page.sun)[1].tobytes(),
-        shown: once(memory, ("colours", i), lambda: _jpeg(page.albedo, quality)),
-        picture: _jpeg(page.picture, quality),
+        shown: once(memory, ("colours", i), lambda: jpeg(page.albedo, quality)),
+        picture: jpeg(page.picture, quality),
     }
     write_files(folder, files)
-
-
-def write_jpeg(path: Path, picture: np.ndarray, quality: int) -> None:
-    """`picture`: (h, w, 3) uint8 sRGB."""
-    write_bytes(path, _jpeg(picture, quality))
-
-
-def _jpeg(picture: np.ndarray, quality: int) -> bytes:
-    data = cv2.imencode(
-        ".jpg", cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, quality]
-    )[1]
-    return data.tobytes()
 
 
 def packed_meshes(meshes: Sequence[LitMesh], gloss: Sequence[np.ndarray]) -> bytes:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from assets.records import DETAILS, Finish
@@ -38,21 +36,11 @@ def meshes_of(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]
             alpha = (
                 min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
             )
-            out.append(
-                LitMesh(
-                    atlas.owners[o],
-                    atlas.kinds[o],
-                    atlas.rooms[o],
-                    number,
-                    both[corner, :3].astype(np.float32),
-                    faces[real],
-                    both[corner, 3:].astype(np.float32),
-                    float(alpha),
-                )
-            )
             kind, area = kinds[mine], areas[mine]
             mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
-            out[-1] = dataclasses.replace(out[-1], gloss=mean)
+            whose = atlas.owners[o], atlas.kinds[o], atlas.rooms[o]
+            xyz, at = both[corner, :3].astype(np.float32), both[corner, 3:].astype(np.float32)
+            out.append(LitMesh(*whose, number, xyz, faces[real], at, float(alpha), mean))
             shine.append(np.concatenate([kind, kind[thin]])[real])
     return out, shine
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from embodied.light.pages.colours import linear
@@ -16,14 +18,12 @@ def shine_of(bake: Bake) -> Shine:
     gloss, detail = ([None if f is None else f[:, k] for f in faces] for k in (slice(3), 3))
     tint: list[np.ndarray | None] = []
     glow = [bake.glow(page) if page < own else None for page in range(len(lit.pages))]
-    colours: dict[int, np.ndarray] = {}
+    albedo = functools.cache(bake.albedo)
     for mesh, shine in zip(lit.meshes, gloss, strict=True):
         if shine is None or not shine[:, 2].any():
             tint.append(None)
             continue
-        if mesh.page not in colours:
-            colours[mesh.page] = bake.albedo(mesh.page)
-        picture = colours[mesh.page]
+        picture = albedo(mesh.page)
         h, w = picture.shape[:2]
         at = mesh.uv[mesh.faces].mean(1)
         x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))

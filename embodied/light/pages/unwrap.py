@@ -120,7 +120,7 @@ def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
         sizes.append(np.ceil(flat[mine].reshape(-1, 2).max(0) - 1e-6).astype(int) + 2)
     places, size = pack(np.array(sizes))
     flat += places[chart][:, None] + 1.0
-    return _unwrapped(corners, normals, flat, uv, part, np.zeros(len(part), bool), size, chart)
+    return _single(Unwrapped(corners, normals, flat, uv, part, np.zeros(len(part), bool), size, chart))
 
 
 def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = False) -> Unwrapped:
@@ -141,7 +141,7 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     if not len(corners):
         empty = np.zeros((0, 3, 3))
         flat = empty[..., :2]
-        return _unwrapped(empty, empty, flat, flat, part, np.zeros(0, bool), np.array([1, 1], np.int32), part)
+        return _single(Unwrapped(empty, empty, flat, flat, part, np.zeros(0, bool), np.array([1, 1], np.int32), part))
     if not trusted:
         once = _without_doubles(corners)
         corners, normals, uv, part = (x[once] for x in (corners, normals, uv, part))
@@ -163,7 +163,7 @@ def unwrap_model(parts: Sequence[MeshPart], budget: float, *, trusted: bool = Fa
     _, faces, place = atlas[0]  # faces keep their order, so part and uv carry over per corner
     luxels, size, chart = _repacked(place[faces] * [atlas.width, atlas.height], faces)
     _retire(atlas)
-    return _unwrapped(corners, normals, luxels, uv, part, thin, size, chart)
+    return _single(Unwrapped(corners, normals, luxels, uv, part, thin, size, chart))
 
 
 def _retire(atlas: Any) -> None:
@@ -249,8 +249,8 @@ def with_budget(flat: Unwrapped, before: float, budget: float) -> Unwrapped:
 def cached_model(
     parts: Sequence[MeshPart], budget: float, cache: Path, *, trusted: bool = False, alone: bool = False
 ) -> Unwrapped:
-    """`unwrap_model`, done once per geometry, at `ONCE`, and its charts packed once per budget; a damaged cache file is
-    replaced.
+    """`unwrap_model`, done once per geometry, at `ONCE`, and its charts packed once per budget; a damaged cache file,
+    or one made by other code or libraries, is replaced.
 
     Args:
       alone: one house alone has this model: it is unwrapped for this budget.
@@ -259,7 +259,7 @@ def cached_model(
     shapes = [digest(*(np.ascontiguousarray(a).tobytes() for a in of_part)) for of_part in arrays]
 
     def known(budget: float, make: Callable[[], Unwrapped]) -> Unwrapped:
-        key = digest(unwrap_code(), round(budget), trusted, alone, shapes)
+        key = digest(code_digest(__name__, without=APART), round(budget), trusted, alone, shapes)
         path = Path(cache) / "unwrapped" / f"{key[:32]}.npz"
         if (found := load_record(Unwrapped, path)) is not None:
             return found
@@ -271,11 +271,6 @@ def cached_model(
         return known(budget, lambda: unwrap_model(parts, budget, trusted=trusted))
     once = lambda: known(ONCE, lambda: unwrap_model(parts, ONCE, trusted=trusted))
     return once() if round(budget) == ONCE else known(budget, lambda: with_budget(once(), ONCE, budget))
-
-
-def unwrap_code() -> str:
-    """Digest of the code and the libraries that unwrap; unwrappings made by others are made anew."""
-    return code_digest(__name__, without=APART)
 
 
 def pack(sizes: np.ndarray, width: int | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -374,20 +369,12 @@ def _spread(corners: np.ndarray) -> float:
     return float(size[1] * size[2])
 
 
-def _unwrapped(
-    corners: np.ndarray,
-    normals: np.ndarray,
-    luxels: np.ndarray,
-    uv: np.ndarray,
-    part: np.ndarray,
-    thin: np.ndarray,
-    size: np.ndarray,
-    chart: np.ndarray,
-) -> Unwrapped:
-    """The record, its coordinates in single precision."""
-    single = lambda a: np.ascontiguousarray(a, np.float32)
-    flat = single(corners), single(normals), single(luxels), single(uv)
-    return Unwrapped(*flat, part, thin, size, np.asarray(chart, np.int32))
+def _single(flat: Unwrapped) -> Unwrapped:
+    """The record with its coordinates in single precision."""
+    corners, normals, luxels, uv = (
+        np.ascontiguousarray(a, np.float32) for a in (flat.corners, flat.normals, flat.luxels, flat.uv)
+    )
+    return Unwrapped(corners, normals, luxels, uv, flat.part, flat.thin, flat.size, np.asarray(flat.chart, np.int32))
 
 
 def _on_the_face(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from assets.archives import open_arrays
 from assets.cache import write_bytes
 from embodied.geometry import r2
 from embodied.house.house import House, Opening
+from embodied.house.shapes import inward
 from embodied.light.arrays import Array, RayScene
 from embodied.light.backend import added_up, constant, drjit, fraction, mitsuba, vector
 from embodied.light.pages.atlas import Atlas
@@ -73,38 +74,24 @@ class Lamp:
 
 def portals_of(house: House) -> tuple[Portal, ...]:
     """One portal per glazed or open hole to the outdoors, in the plane of the outer face of the wall."""
-    return tuple(_portal(house, o) for o in house.openings if None in o.rooms and _lets_light_in(o))
-
-
-def _lets_light_in(o: Opening) -> bool:
-    return o.kind in GLAZED or (o.kind == "passage") or o.angle > 0.05
+    lets_in = lambda o: o.kind in GLAZED or o.kind == "passage" or o.angle > 0.05
+    return tuple(_portal(house, o) for o in house.openings if None in o.rooms and lets_in(o))
 
 
 def _portal(house: House, o: Opening) -> Portal:
-    inside = next(r for r in o.rooms if r is not None)
-    room = house.room_by_id[inside]
     a, b = np.array(o.a), np.array(o.b)
     d = (b - a) / np.linalg.norm(b - a)
     left = np.array([-d[1], d[0]])
-    if _holds(room.polygon, (a + b) / 2 - left * 0.05):
+    if left @ inward(house, o) < 0:
         a, b, left = b, a, -left
-    z = house.storey_of(room).elevation
+    z = house.storey_of(house.room_by_id[o.rooms[0]]).elevation
     # the facade stands outer_wall beyond the inner face, which lies half an inner wall inside the centre line
     out = left * -(house.outer_wall - house.inner_wall / 2)
     corner = np.array([*(a + out), z + o.sill])
     along, up = np.array([*(b - a), 0.0]), np.array([0.0, 0.0, o.head - o.sill])
     if np.cross(along, up)[:2] @ left < 0:
         corner, along = corner + along, -along
-    return Portal(o.id, inside, corner, along, up)
-
-
-def _holds(polygon: Sequence[Sequence[float]], point: np.ndarray) -> bool:
-    """Whether a polygon contains a point (even-odd rule)."""
-    p = np.asarray(polygon, float)
-    q = np.roll(p, -1, axis=0)
-    crosses = (p[:, 1] > point[1]) != (q[:, 1] > point[1])
-    x = p[:, 0] + (point[1] - p[:, 1]) / np.where(q[:, 1] == p[:, 1], 1e-12, q[:, 1] - p[:, 1]) * (q[:, 0] - p[:, 0])
-    return bool(np.sum(crosses & (point[0] < x)) % 2)
+    return Portal(o.id, o.rooms[0], corner, along, up)
 
 
 def lamps_of(house: House, atlas: Atlas, *, points: int = 256) -> tuple[Lamp, ...]:
@@ -118,13 +105,11 @@ def lamps_of(house: House, atlas: Atlas, *, points: int = 256) -> tuple[Lamp, ..
         corners = glow.get(light.placement or "", np.zeros((0, 3, 3)))
         near = [x for x in house.lights if x.on and x.placement == light.placement]
         if light.placement is not None and len(corners):
+            if light is not near[0]:  # several bulbs in one fitting share its glowing faces
+                continue
             area = areas_of(corners)
             total = float(area.sum())
-            radiance = color * light.power / _luminance(color) / (np.pi * total) / UNIT
-            if len(near) > 1:  # several bulbs in one fitting share its glowing faces
-                radiance = radiance * len(near) if light is near[0] else radiance * 0
-                if light is not near[0]:
-                    continue
+            radiance = color * light.power / _luminance(color) / (np.pi * total) / UNIT * len(near)
             at, n = _spread(corners, area, points)
             lamps.append(Lamp(light.id, light.room, at, n, radiance, total, None, np.ones(points)))
         else:

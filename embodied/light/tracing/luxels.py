@@ -66,7 +66,7 @@ def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
         places["normal"],
         places["face_normal"],
         np.concatenate([p.thin[t.face] for p, t in pairs]),
-        np.concatenate([albedo(p, t.cover, maps) for p, t in pairs]),
+        np.concatenate([albedo(p, t, maps) for p, t in pairs]),
         np.zeros((len(owner), 3), np.float32),
         np.zeros(len(owner), bool),
         np.concatenate([_share_of_area(p, t) for p, t in pairs]),

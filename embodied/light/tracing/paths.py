@@ -6,8 +6,8 @@ diffuse below one GGX lobe (Walter et al. 2007) with Schlick's Fresnel term.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,9 +51,9 @@ class Lights:
     bare: Array
     lamp: Array
     """(k,) bool: a bare bulb; any lamp."""
-    spaces: tuple[Space, ...]
-    """Scenes to ask for shadows: the house, and for each bare bulb's lamp the house without it."""
-    space_of_light: RayScene
+    scenes: tuple[RayScene, ...]
+    """To ask for shadows: the house, and for each bare bulb's lamp the house without it."""
+    scene_of_light: Array
     portal_scene: RayScene | None
     towards_sun: np.ndarray
     sun: np.ndarray
@@ -78,20 +78,24 @@ def surfaces_of(lux: Luxels) -> Surfaces:
 
 
 def lights_of(
-    space: Space, without: Callable[[str], Space], portals: Sequence[Portal], lamps: Sequence[Lamp], outdoors: Outdoors
+    scene: RayScene,
+    without: Mapping[str, RayScene],
+    portals: Sequence[Portal],
+    lamps: Sequence[Lamp],
+    outdoors: Outdoors,
 ) -> Lights:
     """Pool what shines.
 
     Args:
-      without: the space without all that belongs to an owner: a bare bulb's own lamp does not stand in its way.
+      without: the scene without all that belongs to an owner: a bare bulb's own lamp does not stand in its way.
     """
     k = len(portals) + len(lamps)
     zero = np.zeros(3)
-    spaces, index = [space], [0] * len(portals)
+    scenes, index = [scene], [0] * len(portals)
     for x in lamps:
         if x.owner is not None:
-            spaces.append(without(x.owner))
-            index.append(len(spaces) - 1)
+            scenes.append(without.get(x.owner, scene))
+            index.append(len(scenes) - 1)
         else:
             index.append(0)
     sky = float(outdoors.picture.mean())
@@ -104,7 +108,7 @@ def lights_of(
         1e-6,
     )
     fill = lambda a: a[np.arange(POINTS) % len(a)]
-    scene = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
+    ways = radiosity.portal_scene(portals) if portals and outdoors.sun.any() else None
     none = [zero] * len(lamps)
     return Lights(
         k,
@@ -121,9 +125,9 @@ def lights_of(
         floats([np.zeros(POINTS)] * len(portals) + [fill(x.weights) for x in lamps]),
         flags([False] * len(portals) + [not x.normals.any() for x in lamps]),
         flags([False] * len(portals) + [True] * len(lamps)),
-        tuple(spaces),
+        tuple(scenes),
         wholes(index or [0]),
-        scene,
+        ways,
         outdoors.sun_direction,
         outdoors.sun * radiosity.GLASS,
     )
@@ -137,7 +141,7 @@ def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator,
     for _ in range(picks if lights.count else 0):
         total = total + _one_light(space, lights, p, rng) / picks
     if lights.portal_scene is not None:
-        share = radiosity.sun_share(space, p, lights.portal_scene, lights.towards_sun, 1)
+        share = radiosity.sun_share(space.scene, p, lights.portal_scene, lights.towards_sun, 1)
         total = total + mi.Color3f(*(constant(x) for x in lights.sun)) * share
     return total
 
@@ -170,19 +174,16 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
         lamp, dr.gather(mi.Vector3f, lights.points, spot), at(lights.corner) + at(lights.along) * a + at(lights.up) * b
     )
     n = dr.select(lamp, dr.gather(mi.Vector3f, lights.normals, spot), at(lights.normal))
-    d = mi.Point3f(q) - p.position
-    far = dr.norm(d)
-    d /= dr.maximum(far, 1e-6)
-    cos, side, active = radiosity.facing(p, d)
+    d, far, cos, side, active = radiosity.towards(p, mi.Point3f(q))
     leaving = dr.select(bare, 1.0, -dr.dot(n, d))
     active &= leaving > 0
     reach = dr.select(bare, far - 0.06, far - 4 * radiosity.LIFT)
     ray = mi.Ray3f(p.position + p.face_normal * side * radiosity.LIFT, d, dr.maximum(reach, 1e-4), 0.0, [])
     active &= reach > 0
-    which = dr.gather(mi.UInt32, lights.space_of_light, pick)
+    which = dr.gather(mi.UInt32, lights.scene_of_light, pick)
     blocked = mi.Bool(False)
-    for i, world in enumerate(lights.spaces):
-        blocked |= world.scene.ray_test(ray, active & (which == i))
+    for i, scene in enumerate(lights.scenes):
+        blocked |= scene.ray_test(ray, active & (which == i))
     g = (
         cos
         * leaving
@@ -190,7 +191,7 @@ def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator
         * dr.gather(mi.Float, lights.strength, pick)
     )
     g *= dr.select(lamp, dr.gather(mi.Float, lights.weights, spot), 1.0)
-    light = dr.select(lamp, at(lights.radiance), mi.Vector3f(radiosity.env_lookup(space, d, active)))
+    light = dr.select(lamp, at(lights.radiance), mi.Vector3f(radiosity.env_lookup(space.env, d, active)))
     return mi.Color3f(dr.select(active & ~blocked, light * dr.minimum(g, dr.select(bare, 400.0, 4.0)) / chance, 0.0))
 
 
@@ -211,7 +212,8 @@ def irradiance(
     p = radiosity.only(p, of)
     total, throughput, alive = mi.Color3f(0.0), mi.Color3f(1.0), mi.Bool(True)
     for depth in range(deepest if len(of) else 0):
-        p = _turned(p, rng)
+        turn = rng.random((2, p.n), np.float32)
+        p = replace(p, turn0=floats(turn[0]), turn1=floats(turn[1]))
         total = total + dr.select(alive, throughput * direct(space, lights, p, rng=rng), 0.0)
         u = rng.random((4, p.n), np.float32)
         side = dr.select(p.thin & (floats(u[2]) < 0.5), -1.0, 1.0)
@@ -244,16 +246,11 @@ def irradiance(
             continue
         sums[of] += array(total)
         of, p = of[living], radiosity.only(q, living)
-        total, throughput, alive = mi.Color3f(0.0), mi.Color3f(_gathered(throughput, living)), mi.Bool(True)
+        throughput = dr.gather(type(throughput), throughput, wholes(living))
+        total, alive = mi.Color3f(0.0), mi.Bool(True)
     if len(of):
         sums[of] += array(total)
     return mi.Color3f(vector(sums))
-
-
-def _gathered(v: Array, which: np.ndarray) -> Array:
-    """Some entries of a vector or colour, by their numbers."""
-    mi, dr, numbers = mitsuba(), drjit(), wholes(which)
-    return mi.Vector3f(*(dr.gather(mi.Float, v[k], numbers) for k in range(3)))
 
 
 def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Points) -> tuple[Array, Array, Points]:
@@ -268,8 +265,3 @@ def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Poi
     thin = dr.gather(mi.Bool, space.thin, h.prim_index, hit)
     q = Points(p.n, ray.o + ray.d * h.t, normal * side, flat * side, thin, p.turn0, p.turn1)
     return luxel, hit & front, q
-
-
-def _turned(p: Points, rng: np.random.Generator) -> Points:
-    turn = rng.random((2, p.n), np.float32)
-    return Points(p.n, p.position, p.normal, p.face_normal, p.thin, floats(turn[0]), floats(turn[1]))

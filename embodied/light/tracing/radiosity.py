@@ -19,6 +19,7 @@ from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import (
     added_up,
     array,
+    bilinear,
     constant,
     drjit,
     flags,
@@ -32,7 +33,7 @@ from embodied.light.backend import (
 )
 from embodied.light.memory import Memory
 from embodied.light.pages.atlas import Atlas
-from embodied.light.pages.cover import Texels, nearest
+from embodied.light.pages.cover import Texels, sources
 from embodied.light.pages.unwrap import face_normals
 from embodied.light.tracing.emitters import GLASS, Lamp, Portal
 
@@ -120,18 +121,11 @@ class Space:
     """Outdoor radiance (ENV_ROWS x 2 ENV_ROWS pixels, flat RGB)."""
 
 
-def sky_alone(scene: RayScene, env: Array) -> Space:
-    """Triangles without pages before a sky: enough for `env_lookup`, not for what is met."""
-    nothing = np.zeros(0, np.int64)
-    return Space(scene, nothing, None, None, None, None, None, None, None, None, env)
-
-
-def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray | None = None) -> Space:
-    """Upload the house.
+def space_of(atlas: Atlas, luxels: Sequence[Texels]) -> Space:
+    """Upload the house, below a black sky.
 
     Args:
       luxels: what lies under each page at fineness 1.
-      env: outdoor radiance picture (h, 2h, 3); black if None.
     """
     corners = np.concatenate([p.corners for p in atlas.pages])
     page = np.concatenate([np.full(len(p.corners), i) for i, p in enumerate(atlas.pages)])
@@ -149,14 +143,14 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels], env: np.ndarray | None = No
         wholes([p.width for p in atlas.pages]),
         wholes([p.height for p in atlas.pages]),
         wholes(np.cumsum(sizes) - sizes),
-        wholes(nearest_luxel(atlas, luxels)),
-        floats(np.zeros((ENV_ROWS, 2 * ENV_ROWS, 3)) if env is None else _small(env)),
+        wholes(_nearest_luxel(luxels)),
+        floats(np.zeros((ENV_ROWS, 2 * ENV_ROWS, 3))),
     )
 
 
 def with_env(space: Space, env: np.ndarray) -> Space:
     """The same space below another sky (h, 2h, 3)."""
-    return replace(space, env=floats(_small(env)))
+    return replace(space, env=floats(small_sky(env)))
 
 
 @dataclass(frozen=True)
@@ -173,52 +167,51 @@ class Together:
         return found
 
 
-def spaces_without(space: Space, atlas: Atlas, owners: Sequence[str]) -> dict[str, Space]:
-    """For each of some owners of faces, the same space for shadow rays that pass through everything of it."""
+def scenes_without(space: Space, atlas: Atlas, owners: Sequence[str]) -> dict[str, RayScene]:
+    """For each of some owners of faces, the same house for shadow rays that pass through everything of it."""
     corners = np.concatenate([p.corners for p in atlas.pages])[space.opaque_faces]
     whose = np.concatenate([p.owner for p in atlas.pages])[space.opaque_faces]
     numbers = {o: atlas.owners.index(o) for o in owners}
     theirs = np.isin(whose, list(numbers.values()))
     rest = scene_of(corners[~theirs]) if numbers else None
     others = {o: corners[theirs & (whose != k)] for o, k in numbers.items()}
-    return {o: replace(space, scene=Together((rest, scene_of(c))) if len(c) else rest) for o, c in others.items()}
+    return {o: Together((rest, scene_of(c))) if len(c) else rest for o, c in others.items()}
 
 
-def nearest_luxel(atlas: Atlas, luxels: Sequence[Texels], good: np.ndarray | None = None) -> np.ndarray:
-    """For every pixel of every page, in order, the number of the luxel to read there: its own or the nearest.
-
-    Args:
-      good: (n,) bool, luxels that may be read; all by default. A page without any keeps its own.
-    """
-    out, start = [], 0
-    for page, t in zip(atlas.pages, luxels):
-        n = len(t.index)
-        number = np.zeros(page.width * page.height, np.int64)
-        number[t.index] = start + np.arange(n)
-        mask = np.zeros(page.width * page.height, bool)
-        chosen = np.ones(n, bool) if good is None or not good[start : start + n].any() else good[start : start + n]
-        mask[t.index[chosen]] = True
-        if mask.any():
-            number = number[nearest(mask.reshape(page.height, page.width)).ravel()]
-        out.append(number)
-        start += n
-    return np.concatenate(out)
+def _nearest_luxel(luxels: Sequence[Texels]) -> np.ndarray:
+    """For every pixel of every page, in order, the number of the luxel to read there: its own or the nearest; 0 on a
+    page without any."""
+    counts = [len(t.index) for t in luxels]
+    starts = np.where(counts, np.cumsum(counts) - counts, 0)
+    return np.concatenate([start + sources(t.index, t.shape) for start, t in zip(starts, luxels)])
 
 
-def env_lookup(space: Space, d: Array, active: Array = True) -> Array:
-    """Outdoor radiance in direction `d`, bilinear in yaw and nearest in the few rows of the small picture."""
+def env_lookup(env: Array, d: Array, active: Array = True) -> Array:
+    """Radiance in direction `d` of `Space.env`, bilinear."""
     mi, dr = mitsuba(), drjit()
     h, w = ENV_ROWS, 2 * ENV_ROWS
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * w - 0.5
     y = dr.clip(dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * h - 0.5, 0, h - 1.001)
-    x0, y0 = dr.floor(x), dr.floor(y)
-    fx, fy = x - x0, y - y0
+    x0, y0, around = bilinear(x, y)
     xi = mi.UInt32(mi.Int32(x0) + w)
     out = mi.Color3f(0.0)
-    for dx, wx in ((0, 1 - fx), (1, fx)):
-        for dy, wy in ((0, 1 - fy), (1, fy)):
-            out += dr.gather(mi.Color3f, space.env, (mi.UInt32(y0) + dy) * w + (xi + dx) % w, active) * (wx * wy)
+    for dx, dy, weight in around:
+        out += dr.gather(mi.Color3f, env, (mi.UInt32(y0) + dy) * w + (xi + dx) % w, active) * weight
     return out
+
+
+def open_sky(scene: RayScene, env: Array, p: Points, samples: int, hidden: Array) -> np.ndarray:
+    """(n, 3) e from the sky `env` on the points' front, by so many ways each; `hidden` (a Color3f) where things are."""
+    mi, dr = mitsuba(), drjit()
+
+    def one(k: Array) -> tuple[Array, ...]:
+        a, b = r2(mi.Float(k) + 1)
+        u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
+        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        free = ~scene.ray_test(mi.Ray3f(p.position + p.face_normal * LIFT, d))
+        return (dr.select(free, env_lookup(env, d, free), hidden),)
+
+    return array(added_up(samples, one, dr.zeros(mi.Color3f, p.n))[0]) / samples
 
 
 def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Memory | None = None) -> Array:
@@ -238,30 +231,27 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Mem
     def one(k: Array) -> tuple[Array, ...]:
         a, b = r2(mi.Float(k) + 1)
         q = corner + along * fraction(p.turn0 + a) + up * fraction(p.turn1 + b)
-        d = q - p.position
-        far = dr.norm(d)
-        d /= dr.maximum(far, 1e-6)
-        cos, side, active = facing(p, d)
+        d, far, cos, side, active = towards(p, q)
         leaving = -dr.dot(n, d)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 4 * LIFT, 0.0, [])
         free = active & (~space.scene.ray_test(ray, active) if ways is None else ((ways >> k) & 1) == 1)
         g = dr.minimum(dr.select(free, cos * leaving / dr.maximum(dr.square(far), 1e-4) * area, 0.0), share)
-        found = env_lookup(space, d, free) * g, g
+        found = env_lookup(space.env, d, free) * g, g
         return found if ways is not None or memory is None else (*found, dr.select(free, mi.UInt32(1) << k, 0))
 
     nothing = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
     memory = memory if samples <= WAYS else None
-    ways = None if memory is None else memory.known(("ways", portal.id))
+    ways = None if memory is None else memory.get(("ways", portal.id))
     if memory is None or ways is not None:
         total, seen = added_up(samples, one, *nothing)
     else:
         total, seen, met = added_up(samples, one, *nothing, dr.zeros(mi.UInt32, p.n))
-        memory.once(("ways", portal.id), lambda: met)
+        memory["ways", portal.id] = met
     return total * dr.select(seen > 1, 1 / seen, 1)
 
 
-def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> Array:
+def lamp_light(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> Array:
     """e (a Color3f) from one lamp."""
     mi, dr = mitsuba(), drjit()
     bare, count = not lamp.normals.any(), number(len(lamp.points))
@@ -273,10 +263,7 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> Array:
     def one(k: Array) -> tuple[Array, ...]:
         pick = fraction(p.turn0 + r2(mi.Float(k) + 1)[0])
         i = dr.minimum(mi.UInt32(pick * mi.Float(count)), count - 1)
-        d = dr.gather(mi.Point3f, at, i) - p.position
-        far = dr.norm(d)
-        d /= dr.maximum(far, 1e-6)
-        cos, side, active = facing(p, d)
+        d, far, cos, side, active = towards(p, dr.gather(mi.Point3f, at, i))
         if bare:
             g = cos / dr.maximum(dr.square(far), 0.06)
         else:
@@ -287,14 +274,14 @@ def lamp_light(space: Space, p: Points, lamp: Lamp, samples: int) -> Array:
         reach = far - (0.06 if bare else 4 * LIFT)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, reach, 0.0, [])
         active &= reach > 0
-        return (dr.minimum(dr.select(active & ~space.scene.ray_test(ray, active), g * strength, 0.0), most),)
+        return (dr.minimum(dr.select(active & ~scene.ray_test(ray, active), g * strength, 0.0), most),)
 
     (total,) = added_up(samples, one, dr.zeros(mi.Float, p.n))
     return mi.Color3f(*(constant(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
 
 
 def sun_share(
-    space: Space, p: Points, portals_scene: RayScene, towards: np.ndarray, directions: int, radius: float = 0.006
+    scene: RayScene, p: Points, portals: RayScene, towards: np.ndarray, directions: int, radius: float = 0.006
 ) -> Array:
     """Cosine-weighted share (a Float) of the sun's disc that a point sees through a portal.
 
@@ -311,8 +298,8 @@ def sun_share(
         d = dr.normalize(frame.n + frame.s * (r * dr.cos(turn)) + frame.t * (r * dr.sin(turn)))
         cos, side, active = facing(p, d)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d)
-        active &= portals_scene.ray_test(ray, active)
-        return (dr.select(active & ~space.scene.ray_test(ray, active), cos, 0.0),)
+        active &= portals.ray_test(ray, active)
+        return (dr.select(active & ~scene.ray_test(ray, active), cos, 0.0),)
 
     (total,) = added_up(directions, one, dr.zeros(mi.Float, p.n))
     return total / whole
@@ -333,7 +320,7 @@ class Patches:
     """(k,) area in square metres."""
 
 
-def patch_light(space: Space, p: Points, patches: Patches) -> np.ndarray:
+def patch_light(scene: RayScene, p: Points, patches: Patches) -> np.ndarray:
     """(n, 3) e from sunlit patches, the same ones for all points and so free of noise."""
     mi, dr = mitsuba(), drjit()
     lift = np.where(patches.thin[:, None], 0.0, LIFT)
@@ -341,16 +328,13 @@ def patch_light(space: Space, p: Points, patches: Patches) -> np.ndarray:
     both, flux, extent = flags(patches.thin), floats(patches.flux), floats(patches.extent)
 
     def one(k: Array) -> tuple[Array, ...]:
-        d = dr.gather(mi.Point3f, places, k) - p.position
-        far = dr.norm(d)
-        d /= dr.maximum(far, 1e-5)
-        cos, side, active = facing(p, d)
+        d, far, cos, side, active = towards(p, dr.gather(mi.Point3f, places, k), 1e-5)
         leaving = -dr.dot(dr.gather(mi.Vector3f, normals, k), d)
         leaving = dr.select(dr.gather(mi.Bool, both, k), dr.abs(leaving), leaving)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 3 * LIFT, 0.0, [])
         g = cos * leaving / (dr.pi * dr.square(far) + dr.gather(mi.Float, extent, k))
-        return (dr.gather(mi.Color3f, flux, k) * dr.select(active & ~space.scene.ray_test(ray, active), g, 0.0),)
+        return (dr.gather(mi.Color3f, flux, k) * dr.select(active & ~scene.ray_test(ray, active), g, 0.0),)
 
     return array(added_up(len(patches.flux), one, dr.zeros(mi.Color3f, p.n))[0])
 
@@ -445,21 +429,17 @@ def hit_luxel(space: Space, ray: Ray, active: Array = True, met: Array = None) -
     return dr.gather(mi.UInt32, space.luxel_of, base + y * w + x, hit), hit, front, near
 
 
-def hit_colour(space: Space, table: Array, ray: Ray, active: Array = True) -> Array:
+def hit_colour(space: Space, table: Array, ray: Ray) -> Array:
     """Colour of a flat table of luxels where a ray hits a front, bilinear, black elsewhere; and whether it hits
     anything."""
     mi, dr = mitsuba(), drjit()
-    q, w, height, base, hit, front, _ = _met(space, ray, active)
+    q, w, height, base, hit, front, _ = _met(space, ray, True)
     x, y = dr.clip(q.x - 0.5, 0.0, mi.Float(w) - 1), dr.clip(q.y - 0.5, 0.0, mi.Float(height) - 1)
-    x0, y0 = mi.UInt32(x), mi.UInt32(y)
-    fx, fy = x - mi.Float(x0), y - mi.Float(y0)
+    x0, y0, around = bilinear(x, y)
     out = mi.Color3f(0.0)
-    for dx, wx in ((0, 1 - fx), (1, fx)):
-        for dy, wy in ((0, 1 - fy), (1, fy)):
-            spot = base + dr.minimum(y0 + dy, height - 1) * w + dr.minimum(x0 + dx, w - 1)
-            out += dr.gather(mi.Color3f, table, dr.gather(mi.UInt32, space.luxel_of, spot, hit), hit & front) * (
-                wx * wy
-            )
+    for dx, dy, weight in around:
+        spot = base + dr.minimum(mi.UInt32(y0) + dy, height - 1) * w + dr.minimum(mi.UInt32(x0) + dx, w - 1)
+        out += dr.gather(mi.Color3f, table, dr.gather(mi.UInt32, space.luxel_of, spot, hit), hit & front) * weight
     return out, hit
 
 
@@ -513,17 +493,28 @@ def reached(units: np.ndarray, some: np.ndarray, sees: np.ndarray) -> np.ndarray
     return np.flatnonzero(found[units])
 
 
+def towards(p: Points, q: Array, least: float = 1e-6) -> tuple[Array, ...]:
+    """Direction and distance from points to places `q`, and what `facing` says of that direction.
+
+    Args:
+      least: distance that is told from none, metres.
+    """
+    dr, d = drjit(), q - p.position
+    far = dr.norm(d)
+    d /= dr.maximum(far, least)
+    return d, far, *facing(p, d)
+
+
 def facing(p: Points, d: Array) -> Array:
     """Cosine at the point (half for each side of a thin one), the side it leaves from, whether it faces `d`."""
     dr = drjit()
-
     cos, flat = dr.dot(p.normal, d), dr.dot(p.face_normal, d)
     cos = dr.select(p.thin, dr.abs(cos) * 0.5, cos)
     side = dr.select(p.thin, dr.sign(flat), 1.0)
     return cos, side, (cos > 0) & (p.thin | (flat > 0))
 
 
-def _small(env: np.ndarray) -> np.ndarray:
-    h = env.shape[0]
-    k = h // ENV_ROWS
+def small_sky(env: np.ndarray) -> np.ndarray:
+    """(ENV_ROWS, 2 ENV_ROWS, 3) means of squares of an outdoor picture (h, 2h, 3)."""
+    k = env.shape[0] // ENV_ROWS
     return env[: k * ENV_ROWS, : 2 * k * ENV_ROWS].reshape(ENV_ROWS, k, 2 * ENV_ROWS, k, 3).mean((1, 3))

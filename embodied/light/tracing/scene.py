@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from embodied.house.house import House
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import drjit, flags, floats, mitsuba, scene_of, wholes
+from embodied.light.backend import bilinear, drjit, flags, floats, mitsuba, scene_of, wholes
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
-from embodied.light.pages.unwrap import face_normals
+from embodied.light.pages.unwrap import distinct, face_normals
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import portals_of, read_lamps
 from embodied.light.tracing.paths import Lights, Surfaces, lights_of
@@ -37,7 +37,6 @@ class BakedScene:
     """(m * 3) roughness, specular, metallic."""
     uv: Array
     """(m * 3 * 2)."""
-    page: Array
     size: Array
     """(pages * 2) texels: width, height."""
     base: Array
@@ -158,14 +157,13 @@ def world_of(bake: Bake, house: House) -> BakedScene:
         wholes(lh),
         wholes(np.cumsum(lw * lh) - lw * lh),
         wholes(np.arange(int((lw * lh).sum()))),
-        floats(_coarse(sun.picture)),
+        floats(radiosity.small_sky(sun.picture)),
     )
     dark = np.zeros_like(pages.coarse_glow)
     surfaces = Surfaces(floats(pages.coarse_albedo), floats(dark if sampled else pages.coarse_glow), floats(dark))
-    without = lambda o: replace(space, scene=scene_of(corners[owner != number[o]]))
-    lights = lights_of(
-        space, without, portals_of(house), read_lamps(bake.folder / "lamps.npz", bake.manifest["lamps"]), sun
-    )
+    lamps = read_lamps(bake.folder / "lamps.npz", bake.manifest["lamps"])
+    without = {x.owner: scene_of(corners[owner != number[x.owner]]) for x in lamps if x.owner is not None}
+    lights = lights_of(space.scene, without, portals_of(house), lamps, sun)
     return BakedScene(
         space,
         surfaces,
@@ -174,7 +172,6 @@ def world_of(bake: Bake, house: House) -> BakedScene:
         flags(outer),
         floats(np.concatenate([g for _, g in solid]) / 255),
         floats(uv),
-        wholes(page),
         wholes(pages.sizes.ravel()),
         wholes(np.cumsum(texels) - texels),
         floats(pages.albedo),
@@ -189,17 +186,10 @@ def world_of(bake: Bake, house: House) -> BakedScene:
     )
 
 
-def _coarse(picture: np.ndarray) -> np.ndarray:
-    """(ENV_ROWS, 2 ENV_ROWS, 3) means of an equirect's squares."""
-    rows = radiosity.ENV_ROWS
-    k = picture.shape[0] // rows
-    return picture.reshape(rows, k, 2 * rows, k, 3).mean((1, 3))
-
-
 def _listed_twice(faces: np.ndarray) -> np.ndarray:
     """(m,) bool: faces whose other side is a face too, which is how sheets are written."""
-    _, which, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return count[which.ravel()] > 1
+    _, which = distinct(np.sort(faces, axis=1))
+    return np.bincount(which)[which] > 1
 
 
 def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
@@ -257,20 +247,18 @@ def look(world: BakedScene, ray: Ray, active: Array = True) -> Hit:
     b1, b2 = h.prim_uv.x, h.prim_uv.y
     at = lambda c: dr.gather(mi.Point2f, world.uv, f * 3 + c, ok)
     q = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
-    page = dr.gather(mi.UInt32, world.page, f, ok)
+    page = dr.gather(mi.UInt32, world.space.page, f, ok)
     w, height = (mi.Float(dr.gather(mi.UInt32, world.size, page * 2 + c, ok)) for c in (0, 1))
     base = dr.gather(mi.UInt32, world.base, page, ok)
     x, y = dr.clip(q.x * w - 0.5, 0, w - 1), dr.clip(q.y * height - 0.5, 0, height - 1)
-    x0, y0 = dr.floor(x), dr.floor(y)
-    fx, fy = x - x0, y - y0
+    x0, y0, around = bilinear(x, y)
     albedo, e, glow = mi.Color3f(0.0), mi.Color3f(0.0), mi.Color3f(0.0)
-    for dx, wx in ((0, 1 - fx), (1, fx)):
-        for dy, wy in ((0, 1 - fy), (1, fy)):
-            i = base + mi.UInt32(dr.minimum(y0 + dy, height - 1)) * mi.UInt32(w) + mi.UInt32(dr.minimum(x0 + dx, w - 1))
-            albedo += dr.gather(mi.Color3f, world.albedo, i, ok) * (wx * wy)
-            e += dr.gather(mi.Color3f, world.light, i, ok) * (wx * wy)
-            if world.glow is not None:
-                glow += dr.gather(mi.Color3f, world.glow, i, ok) * (wx * wy)
+    for dx, dy, weight in around:
+        i = base + mi.UInt32(dr.minimum(y0 + dy, height - 1)) * mi.UInt32(w) + mi.UInt32(dr.minimum(x0 + dx, w - 1))
+        albedo += dr.gather(mi.Color3f, world.albedo, i, ok) * weight
+        e += dr.gather(mi.Color3f, world.light, i, ok) * weight
+        if world.glow is not None:
+            glow += dr.gather(mi.Color3f, world.glow, i, ok) * weight
     n = dr.gather(mi.Vector3f, world.space.normal, f, ok)
     front = dr.dot(n, ray.d) < 0
     n = dr.select(front, n, -n)
