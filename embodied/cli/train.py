@@ -179,7 +179,7 @@ class TrainNav(TrainIliad, Nav):
 
 
 def train_vision(args: TrainVision) -> int:
-    from agents.common.device import use_threads
+    from agents.common.parallel import use_threads
     from agents.vision.drawn import StripSource
     from agents.vision.run import train_vision
 
@@ -223,8 +223,7 @@ def train_speaker(args: TrainSpeaker) -> int:
 
 def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: str) -> Lessons:
     """What an agent by imitation learns from; PyTorch has its threads and, under torchrun, its device."""
-    from agents.common.device import use_threads
-    from agents.common.parallel import join_launcher
+    from agents.common.parallel import join_launcher, use_threads
     from agents.vision.lessons import Lessons
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
@@ -237,7 +236,7 @@ def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: 
 
 
 def train_execution(args: TrainExecution) -> int:
-    from agents.common.device import use_threads
+    from agents.common.parallel import use_threads
     from agents.hari.run import train_execution
     from embodied.datasets.store import dataset_of
 
@@ -248,7 +247,7 @@ def train_execution(args: TrainExecution) -> int:
 
 
 def train_intention(args: TrainIntention) -> int:
-    from agents.common.device import use_threads
+    from agents.common.parallel import use_threads
     from agents.hari.agent import load_executor
     from agents.hari.run import train_intention
     from embodied.datasets.store import dataset_of
@@ -261,7 +260,7 @@ def train_intention(args: TrainIntention) -> int:
 
 
 def train_regex(args: TrainRegex) -> int:
-    from agents.common.device import use_threads
+    from agents.common.parallel import use_threads
     from agents.iliad.config import folder_name
     from agents.iliad.regex.config import students_of
     from agents.iliad.regex.run import learn, prepare
@@ -275,7 +274,7 @@ def train_regex(args: TrainRegex) -> int:
 
 
 def train_nav(args: TrainNav) -> int:
-    from agents.common.device import use_threads
+    from agents.common.parallel import use_threads
     from agents.iliad.config import folder_name
     from agents.iliad.nav.run import NavSource, learn, prepare
 
