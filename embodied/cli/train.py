@@ -313,7 +313,10 @@ COMMANDS: Mapping[str, Any] = {
     "vnla": (TrainVnla, _with_threads(train_vnla)),
     "vln": (
         "Agents that follow route instructions, and a speaker that describes walks.",
-        {"follower": (TrainFollower, _with_threads(train_follower)), "speaker": (TrainSpeaker, _with_threads(train_speaker))},
+        {
+            "follower": (TrainFollower, _with_threads(train_follower)),
+            "speaker": (TrainSpeaker, _with_threads(train_speaker)),
+        },
     ),
     "hari": (
         "The agent that learns which question to ask, in two phases.",
