@@ -11,7 +11,7 @@ import torch
 
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
 from agents.bandit.ratings import CLEAN, Rater, deviation, granular, skewed
-from agents.common.actor_critic import Decisions, actor_loss, advantages, critic_loss
+from agents.common.losses import Decisions, actor_loss, advantages, critic_loss
 from agents.common.session import DivergedError, descend
 from embodied.seeds import stream
 

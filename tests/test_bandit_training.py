@@ -14,14 +14,13 @@ import torch
 from agents.bandit import corpus, libreoffice
 from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import CorpusError, Pair, Sizes
-from agents.bandit.network import Critic, EncoderDecoder, Translator, begin
+from agents.bandit.network import REMEDY, BanditAbout, Critic, EncoderDecoder, Translator, begin, load_network
 from agents.bandit.ratings import Rater
-from agents.bandit.store import REMEDY, BanditAbout, load_network
 from agents.bandit.study import BanditStudy
 from agents.bandit.training import bandit, material, pretrain, teach_critic
 from agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from agents.common.checkpoint import CheckpointError, read_checkpoint
-from agents.common.decoding import sampled_choice
+from agents.common.choosing import sampled_choice
 from agents.common.session import Session
 from agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
 from agents.common.weights import load_weights

@@ -26,8 +26,7 @@ from conftest import two_rooms
 from hand_data import built
 
 from agents.bandit.config import BanditConfig
-from agents.bandit.network import Translator
-from agents.bandit.store import REMEDY, BanditAbout, load_network, save_network
+from agents.bandit.network import REMEDY, BanditAbout, Translator, load_network, save_network
 from agents.bandit.training import NumberedCorpus
 from agents.common.checkpoint import restore
 from agents.common.session import Session

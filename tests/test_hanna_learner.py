@@ -32,7 +32,7 @@ from agents.hanna.asking import RULES, ask_above
 from agents.hanna.collect import imitation_loss, labelled
 from agents.hanna.losses import IGNORE, curiosity, help_loss, navigation_loss, negative_log_likelihood, reason_loss
 from agents.hanna.policy import for_training
-from agents.hanna.training import HannaLearner
+from agents.hanna.run import HannaLearner
 from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Split
@@ -329,14 +329,14 @@ def test_labels_line_up_with_what_the_networks_said():
     episodes, experience = collected(split, for_training(agent.policy(split.bank)), tasks)
     labels = [teacher.relabel(e, split.worlds[e.task.world]) for e in episodes]
     rows = [(t, i) for t in range(8) for i, e in enumerate(episodes) if t < len(e.steps)]
-    assert len(rows) == len(experience.targets.moves)
+    assert len(rows) == len(experience.right_moves)
     for row, (t, i) in enumerate(rows):
         step, label = episodes[i].steps[t], labels[i][t]
         expected = IGNORE if label.move is None else 0 if isinstance(label.move, Stop) else label.move.candidate + 1
-        assert experience.targets.moves[row] == expected
-        assert experience.targets.asks[row] == (IGNORE if label.ask is None else int(label.ask))
+        assert experience.right_moves[row] == expected
+        assert experience.right_asks[row] == (IGNORE if label.ask is None else int(label.ask))
         n = len(step.candidate_nodes)
-        said = experience.said.moves[row].softmax(-1).detach().numpy()
+        said = experience.moves[row].softmax(-1).detach().numpy()
         assert np.allclose(np.append(said[1 : n + 1], said[0]), step.action.thought.moves, atol=1e-5)
         assert said[n + 1 :].sum() == 0
 
@@ -356,12 +356,12 @@ def test_it_overfits_one_batch(model):
     losses, rights = [], []
     for _ in range(40):
         _, played = collected(split, learner, tasks)
-        navigation, asking = imitation_loss(played.said, played.targets, 0.0, len(tasks))
+        navigation, asking = imitation_loss(played, 0.0, len(tasks))
         optimizer.zero_grad()
         (navigation + asking).backward()
         optimizer.step()
-        known = played.targets.moves != IGNORE
-        rights.append(float((played.said.moves.argmax(-1) == played.targets.moves)[known].float().mean()))
+        known = played.right_moves != IGNORE
+        rights.append(float((played.moves.argmax(-1) == played.right_moves)[known].float().mean()))
         losses.append(float((navigation / known.sum()).detach()))
     assert np.mean(rights[-5:]) > 0.8, rights
     assert np.mean(losses[-5:]) < 0.5 * losses[0], losses

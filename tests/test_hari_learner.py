@@ -12,8 +12,8 @@ import torch
 from hand_data import built
 from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
 
-from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.checkpoint import CheckpointError
+from agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.playing import TaskSet
 from agents.hari import pretraining
 from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor

@@ -7,7 +7,7 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
-from agents.common.decoding import greedy_choice
+from agents.common.choosing import greedy_choice
 from agents.common.vocabulary import build_vocabulary
 from agents.hanna.percept import orientation
 from agents.iliad.config import LearnerConfig

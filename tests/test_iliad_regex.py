@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from agents.common.checkpoint import CheckpointError
-from agents.common.decoding import greedy_choice
+from agents.common.choosing import greedy_choice
 from agents.iliad.config import LearnerConfig
 from agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
 from agents.iliad.regex.config import MARGINALS, RegexConfig

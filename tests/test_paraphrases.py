@@ -8,8 +8,7 @@ import shutil
 
 import pytest
 
-from agents.common.paraphrases import VARIED, Wordings, paraphrase, varied
-from agents.common.unheard import UNHEARD
+from agents.common.paraphrases import UNHEARD, VARIED, Wordings, paraphrase, varied
 from agents.common.vocabulary import tokenize
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import NavData

@@ -21,8 +21,7 @@ from agents.vision.bank import FeatureBank
 from agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing, lit_name
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
-from agents.vision.probe import LabelledFeatures, ProbeScores, average_precision, place_auc, read
-from agents.vision.reading import as_numbers
+from agents.vision.probe import LabelledFeatures, ProbeScores, as_numbers, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
 from agents.vision.training import (
     DistillationTarget,

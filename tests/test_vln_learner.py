@@ -22,9 +22,8 @@ from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings, SpeakerSettings
 from agents.vln.network import Said
 from agents.vln.policy import VlnMoment, channels_of
-from agents.vln.run import mixed
+from agents.vln.run import VlnLearner, losses_of, mixed, teacher_share
 from agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
-from agents.vln.training import VlnLearner, losses_of, teacher_share
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import SplitData, dataset_of
 from embodied.envs.make import environment_maker

@@ -32,7 +32,7 @@ from agents.vnla.network import (
     VnlaPercept,
 )
 from agents.vnla.policy import SupervisedVnla, VnlaMoment, carried_out, for_training
-from agents.vnla.training import VnlaLearner, losses_of
+from agents.vnla.run import VnlaLearner, losses_of
 from embodied.action_spaces import WORDS
 from embodied.envs.vnla import RULES, teacher_of
 from embodied.evaluation.rollout import play

@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from agents.common import word_vectors
-from agents.common.unheard import UNHEARD, in_synonyms, reworded
+from agents.common.paraphrases import UNHEARD, in_synonyms, reworded
 from agents.common.vocabulary import build_vocabulary
 from agents.common.word_vectors import Lexicon, WordEmbedding, take_weights, use_vectors, vocabulary_with
 from agents.hanna.attention import TextEncoder

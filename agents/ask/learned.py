@@ -20,8 +20,9 @@ from agents.ask.foresight import CHOICES, Choice, Foresight, carried_out, possib
 from agents.common.weights import load_weights, seeded
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import play
-from embodied.interface import Actions, Detection, Intention, Observation, Observations, Situations, Task
+from embodied.interface import Action, Detection, Intention, Observation, Situation, Task
 from embodied.policies.ask import LIKELY, REACH, Mind, reached
+from embodied.policies.baselines import OneByOne
 
 QUESTIONS = tuple(c for c in CHOICES if isinstance(c, Intention))
 SEEN = 3
@@ -85,7 +86,7 @@ def fit(decisions: Decisions, config: AskerConfig) -> nn.Sequential:
     return net.eval()
 
 
-class LearnedAsker:
+class LearnedAsker(OneByOne):
     """Explores as the baselines do and decides by the network."""
 
     def __init__(self, net: nn.Module, reserve: float = 0.0) -> None:
@@ -100,16 +101,12 @@ class LearnedAsker:
         worth = {c: v - self._reserve * (c in QUESTIONS) for c, v in worth.items()}
         return max(worth, key=lambda c: worth[c])
 
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
-        trails = memory or [Mind() for _ in observations]
-        actions: Actions = [None] * len(observations)
-        for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
-            if o is not None and s is not None:
-                choice = self.choose(o, trails[i]) if thinks(o, trails[i]) else "go"
-                actions[i] = carried_out(choice, s, o, trails[i], rngs[i])
-        return actions, trails
+    def mind(self) -> Any:
+        return Mind()
+
+    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+        choice = self.choose(o, mind) if thinks(o, mind) else "go"
+        return carried_out(choice, s, o, mind, rng)
 
 
 def shown(

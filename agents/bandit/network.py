@@ -7,13 +7,18 @@ number of the equation it computes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
 
+from agents.bandit.config import BanditConfig
 from agents.common.rows import Rows
-from agents.common.vocabulary import END_NUMBER, PAD_NUMBER
+from agents.common.tensor_file import load_into
+from agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
+from agents.common.weights import load_weights, save_weights
+from embodied.identity import Identity
 
 Network = TypeVar("Network", bound=nn.Module)
 SPAN = 0.1
@@ -144,3 +149,33 @@ def begin(network: Network, generator: torch.Generator) -> Network:
         for parameter in network.parameters():
             parameter.uniform_(-SPAN, SPAN, generator=generator)
     return network
+
+
+REMEDY = "delete it and train it again with `embodied study bandit`"
+
+
+@dataclass(frozen=True)
+class BanditAbout:
+    """What stands beside the weights in a file."""
+
+    config: BanditConfig
+    source: tuple[str, ...]
+    target: tuple[str, ...]
+    """The words of the two languages."""
+
+
+def save_network(
+    network: nn.Module, config: BanditConfig, lexicons: tuple[Vocabulary, Vocabulary], path: Path, identity: Identity
+) -> None:
+    """Write weights, settings, words and what they were trained with, atomically."""
+    source, target = (x.words for x in lexicons)
+    save_weights(path, "bandit", network.state_dict(), BanditAbout(config, source, target), identity)
+
+
+def load_network(network: nn.Module, path: Path) -> None:
+    """Put what `save_network` wrote into `network`.
+
+    Raises:
+      FileNotFoundError, ValueError: missing, damaged or of another format.
+    """
+    load_into(network, load_weights(path, "bandit", BanditAbout, REMEDY)[0], path)

@@ -23,13 +23,12 @@ from torch import Tensor
 from agents.bandit.bleu import corpus_bleu, sentence_bleu
 from agents.bandit.config import BanditConfig
 from agents.bandit.corpus import corpus_digest, load
-from agents.bandit.network import Critic, Translator, begin
+from agents.bandit.network import Critic, Translator, begin, load_network, save_network
 from agents.bandit.ratings import CLEAN, Rater
-from agents.bandit.store import load_network, save_network
 from agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
-from agents.common.actor_critic import Decisions, actor_loss, critic_loss
 from agents.common.checkpoint import Stateful
-from agents.common.decoding import sampled_choice
+from agents.common.choosing import sampled_choice
+from agents.common.losses import Decisions, actor_loss, critic_loss
 from agents.common.session import Note, Session, descend
 from agents.common.vocabulary import Vocabulary, most_frequent
 from agents.common.weights import weights_digest

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from agents.bandit.network import Translator
-from agents.common.decoding import Choice, greedy_choice
+from agents.common.choosing import Choice, greedy_choice
 from agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 
 POOL = 20

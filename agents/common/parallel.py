@@ -1,4 +1,5 @@
-"""Several processes, one run: each plays a share of every batch, and gradients are added up.
+"""Where PyTorch computes, with how many threads, and in how many processes: of several that make one run, each plays a
+share of every batch, and gradients are added up.
 
 Started by PyTorch's own launcher, `torchrun --nproc-per-node 4 --no-python embodied train hanna ...`.
 The batch of the settings is the whole batch, so results do not depend on the number of processes
@@ -13,7 +14,31 @@ from typing import TypeVar
 import torch
 import torch.distributed as dist
 
-from agents.common.device import check_device
+from embodied.errors import UnableError
+
+
+def check_device(device: str) -> None:
+    """Refuse a device that PyTorch cannot use here.
+
+    Raises:
+      UnableError: it is none, or there is no GPU.
+    """
+    try:
+        torch.zeros(1, device=device)
+    except (RuntimeError, AssertionError) as e:
+        raise UnableError(f"--device {device} cannot be used here ({str(e).splitlines()[0]}); use --device cpu") from e
+
+
+def use_threads(threads: int) -> None:
+    """Let PyTorch use so many threads on the CPU.
+
+    Raises:
+      ValueError: fewer than one.
+    """
+    if threads < 1:
+        raise ValueError(f"--threads should be at least 1, got {threads}")
+    torch.set_num_threads(threads)
+
 
 T = TypeVar("T")
 

@@ -1,4 +1,5 @@
-"""Whole sentences that no speaker of the corpus says: an instruction is read by its grammar and said in other frames.
+"""Words and whole sentences that no speaker of the corpus says: how well an agent reads what it never heard. An
+instruction is said in synonyms, or read by its grammar and said in other frames.
 
 Nouns, colours and numbers stay as they were said; word order, verbs and what joins clauses are others: in training
 those of varied.toml, in tests those of unheard.toml.
@@ -6,17 +7,20 @@ those of varied.toml, in tests those of unheard.toml.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from assets.catalogue import Catalogue
 from assets.json_file import from_plain, read_toml
+from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedPolicy, Situations
 from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
 from embodied.language.grammar import kind_of, normalised, parse
 from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
@@ -163,3 +167,47 @@ def _subgoal(text: str, wordings: Wordings, rng: np.random.Generator) -> str:
         n, frames = len(list(group)), wordings.actions[word]
         said.append(frames[int(rng.integers(len(frames)))].format(n=n if word == "forward" else 30 * n))
     return " ; ".join(said)
+
+
+UNHEARD = from_plain(Wordings, read_toml(Path(__file__).with_name("unheard.toml")))
+
+
+def in_synonyms(known: Collection[str]) -> Callable[[str], str]:
+    """What replaces each common word of a text by the first of its like that is not in `known`."""
+    new = {word: next((w for w in many if w not in known), word) for word, many in UNHEARD.synonyms.items()}
+    return functools.cache(lambda text: re.sub("[a-z]+", lambda m: new.get(m[0], m[0]), text.lower()))
+
+
+def reworded(agent: Agent, say: Callable[[str], str]) -> Agent:
+    """An agent to which everything is said in other words."""
+    return RewordedPrivileged(agent, say) if isinstance(agent, PrivilegedPolicy) else Reworded(agent, say)
+
+
+@dataclass(frozen=True)
+class Reworded:
+    """A policy to which everything is said in other words."""
+
+    policy: Policy
+    say: Callable[[str], str]
+
+    def act(
+        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        return self.policy.act(_heard(observations, self.say), memory, rngs=rngs)
+
+
+@dataclass(frozen=True)
+class RewordedPrivileged:
+    """As Reworded, of a policy that is shown the situations; tasks in them stay as they are."""
+
+    policy: PrivilegedPolicy
+    say: Callable[[str], str]
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        return self.policy.act_privileged(_heard(observations, self.say), situations, memory, rngs=rngs)
+
+
+def _heard(observations: Observations, say: Callable[[str], str]) -> Observations:
+    return [o if o is None else dataclasses.replace(o, instruction=say(o.instruction)) for o in observations]

@@ -18,26 +18,13 @@ from torch import Tensor
 from agents.common.losses import IGNORE
 from agents.hanna.losses import help_loss, navigation_loss
 from agents.hanna.policy import Moment
-from embodied.interface import Episode, Label, Move, Place, Stop, Teacher
+from embodied.interface import Episode, Move, Place, Stop, Teacher
 
 
 @dataclass(frozen=True, eq=False)
-class Targets:
-    """Labels of the N steps of a batch of episodes, in the order in which they were taken."""
-
-    moves: Tensor
-    """(N,) int64 index of the reference action (0 is stop), IGNORE without one."""
-    negatives: Tensor
-    """(N, A) bool, past mistakes (4.12)."""
-    asks: Tensor
-    """(N,) int64, IGNORE where nobody could be asked."""
-    reasons: Tensor
-    """(N, 3) float32."""
-
-
-@dataclass(frozen=True, eq=False)
-class Said:
-    """What the networks said in the same N steps."""
+class Experience:
+    """What the networks said in the N steps of a batch of finished episodes, in the order in which they were taken, and
+    what the teacher says of them."""
 
     moves: Tensor
     """(N, A) logits."""
@@ -45,50 +32,39 @@ class Said:
     """(N, 2) logits."""
     reasons: Tensor | None
     """(N, 3) logits."""
-
-
-@dataclass(frozen=True, eq=False)
-class Experience:
-    """A batch of finished episodes, ready to be learned from."""
-
-    said: Said
-    targets: Targets
+    right_moves: Tensor
+    """(N,) int64 index of the reference action (0 is stop), IGNORE without one."""
+    negatives: Tensor
+    """(N, A) bool, past mistakes (4.12)."""
+    right_asks: Tensor
+    """(N,) int64, IGNORE where nobody could be asked."""
+    true_reasons: Tensor
+    """(N, 3) float32."""
 
 
 def labelled(
     episodes: Sequence[Episode], moments: Sequence[Moment], teacher: Teacher, worlds: Mapping[str, Place]
 ) -> Experience:
-    """What the networks said in some episodes, beside what the teacher says of them."""
+    """What the networks said in some episodes, beside what the teacher says of them; A is the most actions of any
+    step."""
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
-    return Experience(join(moments), targets(moments, labels))
-
-
-def join(moments: Sequence[Moment]) -> Said:
-    """All steps below each other; A is the most actions of any step."""
-    most = max(m.scores.navigation.shape[1] for m in moments)
-    moves = [F.pad(m.scores.navigation, (0, most - m.scores.navigation.shape[1]), value=-torch.inf) for m in moments]
-    reasons = [m.scores.reasons for m in moments if m.scores.reasons is not None]
-    asks = torch.cat([m.scores.ask for m in moments])
-    return Said(torch.cat(moves), asks, torch.cat(reasons) if reasons else None)
-
-
-def targets(moments: Sequence[Moment], labels: Sequence[Sequence[Label]]) -> Targets:
-    """The labels in the order of `join`: labels[position][step] belongs to moment `step`."""
     rows = [labels[position][t] for t, m in enumerate(moments) for position in m.positions]
-    most = max(m.scores.navigation.shape[1] for m in moments)
+    said = [m.scores for m in moments]
+    most, device = max(s.navigation.shape[1] for s in said), said[0].navigation.device
     negatives = np.zeros((len(rows), most), dtype=bool)
     for i, label in enumerate(rows):
         for action in label.negatives:
             negatives[i, action_index(action)] = True
-    moves = [IGNORE if r.move is None else action_index(r.move) for r in rows]
-    asks = [IGNORE if r.ask is None else int(r.ask) for r in rows]
-    reasons = np.array([r.reasons or (False, False, False) for r in rows], dtype=np.float32)
-    device = moments[0].scores.navigation.device
-    return Targets(
-        torch.tensor(moves, device=device),
-        torch.from_numpy(negatives).to(device),
-        torch.tensor(asks, device=device),
-        torch.from_numpy(reasons).to(device),
+    reasons = [s.reasons for s in said if s.reasons is not None]
+    true_reasons = np.array([r.reasons or (False, False, False) for r in rows], dtype=np.float32)
+    return Experience(
+        moves=torch.cat([F.pad(s.navigation, (0, most - s.navigation.shape[1]), value=-torch.inf) for s in said]),
+        asks=torch.cat([s.ask for s in said]),
+        reasons=torch.cat(reasons) if reasons else None,
+        right_moves=torch.tensor([IGNORE if r.move is None else action_index(r.move) for r in rows], device=device),
+        negatives=torch.from_numpy(negatives).to(device),
+        right_asks=torch.tensor([IGNORE if r.ask is None else int(r.ask) for r in rows], device=device),
+        true_reasons=torch.from_numpy(true_reasons).to(device),
     )
 
 
@@ -98,12 +74,12 @@ def action_index(action: Move | Stop) -> int:
 
 
 def imitation_loss(
-    said: Said, wanted: Targets, alpha: float, episodes: int, floor: float = 0.0, price: float = 1.0
+    x: Experience, alpha: float, episodes: int, floor: float = 0.0, price: float = 1.0
 ) -> tuple[Tensor, Tensor]:
     """Eqs 4.9 and 4.10: navigation and help-request losses, summed over steps, averaged over episodes.
 
     `floor` as in losses.curiosity, `price` as in losses.help_loss.
     """
-    navigation = navigation_loss(said.moves, wanted.moves, wanted.negatives, alpha, floor).sum() / episodes
-    asking = help_loss(said.asks, wanted.asks, said.reasons, wanted.reasons, price).sum() / episodes
+    navigation = navigation_loss(x.moves, x.right_moves, x.negatives, alpha, floor).sum() / episodes
+    asking = help_loss(x.asks, x.right_asks, x.reasons, x.true_reasons, price).sum() / episodes
     return navigation, asking

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.choosing import Chooser, choose_greedily, choose_sampled
+from agents.common.rows import RunningRows, hidden_channels
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
@@ -34,10 +34,9 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False)
-class HannaMemory:
+class HannaMemory(RunningRows):
     """What the policy carries between steps; rows belong to the episodes that still run."""
 
-    positions: tuple[int, ...]
     networks: tuple[Any, Any]
     """Memories of the navigation and the help-request network."""
     previous_action: Tensor
@@ -45,29 +44,8 @@ class HannaMemory:
     previous_ask: Tensor
     """(k,) int64."""
     last_ask: tuple[int, ...]
-    channels: Tensor | None = None
-    """(k, D) what each episode sees of every feature channel; None is everything."""
-    moments: tuple[Moment, ...] = ()
-    """All steps so far, if the policy keeps them."""
     trails: tuple[Trail, ...] = ()
     """The way of each episode so far; empty if the policy does not mind."""
-
-    def keep(self, positions: tuple[int, ...]) -> HannaMemory:
-        """The memory of the episodes at `positions` only."""
-        if positions == self.positions:
-            return self
-        rows = [self.positions.index(p) for p in positions]
-        index = torch.tensor(rows, dtype=torch.long, device=self.previous_ask.device)
-        return dataclasses.replace(
-            self,
-            positions=positions,
-            networks=tuple(m.select(index) for m in self.networks),
-            previous_action=self.previous_action[index],
-            previous_ask=self.previous_ask[index],
-            last_ask=tuple(self.last_ask[r] for r in rows),
-            channels=None if self.channels is None else self.channels[index],
-            trails=tuple(self.trails[r] for r in rows) if self.trails else (),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,15 +128,16 @@ class HannaPolicy:
                 last_ask.append(memory.last_ask[row])
 
         device = percept.actions.device
-        return actions, HannaMemory(
-            positions,
-            networks,
-            percept.actions[torch.arange(len(positions), device=device), torch.tensor(chosen, device=device)],
-            torch.tensor([REQUEST if isinstance(actions[p], Ask) else DO_NOTHING for p in positions], device=device),
-            tuple(last_ask),
-            memory.channels,
-            (*memory.moments, Moment(positions, scores)) if self.keep_moments else (),
-            tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
+        taken = torch.arange(len(positions), device=device), torch.tensor(chosen, device=device)
+        asked = [REQUEST if isinstance(actions[p], Ask) else DO_NOTHING for p in positions]
+        return actions, dataclasses.replace(
+            memory,
+            networks=networks,
+            previous_action=percept.actions[taken],
+            previous_ask=torch.tensor(asked, device=device),
+            last_ask=tuple(last_ask),
+            moments=(*memory.moments, Moment(positions, scores)) if self.keep_moments else (),
+            trails=tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
         )
 
     def _weighed(self, trail: Trail, o: Observation, moves: np.ndarray) -> tuple[Trail, np.ndarray, bool]:
@@ -181,15 +160,14 @@ class HannaPolicy:
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
         """Memory before the first step of the episodes at `positions`."""
-        k, device, share = len(positions), next(self.network.parameters()).device, self.environment_dropout
-        ones = torch.ones(k, self.bank.size, device=device)
+        k, device = len(positions), next(self.network.parameters()).device
         return HannaMemory(
-            positions,
-            self.network.start(k, self.instruction_length),
-            torch.zeros(k, self.network.action_size, device=device),
-            torch.full((k,), START, device=device),
-            (-1,) * k,
-            F.dropout(ones, share) if share else None,
+            positions=positions,
+            networks=self.network.start(k, self.instruction_length),
+            previous_action=torch.zeros(k, self.network.action_size, device=device),
+            previous_ask=torch.full((k,), START, device=device),
+            last_ask=(-1,) * k,
+            channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
             trails=(Trail(),) * k if self.revisit_weight < 1 or self.use_goal_image else (),
         )
 

@@ -1,24 +1,71 @@
-"""What the commands of imitation learning do: a data set with features becomes a split, a split an agent."""
+"""The training of HANNA: retrospective DAgger with the losses of 4.2.3, in the loop of agents.common.imitation; and
+what its commands do: a data set with features becomes a split, a split an agent.
+
+episodes = play tasks with the sampling policies
+labels = teacher.relabel(episodes)                        (collect)
+loss = L_main + L_ask  (4.9, 4.10, 4.13, 4.14)            (losses)
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Unpack
 
 from agents.common import imitation
+from agents.common.losses import IGNORE
 from agents.common.session import Progress
 from agents.common.vocabulary import Vocabulary, build_vocabulary
 from agents.common.weights import weights_digest
 from agents.common.word_vectors import LEARNED_WORDS
 from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
-from agents.hanna.training import HannaLearner
+from agents.hanna.asking import RULES
+from agents.hanna.collect import Experience, imitation_loss, labelled
+from agents.hanna.policy import HannaMemory, for_training
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.vision.lessons import Lessons
+from agents.vision.bank import FeatureBank
+from agents.vision.lessons import Lessons, Split
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
+from embodied.interface import Agent, Episode, Task, Teacher
 from embodied.novelty import FAMILIAR
 from embodied.teachers.hanna import HannaTeacher
+
+
+class HannaLearner(imitation.Learner):
+    """A HANNA agent in training."""
+
+    def __init__(self, agent: HannaAgent, training: Split, teacher: Teacher) -> None:
+        super().__init__(agent, training)
+        config, self._teacher = agent.about.config, teacher
+        guided = config.guided_asking if config.ask_rule == "learned" else 0.0
+        self._player = for_training(
+            agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout, guided
+        )
+
+    def training_task(self, task: Task) -> Task:
+        return dataclasses.replace(task, horizon=self.config.training_steps)
+
+    def evaluation_task(self, task: Task) -> Task:
+        return dataclasses.replace(task, horizon=self.evaluation.evaluation_steps)
+
+    def player(self, update: int, bank: FeatureBank) -> Agent:
+        return dataclasses.replace(self._player, bank=bank)
+
+    def experience(self, episodes: Sequence[Episode], memory: HannaMemory) -> Experience:
+        return labelled(episodes, memory.moments, self._teacher, self.training.worlds)
+
+    def loss_of(self, episodes: Sequence[Episode], experience: Experience) -> imitation.BatchLoss:
+        c, x = self.config, experience
+        losses = imitation_loss(x, c.alpha, c.batch, c.curiosity_floor, c.ask_price)
+        known, askable = x.right_moves != IGNORE, x.right_asks != IGNORE
+        numbers = {
+            "right moves": float((x.moves.argmax(-1) == x.right_moves)[known].float().mean()),
+            **imitation.played(episodes, self.training.worlds),
+            **imitation.asked(episodes, x.asks[askable], x.right_asks[askable]),
+        }
+        return imitation.BatchLoss(losses, losses[0] + losses[1] if c.ask_rule == "learned" else losses[0], numbers)
 
 
 def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[str], str] | None = None) -> Vocabulary:

@@ -79,15 +79,15 @@ def begun_with(config: ExecutionConfig, other: Executor) -> Executor:
 def save_executor(executor: Executor, path: Path, identity: Identity | None = None) -> None:
     """Write an execution policy and what it was trained with, atomically."""
     about = HariAbout(executor.words.names, executor.config)
-    save_weights(path, "hari", _named("execution", executor.network), about, identity)
+    save_weights(path, "hari", nn.ModuleDict({"execution": executor.network}).state_dict(), about, identity)
 
 
 def save_agent(agent: HariAgent, path: Path, identity: Identity | None = None) -> None:
     """Write an agent with its execution policy and what it was trained with, atomically."""
     executor = agent.executor
     about = HariAbout(executor.words.names, executor.config, agent.config)
-    tensors = _named("execution", executor.network) | _named("actor", agent.actor)
-    save_weights(path, "hari", tensors, about, identity)
+    parts = nn.ModuleDict({"execution": executor.network, "actor": agent.actor})
+    save_weights(path, "hari", parts.state_dict(), about, identity)
 
 
 def load_executor(path: Path) -> Executor:
@@ -121,10 +121,6 @@ def load_agent(path: Path) -> HariAgent:
     load_into(actor, _of("actor", tensors), path)
     actor.eval()
     return HariAgent(executor, actor, config)
-
-
-def _named(name: str, module: nn.Module) -> dict[str, torch.Tensor]:
-    return {f"{name}.{k}": v for k, v in module.state_dict().items()}
 
 
 def _of(name: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:

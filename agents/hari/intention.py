@@ -17,8 +17,8 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from agents.common.actor_critic import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.checkpoint import Stateful
+from agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.playing import TaskSet
 from agents.common.session import Note, Progress, Session, descend, episode_seed, tasks_of_update
 from agents.hari.agent import HariAgent, save_agent

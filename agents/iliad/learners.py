@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.common.actor_critic import Decisions, actor_loss
+from agents.common.losses import Decisions, actor_loss
 from agents.iliad.protocol import NOTHING, DescribingTeacher, E, ExecutionScores, Marginal, Q, RequestWorld, Student
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from agents.common.decoding import Choice
+from agents.common.choosing import Choice
 from agents.common.rows import Rows
 
 PAD = 0

@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 import joblib
 
 from agents.common.checkpoint import read_checkpoint
-from agents.common.device import use_threads
+from agents.common.parallel import use_threads
 from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.studies.pages import draw, page

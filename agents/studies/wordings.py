@@ -10,8 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.common.paraphrases import paraphraser
-from agents.common.unheard import UNHEARD, in_synonyms, reworded
+from agents.common.paraphrases import UNHEARD, in_synonyms, paraphraser, reworded
 from agents.studies.tables import StudyRow, StudyTable
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest

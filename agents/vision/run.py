@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from agents.common.device import check_device, use_threads
+from agents.common.parallel import check_device, use_threads
 from agents.common.session import Note
 from agents.vision.config import VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
@@ -18,8 +18,7 @@ from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, rando
 from agents.vision.features import encode_panoramas, feature_path, has_features, save_features
 from agents.vision.labels import HouseStrips
 from agents.vision.occasions import Occasion, make_shown
-from agents.vision.probe import read
-from agents.vision.reading import as_numbers, labelled
+from agents.vision.probe import as_numbers, labelled, read
 from agents.vision.training import DistillationTarget, aligned, save_training, train_encoder, trained_classes, whitened
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit

@@ -29,8 +29,7 @@ from agents.vision.config import RENDER_PRESETS, VisionConfig
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder
 from agents.vision.labels import HouseStrips
-from agents.vision.probe import read
-from agents.vision.reading import labelled
+from agents.vision.probe import labelled, read
 from agents.vision.run import trained_encoder, training_houses
 from agents.vision.training import frequent_classes
 from embodied.datasets.store import Dataset

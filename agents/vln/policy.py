@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.choosing import Chooser, choose_greedily
 from agents.common.losses import IGNORE
+from agents.common.rows import RunningRows, hidden_channels
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.percept import orientation
 from agents.vision.bank import FeatureBank
@@ -55,23 +55,10 @@ class VlnMoment:
 
 
 @dataclass(frozen=True, eq=False)
-class VlnMemory:
+class VlnMemory(RunningRows):
     """What the policy carries between steps; rows belong to the episodes that still run."""
 
-    positions: tuple[int, ...]
     heard: Heard
-    channels: Tensor | None = None
-    """(k, D) what each episode sees of every feature channel; None is everything."""
-    moments: tuple[VlnMoment, ...] = ()
-    """All steps so far, if there is a teacher."""
-
-    def keep(self, positions: tuple[int, ...]) -> VlnMemory:
-        """The memory of the episodes at `positions` only."""
-        if positions == self.positions:
-            return self
-        rows = torch.tensor([self.positions.index(p) for p in positions], device=self.heard.hidden.device)
-        channels = None if self.channels is None else self.channels[rows]
-        return dataclasses.replace(self, positions=positions, heard=self.heard.select(rows), channels=channels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,14 +129,15 @@ class VlnPolicy:
         device = self.network.left.weight.device
         texts = ["" if self.wordless else o.instruction for o in seen]
         words = torch.from_numpy(self.vocabulary.batch(texts, self.instruction_length)).to(device)
-        share, channels = self.environment_dropout, None
-        if share:
-            channels = F.dropout(torch.ones(len(seen), self.bank.size), share)
+        share = self.environment_dropout
+        channels = hidden_channels(len(seen), self.bank.size, share)
+        if channels is not None:
             for row, position in enumerate(positions):
                 s = situations and situations[position]
                 if s and SPOKEN in s.task.id:
                     channels[row] = channels_of(s.task.id, self.bank.size, share)
-        return VlnMemory(positions, self.network.begin(words), None if channels is None else channels.to(device))
+            channels = channels.to(device)
+        return VlnMemory(positions=positions, heard=self.network.begin(words), channels=channels)
 
     def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> Seen:
         views = self.bank.gather([o.sight for o in seen])  # (k, 36, D)

@@ -1,26 +1,91 @@
-"""What the commands of VLN do: a data set with features becomes lessons, lessons a follower."""
+"""The training of a follower: imitation of the shortest path, in the loop of agents.common.imitation; and what its
+commands do: a data set with features becomes lessons, lessons a follower.
+
+episodes = play tasks, actions of teacher or follower (FORCING)                                  (policy)
+loss = - log pi(a*) + progress_weight (left - left*)^2 - room_weight log p(room*)                (`losses_of`)
+"""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Unpack
 
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
 from agents.common import imitation
+from agents.common.choosing import choose_sampled
+from agents.common.losses import IGNORE, negative_log_likelihood
 from agents.common.more_paths import more_routes
 from agents.common.session import Progress
 from agents.common.settings import EvaluationSettings
 from agents.common.vocabulary import build_vocabulary
 from agents.common.weights import weights_digest
+from agents.vision.bank import FeatureBank
 from agents.vision.lessons import Lessons, Split
 from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
+from agents.vln.policy import SupervisedVln, VlnMoment
 from agents.vln.speaker import load_speaker, spoken_tasks
-from agents.vln.training import VlnLearner
 from embodied.identity import identity_of
-from embodied.interface import Task
+from embodied.interface import Agent, Episode, Task
 from embodied.novelty import FAMILIAR
 from embodied.tasks.vln import vln_task
+
+LONGEST = 12
+"""Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
+
+
+class VlnLearner(imitation.Learner):
+    """A follower in training."""
+
+    optimizer_kind = torch.optim.AdamW
+
+    def training_task(self, task: Task) -> Task:
+        return dataclasses.replace(task, horizon=min(task.horizon, LONGEST))
+
+    def player(self, update: int, bank: FeatureBank) -> Agent:
+        dropout, share = self.config.environment_dropout, teacher_share(self.config, update)
+        policy = dataclasses.replace(self.agent.policy(bank), choose=choose_sampled, environment_dropout=dropout)
+        return SupervisedVln(policy, lambda _, rng: bool(rng.random() < share))
+
+    def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VlnMoment]) -> imitation.BatchLoss:
+        c = self.config
+        moves, left, rooms = losses_of(experience, c.batch)
+        right = torch.cat([m.said.moves.argmax(-1) == m.moves for m in experience])
+        known = torch.cat([m.rooms.flatten() for m in experience])
+        guessed = torch.cat([m.said.rooms.argmax(-1).flatten() for m in experience])
+        numbers = {
+            "right moves": float(right.float().mean()),
+            "right rooms": float((guessed == known)[known != IGNORE].float().mean()),
+            **imitation.played(episodes, self.training.worlds),
+        }
+        loss = moves + c.progress_weight * left + c.room_weight * rooms
+        return imitation.BatchLoss((moves, torch.zeros(())), loss, numbers)
+
+
+def teacher_share(config: FollowerSettings, update: int) -> float:
+    """Share of the steps in which the teacher acts; of 'dagger' it falls to the least over the first half."""
+    if config.forcing == "dagger":
+        return max(config.least_teacher, 1.0 - 2.0 * update / config.iterations)
+    return float(config.forcing == "teacher")
+
+
+def losses_of(moments: Sequence[VlnMoment], episodes: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Of actions, of the way that is left and of rooms, each summed over steps and averaged over episodes."""
+    moves = sum(negative_log_likelihood(m.said.moves, m.moves).sum() for m in moments)
+    left = sum(F.mse_loss(m.said.left, m.left, reduction="sum") for m in moments)
+    rooms = sum(_rooms(m) for m in moments)
+    return tuple(torch.as_tensor(x) / episodes for x in (moves, left, rooms))  # type: ignore[return-value]
+
+
+def _rooms(m: VlnMoment) -> Tensor:
+    """-log p of the kinds of rooms, averaged over the actions of a step."""
+    lost = negative_log_likelihood(m.said.rooms.flatten(0, 1), m.rooms.flatten()).view(m.rooms.shape)
+    return (lost.sum(1) / (m.rooms != IGNORE).sum(1)).sum()
 
 
 def train_follower(

@@ -15,8 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.common.choosing import choose_sampled
-from agents.common.decoding import sampled_choice
+from agents.common.choosing import choose_sampled, sampled_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary, build_vocabulary

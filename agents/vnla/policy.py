@@ -16,6 +16,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.choosing import Chooser, choose_greedily, choose_sampled
+from agents.common.rows import RunningRows, hidden_channels
 from agents.common.vocabulary import Vocabulary
 from agents.vision.bank import FeatureBank
 from agents.vnla.network import (
@@ -64,10 +65,9 @@ class VnlaMoment:
 
 
 @dataclass(frozen=True, eq=False)
-class VnlaMemory:
+class VnlaMemory(RunningRows):
     """What the policy carries between steps; rows belong to the episodes that still run."""
 
-    positions: tuple[int, ...]
     state: DecoderState
     text: ReadText
     previous_move: Tensor
@@ -78,28 +78,6 @@ class VnlaMemory:
     """What each saw when it acted last, to know what was carried out; None before, and after asking."""
     times: tuple[frozenset[int], ...]
     """When the asker 'random' asks."""
-    channels: Tensor | None = None
-    """(k, D) what each episode sees of every feature channel; None is everything."""
-    moments: tuple[VnlaMoment, ...] = ()
-    """All steps so far, if there is a teacher."""
-
-    def keep(self, positions: tuple[int, ...]) -> VnlaMemory:
-        """The memory of the episodes at `positions` only."""
-        if positions == self.positions:
-            return self
-        rows = [self.positions.index(p) for p in positions]
-        index = torch.tensor(rows, dtype=torch.long, device=self.previous_ask.device)
-        return dataclasses.replace(
-            self,
-            positions=positions,
-            state=self.state.select(index),
-            text=self.text.select(index),
-            previous_move=self.previous_move[index],
-            previous_ask=self.previous_ask[index],
-            before=tuple(self.before[r] for r in rows),
-            times=tuple(self.times[r] for r in rows),
-            channels=None if self.channels is None else self.channels[index],
-        )
 
 
 Decide = Callable[[int, Observation, Thought, frozenset[int], np.random.Generator], bool]
@@ -192,16 +170,15 @@ class VnlaPolicy:
             random_times(s, rngs[p]) if self.asker == "random" and s is not None else frozenset()
             for p, s in zip(positions, situations, strict=True)
         ]
-        share = self.environment_dropout
         return VnlaMemory(
-            positions,
-            self.network.start(k),
-            self.network.blank(k),
-            torch.full((k,), NO_MOVE, device=device),
-            torch.full((k,), NO_ASK, device=device),
-            (None,) * k,
-            tuple(drawn),
-            F.dropout(torch.ones(k, self.bank.size, device=device), share) if share else None,
+            positions=positions,
+            state=self.network.start(k),
+            text=self.network.blank(k),
+            previous_move=torch.full((k,), NO_MOVE, device=device),
+            previous_ask=torch.full((k,), NO_ASK, device=device),
+            before=(None,) * k,
+            times=tuple(drawn),
+            channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
         )
 
     def encode(self, text: str) -> np.ndarray:

@@ -49,7 +49,7 @@ def evaluate_trained(
     Raises:
       ValueError: an unknown row.
     """
-    from agents.common.device import use_threads
+    from agents.common.parallel import use_threads
     from agents.common.weights import weights_digest
     from agents.studies.episodes import JUDGES, evaluate_frozen
     from agents.vision.drawn import pictures_of

@@ -32,7 +32,7 @@ class Options(WithData, Encoded, Lit, WithDevice):
 
 
 def run(args: Options) -> int:
-    from agents.common.device import check_device
+    from agents.common.parallel import check_device
     from agents.vision.occasions import OCCASIONS
     from agents.vision.run import encoder_of, make_features
 

@@ -318,7 +318,7 @@ def find(args: FindOptions) -> int:
 
 
 def vision(args: VisionOptions) -> int:
-    from agents.common.device import check_device
+    from agents.common.parallel import check_device
     from agents.vision.drawn import StripSource
     from agents.vision.study import EncoderStudy
 

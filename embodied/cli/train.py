@@ -178,114 +178,93 @@ class TrainNav(TrainIliad, Nav):
     world: Annotated[NavConfig, Settings("settings of data and teacher", NAV_SCALES)]
 
 
-def train_vision(args: TrainVision) -> int:
-    from agents.common.device import use_threads
+def train_vision(args: TrainVision) -> None:
     from agents.vision.drawn import StripSource
     from agents.vision.run import train_vision
 
-    use_threads(args.threads)
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
     train_vision(
         source, args.config, args.out, distil_from=args.distil_from, device=args.device, workers=args.workers, note=note
     )
-    return 0
 
 
-def train_hanna(args: TrainHanna) -> int:
+def train_hanna(args: TrainHanna) -> None:
     from agents.hanna.run import train_agent
 
     lessons = _lessons(args, "hanna")
     train_agent(lessons, args.config, args.evaluation, args.out, begin=args.begin, **_session(args))
-    return 0
 
 
-def train_vnla(args: TrainVnla) -> int:
+def train_vnla(args: TrainVnla) -> None:
     from agents.vnla.run import train_agent
 
     train_agent(_lessons(args, "vnla"), args.config, args.evaluation, args.out, **_session(args))
-    return 0
 
 
-def train_follower(args: TrainFollower) -> int:
+def train_follower(args: TrainFollower) -> None:
     from agents.vln.run import train_follower
 
     lessons = _lessons(args, "vln")
     train_follower(lessons, args.config, args.evaluation, args.out, speaker=args.speaker, **_session(args))
-    return 0
 
 
-def train_speaker(args: TrainSpeaker) -> int:
+def train_speaker(args: TrainSpeaker) -> None:
     from agents.vln.speaker import train_speaker
 
     train_speaker(_lessons(args, "vln"), args.config, args.out, note=note)
-    return 0
 
 
 def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: str) -> Lessons:
-    """What an agent by imitation learns from; PyTorch has its threads and, under torchrun, its device."""
-    from agents.common.device import use_threads
+    """What an agent by imitation learns from; under torchrun, PyTorch has its device."""
     from agents.common.parallel import join_launcher
     from agents.vision.lessons import Lessons
     from agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
-    use_threads(args.threads)
     encoder = encoder_of(args.encoder, args.network)
     data, shown = dataset_of(args.data, kind), args.shown if isinstance(args, TrainHanna) else "same"
     device = "cpu" if isinstance(args, TrainSpeaker) else join_launcher(args.device)
     return Lessons(data, encoder, args.pictures, device, shown, args.cache)
 
 
-def train_execution(args: TrainExecution) -> int:
-    from agents.common.device import use_threads
+def train_execution(args: TrainExecution) -> None:
     from agents.hari.run import train_execution
     from embodied.datasets.store import dataset_of
 
-    use_threads(args.threads)
     data = dataset_of(args.data, "hari")
     train_execution(data, args.config, args.out, begin=args.begin, minutes=args.minutes, note=note)
-    return 0
 
 
-def train_intention(args: TrainIntention) -> int:
-    from agents.common.device import use_threads
+def train_intention(args: TrainIntention) -> None:
     from agents.hari.agent import load_executor
     from agents.hari.run import train_intention
     from embodied.datasets.store import dataset_of
 
-    use_threads(args.threads)
     data = dataset_of(args.data, "hari")
     walking = load_executor(args.execution)
     train_intention(data, walking, args.config, args.out, **_session(args, sees=False))
-    return 0
 
 
-def train_regex(args: TrainRegex) -> int:
-    from agents.common.device import use_threads
+def train_regex(args: TrainRegex) -> None:
     from agents.iliad.config import folder_name
     from agents.iliad.regex.config import students_of
     from agents.iliad.regex.run import learn, prepare
 
-    use_threads(args.threads)
     regex, learner = args.world, args.learner
     grounds = prepare(regex, args.out / "shared", words=args.words, templates=args.templates, note=note)
     home = args.out / "students" / students_of(regex) / f"seed_{learner.seed}"
     learn(grounds, learner, home / folder_name(learner), home / "pretraining", minutes=args.minutes, note=note)
-    return 0
 
 
-def train_nav(args: TrainNav) -> int:
-    from agents.common.device import use_threads
+def train_nav(args: TrainNav) -> None:
     from agents.iliad.config import folder_name
     from agents.iliad.nav.run import NavSource, learn, prepare
 
-    use_threads(args.threads)
     nav, learner = args.world, args.learner
     source = NavSource(args.data, args.encoder_digest(), args.pictures, args.cache)
     grounds = prepare(nav, source, args.out / "shared", note=note)
     home = args.out / "students" / nav.teacher / f"seed_{learner.seed}" / folder_name(learner)
     learn(grounds, learner, home, minutes=args.minutes, note=note)
-    return 0
 
 
 def _session(args: TrainHanna | TrainVnla | TrainFollower | TrainIntention, *, sees: bool = True) -> dict[str, Any]:
@@ -315,20 +294,39 @@ def _recorder(
     return keep
 
 
+def _with_threads(train: Callable[[Any], None]) -> Callable[[Any], int]:
+    """The command that trains once PyTorch has its threads."""
+
+    def run(args: Any) -> int:
+        from agents.common.parallel import use_threads
+
+        use_threads(args.threads)
+        train(args)
+        return 0
+
+    return run
+
+
 COMMANDS: Mapping[str, Any] = {
-    "vision": (TrainVision, train_vision),
-    "hanna": (TrainHanna, train_hanna),
-    "vnla": (TrainVnla, train_vnla),
+    "vision": (TrainVision, _with_threads(train_vision)),
+    "hanna": (TrainHanna, _with_threads(train_hanna)),
+    "vnla": (TrainVnla, _with_threads(train_vnla)),
     "vln": (
         "Agents that follow route instructions, and a speaker that describes walks.",
-        {"follower": (TrainFollower, train_follower), "speaker": (TrainSpeaker, train_speaker)},
+        {
+            "follower": (TrainFollower, _with_threads(train_follower)),
+            "speaker": (TrainSpeaker, _with_threads(train_speaker)),
+        },
     ),
     "hari": (
         "The agent that learns which question to ask, in two phases.",
-        {"execution": (TrainExecution, train_execution), "intention": (TrainIntention, train_intention)},
+        {
+            "execution": (TrainExecution, _with_threads(train_execution)),
+            "intention": (TrainIntention, _with_threads(train_intention)),
+        },
     ),
     "iliad": (
         "A student that learns to do what a request says from descriptions (ADEL), demonstrations or rewards.",
-        {"regex": (TrainRegex, train_regex), "nav": (TrainNav, train_nav)},
+        {"regex": (TrainRegex, _with_threads(train_regex)), "nav": (TrainNav, _with_threads(train_nav))},
     ),
 }

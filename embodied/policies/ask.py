@@ -6,28 +6,15 @@ for the oracle), walk up to what looks like the thing, and follow a route while 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import (
-    Action,
-    Actions,
-    Agent,
-    Ask,
-    Detection,
-    Intention,
-    Move,
-    Observation,
-    Observations,
-    Situation,
-    Situations,
-    Stop,
-)
-from embodied.policies.baselines import Shortest
+from embodied.interface import Action, Agent, Ask, Detection, Intention, Move, Observation, Situation, Stop
+from embodied.policies.baselines import OneByOne, Shortest
 
 REACH = 2.0
 """Metres within which a thing has been reached."""
@@ -65,30 +52,23 @@ AskRule = Callable[[Observation, Detection | None, Mind], Action | None]
 one nearest."""
 
 
-class Asker:
+class Asker(OneByOne):
     """Explores, and asks by a rule."""
 
     def __init__(self, rule: AskRule) -> None:
         self.rule = rule
 
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
-        trails = memory or [Mind() for _ in observations]
-        return [
-            None if o is None or s is None else self.one(o, s, trail, rng)
-            for o, s, trail, rng in zip(observations, situations, trails, rngs, strict=True)
-        ], trails
+    def mind(self) -> Any:
+        return Mind()
 
-    def one(self, o: Observation, s: Situation, trail: Mind, rng: np.random.Generator) -> Action:
-        """The action of one episode; notes it in its trail."""
-        action = self.rule(o, reached(o), trail)
+    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+        action = self.rule(o, reached(o), mind)
         if isinstance(action, Ask) and action.intention in o.can_ask:
-            return trail.ask(action.intention, reached(o))
+            return mind.ask(action.intention, reached(o))
         if isinstance(action, Stop):
             return action
-        trail.visits[s.pose.node] = trail.visits.get(s.pose.node, 0) + 1
-        return onward(o, s, trail, rng)
+        mind.visits[s.pose.node] = mind.visits.get(s.pose.node, 0) + 1
+        return onward(o, s, mind, rng)
 
 
 def reached(o: Observation) -> Detection | None:

@@ -58,17 +58,39 @@ class Forward10:
         return Move(0) if observation.time < 10 and len(observation.candidates) else Stop()
 
 
-class Shortest:
+class OneByOne:
+    """A PrivilegedPolicy that looks at each episode by itself. Who derives from it says `one` and, where it remembers
+    something of an episode, `mind`."""
+
+    def mind(self) -> Any:
+        """What it remembers when an episode begins; `one` may change it."""
+        return None
+
+    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+        """The action of one episode."""
+        raise NotImplementedError
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+    ) -> tuple[Actions, Any]:
+        minds = memory or [self.mind() for _ in observations]
+        return [
+            None if o is None or s is None else self.one(o, s, mind, rng)
+            for o, s, mind, rng in zip(observations, situations, minds, rngs, strict=True)
+        ], minds
+
+
+class Shortest(OneByOne):
     """The skyline: the navigation teacher acts; never asks."""
 
     def __init__(self, teacher: Teacher | None = None) -> None:
         """`teacher`: of the action space; the panoramic shortest-path teacher if None."""
         self._label = (teacher or ShortestTeacher()).label
 
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
-        return [None if s is None else self._label(s).move for s in situations], ()
+    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+        move = self._label(s).move
+        assert move is not None, "where an agent is there is something to do"
+        return move
 
 
 WITHOUT_LEARNING: Mapping[str, Callable[[], Agent]] = {
@@ -129,7 +151,7 @@ class _Trail:
     """Nodes where it asked."""
 
 
-class PerfectInterpreter:
+class PerfectInterpreter(OneByOne):
     """The skyline 'perfect assistance interpretation' for an agent without learning.
 
     On a route the teacher acts, so every instruction is understood (4.2.5). On the main task the
@@ -138,18 +160,11 @@ class PerfectInterpreter:
     the task demands (it recognises the object). The authors' row has a trained navigator there (docs/sources.md, S40).
     """
 
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
-        trails = memory or [_Trail() for _ in observations]
-        actions = [
-            None if o is None or s is None else self._one(o, s, trail, rng)
-            for o, s, trail, rng in zip(observations, situations, trails, rngs, strict=True)
-        ]
-        return actions, trails
+    def mind(self) -> Any:
+        return _Trail()
 
-    def _one(self, o: Observation, s: Situation, trail: _Trail, rng: np.random.Generator) -> Action:
-        here = s.pose.node
+    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+        here, trail = s.pose.node, mind
         trail.visited[here] += 1
         if o.mode is Mode.SUB:
             return _teacher_move(s)
@@ -248,21 +263,14 @@ class VnlaAsking:
         return self._ask == "first" or (self._ask == "random" and s.time in times)
 
 
-class HalfwaySkyline:
+class HalfwaySkyline(OneByOne):
     """HARI with perfect navigation on sub-goals (Table 4.7, last row): it asks for a sub-goal, goes
     there, says so, and asks again, until a sub-goal turns out to be the goal itself.
 
     Knowing that is privileged; the authors' skyline learns when to ask (docs/sources.md, S62).
     """
 
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
-        return [
-            None if o is None or s is None else self._one(o, s) for o, s in zip(observations, situations, strict=True)
-        ], ()
-
-    def _one(self, o: Observation, s: Situation) -> Action:
+    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
         if len(s.goals) == 1 and s.pose.node != s.goals[0] and Intention.SUB in o.can_ask:
             return Ask(Intention.SUB)
         return _teacher_move(s)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from torch import Tensor, nn
 
-from agents.common.decoding import greedy_choice
+from agents.common.choosing import greedy_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
 from agents.common.weights import load_weights, save_weights, seeded

@@ -11,7 +11,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from agents.common.decoding import Choice, greedy_choice, sampled_choice
+from agents.common.choosing import Choice, greedy_choice, sampled_choice
 from agents.common.losses import IGNORE, negative_log_likelihood
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.percept import orientation

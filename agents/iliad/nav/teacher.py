@@ -10,7 +10,7 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from agents.common.decoding import greedy_choice, sampled_choice
+from agents.common.choosing import greedy_choice, sampled_choice
 from agents.common.vocabulary import Vocabulary
 from agents.iliad.describing import DescribingNetworks
 from agents.iliad.nav.network import WalkDescriber

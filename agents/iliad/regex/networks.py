@@ -9,7 +9,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from agents.common.decoding import Choice
+from agents.common.choosing import Choice
 from agents.common.vocabulary import END_NUMBER
 from agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD
 from agents.iliad.writing import Bridge, Remembered, Writer, before, last, write

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from torch import Tensor, nn
 
-from agents.common.decoding import greedy_choice
+from agents.common.choosing import greedy_choice
 from agents.common.session import Note
 from agents.common.tensor_file import load_into
 from agents.common.vocabulary import Vocabulary

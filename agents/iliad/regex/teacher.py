@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agents.common.decoding import greedy_choice, sampled_choice
+from agents.common.choosing import greedy_choice, sampled_choice
 from agents.iliad.describing import DescribingNetworks
 from agents.iliad.protocol import NOTHING
 from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts

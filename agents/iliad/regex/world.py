@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from agents.common.decoding import Choice, greedy_choice, sampled_choice
+from agents.common.choosing import Choice, greedy_choice, sampled_choice
 from agents.iliad.protocol import ExecutionScores
 from agents.iliad.regex.coding import PAD, Requests, characters, texts
 from agents.iliad.regex.data import WordTask
