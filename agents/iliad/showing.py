@@ -8,6 +8,7 @@ from typing import Any
 import torch
 
 from agents.common.session import descend
+from agents.common.weights import seeded
 
 RATE, CLIP = 1e-3, 5.0
 """Of the one update that shows what is learned from a description."""
@@ -24,7 +25,8 @@ def learned_from(student: Any, task: Any, said: str | None, done: Any) -> tuple[
     network = learner.network = copy.deepcopy(student.network).train()
     optimizer = torch.optim.Adam(network.parameters(), RATE)
     before = _probability(student, task, said, done)
-    descend(-learner.scores([task], [said], [done]).log_probabilities.sum(), optimizer, "shown episode", CLIP)
+    with seeded(0):  # for dropout
+        descend(-learner.scores([task], [said], [done]).log_probabilities.sum(), optimizer, "shown episode", CLIP)
     return before, _probability(learner, task, said, done)
 
 
