@@ -62,7 +62,7 @@ TABLES: Mapping[str, StudyTable] = {
     ),
     "4.8": StudyTable(
         "Goals on the stack",
-        (_learned("stack 1", stack=1), _learned("stack 2"), _learned("stack 3", stack=3)),
+        tuple(_learned(f"stack {n}", stack=n) for n in (1, 2, 3)),
         ("success",),
         VALIDATION,
         pooled=ACTIONS,

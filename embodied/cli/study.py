@@ -182,7 +182,7 @@ class HariOptions(Study, Trained, Judged, WithData):
     unseen houses (default: in --data)."""
     judging_seeds: Seeds = 3
     """Evaluate with N random seeds, from --seed on."""
-    config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES, skip=("stack", "cooperative", "perfect"))]
+    config: Annotated[IntentionConfig, Settings(TRAINING, INTENTION_SCALES, skip=("cooperative", "perfect"))]
 
 
 @dataclass(frozen=True, kw_only=True)
