@@ -18,6 +18,7 @@ from embodied.interface import Agent
 TEST = tuple(f"test_{c}" for c in CONDITIONS)
 COLUMNS = ("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error")
 RANDOM = "random + rules"
+GREEDY = "learned, greedy"
 
 
 @torch.inference_mode()
@@ -31,7 +32,7 @@ def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
         **{name: RuleAgent(agent.executor, rule) for name, rule in RULES.items()},
         RANDOM: RuleAgent(agent.executor, RandomWithBudgets(means)),
         "learned": policy_of(agent),
-        "learned, likeliest": policy_of(agent, sample=False),
+        GREEDY: policy_of(agent, sample=False),
     }
 
 

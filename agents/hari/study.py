@@ -12,7 +12,7 @@ from agents.common.session import Note
 from agents.common.weights import weights_digest
 from agents.hari.agent import HariAgent, load_agent, load_executor
 from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.judging import RANDOM, TEST, policies, validation_means
+from agents.hari.judging import GREEDY, RANDOM, TEST, policies, validation_means
 from agents.hari.networks import INTENTIONS
 from agents.hari.run import CONDITIONS, rules_of, train_execution, train_intention
 from agents.studies.engine import Measured
@@ -49,6 +49,7 @@ TABLES: Mapping[str, StudyTable] = {
         (
             *(_learned(rule, rule) for rule in RULE_ROWS),
             _learned("learned"),
+            _learned(GREEDY, GREEDY),
             _learned("uncooperative", cooperative=False),
             _learned("skyline", perfect=True),
         ),
@@ -56,6 +57,7 @@ TABLES: Mapping[str, StudyTable] = {
         TEST,
         (
             *((_learned("learned"), _learned(rule, rule)) for rule in (RANDOM, SUB_RULE)),
+            (_learned(GREEDY, GREEDY), _learned(SUB_RULE, SUB_RULE)),
             (_learned("learned"), _learned("uncooperative", cooperative=False)),
         ),
         pooled=ACTIONS,
