@@ -144,7 +144,7 @@ def test_view_k_is_the_view_that_poses_and_candidates_call_k():
 
 def test_the_matterport_order_is_its_own():
     """Matterport3DSimulator: heading 30 (k % 12) degrees clockwise from +y, elevation 30 (k // 12 - 1) degrees."""
-    views = matterport.views36(analytic(), 32)
+    views = analytic().views36(32)[matterport.VIEW_OF_INDEX]
     for k in range(36):
         heading, elevation = math.radians(30 * (k % 12)), math.radians(30 * (k // 12 - 1))
         centre = views[k, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
