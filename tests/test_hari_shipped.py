@@ -36,7 +36,7 @@ def agent() -> HariAgent:
 
 def test_it_is_small_and_says_what_it_was_trained_as(agent):
     assert SHIPPED_HARI.stat().st_size < 10e6
-    assert (agent.config.stack, agent.config.horizon, agent.config.cooperative) == (2, 30, True)
+    assert (agent.config.stack, agent.config.horizon, agent.config.cooperative) == (3, 30, True)
     assert "object/sofa" in agent.executor.words.names
 
 
