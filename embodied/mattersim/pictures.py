@@ -7,7 +7,6 @@ tile is and how often it is turned; nothing is resampled, so that a face survive
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -28,6 +27,8 @@ from embodied.render.panorama import (
 
 TILES = ((3, 0), (5, 1), (2, 3), (4, 1), (0, 1), (1, 2))
 """Face and quarter turns (counter-clockwise) of each tile."""
+WHERE = {face: (tile, turns) for tile, (face, turns) in enumerate(TILES)}
+"""Tile and quarter turns of each face."""
 TURNED_BACK = {1: cv2.ROTATE_90_CLOCKWISE, 2: cv2.ROTATE_180, 3: cv2.ROTATE_90_COUNTERCLOCKWISE}
 """What undoes so many quarter turns."""
 LARGE = 1e30
@@ -48,12 +49,11 @@ def tiles_of(faces: np.ndarray) -> np.ndarray:
     return np.stack([np.rot90(faces[face], turns) for face, turns in TILES])
 
 
-def faces_of(tiles: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """The faces in our order from the tiles of a skybox."""
-    faces = list(tiles)
-    for tile, (face, turns) in zip(tiles, TILES, strict=True):
-        faces[face] = np.ascontiguousarray(tile) if not turns else cv2.rotate(tile, TURNED_BACK[turns])
-    return faces
+def face_of(strip: np.ndarray, face: int) -> np.ndarray:
+    """One of our faces, (s, s, ...), from the six tiles of a skybox beside each other."""
+    tile, turns = WHERE[face]
+    picture = strip[:, tile * len(strip) : (tile + 1) * len(strip)]
+    return cv2.rotate(picture, TURNED_BACK[turns]) if turns else picture
 
 
 class Skyboxes:
@@ -80,7 +80,7 @@ class Skyboxes:
             strip = np.concatenate([_read(folder / FACES.format(viewpoint, k), cv2.IMREAD_COLOR) for k in range(6)], 1)
         else:
             strip = _read(folder / RGB.format(viewpoint), cv2.IMREAD_COLOR)
-        return padded_rgba(faces_of(_apart(cv2.cvtColor(strip, cv2.COLOR_RGB2RGBA))))
+        return padded_rgba(len(strip), lambda k, to: cv2.cvtColor(face_of(strip, k), cv2.COLOR_RGB2RGBA, dst=to))
 
     def _nearness(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_nearness` of a skybox for depth in DEPTH_UNITS.
@@ -89,12 +89,14 @@ class Skyboxes:
           ValueError: the picture is missing.
         """
         units = _read(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), cv2.IMREAD_ANYDEPTH)
-        faces = []
-        for face in faces_of(_apart(units)):
+        stretch = ray_stretch(len(units))
+
+        def write(k: int, to: np.ndarray) -> None:
             with np.errstate(divide="ignore"):
-                near = np.divide(ray_stretch(len(face)), face, dtype=np.float32)
-            faces.append(cv2.threshold(near, LARGE, 0.0, cv2.THRESH_TOZERO_INV)[1])
-        return padded_nearness(faces)
+                np.divide(stretch, face_of(units, k), out=to, dtype=np.float32)
+            cv2.threshold(to, LARGE, 0.0, cv2.THRESH_TOZERO_INV, dst=to)
+
+        return padded_nearness(len(units), write)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
@@ -115,11 +117,6 @@ class Skyboxes:
 
 def _grid(padded: np.ndarray, heading: float, elevation: float, vfov: float, size: tuple[int, int]) -> PixelGrid:
     return perspective_grid(padded.shape[1] - 2, float(yaw_of_heading(heading)), elevation, vfov, *checked(vfov, size))
-
-
-def _apart(strip: np.ndarray) -> list[np.ndarray]:
-    """The six (s, s, ...) tiles of a strip."""
-    return np.split(strip, 6, axis=1)
 
 
 def _read(path: Path, mode: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -121,16 +121,16 @@ class Panorama:
 
     @functools.cached_property
     def _padded_rgba(self) -> np.ndarray:
-        return padded_rgba(self.rgb)
+        return padded_rgba(self.size, lambda k, to: cv2.cvtColor(self.rgb[k], cv2.COLOR_RGB2RGBA, dst=to))
 
     @functools.cached_property
     def _padded_nearness(self) -> np.ndarray:
-        return padded_nearness(np.divide(1.0, self.depth))
+        return padded_nearness(self.size, lambda k, to: np.divide(1.0, self.depth[k], out=to))
 
     @functools.cached_property
     def _padded_ids(self) -> np.ndarray:
         """The bits of the ids as float32, which OpenCV can copy from place to place."""
-        return _padded(np.ascontiguousarray(self.ids, dtype=np.int32).view(np.float32))
+        return _padded(self.size, lambda k, to: np.copyto(to.view(np.int32), self.ids[k]))
 
     def _rgb(self, grid: PixelGrid) -> np.ndarray:
         return resampled_rgb(self._padded_rgba, grid)
@@ -143,37 +143,33 @@ class Panorama:
         return cv2.remap(self._padded_ids, x, y, cv2.INTER_NEAREST).view(np.int32)
 
 
-def padded_rgba(faces: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+def padded_rgba(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarray:
     """(6 (s + 2), s + 2, 4) uint8: the faces below each other, each with a border taken from its neighbours.
 
     The fourth channel means nothing: OpenCV resamples four channels twice as fast as three.
 
     Args:
-      faces: six (s, s, 3) or (s, s, 4) uint8.
+      s: side of a face, pixels.
+      write: writes face k into (s, s, 4).
     """
-    s = len(faces[0])
     padded, pad = np.empty((6, s + 2, s + 2, 4), np.uint8), pad_grid(s)
-    for whole, face in zip(padded, faces, strict=True):
-        if face.shape[2] == 4:
-            whole[1:-1, 1:-1] = face
-        else:
-            cv2.cvtColor(face, cv2.COLOR_RGB2RGBA, dst=whole[1:-1, 1:-1])
+    for k, whole in enumerate(padded):
+        write(k, whole[1:-1, 1:-1])
     flat = padded.reshape(6 * (s + 2), s + 2, 4)
     padded[pad.face, pad.row, pad.column] = cv2.remap(flat, pad.x, pad.y, cv2.INTER_LINEAR)[:, 0]
     return flat
 
 
-def padded_nearness(faces: Sequence[np.ndarray] | np.ndarray) -> np.ndarray:
+def padded_nearness(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarray:
     """(6 (s + 2), s + 2) float32: as `padded_rgba`, 1 / depth, which is linear over a plane; 0 where nothing is."""
-    return _padded(faces, pad_grid(len(faces[0])).ratio)
+    return _padded(s, write, pad_grid(s).ratio)
 
 
-def _padded(faces: Sequence[np.ndarray] | np.ndarray, ratio: np.ndarray | None = None) -> np.ndarray:
+def _padded(s: int, write: Callable[[int, np.ndarray], object], ratio: np.ndarray | None = None) -> np.ndarray:
     """Six (s, s) float32 with borders of the nearest pixels beyond, times `ratio`."""
-    s = len(faces[0])
     padded, pad = np.empty((6, s + 2, s + 2), np.float32), pad_grid(s)
-    for whole, face in zip(padded, faces, strict=True):
-        whole[1:-1, 1:-1] = face
+    for k, whole in enumerate(padded):
+        write(k, whole[1:-1, 1:-1])
     flat = padded.reshape(6 * (s + 2), s + 2)
     border = cv2.remap(flat, pad.x, pad.y, cv2.INTER_NEAREST)[:, 0]
     padded[pad.face, pad.row, pad.column] = border if ratio is None else border * ratio
