@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.common.paraphrases import UNHEARD, in_synonyms, paraphraser, reworded
+from agents.common.settings import EVERYBODY
 from agents.studies.tables import StudyRow, StudyTable
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest
@@ -38,17 +39,19 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
 
 
 def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
-    """Learned from familiar people alone, judged by them and by the others; `row` as in words_table."""
+    """Learned from familiar people alone, judged by them and by the others, beside one that learned from everybody:
+    the others may be harder to follow, heard or not. `row` as in words_table."""
 
-    def heard(reader: StudyRow, novelty: str) -> StudyRow:
-        who = "people never heard" if novelty == NOVEL else "people heard in training"
+    def heard(reader: StudyRow, novelty: str, who: str) -> StudyRow:
         return dataclasses.replace(reader, label=f"{reader.label}, {who}", judge={**reader.judge, SPEAKERS: novelty})
 
     readers = _readers(lambda label, **train: row(label, speakers=FAMILIAR, **train))
-    pairs = [(heard(r, FAMILIAR), heard(r, NOVEL)) for r in readers]
+    pairs = [(heard(r, FAMILIAR, "people heard in training"), heard(r, NOVEL, "people never heard")) for r in readers]
+    novel = [there for _, there in pairs]
+    everybody = heard(row("learned words", speakers=EVERYBODY), NOVEL, "the same people, heard in training")
     title = "Instructions of people who were never heard in training"
-    rows, won = tuple(itertools.chain(*pairs)), _changes([novel for _, novel in pairs])
-    return StudyTable(title, rows, tuple(columns), tuple(splits), (*pairs, *won))
+    rows, lost = (*itertools.chain(*pairs), everybody), [(everybody, there) for there in novel]
+    return StudyTable(title, rows, tuple(columns), tuple(splits), (*pairs, *lost, *_changes(novel)))
 
 
 def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
