@@ -133,6 +133,15 @@ def test_every_reader_is_judged_in_all_wordings(learner):
     assert [r.train.get("varied_words", False) for r in table.rows] == [False] * 6 + [True] * 3
 
 
+@pytest.mark.parametrize("learner", ["vln", "hanna"])
+def test_people_never_heard_are_told_from_people_who_are_hard_to_follow(learner):
+    table = importlib.import_module(f"agents.{learner}.study").TABLES["speakers"]
+    *rows, heard = table.rows
+    assert {r.train["speakers"] for r in rows} == {"familiar"} and heard.train["speakers"] == "everybody"
+    assert all(r.judge[SPEAKERS] == "novel" for r in (*rows[1::2], heard))
+    assert all((heard, r) in table.compared for r in rows[1::2])
+
+
 def test_what_was_judged_names_the_code_that_words_it_and_with_it_the_texts(tmp_path):
     assert not code_of({"played": "learned"})
     assert code_of({WORDING: SYNONYMS}) == code_of({SPEAKERS: "novel"}) == {"wording": code_digest(studied.__name__)}
