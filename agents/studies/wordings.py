@@ -45,13 +45,16 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
     def heard(reader: StudyRow, novelty: str, who: str) -> StudyRow:
         return dataclasses.replace(reader, label=f"{reader.label}, {who}", judge={**reader.judge, SPEAKERS: novelty})
 
+    def both(reader: StudyRow, former: str, latter: str) -> tuple[StudyRow, StudyRow]:
+        return heard(reader, FAMILIAR, former), heard(reader, NOVEL, latter)
+
     readers = _readers(lambda label, **train: row(label, speakers=FAMILIAR, **train))
-    pairs = [(heard(r, FAMILIAR, "people heard in training"), heard(r, NOVEL, "people never heard")) for r in readers]
-    novel = [there for _, there in pairs]
-    everybody = heard(row("learned words", speakers=EVERYBODY), NOVEL, "the same people, heard in training")
+    pairs = [both(r, "people heard in training", "people never heard") for r in readers]
+    everybody = both(row("learned words of everybody", speakers=EVERYBODY), "the former people", "the latter people")
+    rows, never = tuple(itertools.chain(*pairs, everybody)), [novel for _, novel in pairs]
+    compared = (*pairs, everybody, *((everybody[1], novel) for novel in never), *_changes(never))
     title = "Instructions of people who were never heard in training"
-    rows, lost = (*itertools.chain(*pairs), everybody), [(everybody, there) for there in novel]
-    return StudyTable(title, rows, tuple(columns), tuple(splits), (*pairs, *lost, *_changes(novel)))
+    return StudyTable(title, rows, tuple(columns), tuple(splits), compared)
 
 
 def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
