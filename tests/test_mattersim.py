@@ -273,6 +273,8 @@ def test_a_face_survives_the_way_into_a_skybox_and_back():
     faces = np.random.default_rng(0).integers(0, 255, (6, 8, 8, 3), np.uint8)
     strip = np.concatenate(tiles_of(faces), axis=1)
     np.testing.assert_array_equal([face_of(strip, k) for k in range(6)], faces)
+    with pytest.raises(ValueError, match="six squares"):
+        face_of(strip[:, :-6], 0)
 
 
 def box(folder: Path, scan: str, viewpoint: str, *, apart: bool = False) -> None:

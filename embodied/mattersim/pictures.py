@@ -50,9 +50,16 @@ def tiles_of(faces: np.ndarray) -> np.ndarray:
 
 
 def face_of(strip: np.ndarray, face: int) -> np.ndarray:
-    """One of our faces, (s, s, ...), from the six tiles of a skybox beside each other."""
+    """One of our faces, (s, s, ...), from the six tiles of a skybox beside each other.
+
+    Raises:
+      ValueError: the tiles are not square.
+    """
+    height, width = strip.shape[:2]
+    if width != 6 * height:
+        raise ValueError(f"MatterSim: a skybox is six squares beside each other, got {width} x {height} pixels")
     tile, turns = WHERE[face]
-    picture = strip[:, tile * len(strip) : (tile + 1) * len(strip)]
+    picture = strip[:, tile * height : (tile + 1) * height]
     return cv2.rotate(picture, TURNED_BACK[turns]) if turns else picture
 
 
