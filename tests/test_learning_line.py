@@ -221,7 +221,11 @@ def test_what_was_judged_under_other_settings_is_not_shown_under_new_ones(study,
 
 def test_agents_that_are_compared_differ_in_one_setting(study):
     learner, _ = study
-    settings = lambda row: {**dataclasses.asdict(learner.settings(row.train, 0)), **row.judge}
+
+    def settings(row):
+        trained = dataclasses.asdict(learner.settings(row.train, 0))
+        return {**trained, **{k if k in trained else f"judged: {k}": v for k, v in row.judge.items()}}
+
     for table in learner.tables().values():
         for pair in table.compared:
             a, b = map(settings, pair)
