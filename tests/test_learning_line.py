@@ -224,7 +224,7 @@ def test_agents_that_are_compared_differ_in_one_setting(study):
 
     def settings(row):
         trained = dataclasses.asdict(learner.settings(row.train, 0))
-        return {**trained, **{k if k in trained else f"judged: {k}": v for k, v in row.judge.items()}}
+        return {**trained, **{f"judged: {k}": v for k, v in row.judge.items()}}
 
     for table in learner.tables().values():
         for pair in table.compared:

@@ -52,7 +52,7 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
     pairs = [both(r, "people heard in training", "people never heard") for r in readers]
     everybody = both(row("learned words of everybody", speakers=EVERYBODY), "the former people", "the latter people")
     rows, never = tuple(itertools.chain(*pairs, everybody)), [novel for _, novel in pairs]
-    compared = (*pairs, everybody, *((everybody[1], novel) for novel in never), *_changes(never))
+    compared = (*pairs, everybody, (everybody[1], never[0]), *_changes(never))
     title = "Instructions of people who were never heard in training"
     return StudyTable(title, rows, tuple(columns), tuple(splits), compared)
 
