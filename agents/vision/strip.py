@@ -63,3 +63,14 @@ def windows() -> np.ndarray:
     """(36, 12, 36) float32: weight of each cell of the feature map in each view; each view sums to 1."""
     weights = np.stack([view_coverage(k).reshape(ROWS, CELL, COLUMNS, CELL).sum((1, 3)) for k in range(VIEWS)])
     return (weights / weights.sum((1, 2), keepdims=True)).astype(np.float32)
+
+
+@functools.cache
+def inside_windows() -> np.ndarray:
+    """(36, K) int64 indices of cells: those that each view shows more than a tenth as much of as of its fullest cell.
+
+    Views with fewer cells than others have some twice."""
+    weights = windows().reshape(VIEWS, -1)
+    inside = [np.flatnonzero(w > 0.1 * w.max()) for w in weights]
+    longest = max(map(len, inside))
+    return np.stack([np.resize(cells, longest) for cells in inside])

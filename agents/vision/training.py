@@ -26,9 +26,10 @@ from agents.common.session import Session, descend
 from agents.common.tensor_file import save_tensors
 from agents.common.weights import seeded
 from agents.vision.config import VisionConfig
-from agents.vision.encoder import Encoder, pool_views, save_encoder, strip_map, whitening
+from agents.vision.encoder import Encoder, Network, build, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
-from agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet
+from agents.vision.lite import Lite, load_imagenet
+from agents.vision.resnet import COMPACT
 from agents.vision.strip import CELL, COLUMNS
 from assets.cache import digest, write_json
 from assets.records import ROOM_KINDS
@@ -97,10 +98,12 @@ class DistillationTarget:
     """By house, as many nodes as in the lit ones."""
 
 
-def vision_loss(network: ResNet, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
+def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
     """Sum of the five losses, and each as a number."""
-    maps = strip_map(network, batch.rgb)  # (n, D, 12, 36)
-    return head_losses(heads, maps, pool_views(maps), batch)
+    half = isinstance(network, Lite)  # in half the time
+    with torch.autocast(batch.rgb.device.type, torch.bfloat16, enabled=half):
+        maps = strip_map(network, batch.rgb).float()  # (n, D, 12, 36)
+    return head_losses(heads, maps, pool_views(maps, network.peaks), batch)
 
 
 def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
@@ -120,7 +123,7 @@ def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) ->
 
 
 def distillation_loss(
-    network: ResNet, heads: Heads, batch: StripBatch, target: Encoder
+    network: Network, heads: Heads, batch: StripBatch, target: Encoder
 ) -> tuple[Tensor, dict[str, float]]:
     """Mean square between the finished features of `network` and those of `target` in unlit strips, and the losses
     of the heads, whose gradients do not reach the network."""
@@ -264,7 +267,7 @@ def train_encoder(
     network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
     names = [houses[0].classes[i] for i in classes]
     if target is None:
-        return Encoder(network, COMPACT), heads, names
+        return Encoder(network, config.network), heads, names
     return (
         dataclasses.replace(target.encoder, network=network, distilled_from=target.encoder.feature_space),
         heads,
@@ -307,8 +310,10 @@ class _Training:
         """
         self.config, self._device, self._target = config, device, target
         with seeded(config.seed):
-            self.network = ResNet(ARCHITECTURES[COMPACT])
+            self.network = build(config.network)
             self.heads = Heads(self.network.size, classes)
+        if isinstance(self.network, Lite):
+            load_imagenet(self.network)
         if target is not None:
             self.network.load_state_dict(target.encoder.network.state_dict())
         self.network.to(device)
