@@ -73,7 +73,7 @@ def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_i
     run_study(setting, ["encoders", "pictures"], out, rows=rows, note=lambda line: None)
     body = read_json(out / "vision-pictures.json")
     found = {r["label"]: r["values"] for r in body["rows"]}
-    assert [c["key"] for c in body["columns"]][:2] == ["AP_fast", "chance_AP_fast"]
+    assert [c["key"] for c in body["columns"]][:3] == ["AP_fast", "goal_AP_fast", "chance_AP_fast"]
     for name in rows:
         for way in ("fast", "unlit"):
             assert found[name][f"AP_{way}"]["mean"] > found[name][f"chance_AP_{way}"]["mean"]
@@ -93,7 +93,7 @@ def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setti
         run_study(study, ["houses"], tmp_path / "study", note=lambda line: None)["houses"].with_suffix(".json")
     )
     assert [r["label"] for r in body["rows"]] == ["1 houses", "1 houses, 1 of them lit"]
-    assert [c["key"] for c in body["columns"]][::5] == ["AP_fast", "AP_unlit"]
+    assert [c["key"] for c in body["columns"]][::6] == ["AP_fast", "AP_unlit"]
     digests = {p.parent.name: weights_digest(p) for p in (tmp_path / "study").rglob("encoder.safetensors")}
     assert len(set(digests.values())) == 2, "one of them learned from lit pictures"
     wider = dataclasses.replace(study, houses=(2, 8), config=dataclasses.replace(config, epochs=3))

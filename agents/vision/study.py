@@ -16,10 +16,13 @@ from __future__ import annotations
 import dataclasses
 import statistics
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from agents.common.session import Note
 from agents.common.weights import weights_digest
@@ -35,10 +38,13 @@ from agents.vision.training import frequent_classes
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
+from embodied.interface import FindObject
 
 TRAINED = "compact"
 """The row of the encoder that the study trains."""
-COLUMNS = ("AP", "chance AP", "room accuracy", "depth R²", "place AUC", "ms a node", "MB")
+COLUMNS = ("AP", "goal AP", "chance AP", "room accuracy", "depth R²", "place AUC", "ms a node", "MB")
+GOALS = 60
+"""The goal AP is a mean over so many classes: those that tasks seek most often, or all if they seek none."""
 READY = "ready"
 """In a row: the name of encoders that are there already."""
 LIT = "lit"
@@ -83,8 +89,8 @@ class EncoderStudy(StudyLearner):
         rows = (StudyRow(TRAINED, {}), *(StudyRow(n, {READY: n}) for n in self.ready))
         return {
             "encoders": StudyTable("Encoders: what linear readers make of them", rows, COLUMNS),
-            "pictures": StudyTable("Encoders, judged on other pictures", rows, COLUMNS[:5], self.pictures),
-            "houses": StudyTable("Encoders by houses to learn in", self._by_houses(), COLUMNS[:5], self.pictures),
+            "pictures": StudyTable("Encoders, judged on other pictures", rows, COLUMNS[:6], self.pictures),
+            "houses": StudyTable("Encoders by houses to learn in", self._by_houses(), COLUMNS[:6], self.pictures),
         }
 
     def _by_houses(self) -> tuple[StudyRow, ...]:
@@ -144,7 +150,9 @@ class EncoderStudy(StudyLearner):
             seen = self._source(split).strips(names, note=lambda line: None)
         known, other = (labelled(data, houses, encoder, classes) for houses in (seen, unseen))
         found = read(known, other, seed=self.config.seed)
-        numbers = (found.mean_ap, found.chance_ap, 100 * found.room_accuracy, found.depth_r2, found.place_auc)
+        ap = dict(zip(classes, found.ap, strict=True))
+        goals = float(np.nanmean([ap[c] for c in sought(data) or classes if c in ap]))
+        numbers = (found.mean_ap, goals, found.chance_ap, 100 * found.room_accuracy, found.depth_r2, found.place_auc)
         cost = (encoding_ms(encoder.encode_strips, unseen), weights.stat().st_size / 1e6)
         return {name: Samples((float(v),)) for name, v in zip(COLUMNS, (*numbers, *cost), strict=True)}
 
@@ -167,6 +175,12 @@ class EncoderStudy(StudyLearner):
 
     def _seen(self) -> list[HouseStrips]:
         return self.source.strips(training_houses(Dataset(self.source.data), self.config), note=lambda line: None)
+
+
+def sought(data: Dataset) -> list[str]:
+    """The classes that training tasks seek most often."""
+    goals = Counter(t.goal.object_class for t in data.tasks("train") if isinstance(t.goal, FindObject))
+    return [name for name, _ in goals.most_common(GOALS)]
 
 
 def encoding_ms(encode: Any, houses: Sequence[HouseStrips], rounds: int = 5) -> float:
