@@ -152,7 +152,7 @@ def check_recording(rrd: Path) -> None:
         print(f"warning: {rrd} was cut short or changed; its last moments may be missing", file=sys.stderr)
 
 
-def open_file(rrd: Path, *, serve: bool = False, bind: str = HERE) -> int:
+def open_file(rrd: Path, *, serve: bool = False, bind: str = HERE) -> None:
     """Show a .rrd file in the native viewer, or serve it to browsers; returns when that is closed or stopped.
 
     Raises:
@@ -175,7 +175,6 @@ def open_file(rrd: Path, *, serve: bool = False, bind: str = HERE) -> int:
         raise UnableError(
             f"the Rerun viewer ended with status {status}; look at what it wrote above, or use --serve and a browser"
         )
-    return 0
 
 
 def send_file(rrd: Path, viewers: tuple[str, ...]) -> None:

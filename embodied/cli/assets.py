@@ -30,26 +30,24 @@ class Options(Furnished, Printed):
     """Folder for sheets, file for the attribution (default: out/sheets, ATTRIBUTION.md)."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     catalogue = catalogue_of(args)
     chosen = [a for a in catalogue.assets.values() if args.object_class in (None, a.object_class)]
     if not chosen:
         raise ValueError(
             f"no object class {args.object_class!r}; `embodied assets list` names all {len(catalogue.classes)}"
         )
-    return {"build": build, "list": list_assets, "sheet": sheet, "attribution": attribution}[args.action](
-        args, catalogue, chosen
-    )
+    actions = {"build": build, "list": list_assets, "sheet": sheet, "attribution": attribution}
+    actions[args.action](args, catalogue, chosen)
 
 
-def build(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def build(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Import the meshes into the cache."""
     catalogue.build([a.key for a in chosen])
     show(args, {"models": len(chosen), "cache": str(args.cache)}, f"{len(chosen)} models are ready in {args.cache}")
-    return 0
 
 
-def list_assets(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def list_assets(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Print the catalogue by class."""
     by_class = collections.defaultdict(list)
     for a in chosen:
@@ -57,24 +55,21 @@ def list_assets(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) ->
     lines = [f"{name:<24} {', '.join(a.key for a in by_class[name])}" for name in sorted(by_class)]
     lines.append(f"{len(chosen)} models in {len(by_class)} classes")
     show(args, {name: [a.key for a in by_class[name]] for name in sorted(by_class)}, "\n".join(lines))
-    return 0
 
 
-def sheet(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def sheet(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Draw the contact sheets."""
     from embodied.render.contact_sheet import draw_sheets
 
     out = args.out or Path("out/sheets")
     paths = draw_sheets(catalogue, [a.key for a in chosen], out)
     show(args, {"sheets": [str(p) for p in paths]}, f"{len(paths)} sheets in {out}")
-    return 0
 
 
-def attribution(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> int:
+def attribution(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Write who made which model, under which licence."""
     from assets.attribution import write_attribution
 
     out = args.out or Path("ATTRIBUTION.md")
     write_attribution(catalogue, out)
     show(args, {"out": str(out)}, f"wrote {out}")
-    return 0

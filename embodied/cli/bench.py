@@ -46,7 +46,7 @@ class Options(Furnished, Printed):
     """serve: the study runs for N seconds."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     from embodied import gl
     from embodied.bench import bakes, drive, episodes, light, seen, timing, views, world
 
@@ -88,7 +88,6 @@ def run(args: Options) -> int:
             facts[part] = report.facts
             texts.append(report.text)
     show(args, facts, "\n\n".join(texts))
-    return 0
 
 
 def _gpu(catalogue: Catalogue, cache: Path, seed: int, light: str) -> Iterator[Measure]:

@@ -39,7 +39,7 @@ class Options(Cached, Printed):
     """Remove all files of these kinds."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     for kind in args.clear:
         if (args.cache / kind).is_dir() and not (args.cache / kind).is_symlink():
             shutil.rmtree(args.cache / kind)
@@ -51,13 +51,9 @@ def run(args: Options) -> int:
     counts = {kind: measured(args.cache / kind) for kind in KINDS}
     total = sum(size for _, size in counts.values())
     lines = [f"{kind:<12} {size / 2**20:9.1f} MiB in {n} files" for kind, (n, size) in counts.items() if n]
-    facts = {
-        "cache": str(args.cache),
-        "bytes": total,
-        "kinds": {k: {"files": n, "bytes": s} for k, (n, s) in counts.items()},
-    }
+    kinds = {k: {"files": n, "bytes": s} for k, (n, s) in counts.items()}
+    facts = {"cache": str(args.cache), "bytes": total, "kinds": kinds}
     show(args, facts, "\n".join([*lines, f"{'together':<12} {total / 2**20:9.1f} MiB in {args.cache}"]))
-    return 0
 
 
 def files(cache: Path) -> list[Path]:

@@ -35,7 +35,7 @@ class Options(Cached):
     sizes: Annotated[Sizes, Settings("sizes of the splits", Sizes())]
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     from agents.bandit import corpus, libreoffice
 
     if args.folder and args.moses:
@@ -48,4 +48,3 @@ def run(args: Options) -> int:
         facts = {"source": "LibreOffice (MPL-2.0)", "packages": libreoffice.versions(folder)}
         pairs = libreoffice.read(folder)
     corpus.make_corpus(pairs, args.out, args.sizes, seed=args.seed, note=note, **facts)
-    return 0

@@ -13,7 +13,6 @@ ILIAD, their sub-goals for VNLA, and, where they gave stars, rater.json: the sim
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -82,7 +81,7 @@ class Options(Furnished, Printed):
     """Use a Ray cluster instead: its address, or 'local'."""
 
 
-def from_people(args: Options) -> int:
+def from_people(args: Options) -> None:
     """A data set with what people said."""
     from agents.bandit.ratings import fitted
     from assets.cache import write_json
@@ -103,12 +102,12 @@ def from_people(args: Options) -> int:
         facts["rater"] = dataclasses.asdict(rater)
         text += f"\n{len(rated)} ratings resemble {rater}, in rater.json"
     show(args, facts, text)
-    return 0
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     if args.kind == FROM_PEOPLE:
-        return from_people(args)
+        from_people(args)
+        return
     from tqdm import tqdm
 
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
@@ -131,13 +130,9 @@ def run(args: Options) -> int:
         rooms=not args.no_rooms,
         ood=args.ood,
     )
-
-    def watch(jobs: Iterable[str], total: int) -> Iterable[str]:
-        return tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
-
+    watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
     if args.ray in (None, "local") and not (args.out / "dataset.json").exists():
         check_machine(chosen_pictures(args.kind, args.pictures, args.size, None).kind)
-
     how: dict[str, Any] = {"workers": args.workers, "watch": watch, "packs": args.pack, "ray_address": args.ray}
     build_dataset(config, args.out, args.cache, own=args.own, **how)
     data = Dataset(args.out)
@@ -149,12 +144,9 @@ def run(args: Options) -> int:
         files = [f for name in programs for f in export_folder(name, data, args.export / name)]
         note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
     splits = {name: dataclasses.asdict(counts) for name, counts in data.index.splits.items()}
-    show(
-        args,
-        {"folder": str(args.out), "digest": data.digest, "splits": splits, "pictures": dataclasses.asdict(pictures)},
-        f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}",
-    )
-    return 0
+    facts = {"folder": str(args.out), "digest": data.digest, "splits": splits}
+    facts["pictures"] = dataclasses.asdict(pictures)
+    show(args, facts, f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}")
 
 
 def chosen_pictures(kind: str, pictures: str | None, size: int | None, held: PictureSettings | None) -> PictureSettings:

@@ -50,15 +50,16 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Write the Rerun recording here (default: DIR/episode.rrd)."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     check_machine("fast" if args.small else args.pictures)
     if args.small:
-        return show_a_room(args)
-    with viewers_of(args) as viewers:
-        return demonstrate(args, viewers)
+        show_a_room(args)
+    else:
+        with viewers_of(args) as viewers:
+            demonstrate(args, viewers)
 
 
-def demonstrate(args: Options, viewers: tuple[str, ...]) -> int:
+def demonstrate(args: Options, viewers: tuple[str, ...]) -> None:
     """The whole line; both episodes also go to `viewers`."""
     from embodied.generate import generate_house
     from embodied.house.floor_plan import save_plan
@@ -82,26 +83,10 @@ def demonstrate(args: Options, viewers: tuple[str, ...]) -> int:
             walk = find_something(args, world, viewers)
         with timed("the second task: ask for help", seconds):
             help_facts = ask_for_help(args, world, routes, viewers)
-        facts = {
-            "walk": walk,
-            "help": help_facts,
-            "plan": str(args.out / "plan.png"),
-            "seconds": seconds,
-            "renderer": world.fingerprint["renderer"],
-        }
-    show(
-        args,
-        facts,
-        "\n".join(
-            [
-                told(walk),
-                told(help_facts),
-                f"floor plan  {facts['plan']}",
-                f"look at a recording with: {as_typed(Path(sys.argv[0]))} view {help_facts['recording']}",
-            ]
-        ),
-    )
-    return 0
+        facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
+        facts |= {"seconds": seconds, "renderer": world.fingerprint["renderer"]}
+    look = f"look at a recording with: {as_typed(Path(sys.argv[0]))} view {help_facts['recording']}"
+    show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}", look]))
 
 
 def as_typed(program: Path) -> str:
@@ -115,7 +100,7 @@ SMALL = (32.0, 36.0)
 """Area of the flat of --small, square metres."""
 
 
-def show_a_room(args: Options) -> int:
+def show_a_room(args: Options) -> None:
     """A small flat from the seed, lit, and the view of it that shows most objects; needs neither torch nor Rerun."""
     import cv2
     import numpy as np
@@ -143,7 +128,6 @@ def show_a_room(args: Options) -> int:
     cv2.imwrite(str(args.out / "room.png"), np.ascontiguousarray(picture[..., ::-1]))
     facts = {"room": str(args.out / "room.png"), "house": str(args.out / "house.json"), "seconds": seconds}
     show(args, facts, f"a room of it: {facts['room']}")
-    return 0
 
 
 def inhabited(house: House, catalogue: Catalogue, args: Options) -> tuple[House, NavGraph, tuple[Route, ...]]:
@@ -171,9 +155,8 @@ def find_something(args: Options, world: World, viewers: tuple[str, ...]) -> dic
     from embodied.tasks.find import find_pool, find_task
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
-    episode = play(
-        environment_maker("find", {world.name: world}), Shortest(), [task], seed=args.seed, agent="shortest path"
-    )[0]
+    make = environment_maker("find", {world.name: world})
+    episode = play(make, Shortest(), [task], seed=args.seed, agent="shortest path")[0]
     return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
 
 

@@ -53,10 +53,10 @@ class Options(Furnished, Printed):
 def run(args: Options) -> int:
     findings = []
     if args.fix:
-        done = 0
+        done = False
         for said in fix(catalogue_packs=args.pack):
             note(said)
-            done += 1
+            done = True
         if not done:
             note("nothing is missing that can be brought without root")
         else:  # libraries are found by processes that start when they are there
@@ -68,11 +68,8 @@ def run(args: Options) -> int:
         if not args.json:
             print(line(findings[-1]), flush=True)
     ok = all(f.ok for f in findings if f.needed)
-    show(
-        args,
-        {"ok": ok, "findings": [asdict(f) for f in findings]},
-        "Ready." if ok else "Not ready: mend what is marked FAIL, then run `embodied doctor` again.",
-    )
+    text = "Ready." if ok else "Not ready: mend what is marked FAIL, then run `embodied doctor` again."
+    show(args, {"ok": ok, "findings": [asdict(f) for f in findings]}, text)
     return 0 if ok else 1
 
 
@@ -201,29 +198,18 @@ def vulkan(_: Options) -> Finding:
     import ctypes.util
 
     found = ctypes.util.find_library("vulkan")
-    return Finding(
-        "Vulkan",
-        found is not None,
-        found or "no Vulkan loader",
+    remedy = (
         "only --pictures fast-filament and normal-filament need it, with the extra [filament]: apt-get install "
-        "libvulkan1 mesa-vulkan-drivers",
-        False,
+        "libvulkan1 mesa-vulkan-drivers"
     )
+    return Finding("Vulkan", found is not None, found or "no Vulkan loader", remedy, False)
 
 
 def body(_: Options) -> Finding:
     """dm-control, which the driven body needs; its dependency labmaze has no wheel for Python 3.13."""
-    try:
-        text, found = f"dm-control {importlib.metadata.version('dm-control')}", True
-    except importlib.metadata.PackageNotFoundError:
-        text, found = "no dm-control", False
-    return Finding(
-        "driven body",
-        found,
-        text,
-        "only environments with wheels=True need it: pip install --no-deps dm-control",
-        False,
-    )
+    found, missing = _installed(("dm-control",))
+    remedy = "only environments with wheels=True need it: pip install --no-deps dm-control"
+    return Finding("driven body", not missing, (*found, "no dm-control")[0], remedy, False)
 
 
 def disk(args: Options) -> Finding:
@@ -236,10 +222,5 @@ def disk(args: Options) -> Finding:
     except OSError as e:
         text = f"{args.cache} cannot be written ({e.strerror}), where meshes, light and pictures go"
         return Finding("cache", False, text, "set EMBODIED_CACHE or --cache to a folder that you may write")
-    free = shutil.disk_usage(place).free / 2**30
-    return Finding(
-        "disk",
-        free >= FREE_DISK,
-        f"{free:.0f} GiB free for {args.cache}",
-        f"free {FREE_DISK} GiB or choose another --cache",
-    )
+    free, remedy = shutil.disk_usage(place).free / 2**30, f"free {FREE_DISK} GiB or choose another --cache"
+    return Finding("disk", free >= FREE_DISK, f"{free:.0f} GiB free for {args.cache}", remedy)

@@ -49,7 +49,7 @@ COLUMNS = {
 """Of agents without training; "strict success" wants a stop, as HARI's success does."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     from embodied.datasets.store import dataset_of
     from embodied.locks import locked
 
@@ -59,12 +59,12 @@ def run(args: Options) -> int:
     names, files = _agents(args)
     if files and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
-    splits = _splits(args)
+    splits = args.split or (HARI_SPLITS if args.kind == "hari" else ("test_unseen",))
     if data is not None:
         for split in splits:
             data.names(split)  # refuses unknown ones
     with locked(args.out) if args.out else contextlib.nullcontext():
-        return _evaluate(args, data, names, files, splits)
+        _evaluate(args, data, names, files, splits)
 
 
 def _agents(args: Options) -> tuple[list[str], list[Path]]:
@@ -94,13 +94,9 @@ def _agents(args: Options) -> tuple[list[str], list[Path]]:
     return names, files
 
 
-def _splits(args: Options) -> tuple[str, ...]:
-    return args.split or (HARI_SPLITS if args.kind == "hari" else ("test_unseen",))
-
-
 def _evaluate(
     args: Options, data: Dataset | None, names: Sequence[str], files: Sequence[Path], splits: Sequence[str]
-) -> int:
+) -> None:
     """Play, print the table, and write what goes into --out."""
     from agents.hanna.evaluation import behaviour
     from assets.cache import write_json
@@ -147,7 +143,6 @@ def _evaluate(
         from embodied.cli.evaluate_trained import record_trained
 
         record_trained(args, data, args.out, args.rrd)
-    return 0
 
 
 def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
@@ -160,10 +155,8 @@ def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
         return columns_of(kind)
     if kind == "ask":
         return [*ASK_COLUMNS, *metrics.USAGE]
-    return [
-        *COLUMNS.get(kind, ("success", "strict success", "spl", "navigation error", "requests", "steps")),
-        *metrics.USAGE,
-    ]
+    usual = ("success", "strict success", "spl", "navigation error", "requests", "steps")
+    return [*COLUMNS.get(kind, usual), *metrics.USAGE]
 
 
 class _Changes:
@@ -213,12 +206,9 @@ def _play(
 
     looks = bool({LLM, *LOOKING.get(args.kind, {})} & set(names)) or args.kind == "ask" or args.assistant != TEMPLATE
     limit = args.tasks or (FEW_TASKS if LLM in names or data is None else None)
+    watch = functools.partial(bar, name="agents", unit="agent")
     rows: list[Row] = []
     heard: dict[str, tuple[int, int]] = {}
-
-    def watch(agents: Iterable[str]) -> Iterable[str]:
-        return bar(agents, "agents", "agent")
-
     for split in _stages(args, data, splits, changes.own, limit, looks=looks):
 
         def kept(name: str, episodes: Sequence[Episode], split: SplitData = split) -> None:
@@ -251,9 +241,8 @@ def _stages(
     elif data is None:
         seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
         variants = Variants(args.rules, hari=args.hari_rules())
-        flat = flat_playground(
-            args.kind, args.seed, cache=args.cache, sees=seen, variants=variants, assistant=assistant
-        )
+        how: dict[str, Any] = {"cache": args.cache, "sees": seen, "variants": variants, "assistant": assistant}
+        flat = flat_playground(args.kind, args.seed, **how)
         yield SplitData(f"flat_{args.seed}", flat.worlds, tuple(flat.tasks), flat.make_env)
     else:
         catalogue = catalogue_of(args) if looks else None

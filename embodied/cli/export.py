@@ -178,7 +178,7 @@ class UsdOptions(HouseOptions):
     """File to write."""
 
 
-def run_program(what: str, args: ProgramOptions) -> int:
+def run_program(what: str, args: ProgramOptions) -> None:
     from embodied.datasets.folders import export_folder
     from embodied.datasets.store import Dataset
     from embodied.locks import locked
@@ -191,7 +191,6 @@ def run_program(what: str, args: ProgramOptions) -> int:
         files = export_folder(what, data, args.out, features)
     facts = {"program": what, "files": len(files), "out": str(args.out), "readme": str(files[-1])}
     show(args, facts, f"{len(files)} files for {what} in {args.out}; read {files[-1].name} there")
-    return 0
 
 
 def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str, np.ndarray]]:
@@ -215,19 +214,17 @@ def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str
     def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:
         place, pictures = data.place(name), drawn[name]
         features, _ = load_features(files[name], encoder=encoder.digest, source=place.house.digest, pictures=pictures)
-        if features.shape[2] > args.pad:
-            raise ValueError(
-                f"{files[name]} holds features of {features.shape[2]} numbers, --pad is {args.pad}; raise it"
-            )
-        wide = np.pad(features.astype(np.float32), ((0, 0), (0, 0), (0, args.pad - features.shape[2])))
-        return place.graph.ids, wide
+        n = features.shape[2]
+        if n > args.pad:
+            raise ValueError(f"{files[name]} holds features of {n} numbers, --pad is {args.pad}; raise it")
+        return place.graph.ids, np.pad(features.astype(np.float32), ((0, 0), (0, 0), (0, args.pad - n)))
 
     for name in [n for n, file in files.items() if not file.exists()][:1] or list(files)[:1]:
         read(name)
     return ((name, key, rows) for name in files for key, rows in zip(*read(name), strict=True))
 
 
-def run_parquet(args: ParquetOptions) -> int:
+def run_parquet(args: ParquetOptions) -> None:
     from embodied.datasets.parquet import export_parquet
     from embodied.datasets.store import Dataset
     from embodied.locks import locked
@@ -235,10 +232,9 @@ def run_parquet(args: ParquetOptions) -> int:
     with locked(args.out):
         files = export_parquet(Dataset(args.data), args.out, args.episodes)
     show(args, {"files": len(files), "out": str(args.out)}, f"{len(files)} files in {args.out}; README.md is its card")
-    return 0
 
 
-def run_lerobot(args: LeRobotOptions) -> int:
+def run_lerobot(args: LeRobotOptions) -> None:
     from embodied.datasets.lerobot import RecordedCamera, export_lerobot
     from embodied.datasets.store import Dataset
     from embodied.evaluation.evaluate import AGENTS, EXPERTS, agent
@@ -266,26 +262,16 @@ def run_lerobot(args: LeRobotOptions) -> int:
         tasks = whole_split.tasks[: args.tasks]
         episodes = play(whole_split.make_env, agent(data.kind, name), tasks, seed=data.config.seed, agent=name)
 
-    def succeeded(episode: Episode) -> bool:
-        return success(episode, data.place(episode.task.world).graph) > 0
-
-    steps = export_lerobot(
-        data,
-        args.out,
-        bar(episodes, "episodes", "episode"),
-        succeeded=succeeded,
-        camera=RecordedCamera(args.size, args.size),
-        depth=args.depth,
+    succeeded = lambda episode: success(episode, data.place(episode.task.world).graph) > 0
+    watched, camera = bar(episodes, "episodes", "episode"), RecordedCamera(args.size, args.size)
+    steps = export_lerobot(data, args.out, watched, succeeded=succeeded, camera=camera, depth=args.depth)
+    text = (
+        f"{len(episodes)} episodes, {steps} steps in {args.out}: LeRobotDataset('{args.out.name}', root='{args.out}')"
     )
-    show(
-        args,
-        {"episodes": len(episodes), "steps": steps, "out": str(args.out)},
-        f"{len(episodes)} episodes, {steps} steps in {args.out}: LeRobotDataset('{args.out.name}', root='{args.out}')",
-    )
-    return 0
+    show(args, {"episodes": len(episodes), "steps": steps, "out": str(args.out)}, text)
 
 
-def run_walks(what: str, args: WalkOptions) -> int:
+def run_walks(what: str, args: WalkOptions) -> None:
     from embodied.datasets.habitat import route_excursions
     from embodied.datasets.store import dataset_of
     from embodied.datasets.vlnce import export_walks
@@ -301,27 +287,16 @@ def run_walks(what: str, args: WalkOptions) -> int:
     with contextlib.nullcontext() if whole else locked(args.out):
         worlds = data_worlds(args.data, args.split, args.cache, None)
         walks = route_excursions(data.tasks(args.split), worlds)[: args.tasks]
-        steps = export_walks(
-            what,
-            args.out,
-            walks,
-            worlds,
-            seed=data.config.seed,
-            body=body,
-            lens=lens,
-            wander=args.wander,
-            split=args.split,
-            depth=args.depth,
-            watch=lambda episodes: bar(episodes, "walks", "walk"),
-        )
+        how: dict[str, Any] = {"wander": args.wander, "split": args.split, "depth": args.depth}
+        how["watch"] = functools.partial(bar, name="walks", unit="walk")
+        steps = export_walks(what, args.out, walks, worlds, seed=data.config.seed, body=body, lens=lens, **how)
         for world in worlds.values():
             world.close()
     facts = {"walks": len(walks), "steps": steps, "out": str(args.out)}
     show(args, facts, f"{len(walks)} walks, {steps} steps in {args.out}")
-    return 0
 
 
-def run_drives(args: DriveOptions) -> int:
+def run_drives(args: DriveOptions) -> None:
     from embodied.datasets.store import Dataset
     from embodied.gym.drive import make
     from embodied.gym.lerobot import DriveForLeRobot
@@ -335,10 +310,9 @@ def run_drives(args: DriveOptions) -> int:
     env.close()
     facts = {"drives": args.drives, "steps": steps, "out": str(args.out)}
     show(args, facts, f"{args.drives} drives, {steps} steps in {args.out}")
-    return 0
 
 
-def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> int:
+def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> None:
     from embodied.house.validation import load_house
     from embodied.locks import locked
     from embodied.scene.export import export_mjcf
@@ -366,7 +340,6 @@ def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> int:
         path = export_lit_glb(house, lit, args.out, ceilings=not args.no_ceilings, sky=args.sky)
     facts = {"house": house.digest, "format": what, "light": lit.digest if lit else None, "path": str(path)}
     show(args, facts, f"{house.name} as {what}: {path}, {path.stat().st_size / 1e6:.1f} MB")
-    return 0
 
 
 def light(args: HouseOptions, house: House, catalogue: Catalogue) -> LitPages | None:

@@ -31,7 +31,7 @@ class Options(WithData, Encoded, Lit, WithDevice):
     """Use a Ray cluster instead: its address, or 'local'."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     from agents.common.parallel import check_device
     from agents.vision.occasions import OCCASIONS
     from agents.vision.run import encoder_of, make_features
@@ -51,4 +51,3 @@ def run(args: Options) -> int:
         shown=[OCCASIONS[word] for word in args.shown],
         note=note,
     )
-    return 0

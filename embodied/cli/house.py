@@ -18,7 +18,9 @@ from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.house.validation import STYLES
 from embodied.novelty import NOVELTIES
 
+KIND = "kind of house (what is not given is drawn from the seed)"
 WORDS = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}
+WORDS["novelty"] = NOVELTIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,17 +35,10 @@ class Options(Furnished, Printed):
     """Leave out house.xml and its files."""
     glb: bool = False
     """Also write house.glb, for Blender and the web."""
-    config: Annotated[
-        HouseConfig,
-        Settings(
-            "kind of house (what is not given is drawn from the seed)",
-            HouseConfig(),
-            words=WORDS | {"novelty": NOVELTIES},
-        ),
-    ]
+    config: Annotated[HouseConfig, Settings(KIND, HouseConfig(), words=WORDS)]
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     from embodied.house.floor_plan import save_plan
     from embodied.navigation.graph import build_graph, to_matterport
     from embodied.scene.export import export_mjcf
@@ -76,10 +71,5 @@ def run(args: Options) -> int:
         "nodes": len(graph.ids),
         "out": str(args.out),
     }
-    show(
-        args,
-        facts,
-        f"{house.name}: {facts['rooms']} rooms on {facts['area_m2']} m2, {facts['objects']} objects, "
-        f"{facts['nodes']} viewpoints -> {args.out}",
-    )
-    return 0
+    text = f"{house.name}: {facts['rooms']} rooms on {facts['area_m2']} m2, {facts['objects']} objects, "
+    show(args, facts, text + f"{facts['nodes']} viewpoints -> {args.out}")

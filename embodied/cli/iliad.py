@@ -55,17 +55,21 @@ class Options(Nav, Printed):
     """NAV: record the first episode, for Rerun."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     if args.world == "nav":
-        return walks(args, args.student or SHIPPED_WALKER)
+        walks(args, args.student or SHIPPED_WALKER)
+        return
     for name in ("data", "teacher", "rrd"):
         if getattr(args, name) is not None:
             raise ValueError(f"--{name} belongs to --world nav; leave it out, or add --world nav")
     student = args.student or SHIPPED_STUDENT
-    return own_request(args, student, args.request) if args.request else episodes(args, student)
+    if args.request:
+        own_request(args, student, args.request)
+    else:
+        episodes(args, student)
 
 
-def own_request(args: Options, file: Path, request: str) -> int:
+def own_request(args: Options, file: Path, request: str) -> None:
     """What the student makes of the user's words."""
     from agents.iliad.regex.data import WordTask
     from agents.iliad.regex.rules import LETTERS
@@ -78,10 +82,9 @@ def own_request(args: Options, file: Path, request: str) -> int:
     output = done.outputs[0] if done.outputs else None
     body = {"request": request, "word": args.word, "rule": done.rule, "output": output}
     show(args, body, f"{args.word} -> {output or '(no rule)'}   by {done.rule}\n")
-    return 0
 
 
-def episodes(args: Options, file: Path) -> int:
+def episodes(args: Options, file: Path) -> None:
     """Episodes with the student's own teacher."""
     from agents.iliad.regex.run import load_student, prepare
     from agents.iliad.regex.showing import lines_of, tell
@@ -96,10 +99,9 @@ def episodes(args: Options, file: Path) -> int:
     told = [tell(student, grounds.teacher, items[int(i)], seed=args.seed, sample=not args.greedy) for i in chosen]
     text = "\n\n".join("\n".join(lines_of(t)) for t in told)
     show(args, {"episodes": [dataclasses.asdict(t) for t in told]}, text + "\n")
-    return 0
 
 
-def walks(args: Options, file: Path) -> int:
+def walks(args: Options, file: Path) -> None:
     """Episodes of NAV with the student's own teacher, or another one."""
     from agents.iliad.nav.config import NavConfig
     from agents.iliad.nav.run import NavSource, prepare
@@ -130,7 +132,6 @@ def walks(args: Options, file: Path) -> int:
         _record(args, grounds.data.source, student, chosen[0], shown[0])
     text = "\n\n".join("\n".join(lines_of(told)) for told, _ in shown)
     show(args, {"episodes": [dataclasses.asdict(told) for told, _ in shown]}, text + "\n")
-    return 0
 
 
 def _record(args: Options, data: Dataset, student: NavStudent, trip: Trip, shown: tuple[NavTold, NavWalk]) -> None:

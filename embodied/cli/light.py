@@ -62,7 +62,7 @@ class Options(Furnished, Printed):
     """Light it K times: as it is, and with hour, weather and lamps drawn from its seed."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     from embodied.light.backend import device
     from embodied.locks import locked
 
@@ -72,10 +72,10 @@ def run(args: Options) -> int:
     changes = [getattr(args, n) for n in ("time", "weather", "lamps", "landscape", "season")]
     writes = args.lights > 1 or any(c is not None for c in changes)
     with locked(args.folder) if writes else contextlib.nullcontext():
-        return light(args)
+        light(args)
 
 
-def light(args: Options) -> int:
+def light(args: Options) -> None:
     """Write the house anew where its sky changes, and light it."""
     from embodied.house.validation import load_house
     from embodied.light import bake_all, lightings_of, progress_bar
@@ -105,7 +105,6 @@ def light(args: Options) -> int:
         f"MuJoCo:   embodied export mjcf --house {args.folder} --light {args.quality} --out {args.folder / 'lit'}"
     )
     show(args, facts[0] if args.lights == 1 else {"lights": facts}, told)
-    return 0
 
 
 def with_sky(

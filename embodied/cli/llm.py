@@ -46,7 +46,7 @@ def serve(args: ServeOptions) -> int:
     return subprocess.run(command(args.port, args.threads), check=False).returncode
 
 
-def paraphrase(args: ParaphraseOptions) -> int:
+def paraphrase(args: ParaphraseOptions) -> None:
     from agents.language_models.paraphrase import paraphrased
     from assets.catalogue import load_catalogue
     from embodied.datasets.store import Dataset
@@ -61,7 +61,6 @@ def paraphrase(args: ParaphraseOptions) -> int:
         f"{len(found.routes)} of {found.asked} kept ({found.failing:.1%} dropped: {found.invalid} invalid, "
         f"{found.unchanged} unchanged, {found.lost} with which a listener gets lost); {found.usage}"
     )
-    return 0
 
 
 COMMANDS: Mapping[str, Any] = {"serve": (ServeOptions, serve), "paraphrase": (ParaphraseOptions, paraphrase)}

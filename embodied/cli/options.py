@@ -51,28 +51,21 @@ def whole(least: int = 1, most: int = MOST, *, even: bool = False) -> Callable[[
     return read
 
 
-def positive(text: str) -> float:
-    """Finite numbers above zero."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"should be a number above 0, got {text[:40]!r}")
-    return value
+def _finite(words: str, holds: Callable[[float], bool]) -> Callable[[str], float]:
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not holds(value) or value == math.inf:
+            raise argparse.ArgumentTypeError(f"should be a number {words}, got {text[:40]!r}")
+        return value
+
+    return read
 
 
-def not_negative(text: str) -> float:
-    """Finite numbers from zero on."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"should be a number from 0 on, got {text[:40]!r}")
-    return value
-
-
+positive = _finite("above 0", lambda x: x > 0)
+not_negative = _finite("from 0 on", lambda x: x >= 0)
 face = whole(8, 4096)
 """Side of a cube face, pixels."""
 video_side = whole(16, 4096, even=True)
@@ -224,8 +217,8 @@ def drawn_as(kinds: Sequence[str]) -> Option:
     return Option(words=kinds, helps=PICTURE_HELP)
 
 
-Command = tuple[type, Callable[[Any], int]]
-"""The record of its options, whose docstring describes it, and what it does."""
+Command = tuple[type, Callable[[Any], int | None]]
+"""The record of its options, whose docstring describes it, and what it does; nothing returned is the status 0."""
 
 
 def add_commands(parser: argparse.ArgumentParser, commands: Mapping[str, Any], metavar: str, dest: str) -> None:
@@ -243,7 +236,7 @@ def add_commands(parser: argparse.ArgumentParser, commands: Mapping[str, Any], m
             add_command(sub, about, what)
 
 
-def add_command(parser: argparse.ArgumentParser, options: type, run: Callable[[Any], int]) -> None:
+def add_command(parser: argparse.ArgumentParser, options: type, run: Callable[[Any], int | None]) -> None:
     """The options of one command; `args.run(args)` reads and runs it."""
     add_options(parser, options)
     parser.set_defaults(run=lambda args: run(read_options(args, options)))

@@ -43,7 +43,7 @@ class Options(Furnished, Printed):
     """Random seed of the camera's imperfections."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     from embodied.world import open_folder
 
     if (args.node is None) != (args.equirect is None and args.view is None):
@@ -59,19 +59,15 @@ def run(args: Options) -> int:
     with open_folder(args.folder, catalogue, args.cache, drawn) as world:
         fetch(catalogue, world.house)
         if args.node is not None:
-            return one(args, args.node, world)
+            one(args, args.node, world)
+            return
         path = world.render_all(progress=True)
-        facts = {
-            "nodes": len(world.graph.ids),
-            "file": str(path),
-            "mib": round(path.stat().st_size / 2**20, 1),
-            "renderer": world.fingerprint,
-        }
+        facts = {"nodes": len(world.graph.ids), "file": str(path), "mib": round(path.stat().st_size / 2**20, 1)}
+        facts["renderer"] = world.fingerprint
     show(args, facts, f"{facts['nodes']} panoramas in {path} ({facts['mib']} MiB)")
-    return 0
 
 
-def one(args: Options, node: int, world: World) -> int:
+def one(args: Options, node: int, world: World) -> None:
     """Draw one viewpoint as an equirectangular PNG, or a view from it, or both."""
     import cv2
 
@@ -95,4 +91,3 @@ def one(args: Options, node: int, world: World) -> int:
     note(f"node {node} in {world.graph.room_of_node[node]}, {args.camera} camera")
     words = ", ".join(map(str, pictures))
     show(args, {"node": node, "camera": args.camera, "pictures": list(map(str, pictures))}, f"wrote {words}")
-    return 0

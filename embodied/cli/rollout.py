@@ -42,13 +42,13 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Camera of videos and recordings."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
     with viewers_of(args) as viewers:
-        return roll_out(args, viewers)
+        roll_out(args, viewers)
 
 
-def roll_out(args: Options, viewers: tuple[str, ...]) -> int:
+def roll_out(args: Options, viewers: tuple[str, ...]) -> None:
     """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.metrics import PER_EPISODE
@@ -69,13 +69,8 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> int:
                 f"house {world.name!r} has {len(pool)} tasks, asked for {args.episodes}; choose fewer or a larger house"
             )
         tasks = [find_task(pool, i, seed=args.seed, language=People()) for i in range(args.episodes)]
-        episodes = play(
-            lambda: HelpEnv({world.name: world}),
-            WITHOUT_LEARNING[args.agent](),
-            bar(tasks, "episodes", "episode"),
-            seed=args.seed,
-            agent=args.agent,
-        )
+        watched, agent = bar(tasks, "episodes", "episode"), WITHOUT_LEARNING[args.agent]()
+        episodes = play(lambda: HelpEnv({world.name: world}), agent, watched, seed=args.seed, agent=args.agent)
         rows = []
         for number, episode in enumerate(episodes):
             row: dict[str, object] = {"task": episode.task.id, "request": episode.task.request}
@@ -89,17 +84,10 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> int:
                 record_episode(world, episode, Sinks(rrd, viewers), pictures=Pictures(camera=camera), watch=watch)
                 row["recording"] = str(rrd or ", ".join(viewers))
             rows.append(row)
-        facts = {
-            "agent": args.agent,
-            "seed": args.seed,
-            "world": world.name,
-            "renderer": world.fingerprint,
-            "camera": args.camera,
-            "episodes": rows,
-        }
+        facts = {"agent": args.agent, "seed": args.seed, "world": world.name, "renderer": world.fingerprint}
+        facts |= {"camera": args.camera, "episodes": rows}
     lines = [f"{r['task']}  {'ok  ' if r['success'] else 'miss'} SPL {r['spl']:.2f}  {r['request']}" for r in rows]
     show(args, facts, "\n".join(lines))
-    return 0
 
 
 def world_of(args: Options) -> World:

@@ -60,7 +60,7 @@ class Options(WithModel, Furnished, Printed):
 NEEDED = ("starlette", "uvicorn", "websockets")
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
         raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
     from agents.language_models.assistant import assistant_maker
@@ -70,15 +70,11 @@ def run(args: Options) -> int:
     study = load_study(args.study)
     out = args.out or args.study.with_suffix(".people")
     address = (args.address or f"http://{args.host}:{args.port}").rstrip("/")
-
-    def draw(data: Dataset, name: str) -> Path:
-        return drawn(data, name, study, args)
-
     client = functools.cache(lambda: client_of(args))
     opened = open_study(
         args.study,
         out,
-        draw,
+        lambda data, name: drawn(data, name, study, args),
         agents_of(args.study.parent / study.data, client),
         {"llm": assistant_maker("llm", client, args.prompts)},
         origins_of(args),
@@ -89,7 +85,7 @@ def run(args: Options) -> int:
 
         facts = summary(opened.server.sessions)
         show(args, facts, as_text(facts))
-        return 0
+        return
     links = opened.links(address, args.invitations or 0)
     write_secret(out / "links.json", json.dumps(links, indent=1))
     if args.host not in LOOPBACKS:
@@ -98,7 +94,6 @@ def run(args: Options) -> int:
     show(args, links, "\n".join(f"{name}: {link}" for name, many in few.items() for link in many))
     sys.stdout.flush()
     serve(opened, args.host, args.port)
-    return 0
 
 
 def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:

@@ -294,15 +294,14 @@ def _recorder(
     return keep
 
 
-def _with_threads(train: Callable[[Any], None]) -> Callable[[Any], int]:
+def _with_threads(train: Callable[[Any], None]) -> Callable[[Any], None]:
     """The command that trains once PyTorch has its threads."""
 
-    def run(args: Any) -> int:
+    def run(args: Any) -> None:
         from agents.common.parallel import use_threads
 
         use_threads(args.threads)
         train(args)
-        return 0
 
     return run
 

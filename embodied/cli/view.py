@@ -43,28 +43,24 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Write the Rerun recording here (default: RUN/recordings/N.rrd)."""
 
 
-def run(args: Options) -> int:
+def run(args: Options) -> None:
     if args.folder.suffix == ".rrd":
-        return show_file(args)
+        show_file(args)
+        return
     from viz.report import load_run, summary_line, write_page
 
     found = load_run(args.folder)
     if args.episode is not None:
-        return record_one(args, found, args.episode)
-    if args.page:
+        record_one(args, found, args.episode)
+    elif args.page:
         page = write_page(args.folder, found)
         show(args, {"page": str(page), "episodes": len(found)}, f"wrote {page}")
-        return 0
-    rows = [summary_line(i, e) for i, e in enumerate(found)]
-    show(
-        args,
-        {"episodes": [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(found)]},
-        "\n".join(rows),
-    )
-    return 0
+    else:
+        facts = [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(found)]
+        show(args, {"episodes": facts}, "\n".join(summary_line(i, e) for i, e in enumerate(found)))
 
 
-def show_file(args: Options) -> int:
+def show_file(args: Options) -> None:
     """Open a .rrd file in a new viewer, in the browser or in a viewer that runs."""
     if not args.folder.exists():
         raise FileNotFoundError(
@@ -73,13 +69,13 @@ def show_file(args: Options) -> int:
     from viz.sinks import open_file, send_file
 
     if args.connect is None:
-        return open_file(args.folder, serve=args.serve, bind=args.bind)
-    with viewers_of(args) as viewers:
-        send_file(args.folder, viewers)
-    return 0
+        open_file(args.folder, serve=args.serve, bind=args.bind)
+    else:
+        with viewers_of(args) as viewers:
+            send_file(args.folder, viewers)
 
 
-def record_one(args: Options, found: Sequence[Listed], number: int) -> int:
+def record_one(args: Options, found: Sequence[Listed], number: int) -> None:
     """Draw one episode of a run again, into a recording."""
     from embodied.datasets.store import Dataset
     from viz.sinks import Sinks
@@ -97,7 +93,6 @@ def record_one(args: Options, found: Sequence[Listed], number: int) -> int:
         sinks, catalogue, data = Sinks(file, viewers), catalogue_of(args), Dataset(args.data)
         record_again(args.folder, data, episode, sinks, catalogue, args.cache, pictures=args.pictures, video=video)
         show(args, {"recording": str(file)}, f"wrote {file}; open it with: embodied view {file}")
-    return 0
 
 
 def record_again(
