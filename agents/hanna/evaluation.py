@@ -17,7 +17,7 @@ from agents.common.choosing import choose_at
 from agents.hanna.agent import HannaAgent
 from agents.hanna.asking import RULES, ask_every
 from agents.hanna.network import Scores
-from agents.hanna.percept import Percept, slot_distribution
+from agents.hanna.percept import Percept
 from agents.hanna.policy import HannaPolicy, PerfectInterpretation
 from agents.vision.bank import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
@@ -107,8 +107,7 @@ class Uniform(nn.Module):
     def forward(self, memory: object, percept: Percept) -> tuple[Scores, object]:
         logits = torch.zeros(percept.action_mask.shape).masked_fill(~percept.action_mask, -torch.inf)
         logits[:, 0] = -UNWILLING
-        slots = slot_distribution(logits, percept.action_slots)
-        return Scores(logits, slots, torch.zeros(len(logits), 2), None), memory
+        return Scores(logits, torch.zeros(len(logits), 2), None), memory
 
 
 class Forgetting:

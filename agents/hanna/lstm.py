@@ -111,4 +111,4 @@ class LstmNetwork(nn.Module):
         logits = logits.masked_fill(~percept.action_mask, -torch.inf)
         slots = slot_distribution(logits.detach(), percept.action_slots)
         state, help_memory = self.help(memory[1], percept, delta, self.ask_embedding(percept.previous_ask), slots)
-        return Scores(logits, slots, self.ask_out(state), None), (navigation_memory, help_memory)
+        return Scores(logits, self.ask_out(state), None), (navigation_memory, help_memory)

@@ -63,8 +63,6 @@ class Scores:
 
     navigation: Tensor
     """(B, A) logits, -inf where there is no action."""
-    slots: Tensor
-    """(B, 37) the same as probabilities on static indices; carries no gradient."""
     ask: Tensor
     """(B, 2) logits of DO_NOTHING and REQUEST."""
     reasons: Tensor | None
@@ -259,4 +257,4 @@ class HannaNetwork(nn.Module):
         )
         reasons = self.reason_out(state) if self.config.predict_reasons else None  # (B, 3) D.20
         ask = self.ask_out(state if reasons is None else reasons)  # (B, 2) D.19
-        return Scores(logits, slots, ask, reasons), (navigation_memory, help_memory)
+        return Scores(logits, ask, reasons), (navigation_memory, help_memory)

@@ -38,13 +38,9 @@ class Encoded:
         """The same with no more than `width` rows, where the others are padding."""
         return Encoded(self.rows[:, :width], self.present[:, :width])
 
-    def alone(self) -> list[Tensor]:
-        """B tensors (m, h) without padding."""
-        return [r[p] for r, p in zip(self.rows, self.present, strict=True)]
-
     @classmethod
     def together(cls, alone: Sequence[Tensor]) -> Encoded:
-        """What `alone` took apart, padded to the longest."""
+        """B tensors (m, h) without padding, padded to the longest."""
         lengths = torch.tensor([len(r) for r in alone])
         rows = nn.utils.rnn.pad_sequence(list(alone), batch_first=True)
         return cls(rows, torch.arange(rows.shape[1]) < lengths[:, None])

@@ -58,8 +58,6 @@ class Link:
     child: int
     parent: int
     wall: SharedWall
-    tree: bool
-    """Whether the child is entered this way; otherwise it is a further join."""
 
 
 def shared_wall(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> SharedWall | None:
@@ -148,7 +146,7 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tupl
             continue
         reached.add(child)
         total += cost
-        links.append(Link(child, parent, wall, True))
+        links.append(Link(child, parent, wall))
         frontier += [(c, k, child, w) for c, k, w in options[child] if k not in reached]
     if len(reached) < len(cells):
         return None
@@ -156,7 +154,7 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tupl
     for (i, j), wall in walls.items():
         least = JOINS.get((cells[i].kind, cells[j].kind)) or JOINS.get((cells[j].kind, cells[i].kind))
         if least and (i, j) not in tree and wall.length >= least:
-            links.append(Link(i, j, wall, False))
+            links.append(Link(i, j, wall))
     links += _second_doors(cells, walls, links)
     return links, total
 
@@ -177,7 +175,7 @@ def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall], l
         ]
         if beside:
             _, _, other, wall = min(beside)
-            found.append(Link(i, other, wall, False))
+            found.append(Link(i, other, wall))
     return found
 
 

@@ -26,22 +26,11 @@ def register_with_gymnasium() -> None:
 
 def register(gymnasium: ModuleType) -> None:
     """Environments by the name of their maker, which is imported when the first is made."""
-    for kind, name in IDS.items():
+    for kind, name in (IDS | CONTINUOUS).items():
+        one, many = ("env", "in_step") if kind in IDS else ("continuous", "continuous")
+        makers = {"entry_point": f"embodied.gym.{one}:make", "vector_entry_point": f"embodied.gym.{many}:make_vec"}
         if f"embodied/{name}-v0" not in gymnasium.registry:
-            gymnasium.register(
-                f"embodied/{name}-v0",
-                entry_point="embodied.gym.env:make",
-                vector_entry_point="embodied.gym.in_step:make_vec",
-                kwargs={"kind": kind},
-            )
-    for kind, name in CONTINUOUS.items():
-        if f"embodied/{name}-v0" not in gymnasium.registry:
-            gymnasium.register(
-                f"embodied/{name}-v0",
-                entry_point="embodied.gym.continuous:make",
-                vector_entry_point="embodied.gym.continuous:make_vec",
-                kwargs={"kind": kind},
-            )
+            gymnasium.register(f"embodied/{name}-v0", **makers, kwargs={"kind": kind})
     if "embodied/Drive-v0" not in gymnasium.registry:
         gymnasium.register("embodied/Drive-v0", entry_point="embodied.gym.drive:make")
 

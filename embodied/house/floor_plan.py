@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Protocol, TypedDict, Unpack, cast
+from typing import Protocol, cast
 
 import numpy as np
 import shapely
@@ -101,7 +101,7 @@ def paint_plan(
             sheet.hatch(room)
     if furniture:
         _draw_furniture(sheet, house, ids)
-    _draw_walls(sheet, house, rooms)
+    sheet.shape(walls_of(house, rooms), INK)
     for o in house.openings:
         if o.rooms[0] in ids:
             _draw_opening(sheet, house, o)
@@ -119,22 +119,10 @@ def paint_plan(
     return out.image
 
 
-class PlanOptions(TypedDict, total=False):
-    """What `paint_plan` takes by name."""
-
-    storey: int
-    pixels_per_metre: float
-    furniture: bool
-    graph: Graph | None
-    path: tuple[int, ...]
-    facing: float | None
-    titles: bool
-
-
-def save_plan(house: House, file: Path, **options: Unpack[PlanOptions]) -> None:
+def save_plan(house: House, file: Path, *, pixels_per_metre: float = 48.0, graph: Graph | None = None) -> None:
     """Write the plan of the ground floor as a PNG, atomically; options as for `paint_plan`."""
     data = io.BytesIO()
-    paint_plan(house, **options).save(data, format="PNG")
+    paint_plan(house, pixels_per_metre=pixels_per_metre, graph=graph).save(data, format="PNG")
     write_bytes(Path(file), data.getvalue())
 
 
@@ -218,10 +206,6 @@ def walls_of(house: House, rooms: list[Room]) -> shapely.Geometry:
     inside = shapely.union_all([c.buffer(-house.inner_wall / 2, join_style="mitre") for c in cells])
     hull = shapely.union_all(cells).buffer(house.outer_wall - house.inner_wall / 2, join_style="mitre")
     return hull.difference(inside)
-
-
-def _draw_walls(sheet: _Sheet, house: House, rooms: list[Room]) -> None:
-    sheet.shape(walls_of(house, rooms), INK)
 
 
 def _frame(house: House, o: Opening) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:

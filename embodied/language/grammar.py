@@ -6,7 +6,7 @@ import functools
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -358,59 +358,32 @@ def _any(words: Iterable[str]) -> str:
     return "|".join(re.escape(w) for w in sorted(words, key=lambda w: (-len(w), w)))
 
 
-class _Slots:
-    """What the slots of a template held when it was heard; rooms are taken in turn."""
-
-    def __init__(self, heard: _Heard) -> None:
-        self._said, self._thing = heard.said, heard.thing
-        nouns = (heard.said.get(slot) for slot in ("room", "other"))
-        self._rooms: Iterator[str] = iter([ROOM_OF_NOUN[noun] for noun in nouns if noun])
-
-    def room(self) -> str:
-        """The kind of the next room."""
-        return next(self._rooms)
-
-    @property
-    def side(self) -> str:
-        return self._said["side"]
-
-    @property
-    def nth(self) -> int:
-        return WORDS.ordinals.index(self._said["nth"])
-
-    @property
-    def metres(self) -> int:
-        count = self._said["n"]
-        return WORDS.numbers.index(count) if count in WORDS.numbers else int(count)
-
-    @property
-    def thing(self) -> Referent:
-        assert self._thing is not None  # its template has the slot
-        return self._thing
+def _number(word: str) -> int:
+    return WORDS.numbers.index(word) if word in WORDS.numbers else int(word)
 
 
-MAKERS: Mapping[str, Callable[[_Slots], Clause]] = {
-    "turn": lambda s: Turn(s.side),
-    "slight": lambda s: Turn(s.side, 45),
-    "around": lambda s: Turn(LEFT, 180),
-    "exit": lambda s: Exit(s.room()),
-    "enter": lambda s: Enter(s.room()),
-    "cross": lambda s: Cross(s.room()),
-    "door": lambda s: Enter(s.room(), s.side, s.nth),
-    "forward": lambda s: Forward(),
-    "metres": lambda s: Metres(s.metres),
-    "to": lambda s: To(s.thing),
-    "past": lambda s: Past(s.thing),
-    "past_side": lambda s: Past(s.thing, s.side),
-    "avoid": lambda s: Avoid(s.room()),
-    "notice": lambda s: Notice(s.thing),
-    "stop_by": lambda s: StopBy(s.thing),
-    "stop_in": lambda s: StopIn(s.room()),
-    "stop_here": lambda s: StopHere(),
+MAKERS: Mapping[str, Callable[[Mapping[str, str], Iterator[str], Any], Clause]] = {
+    "turn": lambda said, rooms, thing: Turn(said["side"]),
+    "slight": lambda said, rooms, thing: Turn(said["side"], 45),
+    "around": lambda said, rooms, thing: Turn(LEFT, 180),
+    "exit": lambda said, rooms, thing: Exit(next(rooms)),
+    "enter": lambda said, rooms, thing: Enter(next(rooms)),
+    "cross": lambda said, rooms, thing: Cross(next(rooms)),
+    "door": lambda said, rooms, thing: Enter(next(rooms), said["side"], WORDS.ordinals.index(said["nth"])),
+    "forward": lambda said, rooms, thing: Forward(),
+    "metres": lambda said, rooms, thing: Metres(_number(said["n"])),
+    "to": lambda said, rooms, thing: To(thing),
+    "past": lambda said, rooms, thing: Past(thing),
+    "past_side": lambda said, rooms, thing: Past(thing, said["side"]),
+    "avoid": lambda said, rooms, thing: Avoid(next(rooms)),
+    "notice": lambda said, rooms, thing: Notice(thing),
+    "stop_by": lambda said, rooms, thing: StopBy(thing),
+    "stop_in": lambda said, rooms, thing: StopIn(next(rooms)),
+    "stop_here": lambda said, rooms, thing: StopHere(),
 }
-"""The clause that each name of the templates means."""
+"""The clause that each name of the templates means, of what its slots held: words, kinds of rooms in turn, a thing."""
 
 
 def _clauses(heard: _Heard) -> list[Clause]:
-    slots = _Slots(heard)
-    return [MAKERS[kind](slots) for kind in heard.template.kinds]
+    rooms = iter([ROOM_OF_NOUN[noun] for slot in ("room", "other") if (noun := heard.said.get(slot))])
+    return [MAKERS[kind](heard.said, rooms, heard.thing) for kind in heard.template.kinds]

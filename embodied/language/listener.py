@@ -54,8 +54,6 @@ class Heard:
     path: tuple[int, ...]
     cost: float
     """How badly the walk fits the words; 0 is perfect."""
-    looked: int
-    """Nodes at which it looked around."""
 
 
 def follow(world: SeenPlace, text: str, start: int, yaw: float) -> Heard:
@@ -80,7 +78,7 @@ def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: flo
             break
         cost, _, walk = heapq.heappop(queue)
         if walk.clause == len(clauses):
-            return Heard(walk.path, cost, eyes.visited)
+            return Heard(walk.path, cost)
         if walk.state in seen_states:
             continue
         seen_states.add(walk.state)
@@ -88,7 +86,7 @@ def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: flo
             fallback, farthest = walk.path, walk.clause
         for added, further in _onward(eyes, clauses[walk.clause], walk):
             heapq.heappush(queue, (cost + added, next(tie), further))
-    return Heard(fallback, math.inf, eyes.visited)
+    return Heard(fallback, math.inf)
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,11 +84,6 @@ class Lookout:
         self._world = world
         self._looks: dict[int, Seen] = {}
 
-    @property
-    def visited(self) -> int:
-        """At how many nodes it has looked around."""
-        return len(self._looks)
-
     def at(self, node: int) -> Seen:
         """What is seen from `node`."""
         if node not in self._looks:
