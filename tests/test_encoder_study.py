@@ -88,16 +88,17 @@ def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_i
 def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setting, tmp_path):
     source = dataclasses.replace(setting.source, picture_kind="unlit", lights=1)
     config = dataclasses.replace(setting.config, epochs=1)
-    study = dataclasses.replace(setting, source=source, config=config, houses=(1,), lit_houses=1, ready={})
+    ready = {"one": setting.ready["one"]}
+    study = dataclasses.replace(setting, source=source, config=config, houses=(1,), lit_houses=1, ready=ready)
     body = read_json(
         run_study(study, ["houses"], tmp_path / "study", note=lambda line: None)["houses"].with_suffix(".json")
     )
-    assert [r["label"] for r in body["rows"]] == ["1 houses", "1 houses, 1 of them lit"]
+    assert [r["label"] for r in body["rows"]] == ["1 houses", "1 houses, 1 of them lit", "one"]
     assert [c["key"] for c in body["columns"]][::6] == ["AP_fast", "AP_unlit"]
     digests = {p.parent.name: weights_digest(p) for p in (tmp_path / "study").rglob("encoder.safetensors")}
     assert len(set(digests.values())) == 2, "one of them learned from lit pictures"
     wider = dataclasses.replace(study, houses=(2, 8), config=dataclasses.replace(config, epochs=3))
-    assert [r.train["epochs"] for r in wider.tables()["houses"].rows] == [12, 3, 3], "as many updates"
+    assert [r.train["epochs"] for r in wider.tables()["houses"].rows[:3]] == [12, 3, 3], "as many updates"
 
 
 def test_an_encoder_that_the_study_trains_keeps_its_name(setting):

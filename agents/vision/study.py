@@ -8,7 +8,7 @@ dissertation, whose features are a ResNet-152's).
 
 Readers are fitted on training houses, in the pictures that the encoders of the study learn from; 'pictures' judges
 houses in their own light. In 'houses', encoders learn in so many houses, all for as many updates, and readers are
-fitted in the same few houses for all, in the kind of pictures that is judged.
+fitted in the same few houses for all, in the kind of pictures that is judged; `--encoders` adds those that are there.
 """
 
 from __future__ import annotations
@@ -94,14 +94,16 @@ class EncoderStudy(StudyLearner):
         }
 
     def _by_houses(self) -> tuple[StudyRow, ...]:
-        """As many updates in fewer and in more houses, and in the most with some of them lit."""
+        """As many updates in fewer and in more houses, and in the most with some of them lit; then encoders that are
+        there already."""
         if not self.houses:
             return ()
         most = max(self.houses)
         train = {n: {"training_houses": n, "epochs": round(self.config.epochs * most / n)} for n in self.houses}
         judge = {READERS: self.lit_houses}
         mixed = StudyRow(f"{most} houses, {self.lit_houses} of them lit", {**train[most], LIT: self.lit_houses}, judge)
-        return (*(StudyRow(f"{n} houses", train[n], judge) for n in self.houses), mixed)
+        ready = (StudyRow(name, {READY: name}, judge) for name in self.ready)
+        return (*(StudyRow(f"{n} houses", train[n], judge) for n in self.houses), mixed, *ready)
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         train = row.train or {}
