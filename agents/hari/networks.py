@@ -40,7 +40,7 @@ class Encoded:
 
     @classmethod
     def together(cls, alone: Sequence[Tensor]) -> Encoded:
-        """B tensors (m, h) without padding, padded to the longest."""
+        """B tensors (m, h) of different lengths m, padded to the longest."""
         lengths = torch.tensor([len(r) for r in alone])
         rows = nn.utils.rnn.pad_sequence(list(alone), batch_first=True)
         return cls(rows, torch.arange(rows.shape[1]) < lengths[:, None])

@@ -12,6 +12,7 @@ from embodied.render.pictures import PictureSettings
 TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
 """Networks that encode without training here, with weights from disk."""
 TRAINED_NETWORKS = ("compact", "lite0")
+"""Networks that are trained here; the first is the default."""
 PLAIN = PictureSettings(size=192)
 """How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
 

@@ -40,8 +40,6 @@ from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.interface import FindObject
 
-TRAINED = "compact"
-"""The row of the encoder that the study trains."""
 COLUMNS = ("AP", "goal AP", "chance AP", "room accuracy", "depth R²", "place AUC", "ms a node", "MB")
 GOALS = 60
 """The goal AP is a mean over so many classes: those that tasks seek most often, or all if they seek none."""
@@ -82,11 +80,11 @@ class EncoderStudy(StudyLearner):
     judges = ("agents.vision.study",)
 
     def __post_init__(self) -> None:
-        if twice := sorted(self.ready.keys() & {TRAINED}):
+        if twice := sorted(self.ready.keys() & {self.config.network}):
             raise ValueError(f"encoders of the names {twice} are trained by the study; give those of --encoders others")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        rows = (StudyRow(TRAINED, {}), *(StudyRow(n, {READY: n}) for n in self.ready))
+        rows = (StudyRow(self.config.network, {}), *(StudyRow(n, {READY: n}) for n in self.ready))
         return {
             "encoders": StudyTable("Encoders: what linear readers make of them", rows, COLUMNS),
             "pictures": StudyTable("Encoders, judged on other pictures", rows, COLUMNS[:6], self.pictures),

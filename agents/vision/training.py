@@ -100,7 +100,7 @@ class DistillationTarget:
 
 def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
     """Sum of the five losses, and each as a number."""
-    half = isinstance(network, Lite)  # in half the time
+    half = isinstance(network, Lite)  # bfloat16 halves the time
     with torch.autocast(batch.rgb.device.type, torch.bfloat16, enabled=half):
         maps = strip_map(network, batch.rgb).float()  # (n, D, 12, 36)
     return head_losses(heads, maps, pool_views(maps, network.peaks), batch)

@@ -120,7 +120,7 @@ def paint_plan(
 
 
 def save_plan(house: House, file: Path, *, pixels_per_metre: float = 48.0, graph: Graph | None = None) -> None:
-    """Write the plan of the ground floor as a PNG, atomically; options as for `paint_plan`."""
+    """Write the plan of the ground floor as a PNG, atomically; arguments as for `paint_plan`."""
     data = io.BytesIO()
     paint_plan(house, pixels_per_metre=pixels_per_metre, graph=graph).save(data, format="PNG")
     write_bytes(Path(file), data.getvalue())
