@@ -197,6 +197,18 @@ def test_the_file_gives_back_what_was_written(stored):
             assert np.mean((back.rgb.astype(float) - sent.rgb) ** 2) < 6.5, "JPEG below 40 dB"
 
 
+def test_only_channels_that_are_asked_for_are_decoded(stored, monkeypatch):
+    path, panoramas = stored
+    decoded: list[str] = []
+    whole = PanoramaFile.decoded
+    monkeypatch.setattr(PanoramaFile, "decoded", lambda f, data, n, c: (decoded.append(c), whole(f, data, n, c))[1])
+    with PanoramaFile(path) as file:
+        back = file.read(1)
+    assert back.size == 32 and not decoded
+    assert back.view_rgb(0.3).shape == (480, 640, 3) and back.equirect(32) is not None and decoded == ["rgb"]
+    assert np.array_equal(back.ids, panoramas[1].ids) and decoded == ["rgb", "ids"], "also once the file is closed"
+
+
 def test_lossless_colours_are_exact(tmp_path):
     p = analytic(16)
     write_panoramas(tmp_path / "x.pano", [p], {}, lossless=True)

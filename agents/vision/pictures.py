@@ -25,7 +25,6 @@ from embodied.datasets.store import Dataset
 from embodied.gym.eyes import FAR, PIXELS, ViewSettings, framed
 from embodied.gym.playground import pictures_of
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
-from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile
 from embodied.render.photograph import check_camera
 from embodied.seeds import stream
@@ -157,7 +156,7 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         self, house: int, node: int, yaw: float, pitch: float, view: ViewSettings | None
     ) -> dict[str, np.ndarray]:
         """The wanted channels of what is seen, colours last."""
-        panorama = _decoded(self._file(house), node, self._channels)
+        panorama = self._file(house).read(node)
         if view is None:
             faces = {"rgb": panorama.rgb, "depth": np.minimum(panorama.depth, np.float32(FAR)), "ids": panorama.ids}
             return {name: faces[name] for name in self._channels}
@@ -175,14 +174,6 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
                 self._open.popitem(last=False)[1].close()
         self._open.move_to_end(house)
         return self._open[house]
-
-
-def _decoded(file: PanoramaFile, node: int, channels: Sequence[str]) -> Panorama:
-    """A panorama of which only some channels are decoded; the others are empty."""
-    s = file.size
-    rgb = file.rgb(node) if "rgb" in channels else np.empty((6, s, s, 0), np.uint8)
-    depth = file.depth(node) if "depth" in channels else np.empty((6, s, 0), np.float32)
-    return Panorama(rgb, depth, file.ids(node) if "ids" in channels else np.empty((6, s, 0), np.int32))
 
 
 def _colours_first(name: str, picture: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from embodied.gym.playground import flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain import PlainLanguage
+from embodied.render.panorama_file import PanoramaFile
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
 from embodied.tasks.find import find_pool, find_task
@@ -33,6 +34,8 @@ ROUND = 20
 """Of one timed call of a batch."""
 ROUNDS = 40
 """Untimed calls before, in which every process decodes the panoramas that it meets."""
+READ = 20
+"""Viewpoints that one timed call reads from the disk."""
 BATCH = 64
 """Environments of the vectorised line."""
 LINES = (
@@ -62,11 +65,20 @@ def _measures(world: World, seed: int) -> Iterator[Measure]:
         walk = functools.partial(_walk, env, steps, seed)
         yield measure(f"steps, {name}", walk, "1/s", per=steps, aim=aim)
     plain = _env(world, tasks, CameraSensor(store, ("rgb",), ViewSettings()))
+    yield from _from_disk(world)
     resampled = measure("steps, rgb, 128 x 128, again", lambda: _walk(plain, STEPS, seed), "1/s", per=STEPS)
     draw = functools.partial(_draw, plain, world)
     naive = measure("the naive way: a picture drawn per step", lambda: _walk(plain, 40, seed, draw), "1/s", per=40)
     yield naive
     yield share("resampled against drawn", resampled, naive, "x")
+
+
+def _from_disk(world: World) -> Iterator[Measure]:
+    """Views of viewpoints that are not in memory."""
+    view, nodes = ViewSettings(), range(min(READ, len(world.graph.ids)))
+    with PanoramaFile(world.path) as file:
+        look = lambda: [file.read(n).view_rgb(0.0, 0.0, view.vfov, (view.height, view.width)) for n in nodes]
+        yield measure("views of viewpoints on the disk, rgb, 128 x 128", look, "1/s", per=len(nodes))
 
 
 def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:

@@ -199,8 +199,8 @@ class PanoramaStore:
 
 
 def _bytes(panorama: Panorama) -> int:
-    """With the padded copies that resampling makes: about twice the faces."""
-    return 2 * (panorama.rgb.nbytes + panorama.depth.nbytes + panorama.ids.nbytes)
+    """Once all channels are decoded, 11 bytes a pixel, and copied with borders for resampling."""
+    return 2 * 6 * panorama.size**2 * 11
 
 
 class CameraSensor:

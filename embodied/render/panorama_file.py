@@ -15,6 +15,7 @@ Every picture carries a CRC-32 that is checked when it is read.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import io
 import json
@@ -96,21 +97,24 @@ class PanoramaFile:
         return len(self.index.nodes)
 
     def read(self, node: int) -> Panorama:
-        """The whole panorama of one node."""
-        return Panorama(self.rgb(node), self.depth(node), self.ids(node))
+        """The panorama of one node; each channel is decoded when it is first asked for.
+
+        Raises:
+          PanoramaFileError: a picture is damaged.
+        """
+        return _Stored(self, {channel: self._checked(node, channel) for channel in CHANNELS}, node)
 
     def rgb(self, node: int) -> np.ndarray:
         """(6, s, s, 3) uint8."""
-        return _apart(cv2.cvtColor(self._picture(node, "rgb", cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB))
+        return self.decoded(self._checked(node, "rgb"), node, "rgb")
 
     def depth(self, node: int) -> np.ndarray:
         """(6, s, s) float32 metres along each face's axis, to 0.5 mm; inf where nothing is."""
-        millimetres = _apart(self._picture(node, "depth", cv2.IMREAD_UNCHANGED))
-        return np.where(millimetres > 0, millimetres / np.float32(1000), np.float32(np.inf))
+        return self.decoded(self._checked(node, "depth"), node, "depth")
 
     def ids(self, node: int) -> np.ndarray:
         """(6, s, s) int32."""
-        return _apart(self._picture(node, "ids", cv2.IMREAD_UNCHANGED)).astype(np.int32)
+        return self.decoded(self._checked(node, "ids"), node, "ids")
 
     def damaged(self) -> tuple[tuple[int, str], ...]:
         """(node, channel) of every picture that does not match its checksum; reads the whole file."""
@@ -125,7 +129,8 @@ class PanoramaFile:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _picture(self, node: int, channel: str, flag: int) -> np.ndarray:
+    def _checked(self, node: int, channel: str) -> bytes:
+        """The picture as a file, which is whole."""
         if not 0 <= node < len(self):
             raise IndexError(f"{self.path} holds the nodes 0 to {len(self) - 1}, not {node}")
         data = self._data(node, channel)
@@ -133,21 +138,62 @@ class PanoramaFile:
             raise PanoramaFileError(
                 f"{self.path}: the {channel} of node {node} is damaged; delete the file, it is made again"
             )
+        return data
+
+    def decoded(self, data: bytes, node: int, channel: str) -> np.ndarray:
+        """The faces of a picture as `rgb`, `depth` and `ids` return them.
+
+        Raises:
+          PanoramaFileError: it is none of this file's size.
+        """
         picture = None
         if _size_of(data) == (6 * self.size, self.size):
+            flag = cv2.IMREAD_COLOR_RGB if channel == "rgb" else cv2.IMREAD_UNCHANGED
             picture = cv2.imdecode(np.frombuffer(data, np.uint8), flag)
         if picture is None:
             raise PanoramaFileError(
                 f"{self.path}: the {channel} of node {node} is no picture of its size; "
                 "delete the file, it is made again"
             )
-        return picture
+        faces = _apart(picture)
+        if channel == "rgb":
+            return faces
+        if channel == "ids":
+            return faces.astype(np.int32)
+        return np.where(faces > 0, faces / np.float32(1000), np.float32(np.inf))
 
     def _data(self, node: int, channel: str) -> bytes | None:
         """The picture as a file, or None where it is damaged."""
         offset, length, crc = self.index.nodes[node][channel]
         data = os.pread(self._file.fileno(), length, offset)  # whoever shares the file shares its position
         return data if len(data) == length and zlib.crc32(data) == crc else None
+
+
+class _Stored(Panorama):
+    """A panorama of a file, whose channels are decoded when they are first asked for."""
+
+    _file: PanoramaFile
+    _data: dict[str, bytes]
+    _node: int
+
+    def __init__(self, file: PanoramaFile, data: dict[str, bytes], node: int) -> None:
+        self.__dict__.update(_file=file, _data=data, _node=node)
+
+    @property
+    def size(self) -> int:
+        return self._file.size
+
+    @functools.cached_property
+    def rgb(self) -> np.ndarray:
+        return self._file.decoded(self._data["rgb"], self._node, "rgb")
+
+    @functools.cached_property
+    def depth(self) -> np.ndarray:
+        return self._file.decoded(self._data["depth"], self._node, "depth")
+
+    @functools.cached_property
+    def ids(self) -> np.ndarray:
+        return self._file.decoded(self._data["ids"], self._node, "ids")
 
 
 def _size_of(data: bytes) -> tuple[int, int] | None:
