@@ -177,7 +177,7 @@ class PanoramaStore:
     """Owns the decoded panoramas of some worlds, the latest used, within a budget of bytes."""
 
     def __init__(self, worlds: Mapping[str, World], budget: int = MEMORY) -> None:
-        self._worlds, self._budget, self._held = worlds, budget, 0
+        self._worlds, self._budget = worlds, budget
         self._kept: OrderedDict[Viewpoint, Panorama] = OrderedDict()
 
     def at(self, sight: Sight) -> Panorama:
@@ -190,17 +190,20 @@ class PanoramaStore:
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key]
-        panorama = self._worlds[key.world].panorama(key.node)
-        self._kept[key] = panorama
-        self._held += _bytes(panorama)
-        while self._held > self._budget and len(self._kept) > 1:
-            self._held -= _bytes(self._kept.popitem(last=False)[1])
-        return panorama
+        sizes = [_bytes(kept) for kept in self._kept.values()]
+        held = sum(sizes) + sum(sizes[-1:])  # the new one will need about as much as the latest
+        for size in sizes:
+            if held <= self._budget:
+                break
+            self._kept.popitem(last=False)
+            held -= size
+        self._kept[key] = self._worlds[key.world].panorama(key.node)
+        return self._kept[key]
 
 
 def _bytes(panorama: Panorama) -> int:
-    """Once all channels are decoded, 11 bytes a pixel, and copied with borders for resampling."""
-    return 2 * 6 * panorama.size**2 * 11
+    """Of the channels that are decoded, with the padded copies that resampling makes."""
+    return sum(a.nbytes for a in list(panorama.__dict__.values()) if isinstance(a, np.ndarray))
 
 
 class CameraSensor:
