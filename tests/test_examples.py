@@ -70,7 +70,7 @@ def test_a_data_set_teaches_a_torch_module_more_than_guessing(tmp_path):
 @pytest.mark.slow
 def test_looks_from_one_room_are_more_alike_to_an_encoder_than_those_from_two(run):
     said = run("encode.py", "--pictures", "unlit", "--steps", "40")
-    assert "40 looks of 192 numbers" in said
+    assert "40 looks of 256 numbers" in said
     one, two = map(float, re.search(r"one room (\S+), from two rooms (\S+)\n", said).groups())
     assert one > two
 

@@ -23,7 +23,7 @@ WORLD = grid_world()
 def student() -> NavStudent:
     """In a house by hand whose pictures tell nothing: all it knows are directions and words."""
     encoder = load_encoder(SHIPPED_ENCODER)
-    blank = FeatureBank({"grid": np.zeros((len(WORLD.graph.ids), 36, encoder.size))}, encoder.feature_space)
+    blank = FeatureBank({"grid": np.zeros((len(WORLD.graph.ids), 36, encoder.size))}, encoder.digest)
     return load_follower(SHIPPED_WALKER, NavEyes({"grid": WORLD}, blank, build_vocabulary([])))
 
 

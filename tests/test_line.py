@@ -15,7 +15,7 @@ import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 
-from agents.vision import features
+from agents.vision import features, recognise
 from agents.vision.config import PLAIN
 from assets.cache import digest
 from assets.catalogue import load_catalogue
@@ -99,17 +99,21 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
     shared_cache, tmp_path, monkeypatch, capsys
 ):
     """`embodied demo` in a small flat without light; the trained agent's recording shows what its features come from,
-    the world's own pictures, and no others beside them."""
+    the world's own pictures, and no others beside them, and what it recognises in each."""
     fed: list[Panorama] = []
     poses: list[Pose] = []
+    recognised: list[int] = []
     logged: dict[str, list[str]] = {"agent/camera/image": [], "view/lit": []}
     strip_of, log_sight, log = features.strip_of, recording.log_sight, rr.RecordingStream.log
 
     def watched_log(stream, path, *parts, **more):
         if path in logged:
             logged[path].append(jpeg(parts[-1]))
+        if path == "view/panorama/recognised":
+            recognised.append(len(parts[0].positions.as_arrow_array()))
         log(stream, path, *parts, **more)
 
+    monkeypatch.setattr(recognise, "strip_of", strip_of)
     monkeypatch.setattr(features, "strip_of", lambda p: (fed.append(p), strip_of(p))[1])
     monkeypatch.setattr(recording, "log_sight", lambda r, v, pose: (poses.append(pose), log_sight(r, v, pose))[1])
     monkeypatch.setattr(rr.RecordingStream, "log", watched_log)
@@ -134,6 +138,7 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
     assert len(fed) == len(found) and len(poses) == told["help"]["steps"] + 1
     assert all(np.array_equal(p.rgb, rgb) for p, rgb in zip(fed, found, strict=True))
     assert logged == {"agent/camera/image": agent, "view/lit": []}
+    assert len(recognised) == len(poses) and sum(recognised) > len(poses)
 
 
 def test_the_picture_says_how_it_was_drawn_or_that_nobody_looks_at_it():

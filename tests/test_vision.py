@@ -24,16 +24,7 @@ from agents.vision.features import FORMAT, feature_path, load_bank, load_feature
 from agents.vision.lite import Lite, folded, load_imagenet
 from agents.vision.probe import LabelledFeatures, ProbeScores, as_numbers, average_precision, place_auc, read
 from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
-from agents.vision.training import (
-    DistillationTarget,
-    aligned,
-    batches,
-    photograph_strip,
-    strip_count,
-    train_encoder,
-    turn_strip,
-    whitened,
-)
+from agents.vision.training import batches, photograph_strip, strip_count, train_encoder, turn_strip
 from assets.cache import write_json
 from embodied.errors import UnableError
 from embodied.interface import Sight
@@ -209,8 +200,6 @@ def test_lite0_without_its_package_says_what_to_install(monkeypatch):
         load_imagenet(Lite())
     with pytest.raises(ValueError, match="one of .'compact', 'lite0'"):
         VisionConfig(network="nope")
-    with pytest.raises(ValueError, match="distillation trains 'compact'"):
-        VisionConfig(network="lite0", like="0" * 64)
 
 
 def test_a_reading_can_be_read_again(tmp_path):
@@ -342,55 +331,6 @@ def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatc
     assert "continuing after update 2" in lines and again.digest == whole.digest
     with pytest.raises(CheckpointError, match="epochs 3 -> 5"):
         train_encoder(houses, dataclasses.replace(config, epochs=5), folder)
-
-
-@pytest.mark.slow
-def test_an_encoder_learns_to_see_dark_pictures_as_its_example_sees_bright_ones(tmp_path, monkeypatch):
-    tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
-    monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
-    bright = strips_of_colours(8, seed=0)
-    dark = dataclasses.replace(bright, rgb=(bright.rgb // 5)[..., ::-1].copy())
-    config = VisionConfig(epochs=4, batch=2, least_views=1)
-    encoder, _, _ = train_encoder([bright], config, note=lambda line: None)
-    target = DistillationTarget(whitened(encoder, [bright]), {bright.name: bright})
-    with pytest.raises(ValueError, match="pass that encoder"):
-        train_encoder([dark], config, target=target)
-    config = dataclasses.replace(config, epochs=12, like=target.encoder.digest)
-    with pytest.raises(ValueError, match="not as many unlit ones"):
-        train_encoder([dark], config, target=dataclasses.replace(target, strips={}))
-    before = {k: v.clone() for k, v in target.encoder.network.state_dict().items()}
-    learned, _, _ = train_encoder([dark], config, target=target, note=lambda line: None)
-    assert all(torch.equal(v, before[k]) for k, v in target.encoder.network.state_dict().items()), "it stays"
-    aim = target.encoder.encode_strips(bright.rgb)
-    off = [np.square(who.encode_strips(dark.rgb) - aim).mean() for who in (target.encoder, learned)]
-    assert off[1] < off[0] / 2
-    spread = aligned(learned, [dark], target).encode_strips(dark.rgb)
-    variance = lambda f: ((f - f.mean((0, 1))) ** 2).sum()
-    assert variance(spread) == pytest.approx(variance(aim), rel=0.02)
-    assert np.square(spread - aim).mean() < 1.2 * off[1]
-    save_encoder(learned, tmp_path / "e.safetensors")
-    again = load_encoder(tmp_path / "e.safetensors")
-    assert again.distilled_from == again.feature_space == target.encoder.digest != again.digest
-    assert target.encoder.feature_space == target.encoder.digest
-    save_features(tmp_path / "f.safetensors", aim, again, "house")
-    assert load_features(tmp_path / "f.safetensors", encoder=again.digest)[1] == target.encoder.digest
-    with pytest.raises(ValueError, match="made from encoder"):
-        load_features(tmp_path / "f.safetensors", encoder=target.encoder.digest)
-
-
-def test_matched_features_are_those_of_the_example_where_a_linear_map_leads_there():
-    encoder, rng = random_encoder(seed=3), np.random.default_rng(0)
-    rgb = rng.integers(0, 256, (12, 24, 72, 3), dtype=np.uint8).repeat(8, 1).repeat(8, 2)
-    houses = [dataclasses.replace(strips_of_colours(12, seed=0), rgb=rgb)]
-    turn = torch.linalg.qr(torch.randn(encoder.size, encoder.size, generator=torch.Generator().manual_seed(0)))[0]
-    target = DistillationTarget(
-        dataclasses.replace(encoder, mean=torch.ones(encoder.size), mix=3 * turn), {"house": houses[0]}
-    )
-    aim = target.encoder.encode_strips(houses[0].rgb)
-    plain = whitened(encoder, houses)
-    found = aligned(plain, houses, dataclasses.replace(target, strips={houses[0].name: houses[0]}))
-    off = [np.square(e.encode_strips(houses[0].rgb) - aim).mean() for e in (plain, found)]
-    assert off[1] < 0.05 * aim.var() < off[0]
 
 
 def test_an_epoch_sees_each_viewpoint_once_however_often_its_house_was_lit():

@@ -1,4 +1,4 @@
-"""What HARI's assistant spoke of, marked where it is: names in the panorama, boxes in the house."""
+"""What is marked in pictures: what HARI's assistant spoke of, and what an agent recognises."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import rerun as rr
 from embodied.assistants.descriptions import spoken_of
 from embodied.house.house import Placement
 from embodied.interface import Feature, Intention, Place, Pose, Step
+from embodied.render.panorama import Recognised
 
-COLOUR = (255, 160, 30)
+COLOUR, FOUND = (255, 160, 30), (60, 220, 255)
 Marked = tuple[Feature, Placement]
 
 
@@ -30,6 +31,17 @@ def log_described(recording: rr.RecordingStream, world: Place, step: Step, heigh
         rr.Points2D(at, labels=[label(f) for f, _ in here], show_labels=True, radii=3.0, colors=COLOUR),
     )
     recording.log("task/described", boxes([p for _, p in there], [label(f) for f, _ in there], COLOUR))
+
+
+def log_recognised(recording: rr.RecordingStream, found: Sequence[Recognised], pose: Pose, height: int) -> None:
+    """What an agent recognises around it, in its panorama.
+
+    Args:
+      height: of the panorama that is shown, pixels.
+    """
+    at = pixels_towards(np.array([f.yaw for f in found]), np.array([f.pitch for f in found]), pose, height)
+    names = [f"{f.name.replace('_', ' ')} {f.probability:.0%}" for f in found]
+    recording.log("view/panorama/recognised", rr.Points2D(at, labels=names, show_labels=True, radii=3.0, colors=FOUND))
 
 
 def boxes(things: Sequence[Placement], labels: Sequence[str], colour: tuple[int, int, int]) -> rr.Boxes3D:
@@ -71,7 +83,11 @@ def panorama_pixels(world: Place, pose: Pose, placements: list[Placement], heigh
     Its middle column is the agent's gaze, as viz.recording.log_sight turns it.
     """
     offset = np.array([middle(p) for p in placements]).reshape(-1, 3) - world.graph.positions[pose.node]
-    yaw = np.arctan2(offset[:, 1], offset[:, 0]) - pose.yaw
-    pitch = np.arctan2(offset[:, 2], np.hypot(offset[:, 0], offset[:, 1]))
-    column = (np.pi - yaw) % (2 * np.pi) * height / np.pi
+    yaw = np.arctan2(offset[:, 1], offset[:, 0])
+    return pixels_towards(yaw, np.arctan2(offset[:, 2], np.hypot(offset[:, 0], offset[:, 1])), pose, height)
+
+
+def pixels_towards(yaw: np.ndarray, pitch: np.ndarray, pose: Pose, height: int) -> np.ndarray:
+    """(n, 2) pixels as `panorama_pixels`, of directions (n,) and (n,) in radians."""
+    column = (np.pi - (yaw - pose.yaw)) % (2 * np.pi) * height / np.pi
     return np.stack([column, (np.pi / 2 - pitch) * height / np.pi], axis=1)

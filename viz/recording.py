@@ -5,6 +5,7 @@ Entity tree (timeline 'step'):
   task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
   agent/path, agent/route  walked, spoken of       view/panorama, view/target, view/lit
   view/panorama/described, task/described   what HARI's assistant spoke of
+  view/panorama/recognised   what the agent's encoder recognises
   text/...               request, instruction, dialogue, goals (HARI's stack)
   plot/...               distance to the goal, requests, HARI's cost, probabilities     events   a log
 """
@@ -24,11 +25,11 @@ from embodied.language.prose import prose
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
-from embodied.render.panorama import Panorama
+from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
 from embodied.world import World
 from viz.blueprint import blueprint_of
-from viz.described import boxes, log_described
+from viz.described import boxes, log_described, log_recognised
 from viz.house3d import light_meshes, lit_meshes, log_house
 from viz.sinks import Sinks, open_recording
 from viz.story import Story
@@ -46,6 +47,8 @@ HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20
 """Metres above the floor that things are drawn at, so that none hides another."""
 VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)
 """How high the picture along the gaze reaches: for people, and for an agent that sees this one view only (VNLA)."""
+Recognise = Callable[[Panorama], Sequence[Recognised]]
+"""Names what is in a panorama (agents.vision.recognise.Recogniser)."""
 SHORT = 60
 """Letters of a request that is shown as a heading."""
 
@@ -75,6 +78,8 @@ class Views:
     sizes: Pictures
     vfov: float = VFOV
     """Of the picture along the gaze, radians."""
+    recognise: Recognise | None = None
+    """What the agent's encoder recognises in what it sees."""
 
 
 def views_of(world: World, eyes: World | None, sizes: Pictures = Pictures()) -> Views:
@@ -93,6 +98,7 @@ def record(
     eyes: World | None = None,
     pictures: Pictures = Pictures(),
     budget: int | None = None,
+    recognise: Recognise | None = None,
 ) -> Iterator[Step]:
     """Pass `steps` on while logging each: put it between a rollout and whoever consumes it.
 
@@ -104,13 +110,14 @@ def record(
       eyes: the world whose panoramas the agent looks at; None for an agent that looks at none.
       pictures: sizes of the pictures.
       budget: requests that the episode allowed; None where they were not counted.
+      recognise: names what the agent recognises in a panorama of `eyes`.
 
     Yields:
       The same steps.
     """
     log_world(recording, world)
     log_task(recording, world, task)
-    state, views = Story(task, budget), views_of(world, eyes, pictures)
+    state, views = Story(task, budget), dataclasses.replace(views_of(world, eyes, pictures), recognise=recognise)
     if task.kind == "vnla":
         views = dataclasses.replace(views, vfov=ONE_VIEW)
     for index, step in enumerate(steps):
@@ -132,6 +139,7 @@ def record_episode(
     eyes: World | None = None,
     pictures: Pictures = Pictures(),
     watch: Callable[[Sequence[Step]], Iterable[Step]] = iter,
+    recognise: Recognise | None = None,
 ) -> None:
     """Record a finished episode of `world`, with the layout that suits it.
 
@@ -140,6 +148,7 @@ def record_episode(
         said to be. None for an agent that looks at no pictures.
       pictures: their sizes, and the camera.
       watch: wraps the iterator over steps (a progress bar).
+      recognise: names what the agent recognises in a panorama of `eyes`.
 
     Raises:
       OSError: the file could not be written to its end, or a viewer went away.
@@ -149,7 +158,16 @@ def record_episode(
     layout = blueprint_of(world.house, episode, seen, shown=views_of(world, eyes).shown is not None)
     with open_recording(sinks, layout, name=prose(episode.task.request), properties=about) as recording:
         steps = watch(episode.steps)
-        for _ in record(recording, world, episode.task, steps, eyes=eyes, pictures=pictures, budget=episode.budget):
+        for _ in record(
+            recording,
+            world,
+            episode.task,
+            steps,
+            eyes=eyes,
+            pictures=pictures,
+            budget=episode.budget,
+            recognise=recognise,
+        ):
             pass
 
 
@@ -269,6 +287,8 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     equirect = panorama.equirect(sizes.panorama)
     shift = round(pose.yaw / (2 * np.pi) * equirect.shape[1])
     recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), sizes.jpeg))
+    if views.recognise is not None:
+        log_recognised(recording, views.recognise(panorama), pose, sizes.panorama)
     recording.log(
         "agent/body",
         rr.Capsules3D(

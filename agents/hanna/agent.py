@@ -15,6 +15,7 @@ from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork
 from agents.hanna.policy import HannaPolicy
+from agents.hanna.recognition import Likeness
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from agents.vision.bank import FeatureBank
 
@@ -64,6 +65,7 @@ class HannaAgent(SightedAgent):
             revisit_weight=judged.revisit_weight,
             use_goal_image=judged.use_goal_image,
             frontier_discount=judged.frontier_discount,
+            least=Likeness(judged.same_place, judged.same_picture, judged.same_view),
         )
 
 

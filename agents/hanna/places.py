@@ -1,7 +1,7 @@
 """How well pictures are recognised that were taken at another time: precision, recall and AUC in houses never seen.
 
 An agent has walked through a house; a helper shows a picture of one of its places. Which of the places that it saw is
-it, if any? It is told by the agent's own thresholds (agents.hanna.recognition), which were chosen by `threshold`.
+it, if any? It is told by the thresholds of the shipped encoder (agents.hanna.recognition), chosen by `threshold`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.stats
 
-from agents.hanna.recognition import MATCH, SAME, VIEW_MATCH, matches
+from agents.hanna.recognition import Likeness, matches
 from agents.vision.drawn import pictures_of
 from agents.vision.features import feature_path, load_features
 from agents.vision.occasions import OCCASIONS, shown_path
@@ -129,7 +129,8 @@ def recognised(data: Dataset, split: str, shown: str, encoder: str, picture_kind
         seen, _ = load_features(feature_path(data.folder / "features", encoder, name, drawn), encoder=encoder)
         path = shown_path(data, name, OCCASIONS["camera" if own else shown], encoder, drawn)
         asked += queries(name, graph, seen, load_features(path, encoder=encoder)[0], turned=not own)
-    return measured(asked, SAME if own else VIEW_MATCH if shown.endswith("view") else MATCH)
+    least = Likeness()
+    return measured(asked, least.place if own else least.view if shown.endswith("view") else least.picture)
 
 
 def measured(asked: Sequence[Query], least: float) -> dict[str, Samples]:

@@ -18,6 +18,7 @@ from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
 from agents.hanna.percept import COPIES, DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
+from agents.hanna.recognition import Likeness, PlaceMap
 from agents.hanna.trail import Trail, weigh, weigh_by_image
 from agents.vision.bank import FeatureBank
 from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
@@ -75,6 +76,8 @@ class HannaPolicy:
     """Go by the image of where to go, if one is shown (hanna.trail.weigh_by_image)."""
     frontier_discount: float = 0.0
     """How it looks for what the image shows; see hanna.trail.weigh_by_image."""
+    least: Likeness = Likeness()
+    """From which match on pictures are of one place."""
     keep_moments: bool = False
     """Keep Scores, with their gradients, in memory: for training."""
 
@@ -168,7 +171,7 @@ class HannaPolicy:
             previous_ask=torch.full((k,), START, device=device),
             last_ask=(-1,) * k,
             channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
-            trails=(Trail(),) * k if self.revisit_weight < 1 or self.use_goal_image else (),
+            trails=(Trail(PlaceMap(self.least)),) * k if self.revisit_weight < 1 or self.use_goal_image else (),
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:

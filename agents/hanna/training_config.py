@@ -108,6 +108,13 @@ class HannaEvaluation(EvaluationSettings):
     """In evaluation, `ask_threshold` before the first goal image (docs/sources.md, S162)."""
     route_ask_threshold: float = 0.5
     """In evaluation, `ask_threshold` on a route (docs/sources.md, S162)."""
+    same_place: float = 0.55
+    """In evaluation, two panoramas of the agent's own are of one place from this match of their features on."""
+    same_picture: float = 0.42
+    """In evaluation, a goal image was taken where the agent is from this match on; 0.58 suits the compact encoder, and
+    0.68 as --same-place."""
+    same_view: float = 0.25
+    """In evaluation, likewise for a goal image of a single view; 0.42 suits the compact encoder."""
     min_moves_between_requests: int = 0
     """In evaluation, moves after leaving a route before the learned rule asks again."""
 
@@ -116,6 +123,7 @@ class HannaEvaluation(EvaluationSettings):
         require(self, AT_LEAST_ONE, "evaluation_steps")
         require(self, NOT_NEGATIVE, "min_moves_between_requests")
         require(self, SHARE, "revisit_weight", "frontier_discount", "first_ask_threshold", "route_ask_threshold")
+        require(self, SHARE, "same_place", "same_picture", "same_view")
 
 
 SCALES: dict[str, TrainingConfig] = {

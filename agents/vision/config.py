@@ -85,9 +85,6 @@ class VisionConfig:
     """Random seed."""
     cameras: tuple[str, ...] = ("ideal",)
     """Simulated cameras for augmentation, 'ideal', 'phone' or 'robot'; each strip is taken by a random one."""
-    like: str = ""
-    """Digest of an encoder to distil from, which encodes the same places without light; '' for none. The name is that
-    of stored settings."""
 
     def __post_init__(self) -> None:
         if not self.cameras:
@@ -96,8 +93,6 @@ class VisionConfig:
             check_camera(name)
         if self.network not in TRAINED_NETWORKS:
             raise ValueError(f"network should be one of {TRAINED_NETWORKS}, got {self.network!r}")
-        if self.like and self.network != TRAINED_NETWORKS[0]:
-            raise ValueError(f"network is {self.network!r}; distillation trains {TRAINED_NETWORKS[0]!r} alone")
         require(self, AT_LEAST_ONE, "epochs", "batch", "least_views")
         require(self, NOT_NEGATIVE, "training_houses", "shade", "weight_decay")
         require(self, POSITIVE, "learning_rate")

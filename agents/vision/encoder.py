@@ -39,8 +39,6 @@ class EncoderAbout:
     name: str
     sharing: str
     digest: str
-    like: str = ""
-    """Encoder.distilled_from; the name is that of stored files."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +55,6 @@ class Encoder:
     """(D,) subtracted from features; None leaves them as the network gives them."""
     mix: Tensor | None = None
     """(D, D) that whitens features after the mean is gone: x -> (x - mean) @ mix."""
-    distilled_from: str = ""
-    """Digest of the encoder whose features it was trained to give (agents.vision.training.DistillationTarget); '' for
-    none."""
-
-    @property
-    def feature_space(self) -> str:
-        """Digest of the encoder whose features its own can replace: agents trained on those can use these."""
-        return self.distilled_from or self.digest
 
     @property
     def size(self) -> int:
@@ -175,7 +165,7 @@ def imagenet_encoder(name: str, weights: Path) -> Encoder:
 
 def save_encoder(encoder: Encoder, path: Path, identity: Identity | None = None) -> None:
     """Write half-precision weights, settings and what they were trained with, atomically."""
-    about = EncoderAbout(encoder.name, encoder.sharing, encoder.digest, encoder.distilled_from)
+    about = EncoderAbout(encoder.name, encoder.sharing, encoder.digest)
     save_weights(path, "encoder", {k: v.detach().half() for k, v in _tensors(encoder).items()}, about, identity)
 
 
@@ -194,7 +184,7 @@ def load_encoder(path: Path = SHIPPED) -> Encoder:
     network = build(told.name)
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     load_into(network, {**counters, **tensors}, path)
-    encoder = Encoder(network.eval(), told.name, told.sharing, mean, mix, told.like)
+    encoder = Encoder(network.eval(), told.name, told.sharing, mean, mix)
     if encoder.digest != told.digest:
         raise ValueError(f"{path}: contents do not fit the digest {told.digest[:12]}; it was changed")
     return encoder

@@ -81,8 +81,6 @@ def save_features(
 ) -> None:
     """Write (n, 36, D) features; `source` is the digest of what they were computed from (the house)."""
     about = {"format": FORMAT, "encoder": encoder.digest, "source": source, "drawing": drawing(pictures)}
-    if encoder.distilled_from:
-        about["speaks"] = encoder.feature_space
     tensor = torch.from_numpy(np.ascontiguousarray(features, dtype=np.float16))
     save_tensors(Path(path), {"features": tensor}, about)
 
@@ -95,7 +93,7 @@ def load_features(
     pictures: PictureSettings | None = None,
     lights: int = 1,
 ) -> tuple[np.ndarray, str]:
-    """(n, 36, D) float16 features and the feature space of their encoder (Encoder.feature_space).
+    """(n, 36, D) float16 features and the digest of their encoder.
 
     Args:
       encoder, source, pictures: what is expected, if anything.
@@ -117,7 +115,7 @@ def load_features(
     for name, expected in zip(KEYS, (encoder, source, drawn), strict=True):
         if expected is not None and about[name] != expected:
             raise ValueError(f"{path}: made from {name} {about[name][:12]}, expected {expected[:12]}; {remedy}")
-    return features.numpy(), about.get("speaks", about["encoder"])
+    return features.numpy(), about["encoder"]
 
 
 def has_features(path: Path, encoder: Encoder, house: House, pictures: PictureSettings) -> bool:

@@ -98,7 +98,7 @@ class Lessons:
         return kind(
             config=config,
             evaluation=evaluation,
-            encoder=encoder.feature_space,
+            encoder=encoder.digest,
             feature_size=encoder.size,
             words=words.words,
             pictures=pictures,

@@ -5,7 +5,6 @@ What belongs to viz, such as recordings, is passed in from the console command a
 
 from __future__ import annotations
 
-import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -19,7 +18,7 @@ from agents.vision.features import encode_panoramas, feature_path, has_features,
 from agents.vision.labels import HouseStrips
 from agents.vision.occasions import Occasion, make_shown
 from agents.vision.probe import as_numbers, labelled, read
-from agents.vision.training import DistillationTarget, aligned, save_training, train_encoder, trained_classes, whitened
+from agents.vision.training import save_training, train_encoder, trained_classes, whitened
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
@@ -29,39 +28,22 @@ from embodied.render.pictures import PictureSettings
 
 
 def train_vision(
-    source: StripSource,
-    config: VisionConfig,
-    out: Path,
-    *,
-    distil_from: Path | None = None,
-    device: str = "cpu",
-    workers: int = 1,
-    note: Note = print,
+    source: StripSource, config: VisionConfig, out: Path, *, device: str = "cpu", workers: int = 1, note: Note = print
 ) -> None:
     """Cut strips from the pictures of all houses, train on the training houses, evaluate on validation houses, save.
 
     What is there already, strips or an encoder of the same settings, is not made again; training goes on from the
     last epoch that was finished.
 
-    Args:
-      distil_from: an encoder to start from and to distil.
-
     Raises:
       LockedError: another process writes to `out`.
     """
     check_device(device)
     data = Dataset(source.data)
-    other = None if distil_from is None else load_encoder(distil_from)
-    if other is not None:
-        config = dataclasses.replace(config, like=other.digest)
     with locked(out):
         seen = source.strips(training_houses(data, config), workers=workers, note=note)
-        target = None
-        if other is not None:
-            target = distillation_target(other, source, training_houses(data, config), workers=workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
-        shown = seen if target is None else [*seen, *target.strips.values()]  # plain ones as one more lighting
-        encoder, classes = trained_encoder(shown, config, out, note, target=target, device=device)
+        encoder, classes = trained_encoder(seen, config, out, note, device=device)
         untrained = whitened(random_encoder(seed=config.seed), seen)
         numbers = {}
         for name, who in (("trained", encoder), ("random", untrained)):
@@ -71,29 +53,15 @@ def train_vision(
         write_json(out / "readings.json", numbers, indent=1)
 
 
-def distillation_target(
-    encoder: Encoder, source: StripSource, names: Sequence[str], *, workers: int = 1, note: Note = print
-) -> DistillationTarget:
-    """An encoder to distil from, with houses drawn without light."""
-    plain = dataclasses.replace(source, picture_kind="unlit", lights=1)
-    return DistillationTarget(encoder, {h.name: h for h in plain.strips(names, workers=workers, note=note)})
-
-
 def trained_encoder(
-    seen: Sequence[HouseStrips],
-    config: VisionConfig,
-    folder: Path,
-    note: Note = print,
-    *,
-    target: DistillationTarget | None = None,
-    device: str = "cpu",
+    seen: Sequence[HouseStrips], config: VisionConfig, folder: Path, note: Note = print, *, device: str = "cpu"
 ) -> tuple[Encoder, list[str]]:
     """The encoder that `config` makes of strips, from `folder` if it is there, and the classes of its heads."""
     classes = trained_classes(folder, config)
     if classes is None:
         home = folder / "training"
-        encoder, heads, classes = train_encoder(seen, config, home, target=target, device=device, note=note)
-        encoder = aligned(encoder, seen, target) if target else whitened(encoder, seen)
+        encoder, heads, classes = train_encoder(seen, config, home, device=device, note=note)
+        encoder = whitened(encoder, seen)
         save_training(encoder, heads, classes, config, folder)
         (home / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes

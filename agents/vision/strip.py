@@ -58,6 +58,11 @@ def view_coverage(view: int) -> np.ndarray:
     return np.where(inside, np.hypot(rays[..., 0], rays[..., 1]) / ahead**3, 0.0)
 
 
+def cell_direction(row: int, column: int) -> tuple[float, float]:
+    """Yaw and pitch, in radians, of the middle of a cell of the feature map."""
+    return math.pi - (column + 0.5) / COLUMNS * math.tau, HALF - (row + 0.5) / ROWS * 2 * HALF
+
+
 @functools.cache
 def windows() -> np.ndarray:
     """(36, 12, 36) float32: weight of each cell of the feature map in each view; each view sums to 1."""

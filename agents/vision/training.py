@@ -11,7 +11,7 @@ import dataclasses
 import functools
 import operator
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,36 +19,22 @@ import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
-from torch import Tensor, nn
+from torch import Tensor
 
 from agents.common.checkpoint import Stateful
 from agents.common.session import Session, descend
-from agents.common.tensor_file import save_tensors
 from agents.common.weights import seeded
 from agents.vision.config import VisionConfig
 from agents.vision.encoder import Encoder, Network, build, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
 from agents.vision.lite import Lite, load_imagenet
-from agents.vision.resnet import COMPACT
+from agents.vision.recognise import Heads, save_heads
 from agents.vision.strip import CELL, COLUMNS
 from assets.cache import digest, write_json
-from assets.records import ROOM_KINDS
 from embodied.identity import identity_of
 from embodied.records import load_json
 from embodied.render.photograph import camera_traits, photograph
 from embodied.seeds import stream
-
-
-class Heads(nn.Module):
-    """Linear readers of the feature map (cells) and of the pooled features (views)."""
-
-    def __init__(self, size: int, classes: int) -> None:
-        super().__init__()
-        self.cell_objects = nn.Conv2d(size, classes, 1)
-        self.cell_room = nn.Conv2d(size, len(ROOM_KINDS), 1)
-        self.cell_depth = nn.Conv2d(size, 1, 1)
-        self.view_objects = nn.Linear(size, classes)
-        self.view_room = nn.Linear(size, len(ROOM_KINDS))
 
 
 @dataclass(frozen=True)
@@ -75,27 +61,9 @@ class StripBatch:
     """(n, 12, 36) float32."""
     room: Tensor
     """(n,) int64."""
-    plain: Tensor | None = None
-    """(n, 192, 576, 3) uint8, the same places without light, for distillation."""
 
     def to(self, device: str) -> StripBatch:
-        held = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return StripBatch(**{name: value.to(device) for name, value in held.items() if value is not None})
-
-
-@dataclass(frozen=True, eq=False)
-class DistillationTarget:
-    """What an encoder is distilled from: another encoder, and the same places drawn without light, which it encodes.
-
-    Houses without light are cheap, so an agent can learn in many of them. An encoder that gives for a lit house the
-    features that the agent's own encoder gives for the unlit one lets the agent act in lit houses. It starts from that
-    encoder's weights, and the labels train the heads alone. Where the unlit strips are also among the inputs, their
-    features stay as they were.
-    """
-
-    encoder: Encoder
-    strips: Mapping[str, HouseStrips]
-    """By house, as many nodes as in the lit ones."""
+        return StripBatch(**{f.name: getattr(self, f.name).to(device) for f in dataclasses.fields(self)})
 
 
 def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
@@ -103,11 +71,7 @@ def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tens
     half = isinstance(network, Lite)  # bfloat16 halves the time
     with torch.autocast(batch.rgb.device.type, torch.bfloat16, enabled=half):
         maps = strip_map(network, batch.rgb).float()  # (n, D, 12, 36)
-    return head_losses(heads, maps, pool_views(maps, network.peaks), batch)
-
-
-def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
-    """As `vision_loss`, of feature maps (n, D, 12, 36) and pooled features (n, 36, D)."""
+    views = pool_views(maps, network.peaks)  # (n, 36, D)
     cells = (batch.share.permute(0, 3, 1, 2) >= 8).float()  # (n, C, 12, 36): covers 3 % of the cell
     parts = {
         "cell objects": F.binary_cross_entropy_with_logits(heads.cell_objects(maps), cells) * 10,
@@ -122,22 +86,6 @@ def head_losses(heads: Heads, maps: Tensor, views: Tensor, batch: StripBatch) ->
     }
 
 
-def distillation_loss(
-    network: Network, heads: Heads, batch: StripBatch, target: Encoder
-) -> tuple[Tensor, dict[str, float]]:
-    """Mean square between the finished features of `network` and those of `target` in unlit strips, and the losses
-    of the heads, whose gradients do not reach the network."""
-    if batch.plain is None:
-        raise ValueError("the batch holds no unlit strips to distil from; give `batches` `plain`")
-    maps = strip_map(network, batch.rgb)
-    views = target.finish(pool_views(maps))
-    with torch.no_grad():
-        aim = target.finish(pool_views(strip_map(target.network, batch.plain)))
-    distillation = F.mse_loss(views, aim)
-    told, parts = head_losses(heads, maps.detach(), pool_views(maps.detach()), batch)
-    return distillation + told, {"distillation": float(distillation.detach()), **parts}
-
-
 def batches(
     houses: Sequence[HouseStrips],
     classes: Sequence[int],
@@ -146,17 +94,16 @@ def batches(
     shade: float = 0.0,
     *,
     rng: np.random.Generator,
-    plain: Mapping[str, HouseStrips] | None = None,
 ) -> Iterator[StripBatch]:
     """One pass over all nodes in random order, each in one of its house's lightings, rolled, perhaps mirrored,
-    recoloured, and photographed by one of `cameras`; those of `plain`, by house, as they are."""
+    recoloured, and photographed by one of `cameras`."""
     lightings = _by_name(houses)
     where = [(name, i) for name, several in lightings.items() for i in range(len(several[0].rgb))]
     order = rng.permutation(len(where))
     columns = np.asarray(classes)
     for start in range(0, len(order) - len(order) % size, size):
         chosen = [where[k] for k in order[start : start + size]]
-        rgb, share, rooms, depth, room, bare = [], [], [], [], [], []
+        rgb, share, rooms, depth, room = [], [], [], [], []
         for name, i in chosen:
             several = lightings[name]
             house = several[int(rng.integers(len(several)))] if len(several) > 1 else several[0]
@@ -167,8 +114,6 @@ def batches(
             rooms.append(turn_strip(house.rooms[i], turn, mirror))
             depth.append(turn_strip(house.log_depth[i], turn, mirror))
             room.append(house.room[i])
-            if plain is not None:
-                bare.append(turn_strip(plain[name].rgb[i], turn * CELL, mirror))
         shares = np.stack(share)
         yield StripBatch(
             torch.from_numpy(np.stack(rgb)),
@@ -177,7 +122,6 @@ def batches(
             torch.from_numpy(np.stack(rooms).astype(np.int64)),
             torch.from_numpy(np.stack(depth).astype(np.float32)),
             torch.from_numpy(np.array(room, dtype=np.int64)),
-            torch.from_numpy(np.stack(bare)) if bare else None,
         )
 
 
@@ -233,14 +177,12 @@ def train_encoder(
     config: VisionConfig,
     folder: Path | None = None,
     *,
-    target: DistillationTarget | None = None,
     device: str = "cpu",
     note: Callable[[str], None] = print,
 ) -> tuple[Encoder, Heads, list[str]]:
     """The encoder, its heads, and the names of the classes that the heads predict; both on the CPU in the end.
 
     Args:
-      target: what to distil from; `config.like` names its encoder.
       device: where PyTorch computes.
       folder: of the run, whose state is kept after each epoch; training goes on from it. None keeps nothing.
 
@@ -251,10 +193,9 @@ def train_encoder(
     """
     if not houses or len({h.classes for h in houses}) != 1:
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
-    _check_target(houses, config, target)
     classes = frequent_classes(houses, config.least_views)
     strips = strip_count(houses)
-    training = _Training(config, len(classes), strips // config.batch, device, target)
+    training = _Training(config, len(classes), strips // config.batch, device)
     note(f"{strips} strips an epoch, of {len(_by_name(houses))} houses, {len(classes)} classes")
     if folder is None:
         for epoch in range(config.epochs):
@@ -266,13 +207,7 @@ def train_encoder(
                 session.add(training.pass_over(houses, classes, epoch, note))
     network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
     names = [houses[0].classes[i] for i in classes]
-    if target is None:
-        return Encoder(network, config.network), heads, names
-    return (
-        dataclasses.replace(target.encoder, network=network, distilled_from=target.encoder.feature_space),
-        heads,
-        names,
-    )
+    return Encoder(network, config.network), heads, names
 
 
 def _digest_of(houses: Sequence[HouseStrips]) -> str:
@@ -280,42 +215,19 @@ def _digest_of(houses: Sequence[HouseStrips]) -> str:
     return digest(*(digest(h.name, h.classes, h.rgb.tobytes(), h.share.tobytes()) for h in houses))
 
 
-def _check_target(houses: Sequence[HouseStrips], config: VisionConfig, target: DistillationTarget | None) -> None:
-    if (target.encoder.digest if target else "") != config.like:
-        raise ValueError(
-            f"the settings name the encoder {config.like[:12]!r} to distil from; pass that encoder as target, or none"
-        )
-    if target is None:
-        return
-    if (target.encoder.name, target.encoder.sharing) != (COMPACT, "strip"):
-        raise ValueError(
-            f"the encoder to distil from is a {target.encoder.name!r} on {target.encoder.sharing}, training one of "
-            f"{COMPACT!r} on strips; name an encoder of `embodied train vision`"
-        )
-    for house in houses:
-        if house.name not in target.strips or len(target.strips[house.name].rgb) != len(house.rgb):
-            raise ValueError(
-                f"house {house.name!r} has {len(house.rgb)} strips, and not as many unlit ones to distil from"
-            )
-
-
 class _Training:
     """Owns what changes while an encoder learns."""
 
-    def __init__(
-        self, config: VisionConfig, classes: int, updates: int, device: str, target: DistillationTarget | None = None
-    ) -> None:
+    def __init__(self, config: VisionConfig, classes: int, updates: int, device: str) -> None:
         """Args:
         updates: per epoch.
         """
-        self.config, self._device, self._target = config, device, target
+        self.config, self._device = config, device
         with seeded(config.seed):
             self.network = build(config.network)
             self.heads = Heads(self.network.size, classes)
         if isinstance(self.network, Lite):
             load_imagenet(self.network)
-        if target is not None:
-            self.network.load_state_dict(target.encoder.network.state_dict())
         self.network.to(device)
         self.heads.to(device)
         parameters = [*self.network.parameters(), *self.heads.parameters()]
@@ -339,17 +251,9 @@ class _Training:
         self.network.train()
         began, smooth = time.monotonic(), dict[str, float]()
         rng = stream(self.config.seed, "vision", "epoch", epoch)
-        target = None if self._target is None else self._target.encoder.to(self._device)
-        plain = None if self._target is None else self._target.strips
-        drawn = batches(
-            houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng, plain=plain
-        )
+        drawn = batches(houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng)
         for done, batch in enumerate(drawn, 1):
-            batch = batch.to(self._device)
-            if target is None:
-                loss, parts = vision_loss(self.network, self.heads, batch)
-            else:
-                loss, parts = distillation_loss(self.network, self.heads, batch, target)
+            loss, parts = vision_loss(self.network, self.heads, batch.to(self._device))
             descend(loss, self._optimizer, f"epoch {epoch + 1}, update {done}")
             self._schedule.step()
             smooth = {k: 0.95 * smooth.get(k, v) + 0.05 * v for k, v in parts.items()}
@@ -370,37 +274,6 @@ def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
     return Encoder(encoder.network, encoder.name, encoder.sharing, mean, mix)
 
 
-def aligned(encoder: Encoder, houses: Sequence[HouseStrips], target: DistillationTarget) -> Encoder:
-    """The encoder with features that are mapped linearly onto those it was taught to see, and spread as widely.
-
-    What is taught by least squares lies nearer to the mean than what it stands for, and the nearer the less of it can
-    be known; an agent should find two views as far apart as where it learned.
-
-    Args:
-      houses: strips to fit the map on, in any light.
-    """
-    teacher = target.encoder.to("cpu")  # training left its network where it computed
-    aims = {name: _seen_by(teacher, [strips]) for name, strips in target.strips.items()}
-    linear, offset = _spread_map(_seen_by(encoder, houses).double(), torch.cat([aims[h.name] for h in houses]).double())
-    mean, mix = encoder.mean, encoder.mix
-    mean = torch.zeros(encoder.size) if mean is None else mean
-    mix = torch.eye(encoder.size) if mix is None else mix
-    both = mix.double() @ linear  # (x - mean) @ mix @ linear + offset, as (x - other) @ both
-    other = mean.double() - offset @ torch.linalg.pinv(both, rtol=1e-4)
-    return dataclasses.replace(encoder, mean=other.float(), mix=both.float())
-
-
-def _spread_map(seen: Tensor, aim: Tensor, ridge: float = 1e-4) -> tuple[Tensor, Tensor]:
-    """(D, D) and (D,): the least-squares map from `seen` to `aim`, both (n, D), stretched so that what it gives has the
-    variance of `aim`, and its offset."""
-    centre, middle = seen.mean(0), aim.mean(0)
-    x, y = seen - centre, aim - middle
-    damped = x.T @ x + ridge * (x**2).sum() / x.shape[1] * torch.eye(x.shape[1], dtype=x.dtype)
-    fitted = torch.linalg.solve(damped, x.T @ y)
-    fitted = fitted * ((y**2).sum() / ((x @ fitted) ** 2).sum()).sqrt()
-    return fitted, middle - centre @ fitted
-
-
 def _seen_by(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Tensor:
     """(n, D) features of all views of all strips."""
     features = [encoder.encode_strips(h.rgb[i : i + batch]) for h in houses for i in range(0, len(h.rgb), batch)]
@@ -410,8 +283,7 @@ def _seen_by(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
 def save_training(encoder: Encoder, heads: Heads, classes: Sequence[str], config: VisionConfig, folder: Path) -> None:
     """encoder.safetensors (half precision), heads.safetensors and classes.json in `folder`."""
     save_encoder(encoder, folder / "encoder.safetensors")
-    heads_of = {"format": "embodied-heads-1", "encoder": encoder.digest}
-    save_tensors(folder / "heads.safetensors", {k: v.half() for k, v in heads.state_dict().items()}, heads_of)
+    save_heads(heads, encoder, classes, folder / "heads.safetensors")
     write_json(folder / "classes.json", {"classes": list(classes), "config": dataclasses.asdict(config)})
 
 

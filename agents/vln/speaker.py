@@ -100,7 +100,7 @@ def train_speaker(lessons: Lessons, config: SpeakerSettings, folder: Path, *, no
     """Train, or go on training, the speaker of a folder by maximum likelihood; returns its file."""
     training, judged = lessons.split("train"), lessons.split("val_unseen", limit=JUDGED)
     words = build_vocabulary(t.request for t in training.tasks).words
-    speaker = new_speaker(SpeakerAbout(config, lessons.encoder.feature_space, lessons.encoder.size, words))
+    speaker = new_speaker(SpeakerAbout(config, lessons.encoder.digest, lessons.encoder.size, words))
     eyes = speaker.eyes(dict(training.worlds), training.bank)
 
     def loss_of(rng: np.random.Generator) -> Tensor:

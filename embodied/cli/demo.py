@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from embodied.interface import Episode, Route
     from embodied.navigation.graph import NavGraph
     from embodied.world import World
+    from viz.recording import Recognise
 
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
@@ -169,6 +170,7 @@ def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: 
     from agents.vision.bank import FeatureBank
     from agents.vision.encoder import load_encoder
     from agents.vision.features import encode_panoramas
+    from agents.vision.recognise import Recogniser
     from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
     from embodied.language import People
@@ -177,30 +179,38 @@ def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: 
     agent, encoder = HannaAgent.load(SHIPPED_AGENT), load_encoder()
     nodes = bar(range(len(world.graph.ids)), "what the agent sees", "node")
     features = encode_panoramas(encoder, (world.panorama(n) for n in nodes))
-    bank = FeatureBank({world.name: features}, encoder.feature_space)
+    bank = FeatureBank({world.name: features}, encoder.digest)
     pool = hanna_pool(world, seed=args.seed)
     task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
     make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
     if args.video:
         film(world, episode, args.video, args.video_size)
-    return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world)
+    recognise = Recogniser.load(encoder)
+    return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world, recognise=recognise)
 
 
 def recorded(
-    world: World, episode: Episode, path: Path, viewers: tuple[str, ...], *, eyes: World | None = None
+    world: World,
+    episode: Episode,
+    path: Path,
+    viewers: tuple[str, ...],
+    *,
+    eyes: World | None = None,
+    recognise: Recognise | None = None,
 ) -> dict:
     """Record an episode into the file `path` and to `viewers`; what is worth telling about it.
 
     Args:
       eyes: the world whose panoramas the agent looked at; None where it looks at none.
+      recognise: names what the agent recognises there.
     """
     from embodied.evaluation.metrics import navigation_error, spl, success
     from viz.recording import record_episode
     from viz.sinks import Sinks
 
     watch = lambda steps: bar(steps, "recording", "step")
-    record_episode(world, episode, Sinks(path, viewers), eyes=eyes, watch=watch)
+    record_episode(world, episode, Sinks(path, viewers), eyes=eyes, watch=watch, recognise=recognise)
     return {
         "agent": episode.agent,
         "request": episode.task.request,

@@ -164,7 +164,7 @@ class VisionOptions(Study, Trained, Strips, WithData):
     """Kinds of pictures that the tables `pictures` and `houses` evaluate on (default: all)."""
     split: str = "val_unseen"
     """Evaluate on the houses of this split."""
-    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig(), skip=("like",))]
+    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig())]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -68,10 +68,7 @@ class TrainVision(Strips, WithData):
     threads: Count = 2
     workers: Count = 1
     """Render N houses in parallel."""
-    distil_from: InputPath | None = None
-    """Distil from this encoder: start from its weights, and map the new pictures to the features that it gives for the
-    same places without light, so that agents trained on its features can use either encoder."""
-    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig(), skip=("like",))]
+    config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig())]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,9 +180,7 @@ def train_vision(args: TrainVision) -> None:
     from agents.vision.run import train_vision
 
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
-    train_vision(
-        source, args.config, args.out, distil_from=args.distil_from, device=args.device, workers=args.workers, note=note
-    )
+    train_vision(source, args.config, args.out, device=args.device, workers=args.workers, note=note)
 
 
 def train_hanna(args: TrainHanna) -> None:

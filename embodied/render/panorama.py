@@ -12,6 +12,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -39,6 +40,17 @@ NEXT = 16
 """From one pixel to the next of those that tell about which part of the faces a picture shows."""
 CREASE = 0.05
 """Depths that differ by more than this share belong to different things and are not mixed."""
+
+
+class Recognised(NamedTuple):
+    """A thing that somebody finds in a panorama."""
+
+    name: str
+    """Its class."""
+    probability: float
+    yaw: float
+    pitch: float
+    """Radians, towards where it is seen best."""
 
 
 @dataclass(frozen=True, eq=False)
