@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from agents.common.shipped import SHIPPED_HEADS
+from agents.common.weights import origin_of
 from agents.vision.encoder import load_encoder, random_encoder, strip_map
 from agents.vision.features import strip_of
 from agents.vision.recognise import Heads, Recogniser, save_heads
@@ -41,7 +42,8 @@ def test_a_thing_is_found_in_the_cell_that_shows_it_best(panorama, tmp_path):
     score = torch.einsum("d,drc->rc", wanted, maps)
     heads.cell_objects.weight.data[0, :, 0, 0] = wanted * 10
     heads.cell_objects.bias.data = torch.tensor([1.0 - 10 * float(score.max()), -5.0])
-    save_heads(heads, encoder, ["mug", "sofa"], tmp_path / "heads.safetensors")
+    save_heads(heads, encoder, ["mug", "sofa"], tmp_path / "heads.safetensors", {"data": "a data set"})
+    assert origin_of(tmp_path / "heads.safetensors") == {"data": "a data set"}
     (found,) = Recogniser.load(encoder, tmp_path / "heads.safetensors")(panorama)
     assert found.name == "mug" and 0.5 < found.probability < 1
     assert (found.yaw, found.pitch) == cell_direction(*divmod(int(score.argmax()), COLUMNS))

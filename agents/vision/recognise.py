@@ -17,6 +17,7 @@ from agents.vision.features import strip_of
 from agents.vision.labels import SHELL
 from agents.vision.strip import COLUMNS, cell_direction
 from assets.records import ROOM_KINDS
+from embodied.identity import Identity
 from embodied.render.panorama import Panorama, Recognised
 
 
@@ -43,9 +44,12 @@ class HeadsAbout:
     classes: tuple[str, ...]
 
 
-def save_heads(heads: Heads, encoder: Encoder, classes: Sequence[str], path: Path) -> None:
-    """Write half-precision weights and the names of the classes, atomically."""
-    save_weights(path, "heads", half_precision(heads), HeadsAbout(encoder.digest, encoder.size, tuple(classes)))
+def save_heads(
+    heads: Heads, encoder: Encoder, classes: Sequence[str], path: Path, identity: Identity | None = None
+) -> None:
+    """Write half-precision weights, the names of the classes and what they were trained with, atomically."""
+    about = HeadsAbout(encoder.digest, encoder.size, tuple(classes))
+    save_weights(path, "heads", half_precision(heads), about, identity)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from agents.vision.training import save_training, train_encoder, trained_classes
 from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
+from embodied.identity import Identity, identity_of
 from embodied.light import lightings_of
 from embodied.locks import locked
 from embodied.render.pictures import PictureSettings
@@ -43,7 +44,9 @@ def train_vision(
     with locked(out):
         seen = source.strips(training_houses(data, config), workers=workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
-        encoder, classes = trained_encoder(seen, config, out, note, device=device)
+        drawn = sorted({drawing(pictures_of(data, h.name, source.picture_kind)) for h in seen})
+        identity = identity_of("agents.vision.run", settings=config, data=data.digest, pictures=", ".join(drawn))
+        encoder, classes = trained_encoder(seen, config, out, note, identity=identity, device=device)
         untrained = whitened(random_encoder(seed=config.seed), seen)
         numbers = {}
         for name, who in (("trained", encoder), ("random", untrained)):
@@ -54,15 +57,25 @@ def train_vision(
 
 
 def trained_encoder(
-    seen: Sequence[HouseStrips], config: VisionConfig, folder: Path, note: Note = print, *, device: str = "cpu"
+    seen: Sequence[HouseStrips],
+    config: VisionConfig,
+    folder: Path,
+    note: Note = print,
+    *,
+    identity: Identity | None = None,
+    device: str = "cpu",
 ) -> tuple[Encoder, list[str]]:
-    """The encoder that `config` makes of strips, from `folder` if it is there, and the classes of its heads."""
+    """The encoder that `config` makes of strips, from `folder` if it is there, and the classes of its heads.
+
+    Args:
+      identity: what it is trained with, for its file.
+    """
     classes = trained_classes(folder, config)
     if classes is None:
         home = folder / "training"
         encoder, heads, classes = train_encoder(seen, config, home, device=device, note=note)
         encoder = whitened(encoder, seen)
-        save_training(encoder, heads, classes, config, folder)
+        save_training(encoder, heads, classes, config, folder, identity)
         (home / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes
 

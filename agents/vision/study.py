@@ -127,7 +127,7 @@ class EncoderStudy(StudyLearner):
         config, lit = self._settings(train, seed), train.get(LIT, 0)
         names = training_houses(Dataset(self.source.data), config)
         seen = [*self._lit().strips(names[:lit], note=note), *self.source.strips(names[lit:], note=note)]
-        trained_encoder(seen, config, home, note, device=self.device)
+        trained_encoder(seen, config, home, note, identity=self.trained(train, seed, folder), device=self.device)
         return home / "encoder.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:

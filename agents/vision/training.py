@@ -31,7 +31,7 @@ from agents.vision.lite import Lite, load_imagenet
 from agents.vision.recognise import Heads, save_heads
 from agents.vision.strip import CELL, COLUMNS
 from assets.cache import digest, write_json
-from embodied.identity import identity_of
+from embodied.identity import Identity, identity_of
 from embodied.records import load_json
 from embodied.render.photograph import camera_traits, photograph
 from embodied.seeds import stream
@@ -280,10 +280,17 @@ def _seen_by(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
     return torch.from_numpy(np.concatenate(features)).flatten(0, 1)
 
 
-def save_training(encoder: Encoder, heads: Heads, classes: Sequence[str], config: VisionConfig, folder: Path) -> None:
+def save_training(
+    encoder: Encoder,
+    heads: Heads,
+    classes: Sequence[str],
+    config: VisionConfig,
+    folder: Path,
+    identity: Identity | None = None,
+) -> None:
     """encoder.safetensors (half precision), heads.safetensors and classes.json in `folder`."""
-    save_encoder(encoder, folder / "encoder.safetensors")
-    save_heads(heads, encoder, classes, folder / "heads.safetensors")
+    save_encoder(encoder, folder / "encoder.safetensors", identity)
+    save_heads(heads, encoder, classes, folder / "heads.safetensors", identity)
     write_json(folder / "classes.json", {"classes": list(classes), "config": dataclasses.asdict(config)})
 
 
