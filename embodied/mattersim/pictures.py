@@ -7,6 +7,7 @@ tile is and how often it is turned; nothing is resampled, so that a face survive
 from __future__ import annotations
 
 import functools
+import math
 from pathlib import Path
 
 import cv2
@@ -17,11 +18,10 @@ from embodied.geometry import yaw_of_heading
 from embodied.render.panorama import (
     PixelGrid,
     checked,
-    padded_nearness,
+    padded_plane,
     padded_rgba,
     perspective_grid,
-    ray_stretch,
-    resampled_depth,
+    read_maps,
     resampled_rgb,
 )
 
@@ -31,10 +31,8 @@ WHERE = {face: (tile, turns) for tile, (face, turns) in enumerate(TILES)}
 """Tile and quarter turns of each face."""
 TURNED_BACK = {1: cv2.ROTATE_90_CLOCKWISE, 2: cv2.ROTATE_180, 3: cv2.ROTATE_90_COUNTERCLOCKWISE}
 """What undoes so many quarter turns."""
-LARGE = 1e30
-"""More than any depth or its inverse."""
 DEPTH_UNITS = 4000.0
-"""Depth is kept in quarters of a millimetre; 0 where nothing is."""
+"""Depth along the ray is kept in quarters of a millimetre; 0 where nothing is."""
 RGB, DEPTH = "{}_skybox_small.jpg", "{}_skybox_depth_small.png"
 FACES = "{}_skybox{}_sami.jpg"
 """The first release reads its tiles from six files."""
@@ -74,7 +72,7 @@ class Skyboxes:
         """
         self.dataset, self.apart = dataset, apart
         self.colours = functools.lru_cache(maxsize=max(1, kept))(self._colours)
-        self.nearness = functools.lru_cache(maxsize=max(1, kept))(self._nearness)
+        self.distances = functools.lru_cache(maxsize=max(1, kept))(self._distances)
 
     def _colours(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_rgba` of a skybox, but blue, green, red.
@@ -89,21 +87,14 @@ class Skyboxes:
             strip = _read(folder / RGB.format(viewpoint), cv2.IMREAD_COLOR)
         return padded_rgba(len(strip), lambda k, to: cv2.cvtColor(face_of(strip, k), cv2.COLOR_RGB2RGBA, dst=to))
 
-    def _nearness(self, scan: str, viewpoint: str) -> np.ndarray:
-        """`padded_nearness` of a skybox for depth in DEPTH_UNITS.
+    def _distances(self, scan: str, viewpoint: str) -> np.ndarray:
+        """`padded_plane` of a skybox's depth along the ray, uint16 DEPTH_UNITS.
 
         Raises:
           ValueError: the picture is missing.
         """
         units = _read(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), cv2.IMREAD_ANYDEPTH)
-        stretch = ray_stretch(len(units))
-
-        def write(k: int, to: np.ndarray) -> None:
-            with np.errstate(divide="ignore"):
-                np.divide(stretch, face_of(units, k), out=to, dtype=np.float32)
-            cv2.threshold(to, LARGE, 0.0, cv2.THRESH_TOZERO_INV, dst=to)
-
-        return padded_nearness(len(units), write)
+        return padded_plane(len(units), lambda k, to: np.copyto(to, face_of(units, k)), kind=np.uint16)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
@@ -115,11 +106,22 @@ class Skyboxes:
     def metres(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
     ) -> np.ndarray:
-        """(h, w, 1) uint16, quarters of a millimetre along the optical axis; 0 where nothing is."""
-        padded = self.nearness(scan, viewpoint)
-        units = resampled_depth(padded, _grid(padded, heading, elevation, vfov, size))
-        cv2.threshold(units, LARGE, 0.0, cv2.THRESH_TOZERO_INV, dst=units)
-        return cv2.add(units, 0.0, dtype=cv2.CV_16U)[..., None]
+        """(h, w, 1) uint16, quarters of a millimetre along the optical axis; 0 where nothing is.
+
+        Distances along the ray are mixed linearly before they are shortened, also across edges, as its shader does.
+        """
+        padded = self.distances(scan, viewpoint)
+        _, x, y = read_maps(padded, _grid(padded, heading, elevation, vfov, size))
+        along_rays = cv2.remap(padded, x, y, cv2.INTER_LINEAR)
+        return cv2.multiply(along_rays, _ray_shortening(vfov, *size), dtype=cv2.CV_16U)[..., None]
+
+
+@functools.lru_cache(maxsize=8)
+def _ray_shortening(vfov: float, height: int, width: int) -> np.ndarray:
+    """(h, w) float32: distance along the optical axis per distance along each pixel's ray."""
+    step = math.tan(vfov / 2) / height
+    right, up = step * np.arange(1 - width, width, 2), step * np.arange(1 - height, height, 2)
+    return (1 / np.sqrt(1 + right**2 + up[:, None] ** 2)).astype(np.float32)
 
 
 def _grid(padded: np.ndarray, heading: float, elevation: float, vfov: float, size: tuple[int, int]) -> PixelGrid:

@@ -181,7 +181,7 @@ class Simulator:
             for row in np.flatnonzero(self._graphs.included)[: self._cache].tolist():
                 self._skyboxes.colours(self._graphs.scans[row], self._graphs.ids[row])
                 if self._depth:
-                    self._skyboxes.nearness(self._graphs.scans[row], self._graphs.ids[row])
+                    self._skyboxes.distances(self._graphs.scans[row], self._graphs.ids[row])
 
     def newEpisode(
         self,

@@ -142,7 +142,7 @@ class Panorama:
     @functools.cached_property
     def _padded_ids(self) -> np.ndarray:
         """The bits of the ids as float32, which OpenCV can copy from place to place."""
-        return _padded(self.size, lambda k, to: np.copyto(to.view(np.int32), self.ids[k]))
+        return padded_plane(self.size, lambda k, to: np.copyto(to.view(np.int32), self.ids[k]))
 
     def _rgb(self, grid: PixelGrid) -> np.ndarray:
         return resampled_rgb(self._padded_rgba, grid)
@@ -151,7 +151,7 @@ class Panorama:
         return resampled_depth(self._padded_nearness, grid)
 
     def _ids(self, grid: PixelGrid) -> np.ndarray:
-        _, x, y = _maps(self._padded_ids, grid)
+        _, x, y = read_maps(self._padded_ids, grid)
         return cv2.remap(self._padded_ids, x, y, cv2.INTER_NEAREST).view(np.int32)
 
 
@@ -174,12 +174,14 @@ def padded_rgba(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarra
 
 def padded_nearness(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarray:
     """(6 (s + 2), s + 2) float32: as `padded_rgba`, 1 / depth, which is linear over a plane; 0 where nothing is."""
-    return _padded(s, write, pad_grid(s).ratio)
+    return padded_plane(s, write, pad_grid(s).ratio)
 
 
-def _padded(s: int, write: Callable[[int, np.ndarray], object], ratio: np.ndarray | None = None) -> np.ndarray:
-    """Six (s, s) float32 with borders of the nearest pixels beyond, times `ratio`."""
-    padded, pad = np.empty((6, s + 2, s + 2), np.float32), pad_grid(s)
+def padded_plane(
+    s: int, write: Callable[[int, np.ndarray], object], ratio: np.ndarray | None = None, kind: type = np.float32
+) -> np.ndarray:
+    """(6 (s + 2), s + 2) of `kind`: as `padded_rgba`, with borders of the nearest pixels beyond, times `ratio`."""
+    padded, pad = np.empty((6, s + 2, s + 2), kind), pad_grid(s)
     for k, whole in enumerate(padded):
         write(k, whole[1:-1, 1:-1])
     flat = padded.reshape(6 * (s + 2), s + 2)
@@ -190,14 +192,14 @@ def _padded(s: int, write: Callable[[int, np.ndarray], object], ratio: np.ndarra
 
 def resampled_rgb(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w, 3) uint8: what a grid shows of `padded_rgba`."""
-    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, _maps(padded, grid)
+    rgba, (_, x, y) = _scratch(grid.shape, threading.get_ident()).rgba, read_maps(padded, grid)
     cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=rgba)
     return cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB)
 
 
 def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """(h, w) float32: the depth that a grid shows of `padded_nearness`; inf where nothing is."""
-    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), _maps(padded, grid)
+    work, (along, x, y) = _scratch(grid.shape, threading.get_ident()), read_maps(padded, grid)
     nearest = cv2.remap(padded, x, y, cv2.INTER_NEAREST)
     cv2.remap(padded, x, y, cv2.INTER_LINEAR, dst=work.smooth)
     cv2.divide(work.smooth, nearest, dst=work.ratio)
@@ -208,9 +210,9 @@ def resampled_depth(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
         return np.divide(1.0, nearest, out=nearest)
 
 
-def _maps(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
+def read_maps(padded: np.ndarray, grid: PixelGrid) -> np.ndarray:
     """The maps of a grid, once what they show has been read: in order it comes into the cache sooner than by pixels."""
-    maps, words = grid.maps(), padded.view(np.int32).reshape(padded.shape[:2])
+    maps, words = grid.maps(), padded if padded.ndim == 2 else padded.view(np.int32)[..., 0]
     for rows, columns in grid.shown:
         cv2.countNonZero(words[rows, columns])
     return maps
