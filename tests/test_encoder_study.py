@@ -8,6 +8,7 @@ import dataclasses
 import numpy as np
 import pytest
 from hand_data import build, small_house
+from hand_pixels import world_in
 
 from agents.common.weights import weights_digest
 from agents.studies.engine import run_study
@@ -68,19 +69,18 @@ def setting(data, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_is_trained(setting, data, tmp_path):
-    out, rows = tmp_path / "study", ["one", "two"]
-    run_study(setting, ["encoders", "pictures"], out, rows=rows, note=lambda line: None)
-    body = read_json(out / "vision-pictures.json")
+def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_is_trained(setting, tmp_path):
+    out = tmp_path / "study"
+    run_study(setting, ["houses"], out, note=lambda line: None)
+    body = read_json(out / "vision-houses.json")
     found = {r["label"]: r["values"] for r in body["rows"]}
     assert [c["key"] for c in body["columns"]][:3] == ["AP_fast", "goal_AP_fast", "chance_AP_fast"]
-    for name in rows:
+    for name in ("one", "two"):
         for way in ("fast", "unlit"):
             assert found[name][f"AP_{way}"]["mean"] > found[name][f"chance_AP_{way}"]["mean"]
     assert found["two"]["AP_fast"]["half_width"] is not None and found["one"]["AP_fast"]["half_width"] is None
-    assert "Not run: compact" in (out / "vision-encoders.md").read_text()
     kept = {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
-    run_study(setting, ["pictures"], out, rows=rows, note=lambda line: None)
+    run_study(setting, ["houses"], out, note=lambda line: None)
     assert kept == {p: p.stat().st_mtime_ns for p in (out / "runs").rglob("*.json")}
 
 
@@ -97,18 +97,29 @@ def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setti
     assert [c["key"] for c in body["columns"]][::6] == ["AP_fast", "AP_unlit"]
     digests = {p.parent.name: weights_digest(p) for p in (tmp_path / "study").rglob("encoder.safetensors")}
     assert len(set(digests.values())) == 2, "one of them learned from lit pictures"
-    wider = dataclasses.replace(study, houses=(2, 8), config=dataclasses.replace(config, epochs=3))
-    assert [r.train["epochs"] for r in wider.tables()["houses"].rows[:3]] == [12, 3, 3], "as many updates"
+    wider = dataclasses.replace(study, houses=(2, 8, 48), budget=8, config=dataclasses.replace(config, epochs=3))
+    rows = [r.train for r in wider.tables()["houses"].rows[:4]]
+    assert [r["epochs"] for r in rows] == [12, 3, 1, 3] and rows[2]["share"] == 0.5, "as many updates"
+
+
+def test_of_more_houses_than_the_budget_some_viewpoints_are_drawn(data, tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.vision.drawn.drawn_world", lambda *_: world_in(tmp_path))
+    source = StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "unlit", share=0.5)
+    name = data.names("train")[0]
+    (half,) = source.strips([name], note=lambda line: None)
+    (whole,) = dataclasses.replace(source, share=1.0).strips([name], note=lambda line: None)
+    assert 0 < len(half.rgb) == -(-len(whole.rgb) // 2)
+    assert (half.rgb[0] == whole.rgb[0]).all() and (half.share[-1] == whole.share[-1]).all()
 
 
 def test_an_encoder_that_the_study_trains_keeps_its_name(setting):
-    with pytest.raises(ValueError, match=r"\['compact'\] are trained by the study"):
-        dataclasses.replace(setting, ready={"compact": [setting.source.folder]})
+    with pytest.raises(ValueError, match=r"\['8 houses'\] are trained by the study"):
+        dataclasses.replace(setting, houses=(8,), ready={"8 houses": [setting.source.folder]})
 
 
 def test_files_of_one_name_are_training_seeds(tmp_path):
     parser = argparse.ArgumentParser()
     add_options(parser, VisionOptions)
-    words = ["pictures", "--data", str(tmp_path), "--out", str(tmp_path / "o"), "--encoders", "a=x", "b=y", "a=z"]
+    words = ["--data", str(tmp_path), "--out", str(tmp_path / "o"), "--encoders", "a=x", "b=y", "a=z"]
     arms = by_name(read_options(parser.parse_args(words), VisionOptions).encoders)
     assert {name: [p.name for p in paths] for name, paths in arms.items()} == {"a": ["x", "z"], "b": ["y"]}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import joblib
+import numpy as np
 
 from agents.vision.config import RENDER_PRESETS, drawing, lit_name
 from agents.vision.labels import HouseStrips, all_classes, look
@@ -76,6 +78,8 @@ class StripSource:
     """As `pictures_of` takes it."""
     lights: int = 1
     """Lightings that every house is seen in; the first is its own."""
+    share: float = 1.0
+    """Of the viewpoints of each house, in regular steps."""
 
     def strips(
         self, names: Sequence[str], *, workers: int = 1, note: Callable[[str], None] = print
@@ -94,7 +98,8 @@ class StripSource:
 
     def _paths(self, data: Dataset, name: str) -> list[Path]:
         """Where the strips of a house are, in its own light and in others."""
-        folder = self.folder / drawing(pictures_of(data, name, self.picture_kind))
+        part = "" if self.share == 1 else f"_{self.share:.4f}"
+        folder = self.folder / f"{drawing(pictures_of(data, name, self.picture_kind))}{part}"
         return [folder / f"{lit_name(name, k)}.npz" for k in range(self.lights)]
 
     def _draw(self, name: str) -> str:
@@ -104,5 +109,8 @@ class StripSource:
         for lit, path in zip(lightings, self._paths(data, name), strict=True):
             if not path.exists():
                 with drawn_world(data, name, self.cache, pictures, lit) as world:
-                    look(world, classes).save(path)
+                    count = len(world.graph.positions)
+                    look(world, classes, np.linspace(0, count - 1, math.ceil(self.share * count)).astype(int)).save(
+                        path
+                    )
         return name

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,7 +34,7 @@ MOST = 2**30
 
 @dataclass(frozen=True, eq=False)
 class HouseStrips:
-    """Every node of one house: pictures and labels; n is the number of nodes."""
+    """Nodes of one house: pictures and labels; n is their number."""
 
     name: str
     classes: tuple[str, ...]
@@ -97,12 +97,12 @@ def all_classes(catalogue: Catalogue) -> tuple[str, ...]:
     return tuple(sorted({*catalogue.classes, *OPENING_KINDS, *SHELL}))
 
 
-def look(world: World, classes: Sequence[str]) -> HouseStrips:
-    """Draw every node of a world and label what is seen."""
+def look(world: World, classes: Sequence[str], nodes: Iterable[int]) -> HouseStrips:
+    """Draw nodes of a world and label what is seen."""
     object_class, room_of_id = ids_to_labels(world.house, classes)
-    rgb, share, rooms, depths = [], [], [], []
+    rgb, share, rooms, depths, room = [], [], [], [], []
     rows = margin()
-    for node in range(len(world.graph.positions)):
+    for node in nodes:
         panorama = world.panorama(node)
         ids, depth = panorama.equirect_ids(EQUIRECT)[rows], panorama.equirect_depth(EQUIRECT)[rows]
         labels = cell_labels(ids, np.minimum(depth, FARTHEST), object_class, room_of_id, len(classes))
@@ -110,7 +110,7 @@ def look(world: World, classes: Sequence[str]) -> HouseStrips:
         share.append(labels[0])
         rooms.append(labels[1])
         depths.append(labels[2])
-    room = [ROOM_KINDS.index(world.house.room_by_id[str(r)].kind) for r in world.graph.room_of_node]
+        room.append(ROOM_KINDS.index(world.house.room_by_id[str(world.graph.room_of_node[node])].kind))
     return HouseStrips(
         world.house.name,
         tuple(classes),

@@ -1,21 +1,15 @@
-"""Encoders on equal terms: the same pictures, as many passes, judged on the same houses (no counterpart in the
-dissertation, whose features are a ResNet-152's).
+"""Encoders by the number of houses that they learn in, from as many pictures, judged on the same houses (no counterpart
+in the dissertation, whose features are a ResNet-152's).
 
-    embodied study vision encoders --data DATA --out STUDY
-    embodied study vision pictures --data DATA --out STUDY --split test_unseen
-    embodied study vision pictures --data DATA --out STUDY --lights 3 --encoders one=A.safetensors three=B.safetensors
-    embodied study vision houses --data DATA --out STUDY --pictures unlit --houses 12 48 128 --test-pictures unlit fast
+    embodied study vision --data DATA --out STUDY --pictures unlit --houses 12 48 128 --test-pictures unlit fast
 
-Readers are fitted on training houses, in the pictures that the encoders of the study learn from; 'pictures' judges
-houses in their own light. In 'houses', encoders learn in so many houses, all for as many updates, and readers are
-fitted in the same few houses for all, in the kind of pictures that is judged; `--encoders` adds those that are there.
+Readers are fitted in the same few houses for all, in the kind of pictures that is judged; `--encoders` adds encoders
+that are there already.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import statistics
-import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -40,22 +34,20 @@ from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.interface import FindObject
 
-COLUMNS = ("AP", "goal AP", "chance AP", "room accuracy", "depth R²", "place AUC", "ms a node", "MB")
+COLUMNS = ("AP", "goal AP", "chance AP", "room accuracy", "depth R²", "place AUC")
 GOALS = 60
 """The goal AP is a mean over so many classes: those that tasks seek most often, or all if they seek none."""
 READY = "ready"
 """In a row: the name of encoders that are there already."""
 LIT = "lit"
 """In a row: so many of the houses to learn from are seen in light."""
-READERS = "readers"
-"""In a row: readers are fitted in so many houses, drawn as those that are judged."""
-STRIPS = 8
-"""Strips at once when an encoder's price is measured."""
+SHARE = "share"
+"""In a row: such a share of the viewpoints of each house is seen."""
 
 
 @dataclass(frozen=True)
 class EncoderStudy(StudyLearner):
-    """Encoders of several kinds, whose splits are ways of drawing."""
+    """Encoders, whose splits are ways of drawing."""
 
     source: StripSource
     config: VisionConfig
@@ -64,15 +56,18 @@ class EncoderStudy(StudyLearner):
     split: str = "val_unseen"
     """Whose houses they are judged on; choose on validation houses."""
     pictures: tuple[str, ...] = tuple(RENDER_PRESETS)
-    """What the table of pictures judges on."""
+    """What is judged on."""
     threads: int = 1
     device: str = "cpu"
     workers: int = 1
     """Houses drawn side by side."""
     houses: tuple[int, ...] = ()
-    """Numbers of houses that encoders of the table of houses learn in."""
+    """Numbers of houses that encoders learn in."""
+    budget: int = 0
+    """All learn from as many pictures as so many houses have in all epochs; 0: the most of `houses`. Of more houses,
+    only some viewpoints are seen."""
     lit_houses: int = 12
-    """In that table: so many houses are seen in light by one more encoder, and by readers."""
+    """So many houses are seen in light by one more encoder, and by readers."""
     ready: Mapping[str, Sequence[Path]] = field(default_factory=dict)
     """Encoders that are there already, judged beside those that are trained: by row, one file per training seed."""
 
@@ -80,28 +75,27 @@ class EncoderStudy(StudyLearner):
     judges = ("agents.vision.study",)
 
     def __post_init__(self) -> None:
-        if twice := sorted(self.ready.keys() & {self.config.network}):
-            raise ValueError(f"encoders of the names {twice} are trained by the study; give those of --encoders others")
+        labels = [row.label for row in self.tables()["houses"].rows]
+        if twice := {name for name in labels if labels.count(name) > 1}:
+            raise ValueError(f"encoders of the names {sorted(twice)} are trained by the study; give --encoders others")
+
+    @property
+    def _budget(self) -> int:
+        return self.budget or max(self.houses, default=0)
 
     def tables(self) -> Mapping[str, StudyTable]:
-        rows = (StudyRow(self.config.network, {}), *(StudyRow(n, {READY: n}) for n in self.ready))
-        return {
-            "encoders": StudyTable("Encoders: what linear readers make of them", rows, COLUMNS),
-            "pictures": StudyTable("Encoders, judged on other pictures", rows, COLUMNS[:6], self.pictures),
-            "houses": StudyTable("Encoders by houses to learn in", self._by_houses(), COLUMNS[:6], self.pictures),
-        }
-
-    def _by_houses(self) -> tuple[StudyRow, ...]:
-        """As many updates in fewer and in more houses, and in the most with some of them lit; then encoders that are
-        there already."""
-        if not self.houses:
-            return ()
-        most = max(self.houses)
-        train = {n: {"training_houses": n, "epochs": round(self.config.epochs * most / n)} for n in self.houses}
-        judge = {READERS: self.lit_houses}
-        mixed = StudyRow(f"{most} houses, {self.lit_houses} of them lit", {**train[most], LIT: self.lit_houses}, judge)
-        ready = (StudyRow(name, {READY: name}, judge) for name in self.ready)
-        return (*(StudyRow(f"{n} houses", train[n], judge) for n in self.houses), mixed, *ready)
+        """As many updates in fewer and in more houses, and in the budget's with some of them lit; then encoders that
+        are there already."""
+        budget, rows = self._budget, []
+        pictures = self.config.epochs * budget
+        for n in self.houses:
+            share = {SHARE: pictures / n} if n > pictures else {}
+            rows.append(StudyRow(f"{n} houses", {"training_houses": n, "epochs": round(pictures / n) or 1, **share}))
+        if self.houses:
+            lit = {"training_houses": budget, "epochs": self.config.epochs, LIT: self.lit_houses}
+            rows.append(StudyRow(f"{budget} houses, {self.lit_houses} of them lit", lit))
+        rows += [StudyRow(name, {READY: name}) for name in self.ready]
+        return {"houses": StudyTable("Encoders by houses to learn in", tuple(rows), COLUMNS, self.pictures)}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         train = row.train or {}
@@ -110,31 +104,46 @@ class EncoderStudy(StudyLearner):
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Strips are drawn before encoders share the cores."""
         data = Dataset(self.source.data)
-        lit = max((row.judge.get(READERS, 0) for row in rows), default=0)
-        for way in ("", *splits):
-            seen = training_houses(data, self.config)[: lit if way else None]
-            self._source(way).strips([*houses_of(data, (self.split,)), *seen], workers=self.workers, note=note)
+        seen, unseen = self._known(data), houses_of(data, (self.split,))
+        self.source.strips([*unseen, *seen], workers=self.workers, note=note)
+        for way in splits:
+            self._source(way).strips([*unseen, *seen[: self.lit_houses]], workers=self.workers, note=note)
+        for row in rows:
+            if SHARE in (row.train or {}):
+                self._strips(row.train or {}, 0, note)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         if READY in train:
             return identity_of(file=weights_digest(self.ready[train[READY]][seed]))
-        light = {LIT: train[LIT], "lit pictures": self._lit().picture_kind} if LIT in train else {}
-        return identity_of("agents.vision.run", settings=self._settings(train, seed), **light, **self._drawn())
+        other: dict[str, object] = {k: train[k] for k in (LIT, SHARE) if k in train}
+        if LIT in train:
+            other["lit pictures"] = self._lit().picture_kind
+        return identity_of("agents.vision.run", settings=self._settings(train, seed), **other, **self._drawn())
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         if READY in train:
             return self.ready[train[READY]][seed]
-        config, lit = self._settings(train, seed), train.get(LIT, 0)
-        names = training_houses(Dataset(self.source.data), config)
-        seen = [*self._lit().strips(names[:lit], note=note), *self.source.strips(names[lit:], note=note)]
+        config = self._settings(train, seed)
+        seen = self._strips(train, seed, note)
         trained_encoder(seen, config, home, note, identity=self.trained(train, seed, folder), device=self.device)
         return home / "encoder.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {**self._drawn(), "of": self.split, "least views": self.config.least_views}
+        return {**self._drawn(), "of": self.split, "least views": self.config.least_views, "lit": self.lit_houses}
+
+    def _known(self, data: Dataset) -> list[str]:
+        """Names of the houses whose classes are judged."""
+        return training_houses(data, self.config)[: self._budget or None]
+
+    def _strips(self, train: Mapping[str, Any], seed: int, note: Note) -> list[HouseStrips]:
+        """What an encoder learns from."""
+        names, lit = training_houses(Dataset(self.source.data), self._settings(train, seed)), train.get(LIT, 0)
+        unlit = dataclasses.replace(self.source, share=train.get(SHARE, 1.0))
+        lit_ones = self._lit().strips(names[:lit], note=note)
+        return [*lit_ones, *unlit.strips(names[lit:], workers=self.workers, note=note)]
 
     def _settings(self, train: Mapping[str, Any], seed: int) -> VisionConfig:
-        return dataclasses.replace(self.config, seed=seed, **{k: v for k, v in train.items() if k != LIT})
+        return dataclasses.replace(self.config, seed=seed, **{k: v for k, v in train.items() if k not in (LIT, SHARE)})
 
     def _lit(self) -> StripSource:
         """Pictures with light: of the first kind that is judged and has any."""
@@ -142,26 +151,26 @@ class EncoderStudy(StudyLearner):
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         assert weights is not None, "every row is an encoder"
-        data, encoder, seen = Dataset(self.source.data), load_encoder(weights), self._seen()
-        classes = [seen[0].classes[i] for i in frequent_classes(seen, self.config.least_views)]
-        unseen = self._source(split).strips(houses_of(data, (self.split,)))
-        if READERS in row.judge:
-            names = training_houses(data, self.config)[: row.judge[READERS]]
-            seen = self._source(split).strips(names, note=lambda line: None)
-        known, other = (labelled(data, houses, encoder, classes) for houses in (seen, unseen))
+        data, encoder = Dataset(self.source.data), load_encoder(weights)
+        names = self._known(data)
+        shown = self.source.strips(names, note=lambda line: None)
+        classes = [shown[0].classes[i] for i in frequent_classes(shown, self.config.least_views)]
+        drawn = self._source(split)
+        read_in = drawn.strips(names[: self.lit_houses], note=lambda line: None)
+        unseen = drawn.strips(houses_of(data, (self.split,)))
+        known, other = (labelled(data, houses, encoder, classes) for houses in (read_in, unseen))
         found = read(known, other, seed=self.config.seed)
         ap = dict(zip(classes, found.ap, strict=True))
         goals = float(np.nanmean([ap[c] for c in sought(data) or classes if c in ap]))
         numbers = (found.mean_ap, goals, found.chance_ap, 100 * found.room_accuracy, found.depth_r2, found.place_auc)
-        cost = (encoding_ms(encoder.encode_strips, unseen), weights.stat().st_size / 1e6)
-        return {name: Samples((float(v),)) for name, v in zip(COLUMNS, (*numbers, *cost), strict=True)}
+        return {name: Samples((float(v),)) for name, v in zip(COLUMNS, numbers, strict=True)}
 
     def about(self) -> str:
         data = Dataset(self.source.data)
         return (
-            f"Readers fitted on {len(training_houses(data, self.config))} training houses, judged on "
-            f"{len(houses_of(data, (self.split,)))} of {self.split}. {self.config.epochs} passes; seeds "
-            f"{', '.join(map(str, self.repeats))}; rooms in per cent; prices in processor time of one core."
+            f"Linear readers fitted in {self.lit_houses} training houses in the pictures that are judged, judged in "
+            f"{len(houses_of(data, (self.split,)))} of {self.split}; seeds {', '.join(map(str, self.repeats))}; rooms "
+            "in per cent."
         )
 
     def _drawn(self) -> dict[str, object]:
@@ -173,21 +182,8 @@ class EncoderStudy(StudyLearner):
         """Pictures as they learned from, or drawn otherwise."""
         return dataclasses.replace(self.source, picture_kind=way, lights=1) if way else self.source
 
-    def _seen(self) -> list[HouseStrips]:
-        return self.source.strips(training_houses(Dataset(self.source.data), self.config), note=lambda line: None)
-
 
 def sought(data: Dataset) -> list[str]:
     """The classes that training tasks seek most often."""
     goals = Counter(t.goal.object_class for t in data.tasks("train") if isinstance(t.goal, FindObject))
     return [name for name, _ in goals.most_common(GOALS)]
-
-
-def encoding_ms(encode: Any, houses: Sequence[HouseStrips], rounds: int = 5) -> float:
-    """Milliseconds of processor time per viewpoint, the median of some looks at several strips."""
-    strips, times = houses[0].rgb[:STRIPS], []
-    for _ in range(rounds + 1):
-        began = time.process_time()
-        encode(strips)
-        times.append((time.process_time() - began) / len(strips) * 1000)
-    return statistics.median(times[1:])

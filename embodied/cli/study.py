@@ -2,7 +2,7 @@
 
     embodied study hanna 4.5 --data DATA --judged-in OTHER --out STUDY --seeds 3
     embodied study find --data DATA --out STUDY
-    embodied study vision encoders pictures --data DATA --out STUDY
+    embodied study vision --data DATA --houses 12 48 --out STUDY
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study vln followers speaker --data DATA --out STUDY
@@ -150,18 +150,18 @@ class FindOptions(Study, Trained, WithData, EncoderFile):
 class VisionOptions(Study, Trained, Strips, WithData):
     """Encoders that turn pictures into features."""
 
-    tables: Tables
-    """Make these tables: encoders, pictures or houses."""
     seeds: Seeds = 1
     houses: Annotated[tuple[int, ...], Option(whole(1), "N")] = ()
-    """Numbers of training houses that the table `houses` compares."""
+    """Numbers of training houses to compare."""
+    budget: Count = 0
+    """Train every encoder on as many pictures as N houses have in all epochs; of more houses only some viewpoints are
+    drawn (default: the largest of --houses)."""
     lit_houses: Count = 12
-    """In the table `houses`: N houses are lit for one more encoder, and for readers."""
+    """N houses are lit for one more encoder, and for linear readers."""
     encoders: NamedFiles = ()
-    """Evaluate these encoders instead of training those that --rows names; those of one name are training seeds of one
-    kind."""
+    """Evaluate these encoders, too; those of one name are training seeds of one kind."""
     test_pictures: tuple[Annotated[str, PRESETS], ...] = tuple(RENDER_PRESETS)
-    """Kinds of pictures that the tables `pictures` and `houses` evaluate on (default: all)."""
+    """Kinds of pictures to evaluate on (default: all)."""
     split: str = "val_unseen"
     """Evaluate on the houses of this split."""
     config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig())]
@@ -323,10 +323,9 @@ def vision(args: VisionOptions) -> int:
     from agents.vision.study import EncoderStudy
 
     check_device(args.device)
-    ready = by_name(args.encoders)
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
-    learner = study_of(EncoderStudy, args, source=source, pictures=args.test_pictures, ready=ready)
-    return run_table(args, learner, rows=args.rows or tuple(ready))
+    ready = by_name(args.encoders)
+    return run_table(args, study_of(EncoderStudy, args, source=source, pictures=args.test_pictures, ready=ready))
 
 
 def hari(args: HariOptions) -> int:
