@@ -46,8 +46,13 @@ def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
                 look = functools.partial(_look, panorama, SHOWN[shown], size, itertools.count(0.01, 1.01))
                 yield _rate(f"{name}, {shown}, new angles", look)
         write_skybox(panorama, "viewpoint", skybox_folder(folder, "scan"))
+        kept = Skyboxes(folder, 1)
         for shown, depth in (("rgb", False), ("rgb and depth", True)):
-            yield _rate(f"skyboxes of {SIZE} not in memory, {shown}", functools.partial(_open, folder, depth))
+            for (height, width), *_ in AIMS:
+                again = functools.partial(_open, lambda: kept, depth, (height, width))
+                yield _rate(f"skyboxes of {SIZE} in memory, {width} x {height}, {shown}", again)
+            anew = functools.partial(_open, functools.partial(Skyboxes, folder, 1), depth, (480, 640))
+            yield _rate(f"skyboxes of {SIZE} not in memory, {shown}", anew)
 
 
 def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Measure:
@@ -62,10 +67,10 @@ def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], 
             panorama.through(grid, channel)
 
 
-def _open(folder: str, depth: bool) -> None:
-    """VIEWS times the first picture of a skybox."""
+def _open(skyboxes: Callable[[], Skyboxes], depth: bool, size: tuple[int, int]) -> None:
+    """VIEWS times a picture of a skybox."""
     for _ in range(VIEWS):
-        boxes = Skyboxes(folder, 1)
-        boxes.rgb("scan", "viewpoint", 0.0, 0.0, VFOV36, (480, 640))
+        boxes = skyboxes()
+        boxes.rgb("scan", "viewpoint", 0.0, 0.0, VFOV36, size)
         if depth:
-            boxes.metres("scan", "viewpoint", 0.0, 0.0, VFOV36, (480, 640))
+            boxes.metres("scan", "viewpoint", 0.0, 0.0, VFOV36, size)
