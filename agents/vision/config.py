@@ -23,11 +23,11 @@ RENDER_PRESETS: Mapping[str, PictureSettings] = {
     "fast": PictureSettings(192, "fast"),
     "normal-matte": PictureSettings(192, "normal-matte"),
     "normal": PictureSettings(192, "normal"),
-    "traced": PictureSettings(96, "traced", light="fast", rays=4),
+    "traced": PictureSettings(192, "traced", light="fast", rays=4),
     "reference": PictureSettings(96, "reference", light="fast", rays=8),
 }
 """How encoders and agents may be shown houses, besides as a data set holds them, by kinds of pictures. Traced ones are
-coarse and of few rays, denoised, or a house would take hours; their exposure is that of 'fast' light."""
+of few rays, and references coarse besides, or a house would take hours; their exposure is that of 'fast' light."""
 
 
 def drawing(pictures: PictureSettings) -> str:

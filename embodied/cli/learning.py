@@ -22,7 +22,7 @@ SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "la
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
     pictures: Annotated[str | None, PRESET] = None
-    """How the encoded pictures are drawn; traced and reference at 96 pixels with few rays (default: as the panoramas of
+    """How the encoded pictures are drawn; traced and reference of few rays (default: as the panoramas of
     the data set, else unlit)."""
 
 
