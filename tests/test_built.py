@@ -14,22 +14,7 @@ import pytest
 import shapely
 
 from assets.built import MAKERS, soft, storage, tableware
-from assets.built.primitives import (
-    ball,
-    bar,
-    box,
-    cylinder,
-    extruded,
-    fitted,
-    flat,
-    lathe,
-    part,
-    pillow,
-    scaled,
-    sheet,
-    tube,
-    turned,
-)
+from assets.built.primitives import ball, bar, box, cylinder, extruded, fitted, flat, lathe, part, pillow, sheet, tube
 from assets.built.table import BUILDS, read_makers, remade
 from assets.materials import MATERIALS
 from assets.materials.registry import read_materials
@@ -119,11 +104,11 @@ def test_a_primitive_is_closed_faces_outward_and_has_its_volume(name):
 def test_a_pillow_is_closed_and_moving_shapes_keeps_them_outward():
     for shape in (
         pillow(0.4, 0.5, 0.15),
-        scaled(box([0, 0, 0], [1, 1, 1], 0.1), -1, 1, 2),
-        turned(cylinder(1, 0, 1), 1.0, "x"),
+        box([0, 0, 0], [1, 1, 1], 0.1).scaled(-1, 1, 2),
+        cylinder(1, 0, 1).turned(1.0, "x"),
     ):
         assert volume(shape) > 0 and against_normals(shape) == 0
-    assert volume(scaled(box([0, 0, 0], [1, 2, 3]), 1, -2, 1)) == pytest.approx(12)
+    assert volume(box([0, 0, 0], [1, 2, 3]).scaled(1, -2, 1)) == pytest.approx(12)
 
 
 def test_a_flat_polygon_has_its_area_and_looks_up_or_down():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assets.built.maker import BLACK, PORCELAIN, FinishOf, Look, Size, handle, material, metal, parts_of, plain
-from assets.built.primitives import Shape, bar, box, cylinder, lathe, moved, pillow, scaled, turned
+from assets.built.primitives import Shape, bar, box, cylinder, lathe, pillow
 from assets.records import MeshPart
 
 
@@ -27,7 +27,7 @@ def bed(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     count = max(1, round(w / 0.8))
     each = inner / count
     one = pillow(each * 0.86, 0.42, 0.15)
-    pillows = [moved(one, -inner / 2 + each * (k + 0.5), d / 2 - 0.3, top + 0.04) for k in range(count)]
+    pillows = [one.moved(-inner / 2 + each * (k + 0.5), d / 2 - 0.3, top + 0.04) for k in range(count)]
     return parts_of(
         (material(look, "wood", finish, "oak/0"), frame),
         (finish("cotton/0"), [mattress, *pillows]),
@@ -52,9 +52,9 @@ def sofa(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         x = -inner / 2 + each * (k + 0.5)
         low, high = [x - each / 2 + 0.004, -d / 2, seat - 0.14], [x + each / 2 - 0.004, d / 2 - back, seat]
         cushions.append(box(low, high, 0.035))
-        lean = turned(pillow(each * 0.95, h - seat + 0.02, 0.17), np.pi / 2 + 0.18, "x")
-        cushions.append(moved(lean, x, d / 2 - back - 0.04, (h + seat) / 2))
-    feet = [moved(cylinder(0.022, 0, 0.1), x, y) for x in _edges(w, 0.12) for y in _edges(d, 0.12)]
+        lean = pillow(each * 0.95, h - seat + 0.02, 0.17).turned(np.pi / 2 + 0.18, "x")
+        cushions.append(lean.moved(x, d / 2 - back - 0.04, (h + seat) / 2))
+    feet = [cylinder(0.022, 0, 0.1).moved(x, y) for x in _edges(w, 0.12) for y in _edges(d, 0.12)]
     return parts_of((material(look, "cloth", finish, "tweed/0"), [*body, *cushions]), (finish("walnut/0"), feet))
 
 
@@ -96,7 +96,7 @@ def chair(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
         for z in np.linspace(seat + 0.14, h - 0.075, 3)
     ]
     wood += [bar([x, -d / 2 + leg, 0.2], [x, d / 2 - leg, 0.2], 0.02, 0.02) for x in _edges(w, leg)]
-    cushion = moved(pillow(w * 0.92, (d - 0.03) * 0.92, 0.06), 0, -0.012, seat + 0.012)
+    cushion = pillow(w * 0.92, (d - 0.03) * 0.92, 0.06).moved(0, -0.012, seat + 0.012)
     return parts_of(
         (material(look, "wood", finish, "oak/0"), wood), (material(look, "cloth", finish, "linen/3"), cushion)
     )
@@ -109,11 +109,11 @@ def office_chair(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     dark: list[Shape] = [cylinder(0.028, 0.09, seat - 0.06)]
     for angle in np.arange(5) * 2 * np.pi / 5 + np.pi / 10:
         x, y = reach * np.cos(angle), reach * np.sin(angle)
-        dark += [bar([0, 0, 0.1], [x, y, 0.07], 0.04, 0.03), moved(cylinder(0.028, 0, 0.056), x, y)]
+        dark += [bar([0, 0, 0.1], [x, y, 0.07], 0.04, 0.03), cylinder(0.028, 0, 0.056).moved(x, y)]
     dark.append(bar([0, d * 0.3, seat - 0.05], [0, d / 2 - 0.03, h - 0.3], 0.06, 0.02))
     pads = [
-        moved(pillow(w * 0.8, d * 0.78, 0.11), 0, -d * 0.05, seat - 0.01),
-        moved(turned(pillow(w * 0.74, h - seat - 0.1, 0.1), np.pi / 2, "x"), 0, d / 2 - 0.06, (h + seat) / 2 + 0.05),
+        pillow(w * 0.8, d * 0.78, 0.11).moved(0, -d * 0.05, seat - 0.01),
+        pillow(w * 0.74, h - seat - 0.1, 0.1).turned(np.pi / 2, "x").moved(0, d / 2 - 0.06, (h + seat) / 2 + 0.05),
     ]
     return parts_of((BLACK, dark), (material(look, "cloth", finish, "tweed/0"), pads))
 
@@ -126,13 +126,13 @@ def toilet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     lid = lathe([(0, rim - 0.03), (0.2, rim - 0.03), (0.2, rim - 0.008), (0.19, rim), (0, rim)], 28)
     length = (d - tank) / 0.4
     place = {"y": -d / 2 + (d - tank) / 2}
-    oval = [moved(scaled(s, w / 0.42, length, 1.0), **place) for s in (bowl, lid)]
+    oval = [s.scaled(w / 0.42, length, 1.0).moved(**place) for s in (bowl, lid)]
     cistern = [
         box([-w / 2 + 0.01, d / 2 - tank, rim - 0.02], [w / 2 - 0.01, d / 2, h - 0.03], 0.02),
         box([-w / 2, d / 2 - tank - 0.01, h - 0.03], [w / 2, d / 2, h - 0.006], 0.008),
         box([-0.1, d / 2 - tank - 0.08, 0], [0.1, d / 2, rim - 0.02], 0.02),
     ]
-    button = moved(cylinder(0.025, h - 0.006, h), 0, d / 2 - tank / 2)
+    button = cylinder(0.025, h - 0.006, h).moved(0, d / 2 - tank / 2)
     return parts_of((PORCELAIN, [*oval, *cistern]), (metal(look, finish, "chrome"), button))
 
 
@@ -171,7 +171,7 @@ def low_cabinet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
     w, d, h = size
     foot = 0.1
     wood = [box([-w / 2, -d / 2 + 0.02, foot], [w / 2, d / 2, h], 0.003)]
-    wood += [moved(cylinder(0.018, 0, foot), x, y) for x in _edges(w, 0.12) for y in _edges(d, 0.12)]
+    wood += [cylinder(0.018, 0, foot).moved(x, y) for x in _edges(w, 0.12) for y in _edges(d, 0.12)]
     count = max(2, round(w / 0.5))
     edges, grips = np.linspace(-w / 2, w / 2, count + 1), []
     for k, (a, b) in enumerate(zip(edges, edges[1:])):

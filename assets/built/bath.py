@@ -28,17 +28,11 @@ from assets.built.primitives import (
     box,
     cylinder,
     extruded,
-    hung,
     joined,
     lathe,
-    moved,
     quads,
-    reversed_shape,
-    scaled,
     sheet,
-    shifted_uv,
     tube,
-    turned,
     unrolled_uv,
 )
 from assets.built.soft import layers
@@ -63,13 +57,13 @@ def vanity(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     slab = extruded(plate, top - 0.05, top)
     profile = [(0.08, -deep), (0.55, -deep * 0.93), (0.85, -deep * 0.6), (0.97, -0.015), (1.0, 0.0)]
     bowl = lathe([(0.0, -deep), *profile], 40, 0.9)
-    bowl = moved(scaled(reversed_shape(bowl), rx, ry, 1), 0, cy, top)
-    drain = moved(cylinder(0.022, 0, 0.003, 0.001, 14), 0, cy, top - deep)
+    bowl = bowl.reversed().scaled(rx, ry, 1).moved(0, cy, top)
+    drain = cylinder(0.022, 0, 0.003, 0.001, 14).moved(0, cy, top - deep)
     ty = cy + ry + 0.035
     neck = [(0, ty, top), (0, ty, top + 0.09), (0, ty - 0.03, top + 0.115), (0, ty - 0.11, top + 0.10)]
     spout = tube(neck, 0.011, 10)
     lever = tube([(0, ty, top + 0.09), (0, ty + 0.005, top + 0.13), (0, ty - 0.05, top + tap)], 0.006, 8)
-    base = moved(cylinder(0.022, 0, 0.012, 0.003, 14), 0, ty, top)
+    base = cylinder(0.022, 0, 0.012, 0.003, 14).moved(0, ty, top)
     wood = material(look, "front", finish, "oak/0")
     return parts_of(
         (wood, [body, *doors]),
@@ -102,13 +96,13 @@ def shower(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     by = d / 2 - 0.05
     rail = tube([(0, by, 1.05), (0, by, h - 0.02)], 0.010, 10)
     neck = tube([(0, by, h - 0.03), (0, by - 0.05, h - 0.012), (0, by - 0.28, h - 0.012)], 0.010, 10)
-    head = moved(lathe([(0, -0.02), (0.11, -0.02), (0.11, -0.010), (0.02, 0.0), (0, 0.0)], 28), 0, by - 0.28, h - 0.02)
-    mixer = [moved(turned(cylinder(0.022, -0.13, 0.13, 0.004, 14), np.pi / 2, "y"), 0, by, 1.08)]
+    head = lathe([(0, -0.02), (0.11, -0.02), (0.11, -0.010), (0.02, 0.0), (0, 0.0)], 28).moved(0, by - 0.28, h - 0.02)
+    mixer = [cylinder(0.022, -0.13, 0.13, 0.004, 14).turned(np.pi / 2, "y").moved(0, by, 1.08)]
     s = np.linspace(0, 1, 14)
     sag = np.sin(np.pi * s)
     hose = tube(np.stack([0.10 + 0.05 * sag, by - 0.02 - 0.05 * sag, 1.06 - 0.55 * sag + 0.45 * s], 1), 0.006, 7)
     stays = [box([-0.012, by, z], [0.012, d / 2, z + 0.02]) for z in (1.07, h - 0.12)]
-    drain = moved(cylinder(0.045, 0, 0.004, 0.001, 18), -w * 0.1, d * 0.25, 0.02)
+    drain = cylinder(0.045, 0, 0.004, 0.001, 18).moved(-w * 0.1, d * 0.25, 0.02)
     return parts_of(
         (PORCELAIN, tray), (GLASS, glass), (CHROME, [*posts, rail, neck, head, *mixer, hose, *stays, drain])
     )
@@ -145,12 +139,12 @@ def towel_rail(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
     y, z = -d * 0.1, h - 0.035
     rail = tube([(-w / 2, y, z), (w / 2, y, z)], 0.008, 10)
     posts = [
-        joined(tube([(x, y, z), (x, d / 2, z)], 0.007, 8), hung(cylinder(0.022, 0, 0.006, 0.002, 14), x, d / 2, z))
+        joined(tube([(x, y, z), (x, d / 2, z)], 0.007, 8), cylinder(0.022, 0, 0.006, 0.002, 14).hung(x, d / 2, z))
         for x in (-w / 2 + 0.02, w / 2 - 0.02)
     ]
     tw = w * float(look.get("share", 0.72))
-    towel = shifted_uv(_draped(tw, h - 0.012, min(d * 0.7, 0.06), rng=rng), *rng.random(2))
-    towel = moved(towel, rng.uniform(-0.05, 0.05) * w, y, 0)
+    towel = _draped(tw, h - 0.012, min(d * 0.7, 0.06), rng=rng).shifted_uv(*rng.random(2))
+    towel = towel.moved(rng.uniform(-0.05, 0.05) * w, y, 0)
     return parts_of(
         (metal(look, finish, "chrome"), [rail, *posts]), (material(look, "cloth", finish, "terry/0"), towel)
     )
@@ -172,7 +166,7 @@ def hanging_towel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Ge
     cloth = np.stack(np.broadcast_arrays(x, y, z), -1)
     hook = joined(
         tube([(0, d / 2, h - 0.03), (0, -d * 0.1, h - 0.035), (0, -d * 0.25, h - 0.005)], 0.006, 8),
-        hung(cylinder(0.02, 0, 0.006, 0.002, 14), 0, d / 2, h - 0.03),
+        cylinder(0.02, 0, 0.006, 0.002, 14).hung(0, d / 2, h - 0.03),
     )
     terry, low, high = material(look, "cloth", finish, "terry/0"), 2, 4  # rows of the woven border
     pile = [sheet(cloth[: low + 1], 0.006), sheet(cloth[high:], 0.006)]
@@ -234,7 +228,7 @@ def toothbrush_cup(size: Size, look: Look, finish: FinishOf, *, rng: np.random.G
         foot = np.array([-0.4 * r * np.cos(a), -0.4 * r * np.sin(a), 0.012])
         top = np.array([0.75 * r * np.cos(a), 0.75 * r * np.sin(a), h * rng.uniform(0.9, 0.99)])
         stick = tube([foot, (foot + top) / 2, top], [0.004, 0.005, 0.0035], 6)
-        head = moved(box([-0.005, -0.006, -0.014], [0.005, 0.006, 0.010], 0.001), *(top + [0.004, 0, 0]))
+        head = box([-0.005, -0.006, -0.014], [0.005, 0.006, 0.010], 0.001).moved(*(top + [0.004, 0, 0]))
         brushes += [(plain(c, 0.35), stick), (plain((0.93, 0.95, 0.96), 0.8), head)]
     return parts_of((PORCELAIN, body), *brushes)
 
@@ -245,7 +239,7 @@ def paper_roll(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
     r = min(h * 0.42, d * 0.42)
     x, y, z = w / 2 - 0.008, -d / 2 + r, h - r - 0.012
     roll = lathe([(0.02, -0.05), (r, -0.05), (r, 0.05), (0.02, 0.05), (0.02, -0.05)], 28)
-    roll = moved(turned(roll, np.pi / 2, "y"), 0, y, z)
+    roll = roll.turned(np.pi / 2, "y").moved(0, y, z)
     loose = box([-0.05, -d / 2, 0], [0.05, -d / 2 + 0.0015, z])
     arm = tube([(x, d / 2, z), (x, y, z), (-w / 2, y, z)], 0.006, 8)
     plate = box([w / 2 - 0.03, d / 2 - 0.006, h - r - 0.035], [w / 2, d / 2, h], 0.002)
@@ -270,8 +264,8 @@ def bin_(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         lump = ball(0.04, 10, 7)
         dents = rng.normal(1.0, 0.13, (len(lump.vertices), 1))
         lump = _faceted(lump.vertices * dents, lump.faces)
-        paper.append(moved(lump, q * np.cos(a), q * np.sin(a), 0.04 + 0.03 * (k % 3)))
-    return parts_of((main, [scaled(s, 1, d / w, 1) for s in (shell, edge)]), (PAPER, paper))
+        paper.append(lump.moved(q * np.cos(a), q * np.sin(a), 0.04 + 0.03 * (k % 3)))
+    return parts_of((main, [s.scaled(1, d / w, 1) for s in (shell, edge)]), (PAPER, paper))
 
 
 def _faceted(vertices: np.ndarray, faces: np.ndarray) -> Shape:
@@ -301,11 +295,11 @@ def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[tuple[Finish,
     arm = box([-0.012, -d / 2 - 0.008, 0.012], [0.012, -d / 2 + 0.03, 0.02], 0.003)
     pedal = box([-w * 0.17, -d / 2 - 0.016, 0.010], [w * 0.17, -d / 2 + 0.006, 0.024], 0.006)
     dark = plain((0.05, 0.05, 0.055), 0.45)
-    rounds = [scaled(s, 1, d / w, 1) for s in (body, lid)]
+    rounds = [s.scaled(1, d / w, 1) for s in (body, lid)]
     return [
         (main, rounds),
-        (dark, [scaled(base, 1, d / w, 1), scaled(gap, 1, d / w, 1), hinge]),
-        (CHROME, [scaled(band, 1, d / w, 1), arm, pedal]),
+        (dark, [base.scaled(1, d / w, 1), gap.scaled(1, d / w, 1), hinge]),
+        (CHROME, [band.scaled(1, d / w, 1), arm, pedal]),
     ]
 
 

@@ -23,22 +23,7 @@ from assets.built.maker import (
     plain,
     whole_image,
 )
-from assets.built.primitives import (
-    Shape,
-    ball,
-    between,
-    box,
-    cylinder,
-    flat,
-    frame,
-    lathe,
-    moved,
-    scaled,
-    sheet,
-    tube,
-    turned,
-    upright,
-)
+from assets.built.primitives import Shape, ball, between, box, cylinder, flat, frame, lathe, sheet, tube, upright
 from assets.records import MeshPart
 
 GLAZES = {
@@ -106,11 +91,11 @@ def mirror(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     rim = FRAMES[name] if name in FRAMES else finish(name)
     if look.get("round"):
         ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)], 48)
-        ring = moved(scaled(turned(ring, np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
+        ring = ring.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
         disc = lathe([(0.5 - f / w, 0), (0, 0)], 48)
-        disc = moved(scaled(turned(disc, np.pi / 2, "x"), w, 1, h), 0, y0 + 0.006, h / 2)
+        disc = disc.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, y0 + 0.006, h / 2)
         disc = Shape(disc.vertices, disc.faces, np.tile([0.0, -1.0, 0.0], (len(disc.vertices), 1)), disc.uv)
-        back = moved(scaled(turned(cylinder(0.49, 0, 0.004, 0, 32), np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
+        back = cylinder(0.49, 0, 0.004, 0, 32).turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
         return parts_of((rim, ring), (BLACK, back), (MIRROR, disc))
     x, boards = w / 2 - f, frame(-w / 2, w / 2, 0, h, (y0, d / 2), f, 0.002)
     glass, back = upright(-x, x, f, h - f, y0 + 0.006), upright(x, -x, f, h - f, d / 2)
@@ -121,10 +106,10 @@ def wall_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
     """A round case with a printed dial behind glass."""
     w, d, h = size
     case = lathe([(0, 0), (0.5, 0), (0.5, 0.7 * d), (0.485, d), (0.455, d), (0.45, 0.75 * d), (0.45, 0.72 * d)], 40)
-    case = moved(scaled(turned(case, np.pi / 2, "x"), w, 1, h), 0, d / 2, h / 2)
+    case = case.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
     t = np.linspace(0, 2 * np.pi, 41)[:-1]
-    disc = turned(flat(shapely.Polygon(np.stack([0.452 * np.cos(t), 0.452 * np.sin(t)], 1)), 0.0), np.pi / 2, "x")
-    disc = moved(scaled(disc, w, 1, h), 0, d / 2 - 0.72 * d, h / 2)
+    disc = flat(shapely.Polygon(np.stack([0.452 * np.cos(t), 0.452 * np.sin(t)], 1)), 0.0).turned(np.pi / 2, "x")
+    disc = disc.scaled(w, 1, h).moved(0, d / 2 - 0.72 * d, h / 2)
     face = material(look, "face", finish, "clock_face/0")
     disc = whole_image(disc, face, -w * 0.452, w * 0.452, h * 0.048, h * 0.952)
     return parts_of((metal(look, finish, "black"), case), (face, disc))
@@ -161,7 +146,7 @@ def vase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
             twigs.append(tube(bow, np.linspace(0.0028, 0.0012, 6), 5))
             for q in np.linspace(0.45, 1, 6):
                 i = min(5, round(q * 5))
-                buds.append(moved(scaled(ball(0.009, 6, 5), 1, 1, 1.5), *(bow[i] + rng.normal(0, 0.008, 3))))
+                buds.append(ball(0.009, 6, 5).scaled(1, 1, 1.5).moved(*(bow[i] + rng.normal(0, 0.008, 3))))
     return parts_of(
         (clay, lathe(profile, 28, 0.9)), (plain((0.32, 0.23, 0.16), 0.9), twigs), (plain((0.86, 0.80, 0.72), 0.9), buds)
     )

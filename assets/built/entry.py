@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from assets.built.maker import FinishOf, Look, Size, material, metal, parts_of, plain
-from assets.built.primitives import Shape, bar, box, extruded, joined, lathe, moved, scaled, sheet, tube, turned
+from assets.built.primitives import Shape, bar, box, extruded, joined, lathe, sheet, tube
 from assets.records import MeshPart
 
 
@@ -41,7 +41,7 @@ def shoes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
             lay.append((bar([-x, y[i], z], [x, y[i] - 0.004 * k, z], 0.007, 0.005), laces))
         turn, at = side * 0.04 + rng.normal(0, 0.05), side * w * 0.25
         for shape, group in lay:
-            group.append(moved(turned(scaled(shape, side, 1, 1), turn), at, rng.normal(0, 0.003)))
+            group.append(shape.scaled(side, 1, 1).turned(turn).moved(at, rng.normal(0, 0.003)))
     pale = (0.88, 0.87, 0.84) if look.get("colour") in ("white", "blue") else (0.09, 0.08, 0.075)
     dark = (0.7 * colour[0], 0.7 * colour[1], 0.7 * colour[2])
     return parts_of((plain(colour, 0.45), uppers), (plain(pale, 0.7), soles), (plain(dark, 0.8), laces))
@@ -69,7 +69,7 @@ def coat_hooks(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
         if k in full:
             drop = (h - 0.04) * (1.0 if k == min(full) else rng.uniform(0.72, 0.98))
             garment = _coat(min(0.40, w / count * 2.0), d * 0.62, drop, rng=rng)
-            garment = moved(garment, x, d / 2 - 0.02 - d * 0.40, h - 0.035 - drop)
+            garment = garment.moved(x, d / 2 - 0.02 - d * 0.40, h - 0.035 - drop)
             clothes.append((finish(cloths[order[k % len(cloths)]]), garment))
     return parts_of((material(look, "wood", finish, "oak/0"), plank), (metal(look, finish, "black"), hooks), *clothes)
 
@@ -113,7 +113,7 @@ def coat(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     """A coat on a hook."""
     w, d, h = size
     hook = tube([(0, d / 2, h - 0.02), (0, d / 2 - 0.04, h - 0.025), (0, d / 2 - 0.05, h)], 0.005, 8)
-    body = moved(_coat(w, d * 0.7, h - 0.02, rng=rng), 0, d / 2 - 0.01 - d * 0.42, 0)
+    body = _coat(w, d * 0.7, h - 0.02, rng=rng).moved(0, d / 2 - 0.01 - d * 0.42, 0)
     return parts_of((metal(look, finish, "black"), hook), (material(look, "cloth", finish, "tweed/0"), body))
 
 

@@ -5,27 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assets.built.maker import BLACK, GLASS, PAPER, STEEL, FinishOf, Look, Size, material, metal, parts_of, plain
-from assets.built.primitives import (
-    Shape,
-    ball,
-    between,
-    box,
-    cylinder,
-    frame,
-    hung,
-    joined,
-    lathe,
-    moved,
-    quads,
-    reversed_shape,
-    rim,
-    scaled,
-    sheet,
-    shifted_uv,
-    tube,
-    turned,
-    two_sided,
-)
+from assets.built.primitives import Shape, ball, between, box, cylinder, frame, joined, lathe, quads, rim, sheet, tube
 from assets.records import Finish, MeshPart
 
 TINTS = {
@@ -50,7 +30,7 @@ def _tint(look: Look, name: str = "colour", default: str = "white") -> tuple[flo
 
 def _leaf(x: float, y: float, z: float, w: float, d: float, turn: float, thick: float) -> Shape:
     """A sheet of paper lying at (x, y, z)."""
-    return moved(turned(box([-w / 2, -d / 2, 0], [w / 2, d / 2, thick]), turn), x, y, z)
+    return box([-w / 2, -d / 2, 0], [w / 2, d / 2, thick]).turned(turn).moved(x, y, z)
 
 
 # ------------------------------------------------------------------ paper
@@ -93,7 +73,7 @@ def note(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
 
     rows = np.linspace(0, 1, 6)
     edges = np.array([(-w / 2, curl(t), h * t, w / 2) for t in rows])
-    leaf = two_sided(sheet(np.stack([edges[:, :3], edges[:, [3, 1, 2]]], 1)))
+    leaf = sheet(np.stack([edges[:, :3], edges[:, [3, 1, 2]]], 1)).two_sided()
 
     def patch(x0: float, x1: float, z0: float, z1: float) -> Shape:
         """A flat mark on the sheet, in shares of it."""
@@ -118,7 +98,7 @@ def note(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     else:
         ink = [patch(0.12, 0.12 + float(rng.uniform(0.35, 0.75)), 0.82 - 0.11 * k, 0.84 - 0.11 * k) for k in range(6)]
         marks = [(plain((0.2, 0.2, 0.28), 0.9), ink)]
-    pin = moved(scaled(ball(0.006, 8, 5), 1, 0.6, 1), 0, d / 2 - 0.004, h * 0.965)
+    pin = ball(0.006, 8, 5).scaled(1, 0.6, 1).moved(0, d / 2 - 0.004, h * 0.965)
     head = plain(TINTS[("red", "blue", "green", "yellow")[int(rng.integers(4))]], 0.35)
     paper = plain(_tint(look, "paper"), 0.9, specular=0.2)
     return parts_of((paper, leaf), (head, pin), *marks)
@@ -141,9 +121,9 @@ def notice_board(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
         cz = (k // columns + 0.5 + rng.uniform(-0.1, 0.1)) * (h - 2 * f) / rows + f
         pw, ph = rng.uniform(0.4, 0.75) * w / columns, rng.uniform(0.45, 0.75) * h / rows
         lean = rng.normal(0, 0.06)
-        leaf = turned(box([-pw / 2, -0.0012, -ph / 2], [pw / 2, 0, ph / 2]), lean, "y")
-        leaves.setdefault(names[int(rng.integers(len(names)))], []).append(moved(leaf, cx, y - 0.0105, cz))
-        pins.append(moved(ball(0.005, 8, 5), cx, y - 0.014, cz + ph * 0.42))
+        leaf = box([-pw / 2, -0.0012, -ph / 2], [pw / 2, 0, ph / 2]).turned(lean, "y")
+        leaves.setdefault(names[int(rng.integers(len(names)))], []).append(leaf.moved(cx, y - 0.0105, cz))
+        pins.append(ball(0.005, 8, 5).moved(cx, y - 0.014, cz + ph * 0.42))
     return parts_of(
         (material(look, "wood", finish, "oak/0"), [left, right, bottom, top]),
         (plain((0.62, 0.45, 0.28), 0.95, specular=0.1), cork),
@@ -168,7 +148,7 @@ def wall_calendar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Ge
         for x in np.linspace(a + 0.015, b - 0.015, 7)
         for z in np.linspace(h * 0.06, h * 0.42, 5)
     ]
-    nail = hung(cylinder(0.004, 0, 0.012), 0, y, h * 0.99)
+    nail = cylinder(0.004, 0, 0.012).hung(0, y, h * 0.99)
     return parts_of((PAPER, leaf), (art, picture), (plain((0.3, 0.3, 0.33), 0.8), days), (STEEL, nail))
 
 
@@ -202,8 +182,8 @@ def cable(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     x, y = w * 0.9 * r * np.cos(turns * t), d * 0.9 * r * np.sin(turns * t)
     path = np.stack([x, y, 0.0022 + 0.002 * np.sin(12 * t)], 1)
     end = path[-1]
-    plug = moved(box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004), end[0], end[1])
-    tip = moved(box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001), *path[0, :2])
+    plug = box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004).moved(end[0], end[1])
+    tip = box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001).moved(*path[0, :2])
     skin = plain(_tint(look), 0.45)
     return parts_of((skin, [tube(path, 0.0022, 6), plug]), (STEEL, tip))
 
@@ -229,15 +209,15 @@ def _crumpled(size: Size, cells: int, roundness: float, *, rng: np.random.Genera
     top = sheet(np.stack([px, py, rise], -1))
     low = sheet(np.stack([px, py, 0 * rise], -1))
     up = rim(np.stack([px, py, rise], -1))
-    return shifted_uv(joined(top, reversed_shape(low), between(up * [1, 1, 0], up)), *rng.random(2))
+    return joined(top, low.reversed(), between(up * [1, 1, 0], up)).shifted_uv(*rng.random(2))
 
 
 def thrown_clothes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Clothes as they were taken off: two pieces, one over the other."""
     w, d, h = size
     under = _crumpled((w, d, h * 0.7), 14, 0.8, rng=rng)
-    over = turned(_crumpled((w * 0.6, d * 0.6, h * 0.55), 12, 0.6, rng=rng), rng.uniform(0, 3))
-    over = moved(over, 0.06 * w, -0.05 * d, h * 0.45)
+    over = _crumpled((w * 0.6, d * 0.6, h * 0.55), 12, 0.6, rng=rng).turned(rng.uniform(0, 3))
+    over = over.moved(0.06 * w, -0.05 * d, h * 0.45)
     cloth, other = material(look, "cloth", finish, "denim/0"), material(look, "other", finish, "linen/4")
     return parts_of((cloth, under), (other, over))
 
@@ -264,7 +244,7 @@ def duvet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     puff = ((1 - x**4) * (1 - y**4)) ** 0.45
     rise = puff * h * (0.36 + 0.64 * lie.clip(-0.2, 1.0)) + 0.004
     top, low = sheet(np.stack([px, py, rise], -1)), sheet(np.stack([px, py, 0 * rise], -1))
-    cloth = shifted_uv(joined(top, reversed_shape(low)), *rng.random(2))
+    cloth = joined(top, low.reversed()).shifted_uv(*rng.random(2))
     return parts_of((material(look, "cloth", finish, "cotton/0"), cloth))
 
 
@@ -279,13 +259,13 @@ def dish_rack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Genera
     wires = [tube([(-a, s * b, z), (a, s * b, z)], wire, 6) for s in (-1, 1) for z in (0.02, rim)]
     wires += [tube([(x, -b, rim), (x, -b, 0.02), (x, b, 0.02), (x, b, rim)], wire, 6) for x in np.linspace(-a, a, 7)]
     foot = cylinder(0.006, 0, 0.02, segments=8)
-    feet = [moved(foot, x * (w / 2 - 0.02), y * (d / 2 - 0.02)) for x in (-1, 1) for y in (-1, 1)]
+    feet = [foot.moved(x * (w / 2 - 0.02), y * (d / 2 - 0.02)) for x in (-1, 1) for y in (-1, 1)]
     r = min(0.12, d / 2, (h - 0.03) / 2)
     flat = lathe([(0, 0), (r * 0.62, 0.003), (r, 0.016), (r * 0.99, 0.018), (r * 0.6, 0.006), (0, 0.005)], 24, 0.7)
-    lean = turned(turned(flat, np.pi / 2, "y"), 0.16, "y")
-    stand = [moved(lean, x, 0, r + 0.022) for x in np.linspace(-0.36, 0.05, 4) * w]
+    lean = flat.turned(np.pi / 2, "y").turned(0.16, "y")
+    stand = [lean.moved(x, 0, r + 0.022) for x in np.linspace(-0.36, 0.05, 4) * w]
     cup = lathe([(0.0, 0.08), (0.03, 0.08), (0.038, 0.0), (0.034, 0.0), (0.026, 0.076), (0, 0.076)], 18)
-    cups = [moved(cup, 0.32 * w, y, 0.024) for y in (-0.2 * d, 0.2 * d)]
+    cups = [cup.moved(0.32 * w, y, 0.024) for y in (-0.2 * d, 0.2 * d)]
     return parts_of(
         (metal(look, finish, "chrome"), wires),
         (BLACK, feet),
@@ -308,7 +288,7 @@ def jar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
         "coffee": (0.16, 0.09, 0.05),
     }
     inside = lathe([(0, 0.009), (r * 0.93, 0.009), (r * 0.93, h * 0.6), (0, h * 0.61)], 20)
-    lid = moved(cylinder(r * 0.9, 0, h - body, 0.004, 20), 0, 0, body)
+    lid = cylinder(r * 0.9, 0, h - body, 0.004, 20).moved(0, 0, body)
     return parts_of(
         (GLASS, shell),
         (plain(grain[str(look.get("holds", "pasta"))], 0.9), inside),
@@ -351,11 +331,11 @@ def toilet_roll(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
 def duck(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A bath duck."""
     w, d, h = size
-    body = moved(scaled(ball(0.5, 14, 9), w, d, h * 0.62), 0, 0, h * 0.31)
-    head = moved(ball(h * 0.24, 12, 8), 0, -d * 0.2, h * 0.74)
-    tail = moved(scaled(ball(0.5, 8, 6), w * 0.3, d * 0.24, h * 0.3), 0, d * 0.42, h * 0.5)
-    beak = moved(scaled(ball(0.5, 8, 6), w * 0.28, d * 0.2, h * 0.1), 0, -d * 0.42, h * 0.7)
-    eyes = [moved(ball(h * 0.035, 6, 4), s * h * 0.13, -d * 0.36, h * 0.82) for s in (-1, 1)]
+    body = ball(0.5, 14, 9).scaled(w, d, h * 0.62).moved(0, 0, h * 0.31)
+    head = ball(h * 0.24, 12, 8).moved(0, -d * 0.2, h * 0.74)
+    tail = ball(0.5, 8, 6).scaled(w * 0.3, d * 0.24, h * 0.3).moved(0, d * 0.42, h * 0.5)
+    beak = ball(0.5, 8, 6).scaled(w * 0.28, d * 0.2, h * 0.1).moved(0, -d * 0.42, h * 0.7)
+    eyes = [ball(h * 0.035, 6, 4).moved(s * h * 0.13, -d * 0.36, h * 0.82) for s in (-1, 1)]
     return parts_of(
         (plain(TINTS["yellow"], 0.35), [body, head, tail]), (plain(TINTS["orange"], 0.4), beak), (BLACK, eyes)
     )
@@ -380,9 +360,9 @@ def blocks(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
             continue
         taken.append((float(x), float(y)))
         one = box([-side / 2, -side / 2, 0], [side / 2, side / 2, side], 0.002)
-        by.setdefault(names[k % 6], []).append(moved(turned(one, rng.uniform(0, 1.57)), x, y))
+        by.setdefault(names[k % 6], []).append(one.turned(rng.uniform(0, 1.57)).moved(x, y))
         if k < 3:
-            by.setdefault(names[(k + 2) % 6], []).append(moved(turned(one, rng.uniform(0, 1.57)), x, y, side))
+            by.setdefault(names[(k + 2) % 6], []).append(one.turned(rng.uniform(0, 1.57)).moved(x, y, side))
     return parts_of(*((plain(TINTS[n], 0.5), s) for n, s in sorted(by.items())))
 
 
@@ -397,9 +377,9 @@ def board_game(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
         shrink = 1.0 - 0.07 * k
         a, b, t = w * shrink * 0.96, d * shrink * 0.96, h / count
         lean = 0.0 if k == 0 else rng.normal(0, 0.06)
-        case = turned(box([-a / 2, -b / 2, 0], [a / 2, b / 2, t - 0.0012], 0.002), lean)
-        title = turned(box([-a * 0.3, -b * 0.12, t - 0.0014], [a * 0.3, b * 0.12, t]), lean)
-        made += [(plain(TINTS[names[order[k % 5]]], 0.45), moved(case, z=k * t)), (PAPER, moved(title, z=k * t))]
+        case = box([-a / 2, -b / 2, 0], [a / 2, b / 2, t - 0.0012], 0.002).turned(lean)
+        title = box([-a * 0.3, -b * 0.12, t - 0.0014], [a * 0.3, b * 0.12, t]).turned(lean)
+        made += [(plain(TINTS[names[order[k % 5]]], 0.45), case.moved(z=k * t)), (PAPER, title.moved(z=k * t))]
     return parts_of(*made)
 
 

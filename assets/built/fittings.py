@@ -5,24 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 from assets.built.maker import BLACK, CHROME, WHITE, FinishOf, Look, Size, material, parts_of, plain
-from assets.built.primitives import Shape, box, cylinder, hung, lathe, moved, quads, tube, turned
+from assets.built.primitives import Shape, box, cylinder, lathe, quads, tube
 from assets.records import MeshPart
 
 
 def switch(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     plate = box([-w / 2, -d * 0.1, 0], [w / 2, d / 2, h], 0.002)
-    rocker = turned(box([-w * 0.33, -d * 0.35, -h * 0.33], [w * 0.33, d * 0.2, h * 0.33], 0.0015), 0.05, "x")
-    return parts_of((WHITE, [plate, moved(rocker, 0, -d * 0.1, h / 2)]))
+    rocker = box([-w * 0.33, -d * 0.35, -h * 0.33], [w * 0.33, d * 0.2, h * 0.33], 0.0015).turned(0.05, "x")
+    return parts_of((WHITE, [plate, rocker.moved(0, -d * 0.1, h / 2)]))
 
 
 def socket(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     w, d, h = size
     plate = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002)
     around = [(0.0195, 0), (0.021, 0.0), (0.021, 0.0012), (0.0195, 0.0012), (0.0195, 0)]
-    ring = hung(lathe(around, 24), 0, -d / 2, h / 2)
-    well = hung(lathe([(0, 0), (0.0195, 0), (0.0195, 0.0006), (0, 0.0006)], 24), 0, -d / 2, h / 2)
-    holes = [hung(cylinder(0.0025, 0, 0.001, 0, 10), x, -d / 2 - 0.0003, h / 2) for x in (-0.0095, 0.0095)]
+    ring = lathe(around, 24).hung(0, -d / 2, h / 2)
+    well = lathe([(0, 0), (0.0195, 0), (0.0195, 0.0006), (0, 0.0006)], 24).hung(0, -d / 2, h / 2)
+    holes = [cylinder(0.0025, 0, 0.001, 0, 10).hung(x, -d / 2 - 0.0003, h / 2) for x in (-0.0095, 0.0095)]
     return parts_of((WHITE, [plate, ring]), (plain((0.78, 0.77, 0.75), 0.5), well), (BLACK, holes))
 
 
@@ -39,7 +39,7 @@ def radiator(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
                 made.append(tube([(x, y, 0.03), (x, y, h - 0.03)], 0.0125, 8, caps=False))
             for z in (0.03, h - 0.03):
                 made.append(box([x - 0.02, -d / 2, z - 0.03], [x + 0.02, d / 2, z + 0.03], 0.010))
-        knob = [moved(turned(cylinder(0.018, 0, 0.06, 0.004, 14), np.pi / 2, "y"), w / 2 - 0.05, -d / 2 + 0.03, 0.05)]
+        knob = [cylinder(0.018, 0, 0.06, 0.004, 14).turned(np.pi / 2, "y").moved(w / 2 - 0.05, -d / 2 + 0.03, 0.05)]
     else:
         right = w / 2 - 0.07  # the valve stands beside the panel
         made.append(box([-w / 2, -d / 2 + 0.016, 0], [right, d / 2 - 0.02, h], 0.006))
@@ -87,9 +87,9 @@ def _valve(x: float, panel: float, d: float, h: float) -> tuple[list[Shape], lis
     around = ((x + 0.0215 * np.cos(t), y + 0.0215 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 9)[:-1])
     ribs = [box([u - 0.002, v - 0.002, 0.088], [u + 0.002, v + 0.002, 0.13]) for u, v in around]
     pipes = [
-        moved(cylinder(0.012, 0.02, 0.078, 0.002, 14), x, y, 0),
+        cylinder(0.012, 0.02, 0.078, 0.002, 14).moved(x, y, 0),
         tube([(x, y, 0.045), (panel - 0.01, y, 0.045)], 0.009, 10),
         tube([(x, y, 0.03), (x, d / 2, 0.03)], 0.008, 10),
-        moved(turned(cylinder(0.008, 0, 0.014, 0.002, 10), np.pi / 2, "y"), panel - 0.002, y, h - 0.06),
+        cylinder(0.008, 0, 0.014, 0.002, 10).turned(np.pi / 2, "y").moved(panel - 0.002, y, h - 0.06),
     ]
-    return [moved(head, x, y, 0), *ribs], pipes
+    return [head.moved(x, y, 0), *ribs], pipes

@@ -26,20 +26,7 @@ from assets.built.maker import (
     parts_of,
     plain,
 )
-from assets.built.primitives import (
-    Shape,
-    between,
-    box,
-    cylinder,
-    hung,
-    joined,
-    lathe,
-    moved,
-    quads,
-    tube,
-    turned,
-    upright,
-)
+from assets.built.primitives import Shape, between, box, cylinder, joined, lathe, quads, tube, upright
 from assets.records import Finish, MeshPart
 
 TOP = 0.038
@@ -133,14 +120,14 @@ def sink(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     zb = h - deep
     ground = [(*p, zb) for p in low]
     basin = joined(between([(*p, h) for p in top], ground), quads([ground]))
-    drain = moved(cylinder(0.035, 0, 0.003, 0.001, 14), 0, by, zb)
+    drain = cylinder(0.035, 0, 0.003, 0.001, 14).moved(0, by, zb)
     ty = hi[1] + 0.045
     t = np.linspace(0, np.pi, 10)
     bow = np.stack([0 * t, ty - 0.085 + 0.085 * np.cos(t), h + 0.20 + 0.085 * np.sin(t)], 1)
     neck = np.concatenate([[(0, ty, h), (0, ty, h + 0.17)], bow, [(0, ty - 0.17, h + 0.15)]])
     tap = [
         tube(neck, 0.012, 10),
-        moved(cylinder(0.025, 0, 0.02, 0.004, 14), 0, ty, h),
+        cylinder(0.025, 0, 0.02, 0.004, 14).moved(0, ty, h),
         tube([(0.012, ty, h + 0.06), (0.05, ty, h + 0.075), (0.085, ty - 0.01, h + 0.10)], 0.007, 8),
     ]
     style, grip = str(look.get("style", "flat")), str(look.get("handle", "bar"))
@@ -164,12 +151,12 @@ def cooker(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     glass = [box([-ow / 2 + 0.002, y, z0 + drawer + 0.003], [ow / 2 - 0.002, y + 0.02, z1 - panel - 0.003], 0.003)]
     hob = [box([-ow / 2 + 0.01, -0.26, h], [ow / 2 - 0.01, 0.25, h + 0.006], 0.002)]
     rings = [
-        moved(lathe([(r - 0.0025, 0), (r, 0), (r, 0.0006), (r - 0.0025, 0.0006)], 28), x, yy, h + 0.0058)
+        lathe([(r - 0.0025, 0), (r, 0), (r, 0.0006), (r - 0.0025, 0.0006)], 28).moved(x, yy, h + 0.0058)
         for x, yy, big in ((-0.14, -0.11, 0.09), (0.14, -0.11, 0.07), (-0.14, 0.12, 0.07), (0.14, 0.12, 0.105))
         for r in (big, big * 0.62)
     ]
     touch = [box([x - 0.006, -0.243, h + 0.0055], [x + 0.006, -0.231, h + 0.0064]) for x in np.linspace(-0.1, 0.1, 6)]
-    knobs = [moved(_knob(), x, y, z1 - panel / 2) for x in (-0.22, -0.13, 0.13, 0.22)]
+    knobs = [_knob().moved(x, y, z1 - panel / 2) for x in (-0.22, -0.13, 0.13, 0.22)]
     marks = [
         box([x - 0.0012, y - 0.0275, z1 - panel / 2], [x + 0.0012, y - 0.024, z1 - panel / 2 + 0.014])
         for x in (-0.22, -0.13, 0.13, 0.22)
@@ -261,13 +248,13 @@ def _crockery(
     tinted: list[Shape] = []
     clear: list[Shape] = []
     for x, pile, count in ((-width / 4, light, 6), (width / 4, tinted, 5)):
-        pile += [moved(lathe(plate, 18, 0.6), x, y, boards[0] + 0.009 * k) for k in range(count)]
+        pile += [lathe(plate, 18, 0.6).moved(x, y, boards[0] + 0.009 * k) for k in range(count)]
     pile = light if rng.random() < 0.5 else tinted
-    pile += [moved(lathe(dish, 16, 0.6), -width / 4, y, boards[1] + 0.018 * k) for k in range(3)]
+    pile += [lathe(dish, 16, 0.6).moved(-width / 4, y, boards[1] + 0.018 * k) for k in range(3)]
     ear = tube([(0.032, 0, 0.062), (0.055, 0, 0.052), (0.052, 0, 0.028), (0.03, 0, 0.02)], 0.004, 5)
     for x in (width * 0.14, width * 0.34):
-        light.append(moved(turned(joined(lathe(cup, 14, 0.6), ear), float(rng.uniform(-2.6, -0.5))), x, y, boards[1]))
-    clear += [moved(lathe(glass, 12, 0.6), x * width, y, boards[2]) for x in (-0.38, -0.22, -0.06, 0.14, 0.3)]
+        light.append(joined(lathe(cup, 14, 0.6), ear).turned(float(rng.uniform(-2.6, -0.5))).moved(x, y, boards[1]))
+    clear += [lathe(glass, 12, 0.6).moved(x * width, y, boards[2]) for x in (-0.38, -0.22, -0.06, 0.14, 0.3)]
     return [(white, light), (colour, tinted), (GLASS, clear)]
 
 
@@ -355,7 +342,7 @@ def _water(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
         box([x + k * 0.05 - 0.012, y - 0.0036, sill + 0.04], [x + k * 0.05 + 0.012, y, sill + 0.052])
         for k in (-1, 0, 1)
     ]
-    spout = moved(cylinder(0.016, 0, 0.03, 0.003, 14), x, y - 0.014, sill - rim - 0.03)
+    spout = cylinder(0.016, 0, 0.03, 0.003, 14).moved(x, y - 0.014, sill - rim - 0.03)
     lever = box([x - 0.02, y - 0.008, z + 0.07], [x + 0.02, y, sill - 0.06], 0.003)
     tray = box([x0 + rim, y - 0.022, z + rim], [x1 - rim, y, z + rim + 0.008], 0.002)
     return [
@@ -376,10 +363,10 @@ def _notes(
         x = (k % 3 - 1) * w * 0.24 + rng.normal(0, 0.015) + 0.03
         z = h - 0.16 - 0.21 * (k // 3) - rng.uniform(0, 0.05)
         pw, ph = rng.uniform(0.07, 0.12), rng.uniform(0.08, 0.16)
-        leaf = turned(box([-pw / 2, -0.0008, -ph], [pw / 2, 0, 0]), rng.normal(0, 0.05), "y")
+        leaf = box([-pw / 2, -0.0008, -ph], [pw / 2, 0, 0]).turned(rng.normal(0, 0.05), "y")
         tint = ((0.9, 0.885, 0.84), (0.9, 0.8, 0.4), (0.9, 0.885, 0.84), (0.75, 0.83, 0.88), (0.88, 0.62, 0.66))
-        papers.append((plain(tint[int(rng.integers(5))], 0.9), moved(leaf, x, y - 0.0004, z)))
-        magnets.append(hung(cylinder(0.012, 0, 0.006, 0.002, 12), x, y, z - 0.015))
+        papers.append((plain(tint[int(rng.integers(5))], 0.9), leaf.moved(x, y - 0.0004, z)))
+        magnets.append(cylinder(0.012, 0, 0.006, 0.002, 12).hung(x, y, z - 0.015))
     return papers, magnets
 
 
@@ -434,7 +421,7 @@ def hood(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         box([-w / 2 + 0.05, -d / 2 + 0.06, -0.001], [-0.01, d / 2 - 0.06, 0.004]),
         box([0.01, -d / 2 + 0.06, -0.001], [w / 2 - 0.05, d / 2 - 0.06, 0.004]),
     ]
-    lamps = [moved(cylinder(0.025, -0.002, 0.003, 0.0, 12), x, -d / 2 + 0.035, 0) for x in (-w * 0.25, w * 0.25)]
+    lamps = [cylinder(0.025, -0.002, 0.003, 0.0, 12).moved(x, -d / 2 + 0.035, 0) for x in (-w * 0.25, w * 0.25)]
     return parts_of(
         (metal(look, finish), [box([-w / 2, -d / 2, 0], [w / 2, d / 2, rim], 0.002), between(low, high), shaft]),
         (plain((0.45, 0.45, 0.45), 0.4, 1.0), filters),

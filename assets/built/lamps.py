@@ -20,23 +20,7 @@ from assets.built.maker import (
     plain,
     tinted,
 )
-from assets.built.primitives import (
-    Shape,
-    ball,
-    box,
-    cylinder,
-    hung,
-    joined,
-    lathe,
-    moved,
-    quads,
-    reversed_shape,
-    scaled,
-    sheet,
-    tube,
-    turned,
-    two_sided,
-)
+from assets.built.primitives import Shape, ball, box, cylinder, joined, lathe, quads, sheet, tube
 from assets.records import Finish, MeshPart
 
 OPAL = plain((0.96, 0.94, 0.89), 0.3, emission=(7.0, 5.9, 4.5))
@@ -45,7 +29,7 @@ GLOW = plain((1.0, 0.96, 0.88), 0.3, emission=BULB)
 
 def _bulb(z: float, r: float = 0.03) -> Shape:
     """A glowing bulb whose middle is at z."""
-    return moved(scaled(ball(r, 12, 9), 1, 1, 1.15), 0, 0, z)
+    return ball(r, 12, 9).scaled(1, 1, 1.15).moved(0, 0, z)
 
 
 def _canopy(h: float) -> Shape:
@@ -55,7 +39,7 @@ def _canopy(h: float) -> Shape:
 
 def _drum(r0: float, r1: float, z0: float, z1: float, segments: int = 32) -> Shape:
     """A fabric shade, open above and below."""
-    return two_sided(lathe([(r0, z0), (r1, z1)], segments))
+    return lathe([(r0, z0), (r1, z1)], segments).two_sided()
 
 
 def _cloth(look: Look, finish: FinishOf) -> Finish:
@@ -71,7 +55,7 @@ def pendant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
     socket = lathe([(0, body - 0.045), (0.02, body - 0.045), (0.022, body), (0.012, body + 0.03), (0, body + 0.03)], 16)
     rim, mount = metal(look, finish, "black"), [_canopy(h), cord, socket]
     if kind == "globe":
-        return parts_of((rim, mount), (OPAL, moved(ball(r, 28, 17), 0, 0, r)))
+        return parts_of((rim, mount), (OPAL, ball(r, 28, 17).moved(0, 0, r)))
     if kind == "drum":
         around = [(r * 0.97 * np.cos(t), r * 0.97 * np.sin(t), 0.006) for t in np.linspace(0, 6.283, 33)[:-1]]
         ring, shade = tube(around, 0.003, 5, closed=True), _drum(r, r * 0.96, 0, body)
@@ -128,7 +112,7 @@ def panel(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     nut = lathe([(0, 0), (0.008, 0.001), (0.012, 0.004), (0.008, 0.007), (0.018, 0.010), (0, 0.012)], 16)
     return parts_of(
         (metal(look, finish, "steel"), [frame, nut]),
-        (plain((0.97, 0.96, 0.93), 0.25, emission=LIGHTS["panel"]), reversed_shape(pane)),
+        (plain((0.97, 0.96, 0.93), 0.25, emission=LIGHTS["panel"]), pane.reversed()),
     )
 
 
@@ -143,16 +127,16 @@ def bar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     rod = tube([(0, 0, beam + 0.02), (0, 0, h - 0.02)], 0.006, 8)
     t = np.linspace(0, 1, 9)
     bell = np.stack([r * (1 - 0.72 * t**1.6), high * t], 1)
-    shade = two_sided(lathe([*bell, (0.02, high + 0.004)], 24, 0.9))
+    shade = lathe([*bell, (0.02, high + 0.004)], 24, 0.9).two_sided()
     lip = lathe([(r * 0.97, 0), (r, 0), (r, 0.004), (r * 0.97, 0.004), (r * 0.97, 0)], 24)
     crown = [(0, high - 0.01), (r * 0.34, high - 0.01), (r * 0.34, high + 0.02), (0.012, high + 0.04), (0, beam)]
     cap = lathe(crown, 16)
     places = (-w / 2 + r, 0.0, w / 2 - r)
     return parts_of(
         (material(look, "wood", finish, "walnut/0"), wood),
-        (rim, [rod, _canopy(h), *(moved(s, x) for x in places for s in (cap, lip))]),
-        (OPAL, [moved(shade, x) for x in places]),
-        (GLOW, [moved(_bulb(high * 0.45, r * 0.34), x) for x in places]),
+        (rim, [rod, _canopy(h), *(s.moved(x) for x in places for s in (cap, lip))]),
+        (OPAL, [shade.moved(x) for x in places]),
+        (GLOW, [_bulb(high * 0.45, r * 0.34).moved(x) for x in places]),
     )
 
 
@@ -172,16 +156,16 @@ def sconce(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     w, d, h = size
     r = min(w / 2, d * 0.4)
     back, y = d / 2, -d / 2 + r
-    plate = hung(cylinder(0.05, 0, 0.015, 0.004, 20), 0, back, h * 0.35)
+    plate = cylinder(0.05, 0, 0.015, 0.004, 20).hung(0, back, h * 0.35)
     s = np.linspace(0, 1, 8)
     arm = tube(np.stack([0 * s, back - (back - y) * s, h * 0.35 - 0.25 * h * np.sin(np.pi * s) * 0.5], 1), 0.007, 8)
     rim = metal(look, finish, "brass")
     if look.get("kind") == "globe":
-        return parts_of((rim, [plate, arm]), (OPAL, moved(ball(r, 20, 13), 0, y, h - r)))
+        return parts_of((rim, [plate, arm]), (OPAL, ball(r, 20, 13).moved(0, y, h - r)))
     stem = tube([(0, y, h * 0.35), (0, y, h * 0.55)], 0.007, 8)
-    shade = moved(_drum(r, r * 0.7, h * 0.4, h, 24), 0, y, 0)
+    shade = _drum(r, r * 0.7, h * 0.4, h, 24).moved(0, y, 0)
     return parts_of(
-        (rim, [plate, arm, stem]), (_cloth(look, finish), shade), (GLOW, moved(_bulb(h * 0.66, 0.024), 0, y, 0))
+        (rim, [plate, arm, stem]), (_cloth(look, finish), shade), (GLOW, _bulb(h * 0.66, 0.024).moved(0, y, 0))
     )
 
 
@@ -214,7 +198,7 @@ def _stem(kind: str, r: float, top: float, tall: bool) -> Shape:
         ways = [(np.cos(a), np.sin(a)) for a in (2 * np.pi * k / 3 + 0.5 for k in range(3))]
         feet = [[(0.02 * c, 0.02 * s, top + 0.02), (r * 0.92 * c, r * 0.92 * s, 0.0)] for c, s in ways]
         legs = [tube(leg, [0.010, 0.014], 8) for leg in feet]
-        return joined(*legs, moved(cylinder(0.035, 0, 0.03, 0.006, 16), 0, 0, top - 0.005))
+        return joined(*legs, cylinder(0.035, 0, 0.03, 0.006, 16).moved(0, 0, top - 0.005))
     if kind == "ceramic":
         t = np.linspace(0, 1, 12)
         belly = np.stack([r * (0.28 + 0.30 * np.sin(np.pi * t**0.8)), t * (top - 0.03)], 1)
@@ -227,14 +211,14 @@ def _stem(kind: str, r: float, top: float, tall: bool) -> Shape:
 def desk_lamp(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """Weighted foot, two arms, a metal head that looks down."""
     w, d, h = size
-    foot = moved(cylinder(min(0.09, d * 0.45), 0, 0.022, 0.006, 24), -w * 0.22, 0, 0)
+    foot = cylinder(min(0.09, d * 0.45), 0, 0.022, 0.006, 24).moved(-w * 0.22, 0, 0)
     a, b, c = np.array([-w * 0.22, 0, 0.02]), np.array([-w * 0.38, 0, h * 0.55]), np.array([w * 0.12, 0, h * 0.97])
     hinge = ball(0.012, 10, 7)
-    arms = [tube([a, b], 0.006, 8), tube([b, c], 0.006, 8), moved(hinge, *b), moved(hinge, *c)]
+    arms = [tube([a, b], 0.006, 8), tube([b, c], 0.006, 8), hinge.moved(*b), hinge.moved(*c)]
     head = lathe([(0.075, -0.085), (0.055, -0.03), (0.028, 0.0), (0.022, 0.03), (0, 0.03)], 24, 0.9)
     inner = lathe([(0, -0.002), (0.026, -0.004), (0.053, -0.033), (0.073, -0.085)], 24, 0.9)
     tilt = 0.35
-    place = [moved(turned(s, -tilt, "y"), w * 0.2, 0, h * 0.9) for s in (head, inner, _bulb(-0.05, 0.022))]
+    place = [s.turned(-tilt, "y").moved(w * 0.2, 0, h * 0.9) for s in (head, inner, _bulb(-0.05, 0.022))]
     return parts_of(
         (metal(look, finish, "black"), [foot, *arms, place[0]]),
         (plain((0.93, 0.92, 0.88), 0.4), place[1]),

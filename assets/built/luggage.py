@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from assets.built.maker import BLACK, CHROME, STEEL, FinishOf, Look, Size, material, parts_of, plain
-from assets.built.primitives import Shape, box, flat, joined, moved, reversed_shape, sheet, shifted_uv, tube, turned
+from assets.built.primitives import Shape, box, flat, joined, sheet, tube
 from assets.records import MeshPart
 
 SEAM = plain((0.06, 0.055, 0.05), 0.8, specular=0.1)
@@ -17,12 +17,12 @@ def rucksack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     """A rucksack that stands: a stuffed body with a zip over it, a pocket before it, straps behind, a loop on top."""
     w, d, h = size
     y, bw, bd = 0.02 * d, 0.80 * w, 0.60 * d
-    body = moved(_stuffed(bw, bd, 0.94 * h, 0.24 * h), 0, y)
+    body = _stuffed(bw, bd, 0.94 * h, 0.24 * h).moved(0, y)
     front_y = y - bd / 2
-    pocket = moved(_stuffed(0.66 * w, 0.26 * d, 0.44 * h, 0.09 * h), 0, front_y - 0.045 * d, 0.03 * h)
+    pocket = _stuffed(0.66 * w, 0.26 * d, 0.44 * h, 0.09 * h).moved(0, front_y - 0.045 * d, 0.03 * h)
     bag = _stuffed(0.20 * w, 0.34 * d, 0.36 * h, 0.05 * h)
-    sides = [moved(bag, s * (bw / 2 + 0.01 * w), y, 0.02 * h) for s in (-1, 1)]
-    foot = moved(_stuffed(bw * 1.02, bd * 1.02, 0.14 * h, 0.01 * h), 0, y)
+    sides = [bag.moved(s * (bw / 2 + 0.01 * w), y, 0.02 * h) for s in (-1, 1)]
+    foot = _stuffed(bw * 1.02, bd * 1.02, 0.14 * h, 0.01 * h).moved(0, y)
     a = np.linspace(0.04, 0.96, 17) * np.pi
     ridge = np.stack([0.93 * bw / 2 * np.cos(a), np.full(17, y - 0.30 * bd), 0.60 * h + 0.285 * h * np.sin(a)], 1)
     mouth = np.stack([0.30 * w * np.cos(a), np.full(17, front_y - 0.160 * d), 0.355 * h + 0.075 * h * np.sin(a)], 1)
@@ -39,7 +39,7 @@ def rucksack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
     cloth = material(look, "cloth", finish, "denim/0")
     trim = material(look, "trim", finish, "leather/0")
     return parts_of(
-        (cloth, [body, shifted_uv(pocket, 0.1, 0.3), *sides]),
+        (cloth, [body, pocket.shifted_uv(0.1, 0.3), *sides]),
         (trim, [foot, loop, *straps, label]),
         (SEAM, zips),
         (STEEL, pulls),
@@ -80,7 +80,7 @@ def suitcase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
         box([x - 0.011, -d / 2, low + 0.09 * tall], [x + 0.011, -d / 2 + 0.012, high - 0.09 * tall], 0.004)
         for x in np.linspace(-0.38, 0.38, 8) * wide
     ]
-    halves = [joined(shell, *ribs), turned(joined(shell, *ribs), np.pi)]
+    halves = [joined(shell, *ribs), joined(shell, *ribs).turned(np.pi)]
     ring = np.asarray(outline.buffer(-0.05).buffer(0.052, quad_segs=6).exterior.coords)[:-1]
     seam = tube(np.column_stack([ring[:, 0], 0 * ring[:, 0], ring[:, 1]]), 0.0065, 6, closed=True)
     corners = [
@@ -121,7 +121,7 @@ def _half_shell(outline: shapely.Polygon, deep: float, r: float) -> Shape:
         grid.append(np.column_stack([p[:, 0], np.full(len(p), -y), p[:, 1]]))
     p = grid[-1]
     face = flat(shapely.Polygon(p[:, [0, 2]]), deep)
-    return joined(reversed_shape(sheet(np.array(grid)[:, ::-1])), turned(face, np.pi / 2, "x"))
+    return joined(sheet(np.array(grid)[:, ::-1]).reversed(), face.turned(np.pi / 2, "x"))
 
 
 def _corner(x: float, z: float, side: int, up: int, d: float) -> Shape:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.built.primitives import Shape, between, box, fitted, frame, hung, joined, lathe, moved, part, tube
+from assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, part, tube
 from assets.records import Asset, Color, Finish, MeshPart, SupportSurface
 
 Size = tuple[float, float, float]
@@ -156,11 +156,11 @@ def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = Fal
     """A handle on a front at y: 'bar', 'knob' or 'cup'."""
     if style == "knob":
         knob = [(0, 0), (0.006, 0), (0.0055, 0.012), (0.014, 0.018), (0.015, 0.024), (0.011, 0.029), (0, 0.03)]
-        return hung(lathe(knob, 12), x, y, z)
+        return lathe(knob, 12).hung(x, y, z)
     if style == "cup":
         t = np.linspace(0, np.pi, 9)
         half = np.stack([np.cos(t) * 0.045, 0 * t, np.sin(t) * 0.02], 1)
-        return moved(tube(half + [0, -0.012, -0.008], 0.007, 6), x, y, z)
+        return tube(half + [0, -0.012, -0.008], 0.007, 6).moved(x, y, z)
     h = length / 2
     along, out = np.array([0, 0, 1.0] if upright else [1.0, 0, 0]), np.array([0, -0.028, 0])
     low, high = -h * along, h * along

@@ -27,17 +27,12 @@ from assets.built.primitives import (
     box,
     cylinder,
     frame,
-    hung,
     joined,
     lathe,
-    moved,
     quads,
     rim,
-    scaled,
     sheet,
     tube,
-    turned,
-    two_sided,
     upright,
 )
 from assets.records import Finish, MeshPart
@@ -141,11 +136,11 @@ def book_row(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generat
         cover, leaves, band = _book(t - 0.0008, d * deep, h * tall, rng=rng)
         shift = {"x": x + t / 2, "y": -d / 2 + d * deep / 2 + (0 if first else rng.uniform(0, 0.01))}
         cloth = int(palette[rng.integers(len(palette))])
-        by_color.setdefault(cloth, []).append(moved(cover, **shift))
-        titles[_ink(cloth)].append(moved(_on_spine(t, d * deep, h * tall, rng=prints), **shift))
-        pages.append(moved(leaves, **shift))
+        by_color.setdefault(cloth, []).append(cover.moved(**shift))
+        titles[_ink(cloth)].append(_on_spine(t, d * deep, h * tall, rng=prints).moved(**shift))
+        pages.append(leaves.moved(**shift))
         if band is not None:
-            bands.append(moved(band, **shift))
+            bands.append(band.moved(**shift))
         x, first = x + t, False
         if x > w / 2 - 0.012:
             break
@@ -174,7 +169,7 @@ def book_stack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
             print_ = joined(print_, _on_front(*inner, rng=prints))
         angle = 0.0 if count == 1 else rng.normal(0, 0.12)
         place = [
-            moved(turned(moved(turned(s, np.pi / 2, "y"), -w * 0.47 * shrink, 0, t / 2), angle), 0, 0, z)
+            s.turned(np.pi / 2, "y").moved(-w * 0.47 * shrink, 0, t / 2).turned(angle).moved(0, 0, z)
             for s in (cover, leaves, print_)
         ]
         cloth = int(colours[k % len(CLOTH)])
@@ -202,8 +197,8 @@ def papers(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     leaves = []
     for k, z in enumerate(np.linspace(0, h * 0.92, 6)):
         leaf = box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16])
-        leaf = turned(leaf, rng.normal(0, 0.05) if k else 0.0)
-        leaves.append(moved(leaf, rng.normal(0, 0.004), rng.normal(0, 0.004), z))
+        leaf = leaf.turned(rng.normal(0, 0.05) if k else 0.0)
+        leaves.append(leaf.moved(rng.normal(0, 0.004), rng.normal(0, 0.004), z))
     return parts_of((PAPER, leaves))
 
 
@@ -218,7 +213,7 @@ def photo_frame(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
     back = box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
     leg = bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
     wood = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(str(look.get("frame", "oak"))) or finish("oak/0")
-    lean = [turned(s, -tilt, "x") for s in (joined(*boards), image, back)]
+    lean = [s.turned(-tilt, "x") for s in (joined(*boards), image, back)]
     return parts_of((wood, lean[0]), (art, lean[1]), (BLACK, [lean[2], leg]))
 
 
@@ -230,27 +225,27 @@ def alarm_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
     back = [(0, 0), (r * 0.86, 0), (r * 0.97, d * 0.12), (r, d * 0.3)]
     case = [*back, (r, d * 0.62), (r * 0.94, d * 0.7), (r * 0.9, d * 0.62)]
     around = [(r * 0.90, d * 0.62), (r * 0.90, d * 0.73), (r * 0.96, d * 0.75), (r * 1.0, d * 0.7), (r * 1.0, d * 0.62)]
-    shell, ring = (hung(lathe(profile, 36, 0.9), 0, d * 0.4, zc) for profile in (case, around[::-1]))
+    shell, ring = (lathe(profile, 36, 0.9).hung(0, d * 0.4, zc) for profile in (case, around[::-1]))
     face = finish("clock_face/0")
-    disc = hung(cylinder(r * 0.9, 0, 0.001, 0, 36), 0, d * 0.4 - d * 0.66, zc)
+    disc = cylinder(r * 0.9, 0, 0.001, 0, 36).hung(0, d * 0.4 - d * 0.66, zc)
     disc = whole_image(disc, face, -r * 0.9, r * 0.9, zc - r * 0.9, zc + r * 0.9)
     t = np.linspace(0, np.pi / 2, 6)
     cap = lathe([(0, -0.002), (r * 0.36, -0.002), *np.stack([r * 0.38 * np.cos(t), r * 0.30 * np.sin(t)], 1)], 20, 0.9)
     nail = [(0, -r * 0.3), (r * 0.05, -r * 0.3), (r * 0.05, r * 0.36), (r * 0.09, r * 0.38), (0, r * 0.42)]
     pin = lathe(nail, 8, 0.9)
     bells = [
-        moved(turned(s, side * 0.55, "y"), side * r * 0.56, 0, zc + r * 0.98) for side in (-1, 1) for s in (cap, pin)
+        s.turned(side * 0.55, "y").moved(side * r * 0.56, 0, zc + r * 0.98) for side in (-1, 1) for s in (cap, pin)
     ]
     hammer = [
         tube([(0, 0, zc + r * 0.9), (0, 0, zc + r * 1.16)], 0.0016, 6),
-        moved(ball(0.0045, 8, 6), 0, 0, zc + r * 1.18),
+        ball(0.0045, 8, 6).moved(0, 0, zc + r * 1.18),
     ]
     a = np.linspace(0.25, np.pi - 0.25, 12)
     bow = tube(np.stack([r * 0.6 * np.cos(a), 0 * a, zc + r * 1.02 + r * 0.42 * np.sin(a)], 1), 0.0016, 6)
     feet = [
         joined(
             tube([(s * r * 0.5, 0, zc - r * 0.75), (s * r * 0.78, 0, 0.005)], [0.003, 0.004], 7),
-            moved(ball(0.0055, 8, 6), s * r * 0.78, 0, 0.0055),
+            ball(0.0055, 8, 6).moved(s * r * 0.78, 0, 0.0055),
         )
         for s in (-1, 1)
     ]
@@ -279,16 +274,16 @@ def keys(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     """A ring with three keys fanned out and a leather tag."""
     _, d, h = size
     around = [(0.016 * np.cos(t), 0.016 * np.sin(t), 0) for t in np.linspace(0, 6.283, 19)[:-1]]
-    ring = moved(tube(around, 0.0011, 6, closed=True), 0, d * 0.3, h * 0.5)
+    ring = tube(around, 0.0011, 6, closed=True).moved(0, d * 0.3, h * 0.5)
     made = []
     for k, a in enumerate((-2.1, -1.5, -1.0)):
-        bow = moved(lathe([(0.004, 0), (0.011, 0), (0.011, 0.002), (0.004, 0.002), (0.004, 0)], 16), 0.013)
+        bow = lathe([(0.004, 0), (0.011, 0), (0.011, 0.002), (0.004, 0.002), (0.004, 0)], 16).moved(0.013)
         blade = joined(
             box([0.022, -0.0035, 0], [0.052, 0.0035, 0.002]),
             *[box([x, -0.0055, 0], [x + 0.003, -0.003, 0.002]) for x in (0.036, 0.042, 0.047)],
         )
-        made.append(moved(turned(joined(bow, blade), a), 0, d * 0.3, 0.001 + 0.0022 * k))
-    tag = moved(turned(box([0.014, -0.010, 0], [0.060, 0.010, 0.003], 0.001), 0.3), 0, d * 0.3, 0.001)
+        made.append(joined(bow, blade).turned(a).moved(0, d * 0.3, 0.001 + 0.0022 * k))
+    tag = box([0.014, -0.010, 0], [0.060, 0.010, 0.003], 0.001).turned(0.3).moved(0, d * 0.3, 0.001)
     return parts_of((STEEL, [ring, made[0], made[2]]), (BRASS, made[1]), (plain((0.36, 0.22, 0.13), 0.6), tag))
 
 
@@ -301,8 +296,8 @@ def tissue_box(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gener
     slot = lathe([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0008), (0.0, 0.0008)], 24)
     return parts_of(
         (material(look, "skin", finish, "cotton/3"), box([-w / 2, -d / 2, 0], [w / 2, d / 2, top], 0.003)),
-        (BLACK, moved(scaled(slot, w * 0.32, d * 0.2, 1), 0, 0, top - 0.0004)),
-        (plain((0.95, 0.95, 0.95), 0.95, specular=0.05), two_sided(tissue)),
+        (BLACK, slot.scaled(w * 0.32, d * 0.2, 1).moved(0, 0, top - 0.0004)),
+        (plain((0.95, 0.95, 0.95), 0.95, specular=0.05), tissue.two_sided()),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assets.built.maker import SOIL, FinishOf, Look, Size, parts_of, plain
-from assets.built.primitives import Shape, lathe, sheet, tube, turned, two_sided
+from assets.built.primitives import Shape, lathe, sheet, tube
 from assets.records import MeshPart
 
 GREENS = {
@@ -78,7 +78,7 @@ def _leaf(angle: float, reach: float, z: float, length: float, width: float, ris
     x = out[:, None] + 0 * t
     y = half[:, None] * t
     zz = up[:, None] + 0.25 * half[:, None] * np.abs(t)
-    return two_sided(turned(sheet(np.stack([x, y, zz], -1).transpose(1, 0, 2)), angle))
+    return sheet(np.stack([x, y, zz], -1).transpose(1, 0, 2)).turned(angle).two_sided()
 
 
 def _blade(angle: float, reach: float, z0: float, z1: float, width: float, droop: float) -> Shape:
@@ -86,4 +86,4 @@ def _blade(angle: float, reach: float, z0: float, z1: float, width: float, droop
     out, up = reach * s**1.8, z0 * 0.85 + (z1 - z0 * 0.85) * (s - droop * s**3) / (1 - droop * 0.6)
     half = width / 2 * (1 - s**2.5) + 0.0005
     p = np.stack([np.stack([out, half, up], 1), np.stack([out, -half, up], 1)])
-    return two_sided(turned(sheet(p), angle))
+    return sheet(p).turned(angle).two_sided()

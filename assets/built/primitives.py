@@ -26,6 +26,40 @@ class Shape:
     normals: np.ndarray
     uv: np.ndarray
 
+    def moved(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
+        return Shape(self.vertices + [x, y, z], self.faces, self.normals, self.uv)
+
+    def turned(self, angle: float, axis: str = "z") -> Shape:
+        """Turned by `angle` radians, right-handed, about an axis through the origin."""
+        i = "xyz".index(axis)
+        j, k = (i + 1) % 3, (i + 2) % 3
+        m = np.eye(3)
+        m[j, j] = m[k, k] = np.cos(angle)
+        m[k, j] = np.sin(angle)
+        m[j, k] = -np.sin(angle)
+        return Shape(self.vertices @ m.T, self.faces, self.normals @ m.T, self.uv)
+
+    def hung(self, x: float, y: float, z: float) -> Shape:
+        """What stands on the floor, standing on a front at y instead: what was up looks along -y."""
+        return self.turned(np.pi / 2, "x").moved(x, y, z)
+
+    def scaled(self, x: float, y: float, z: float) -> Shape:
+        """Scaled along the axes; a negative factor mirrors and keeps faces outward."""
+        factors = np.array([x, y, z])
+        faces = self.faces if np.prod(factors) > 0 else self.faces[:, ::-1]
+        return Shape(self.vertices * factors, faces, _unit(self.normals / factors), self.uv)
+
+    def reversed(self) -> Shape:
+        """The same surface seen from its other side."""
+        return Shape(self.vertices, self.faces[:, ::-1], -self.normals, self.uv)
+
+    def two_sided(self) -> Shape:
+        return joined(self, self.reversed())
+
+    def shifted_uv(self, u: float, v: float) -> Shape:
+        """The same shape cut from another place of its material, metres."""
+        return Shape(self.vertices, self.faces, self.normals, self.uv + [u, v])
+
 
 # ------------------------------------------------------------------ putting shapes together
 
@@ -41,6 +75,11 @@ def joined(*shapes: Shape) -> Shape:
     )
 
 
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """(..., 3) vectors at length 1; zeros stay."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
 def part(finish: Finish, *shapes: Shape) -> MeshPart:
     """`shapes` as one mesh of `finish`, uv divided by its tile."""
     s = joined(*shapes)
@@ -53,49 +92,6 @@ def part(finish: Finish, *shapes: Shape) -> MeshPart:
     )
 
 
-def moved(shape: Shape, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Shape:
-    return Shape(shape.vertices + [x, y, z], shape.faces, shape.normals, shape.uv)
-
-
-def turned(shape: Shape, angle: float, axis: str = "z") -> Shape:
-    """Turned by `angle` radians, right-handed, about an axis through the origin."""
-    i = "xyz".index(axis)
-    j, k = (i + 1) % 3, (i + 2) % 3
-    m = np.eye(3)
-    m[j, j] = m[k, k] = np.cos(angle)
-    m[k, j] = np.sin(angle)
-    m[j, k] = -np.sin(angle)
-    return Shape(shape.vertices @ m.T, shape.faces, shape.normals @ m.T, shape.uv)
-
-
-def hung(shape: Shape, x: float, y: float, z: float) -> Shape:
-    """What stands on the floor, standing on a front at y instead: what was up looks along -y."""
-    return moved(turned(shape, np.pi / 2, "x"), x, y, z)
-
-
-def scaled(shape: Shape, x: float, y: float, z: float) -> Shape:
-    """Scaled along the axes; a negative factor mirrors and keeps faces outward."""
-    factors = np.array([x, y, z])
-    normals = shape.normals / factors
-    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    faces = shape.faces if np.prod(factors) > 0 else shape.faces[:, ::-1]
-    return Shape(shape.vertices * factors, faces, normals, shape.uv)
-
-
-def reversed_shape(shape: Shape) -> Shape:
-    """The same surface seen from its other side."""
-    return Shape(shape.vertices, shape.faces[:, ::-1], -shape.normals, shape.uv)
-
-
-def two_sided(shape: Shape) -> Shape:
-    return joined(shape, reversed_shape(shape))
-
-
-def shifted_uv(shape: Shape, u: float, v: float) -> Shape:
-    """The same shape cut from another place of its material, metres."""
-    return Shape(shape.vertices, shape.faces, shape.normals, shape.uv + [u, v])
-
-
 def fitted(parts: Sequence[MeshPart], size: Sequence[float]) -> tuple[MeshPart, ...]:
     """`parts` scaled and moved so that their box is exactly `size`, origin at the centre of its base."""
     low, high = bounds(parts)
@@ -103,9 +99,7 @@ def fitted(parts: Sequence[MeshPart], size: Sequence[float]) -> tuple[MeshPart, 
     origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
     done = []
     for p in parts:
-        normals = p.normals / factors
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        vertices = (p.vertices - origin) * factors
+        vertices, normals = (p.vertices - origin) * factors, _unit(p.normals / factors)
         done.append(MeshPart(vertices.astype(np.float32), p.faces, normals.astype(np.float32), p.uv, p.finish))
     return tuple(done)
 
@@ -116,8 +110,7 @@ def fitted(parts: Sequence[MeshPart], size: Sequence[float]) -> tuple[MeshPart, 
 def quads(corners: ArrayLike, uv: np.ndarray | None = None) -> Shape:
     """Flat quadrilaterals (m, 4, 3), counter-clockwise; uv (m, 4, 2) metres or projected along the face."""
     p = np.asarray(corners, float).reshape(-1, 4, 3)
-    normals = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    normals = _unit(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]))
     m = len(p)
     base = 4 * np.arange(m)[:, None]
     faces = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]], axis=1).reshape(-1, 3)
@@ -371,8 +364,7 @@ def tube(path: ArrayLike, radius: ArrayLike, segments: int = 8, closed: bool = F
     p = np.asarray(path, float)
     k = len(p)
     r = np.broadcast_to(np.asarray(radius, float), (k,))
-    tangent = (np.roll(p, -1, 0) - np.roll(p, 1, 0)) if closed else np.gradient(p, axis=0)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
+    tangent = _unit((np.roll(p, -1, 0) - np.roll(p, 1, 0)) if closed else np.gradient(p, axis=0))
     side = np.empty_like(p)
     start = np.eye(3)[np.abs(tangent[0]).argmin()]
     for i in range(k):
@@ -421,7 +413,7 @@ def sheet(points: np.ndarray, thickness: float = 0.0) -> Shape:
     if thickness <= 0:
         return front
     q = p - normals * thickness
-    back = reversed_shape(_grid(q, normals, uv))
+    back = _grid(q, normals, uv).reversed()
     return joined(front, back, between(rim(q), rim(p)))
 
 
@@ -443,8 +435,7 @@ def _grid_normals(p: np.ndarray) -> np.ndarray:
             for s in ((0, 1), (0, -1), (1, 0), (-1, 0))
         )
         near = np.where(np.linalg.norm(near, axis=2, keepdims=True) > 1e-9, near, n.mean((0, 1)))
-        near = near / np.maximum(np.linalg.norm(near, axis=2, keepdims=True), 1e-12)
-        n = np.where(pointed[..., None], near, n)
+        n = np.where(pointed[..., None], _unit(near), n)
     return n
 
 
@@ -473,7 +464,7 @@ def pillow(
     bump = 0.0 if waves is None else waves * puff
     top = sheet(np.stack([px, py, rise + bump], axis=-1))
     low = sheet(np.stack([px, py, -rise], axis=-1))
-    return joined(top, reversed_shape(low))
+    return joined(top, low.reversed())
 
 
 def folds(

@@ -5,24 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from assets.built.maker import WHITE, FinishOf, Look, Size, material, metal, parts_of, plain, whole_image
-from assets.built.primitives import (
-    Shape,
-    ball,
-    box,
-    cylinder,
-    folds,
-    joined,
-    lathe,
-    moved,
-    pillow,
-    quads,
-    reversed_shape,
-    scaled,
-    sheet,
-    shifted_uv,
-    tube,
-    turned,
-)
+from assets.built.primitives import Shape, ball, box, cylinder, folds, joined, lathe, pillow, quads, sheet, tube
 from assets.records import MeshPart
 
 PLEAT = 0.095
@@ -63,7 +46,7 @@ def round_rug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Genera
     w, d, h = size
     pattern = material(look, "pattern", finish, "rug_rings/0")
     disc = lathe([(0, 0), (0.49, 0), (0.5, h * 0.4), (0.495, h * 0.85), (0.485, h), (0, h)], 56, 0.8)
-    disc = scaled(disc, w, d, 1.0)
+    disc = disc.scaled(w, d, 1.0)
     return parts_of((pattern, whole_image(disc, pattern, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)))
 
 
@@ -83,11 +66,11 @@ def curtain(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
         grid = folds(width, rod_z - 0.035, count, min(d * 0.36, 0.06), rng=rng, columns=count * 9, rows=7, gather=0.1)
         cloth_sheet = sheet(grid, 0.0025)
         # Cloth is gathered: the pattern runs on over the folds, as measured along the sheet.
-        parts.append(moved(cloth_sheet, side * (w / 2 - 0.05 - width / 2), -0.01, 0.0))
+        parts.append(cloth_sheet.moved(side * (w / 2 - 0.05 - width / 2), -0.01, 0.0))
         for x in np.linspace(-0.46, 0.46, max(4, count // 2)) * width:
-            hooks.append(moved(ring, side * (w / 2 - 0.05 - width / 2) + x, -0.01, rod_z - 0.008))
+            hooks.append(ring.moved(side * (w / 2 - 0.05 - width / 2) + x, -0.01, rod_z - 0.008))
     rod = tube([(-w / 2 + 0.03, -0.01, rod_z), (w / 2 - 0.03, -0.01, rod_z)], 0.011, 10)
-    ends = [moved(scaled(ball(0.022, 12, 8), 1.4, 1, 1), s * (w / 2 - 0.031), -0.01, rod_z) for s in (-1, 1)]
+    ends = [ball(0.022, 12, 8).scaled(1.4, 1, 1).moved(s * (w / 2 - 0.031), -0.01, rod_z) for s in (-1, 1)]
     brackets = [
         joined(
             box([x - 0.008, -0.01, rod_z - 0.008], [x + 0.008, d / 2, rod_z + 0.008], 0.002),
@@ -110,7 +93,7 @@ def roller_blind(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
     """Cloth from a roll, a bar at its foot, a bead chain."""
     w, d, h = size
     r = min(d / 2, 0.028)
-    roll = moved(turned(cylinder(r * 0.85, -w / 2 + 0.02, w / 2 - 0.02, 0, 16), np.pi / 2, "y"), 0, 0, h - r)
+    roll = cylinder(r * 0.85, -w / 2 + 0.02, w / 2 - 0.02, 0, 16).turned(np.pi / 2, "y").moved(0, 0, h - r)
     cloth = box([-w / 2 + 0.025, -0.001, 0.014], [w / 2 - 0.025, 0.001, h - r])
     foot = box([-w / 2 + 0.022, -0.006, 0], [w / 2 - 0.022, 0.006, 0.022], 0.003)
     spans = ((-w / 2, -w / 2 + 0.02), (w / 2 - 0.02, w / 2))
@@ -130,7 +113,7 @@ def cushion(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
         waves += 0.045 * h * np.sin(k * (x * np.cos(a) + y * np.sin(a)) * 2 + rng.uniform(0, 6))
     waves -= 0.10 * h * np.exp(-((x - rng.normal(0, 0.2)) ** 2 + (y - rng.normal(0, 0.2)) ** 2) * 3)
     cloth = material(look, "cloth", finish, "linen/7")
-    return parts_of((cloth, moved(shifted_uv(pillow(w, d, h, cells, 0.36, waves), *rng.random(2)), 0, 0, h / 2)))
+    return parts_of((cloth, pillow(w, d, h, cells, 0.36, waves).shifted_uv(*rng.random(2)).moved(0, 0, h / 2)))
 
 
 def throw(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -147,7 +130,7 @@ def layers(size: Size, count: int, *, rng: np.random.Generator) -> list[Shape]:
         dx, dy = rng.normal(0, 0.004, 2)
         for outer in (True, False):
             leaf = _folded_leaf(w - 0.012, d - 0.01, t, outer, rng=rng)
-            made.append(shifted_uv(moved(leaf, dx, dy, k * t), *rng.random(2)))
+            made.append(leaf.moved(dx, dy, k * t).shifted_uv(*rng.random(2)))
     return made
 
 
@@ -178,4 +161,4 @@ def _folded_leaf(w: float, d: float, t: float, outer: bool, *, rng: np.random.Ge
     leaf = sheet(grid)
     a, b, c = (leaf.vertices - np.mean(leaf.vertices, axis=0))[leaf.faces.T]
     volume = np.einsum("ij,ij->", a, np.cross(b, c))
-    return leaf if volume > 0 else reversed_shape(leaf)
+    return leaf if volume > 0 else leaf.reversed()

@@ -23,7 +23,7 @@ from assets.built.maker import (
     parts_of,
     surface,
 )
-from assets.built.primitives import bar, box, moved, pillow
+from assets.built.primitives import bar, box, pillow
 from assets.records import MeshPart, SupportSurface
 
 BOARD = 0.022
@@ -155,4 +155,4 @@ def storage_box(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
 def bean_bag(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
     """A floor cushion, thick and round."""
     w, d, h = size
-    return parts_of((material(look, "cloth", finish, "linen/9"), moved(pillow(w, d, h, 16, 0.28), 0, 0, h / 2)))
+    return parts_of((material(look, "cloth", finish, "linen/9"), pillow(w, d, h, 16, 0.28).moved(0, 0, h / 2)))

@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from assets.built.maker import BLACK, BRASS, GLASS, STEEL, FinishOf, Look, Size, material, parts_of, plain
-from assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, moved, scaled, tube, turned
+from assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, tube
 from assets.records import MeshPart
 
 MUGS = {
@@ -32,9 +32,9 @@ def mug(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     t = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 10)
     bow = np.stack([cx + r * 0.94 + (w / 2 - cx - r - 0.005) * np.cos(t), 0 * t, h * 0.5 + h * 0.30 * np.sin(t)], 1)
     ear = tube(bow, 0.0055, 8)
-    drink = [moved(lathe([(r * 0.9, 0), (0, 0.0001)], 24), cx, 0, h * 0.8)] if look.get("coffee") else []
+    drink = [lathe([(r * 0.9, 0), (0, 0.0001)], 24).moved(cx, 0, h * 0.8)] if look.get("coffee") else []
     return parts_of(
-        (MUGS[str(look.get("colour", "white"))], [moved(cup(r, h), cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink)
+        (MUGS[str(look.get("colour", "white"))], [cup(r, h).moved(cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink)
     )
 
 
@@ -55,7 +55,7 @@ def plates(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     one = lathe([*below, (r * 0.985, 0.022), (r * 0.64, 0.008), (r * 0.56, 0.005), (0, 0.005)], 36, 0.6)
     tints = {"white": (0.92, 0.91, 0.89), "blue": (0.32, 0.43, 0.52), "sand": (0.80, 0.73, 0.63)}
     color = plain(tints[str(look.get("colour", "white"))], 0.15)
-    return parts_of((color, [moved(one, 0, 0, k * step) for k in range(count)]))
+    return parts_of((color, [one.moved(0, 0, k * step) for k in range(count)]))
 
 
 def bowl(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
@@ -78,8 +78,8 @@ def bowl(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
             a = 2 * np.pi * k / 6
             q = 0.0 if k == 6 else r * 0.50
             z = h - fr if k == 6 else rise * 0.55 + fr * 0.55 + rng.uniform(-0.004, 0.004)
-            apple = scaled(ball(fr * rng.uniform(0.9, 1.0), 14, 10), 1, 1, 0.93)
-            heap.append((plain(tints[int(rng.integers(4))], 0.3), moved(apple, q * np.cos(a), q * np.sin(a), z)))
+            apple = ball(fr * rng.uniform(0.9, 1.0), 14, 10).scaled(1, 1, 0.93)
+            heap.append((plain(tints[int(rng.integers(4))], 0.3), apple.moved(q * np.cos(a), q * np.sin(a), z)))
     return parts_of((skin, shell), *heap)
 
 
@@ -144,13 +144,13 @@ def knife_block(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gene
     """A leaning block of wood with knife handles standing out."""
     w, d, h = size
     lean = 0.32
-    body = turned(box([-w / 2, -d * 0.35, 0.0], [w / 2, d * 0.30, h * 0.70], 0.004), -lean, "x")
+    body = box([-w / 2, -d * 0.35, 0.0], [w / 2, d * 0.30, h * 0.70], 0.004).turned(-lean, "x")
     handles, bolsters = [], []
     for x in np.linspace(-0.3, 0.3, 3) * w:
         for y, s in ((-0.18 * d, 1.0), (0.1 * d, 0.85)):
             handle = box([x - 0.007, y - 0.011, h * 0.73], [x + 0.007, y + 0.011, h * 0.73 + 0.10 * s], 0.004)
             bolster = box([x - 0.005, y - 0.010, h * 0.69], [x + 0.005, y + 0.010, h * 0.735])
-            handles.append(turned(handle, -lean, "x"))
-            bolsters.append(turned(bolster, -lean, "x"))
+            handles.append(handle.turned(-lean, "x"))
+            bolsters.append(bolster.turned(-lean, "x"))
     foot = box([-w / 2, -d * 0.28, 0], [w / 2, d * 0.55, 0.018], 0.003)
     return parts_of((material(look, "wood", finish, "beech/0"), [body, foot]), (BLACK, handles), (STEEL, bolsters))

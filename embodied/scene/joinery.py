@@ -13,22 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.built.primitives import (
-    Shape,
-    between,
-    box,
-    cylinder,
-    frame,
-    joined,
-    moved,
-    part,
-    quads,
-    scaled,
-    tube,
-    turned,
-    two_sided,
-    upright,
-)
+from assets.built.primitives import Shape, between, box, cylinder, frame, joined, part, quads, tube, upright
 from assets.records import Finish
 from embodied.house.house import House, Opening
 from embodied.house.shapes import inward
@@ -64,7 +49,7 @@ class _Hole:
     hinge_at_origin: bool
 
     def world(self, shape: Shape) -> Shape:
-        return moved(turned(shape, self.yaw), *self.origin)
+        return shape.turned(self.yaw).moved(*self.origin)
 
     def point(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         c, s = math.cos(self.yaw), math.sin(self.yaw)
@@ -206,7 +191,7 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
         gx0, gx1 = x0 + sash - 0.006, x1 - sash + 0.006
         gz0, gz1 = b0 + foot - 0.006, b1 - sash + 0.006
         ym = (y0 + y1) / 2
-        panes.append(two_sided(upright(gx1, gx0, gz0, gz1, ym)))
+        panes.append(upright(gx1, gx0, gz0, gz1, ym).two_sided())
         if bars:
             rows = max(1, round((gz1 - gz0) / 0.5))
             for k in range(1, rows):
@@ -317,7 +302,7 @@ def _leaves(house: House, hole: _Hole, wood: Finish) -> list[Part]:
         if panes is not None:
             pieces.append(("glass", GLASS, panes, stem + "/glass"))
         for name, material, shape, key in pieces:
-            mesh = part(material, scaled(shape, side, 1, 1))
+            mesh = part(material, shape.scaled(side, 1, 1))
             parts.append(Part(f"{o.id}/{name}", "opening", o.rooms[0], mesh, key, pivot, yaw))
     return parts
 
@@ -351,7 +336,7 @@ def _leaf(width: float, height: float, thick: float, style: str) -> tuple[Shape,
         for x0, x1 in columns:
             if style == "glazed" and r == 1:
                 ym = -thick / 2
-                panes.append(two_sided(upright(x1, x0, z0, z1, ym)))
+                panes.append(upright(x1, x0, z0, z1, ym).two_sided())
             else:
                 shapes.append(_panel(x0, x1, z0, z1, thick))
     return joined(*shapes), joined(*panes) if panes else None
@@ -375,10 +360,10 @@ def _lever(x: float, thick: float) -> Shape:
     """Lever handles on both sides of a leaf at 1.03 m."""
     z, shapes = 1.03, []
     for y, out in ((0.0, 1.0), (-thick, -1.0)):
-        rose = moved(turned(cylinder(0.025, 0, 0.009, 0.003, 14), -out * math.pi / 2, "x"), x, y, z)
+        rose = cylinder(0.025, 0, 0.009, 0.003, 14).turned(-out * math.pi / 2, "x").moved(x, y, z)
         near, far = y + out * 0.045, y + out * 0.055
         path = [(x, y + out * 0.004, z), (x, near, z), (x - 0.012, far, z), (x - 0.12, far, z)]
-        key = moved(turned(cylinder(0.018, 0, 0.006, 0.0, 12), -out * math.pi / 2, "x"), x, y, z - 0.09)
+        key = cylinder(0.018, 0, 0.006, 0.0, 12).turned(-out * math.pi / 2, "x").moved(x, y, z - 0.09)
         shapes += [rose, tube(path, 0.0095, 10), key]
     return joined(*shapes)
 

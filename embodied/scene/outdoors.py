@@ -10,20 +10,7 @@ import numpy as np
 import shapely
 from scipy.spatial import ConvexHull
 
-from assets.built.primitives import (
-    Shape,
-    bar,
-    box,
-    extruded,
-    flat,
-    joined,
-    part,
-    projected_uv,
-    quads,
-    sheet,
-    tube,
-    two_sided,
-)
+from assets.built.primitives import Shape, bar, box, extruded, flat, joined, part, projected_uv, quads, sheet, tube
 from assets.records import Finish
 from embodied.house.house import House
 from embodied.house.shapes import inward, room_union
@@ -334,7 +321,7 @@ def _fir(height: float, *, rng: np.random.Generator) -> Shape:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.repeat(normals / np.linalg.norm(normals, axis=1, keepdims=True), 3, axis=0)
     vertices, faces = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
-    return two_sided(Shape(vertices, faces, normals, projected_uv(vertices, normals)))
+    return Shape(vertices, faces, normals, projected_uv(vertices, normals)).two_sided()
 
 
 def _bare(height: float, *, rng: np.random.Generator) -> Shape:

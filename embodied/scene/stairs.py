@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import shapely
 
-from assets.built.primitives import bar, box, moved, part, quads, turned
+from assets.built.primitives import bar, box, part, quads
 from assets.records import Finish
 from embodied.house.house import House, Stair
 from embodied.scene.part import Part
@@ -59,8 +59,8 @@ def stair_parts(house: House, stair: Stair, finish: Callable[[str], Finish]) -> 
         if k < len(rows) - 1:
             nx, ny = rows[k + 1, :2]
             deep = max(going, float(np.hypot(nx - x, ny - y)))
-            treads.append(moved(turned(box([-0.025, -half, z - TREAD], [deep + 0.002, half, z], 0.006), yaw), x, y))
-        risers.append(moved(turned(box([0, -half, z - rise], [0.018, half, z - TREAD]), yaw), x, y))
+            treads.append(box([-0.025, -half, z - TREAD], [deep + 0.002, half, z], 0.006).turned(yaw).moved(x, y))
+        risers.append(box([0, -half, z - rise], [0.018, half, z - TREAD]).turned(yaw).moved(x, y))
     for a, b in itertools.pairwise(p):
         d = (b - a) / max(np.linalg.norm((b - a)[:2]), 1e-9)
         side = np.array([-d[1], d[0], 0.0])
