@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import BLACK, CHROME, GAP, STEEL, FinishOf, Look, Size, parts_of, plain
+from assets.built.maker import BLACK, CHROME, GAP, STEEL, Order, parts_of, plain
 from assets.built.primitives import box, cylinder, lathe
 from assets.records import Finish, MeshPart
 
@@ -13,9 +13,9 @@ DOOR = Finish(color=(0.16, 0.19, 0.21, 0.45), roughness=0.04)
 """Dark glass."""
 
 
-def washer(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def washer(order: Order) -> list[MeshPart]:
     """A washing machine that is filled from before; dial, keys and display on a panel that rises behind its top."""
-    w, d, h = size
+    w, d, h = order.size
     top, panel_y = 0.84 * h, 0.25 * d
     y = -d / 2 + 0.03
     body = [

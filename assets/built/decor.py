@@ -8,21 +8,7 @@ import numpy as np
 import shapely
 from scipy.interpolate import PchipInterpolator
 
-from assets.built.maker import (
-    BLACK,
-    BRASS,
-    MIRROR,
-    PAPER,
-    WHITE,
-    FinishOf,
-    Look,
-    Size,
-    material,
-    metal,
-    parts_of,
-    plain,
-    whole_image,
-)
+from assets.built.maker import BLACK, BRASS, MIRROR, PAPER, WHITE, Order, parts_of, plain, whole_image
 from assets.built.primitives import Shape, ball, between, box, cylinder, flat, frame, lathe, sheet, tube, upright
 from assets.records import MeshPart
 
@@ -36,13 +22,13 @@ GLAZES = {
 FRAMES = {"black": BLACK, "white": WHITE, "brass": BRASS}
 
 
-def picture(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def picture(order: Order) -> list[MeshPart]:
     """Framed art: a moulded frame, a mat where look['mat'] > 0, the picture, glass over paper."""
-    w, d, h = size
-    name = str(look.get("frame", "oak/0"))
-    wood = FRAMES[name] if name in FRAMES else finish(name)
-    f = float(look.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
-    m = float(look.get("mat", 0.0)) * min(w, h)
+    w, d, h = order.size
+    name = order.word("frame", "oak/0")
+    wood = FRAMES[name] if name in FRAMES else order.finish(name)
+    f = float(order.look.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
+    m = float(order.look.get("mat", 0.0)) * min(w, h)
     y0, y1 = -d / 2, d / 2
     moulding = []
     lines = [(0.0, y1), (0.0, y0 + 0.004), (0.25 * f, y0), (0.8 * f, y0 + 0.001), (f, y0 + 0.006), (f, y0 + 0.012)]
@@ -52,7 +38,7 @@ def picture(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
         uv = np.where(upright_grain, strip.uv[:, ::-1], strip.uv)
         moulding.append(Shape(strip.vertices, strip.faces, strip.normals, uv))
     back = upright(w / 2, -w / 2, 0, h, y1)
-    art = material(look, "art", finish, "art_hills/0")
+    art = order.material("art", "art_hills/0")
     g = f + m
     x0, x1, z0, z1 = -w / 2 + g, w / 2 - g, g, h - g
     image = whole_image(upright(x0, x1, z0, z1, y0 + 0.0125), art, x0, x1, z0, z1)
@@ -66,30 +52,30 @@ def _inset(w: float, h: float, by: float, y: float) -> list[tuple[float, float, 
     return [(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]
 
 
-def canvas(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def canvas(order: Order) -> list[MeshPart]:
     """A painting on a stretched canvas without a frame."""
-    w, d, h = size
-    art = material(look, "art", finish, "art_brushwork/0")
+    w, d, h = order.size
+    art = order.material("art", "art_brushwork/0")
     return parts_of((art, whole_image(box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002), art, -w / 2, w / 2, 0, h)))
 
 
-def poster(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def poster(order: Order) -> list[MeshPart]:
     """Unframed paper on the wall, its corners coming off a little."""
-    w, d, h = size
+    w, d, h = order.size
     x, z = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(0, h, 9))
     curl = (np.abs(x) / (w / 2)) ** 6 * (np.abs(z - h / 2) / (h / 2)) ** 6
-    y = d / 2 - 0.001 - curl * (d - 0.001) * rng.uniform(0.5, 1.0, (9, 9))
-    art = material(look, "art", finish, "art_poster/0")
+    y = d / 2 - 0.001 - curl * (d - 0.001) * order.rng.uniform(0.5, 1.0, (9, 9))
+    art = order.material("art", "art_poster/0")
     return parts_of((art, whole_image(sheet(np.stack([x, y, z], -1), 0.0004), art, -w / 2, w / 2, 0, h)))
 
 
-def mirror(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def mirror(order: Order) -> list[MeshPart]:
     """A looking-glass in a slim frame; round where look['round'] is 1."""
-    w, d, h = size
-    y0, f = -d / 2, float(look.get("width", 0.016))
-    name = str(look.get("frame", "black"))
-    rim = FRAMES[name] if name in FRAMES else finish(name)
-    if look.get("round"):
+    w, d, h = order.size
+    y0, f = -d / 2, float(order.look.get("width", 0.016))
+    name = order.word("frame", "black")
+    rim = FRAMES[name] if name in FRAMES else order.finish(name)
+    if order.look.get("round"):
         ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)], 48)
         ring = ring.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
         disc = lathe([(0.5 - f / w, 0), (0, 0)], 48)
@@ -102,23 +88,23 @@ def mirror(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     return parts_of((rim, boards), (BLACK, back), (MIRROR, glass))
 
 
-def wall_clock(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def wall_clock(order: Order) -> list[MeshPart]:
     """A round case with a printed dial behind glass."""
-    w, d, h = size
+    w, d, h = order.size
     case = lathe([(0, 0), (0.5, 0), (0.5, 0.7 * d), (0.485, d), (0.455, d), (0.45, 0.75 * d), (0.45, 0.72 * d)], 40)
     case = case.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
     t = np.linspace(0, 2 * np.pi, 41)[:-1]
     disc = flat(shapely.Polygon(np.stack([0.452 * np.cos(t), 0.452 * np.sin(t)], 1)), 0.0).turned(np.pi / 2, "x")
     disc = disc.scaled(w, 1, h).moved(0, d / 2 - 0.72 * d, h / 2)
-    face = material(look, "face", finish, "clock_face/0")
+    face = order.material("face", "clock_face/0")
     disc = whole_image(disc, face, -w * 0.452, w * 0.452, h * 0.048, h * 0.952)
-    return parts_of((metal(look, finish, "black"), case), (face, disc))
+    return parts_of((order.metal("black"), case), (face, disc))
 
 
-def vase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def vase(order: Order) -> list[MeshPart]:
     """A turned vase, with dry branches where look['branches'] is 1."""
-    w, _, h = size
-    branches = bool(look.get("branches"))
+    (w, _, h), rng = order.size, order.rng
+    branches = bool(order.look.get("branches"))
     body = h * 0.42 if branches else h
     belly, neck, at = rng.uniform(0.42, 0.5), rng.uniform(0.16, 0.28), rng.uniform(0.3, 0.55)
     t = np.linspace(0, 1, 22)
@@ -134,7 +120,7 @@ def vase(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         *[(a * w, b * (body - 0.004)) for a, b in zip(inner[:8:-1], t[:8:-1])],
         (0, body * 0.4),
     ]
-    clay = GLAZES[str(look.get("glaze", "white"))]
+    clay = GLAZES[order.word("glaze", "white")]
     twigs, buds = [], []
     if branches:
         for _ in range(7):

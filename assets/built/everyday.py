@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import BLACK, GLASS, PAPER, STEEL, FinishOf, Look, Size, material, metal, parts_of, plain
+from assets.built.maker import BLACK, GLASS, PAPER, STEEL, Order, Size, parts_of, plain
 from assets.built.primitives import Shape, ball, between, box, cylinder, frame, joined, lathe, quads, rim, sheet, tube
 from assets.records import Finish, MeshPart
 
@@ -24,8 +24,8 @@ TINTS = {
 """Colours of mass-made things, sRGB."""
 
 
-def _tint(look: Look, name: str = "colour", default: str = "white") -> tuple[float, float, float]:
-    return TINTS[str(look.get(name, default))]
+def _tint(order: Order, name: str = "colour", default: str = "white") -> tuple[float, float, float]:
+    return TINTS[order.word(name, default)]
 
 
 def _leaf(x: float, y: float, z: float, w: float, d: float, turn: float, thick: float) -> Shape:
@@ -36,9 +36,9 @@ def _leaf(x: float, y: float, z: float, w: float, d: float, turn: float, thick: 
 # ------------------------------------------------------------------ paper
 
 
-def post(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def post(order: Order) -> list[MeshPart]:
     """Letters in a loose heap, some with a window, one brown."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     count = 4
     letters: list[Shape] = []
     windows: list[Shape] = []
@@ -63,9 +63,9 @@ def post(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
     )
 
 
-def note(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def note(order: Order) -> list[MeshPart]:
     """A sheet on a wall under a pin, its foot coming forward; a child's drawing (look['drawing']) or writing."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
 
     def curl(share: float) -> float:
         """How far the sheet comes forward at a share of its height."""
@@ -81,7 +81,7 @@ def note(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         return quads([[(a, *low), (b, *low), (b, *high), (a, *high)]])
 
     marks: list[tuple[Finish, list[Shape]]]
-    if look.get("drawing"):
+    if order.look.get("drawing"):
         crayons = [(0.35, 0.6, 0.85), (0.7, 0.2, 0.18), (0.85, 0.6, 0.3), (0.6, 0.35, 0.65), (0.2, 0.45, 0.7)]
         wall, roof, sky = (crayons[k] for k in rng.permutation(5)[:3])
         grass, sun = (0.3, 0.6, 0.25), (0.95, 0.8, 0.2)
@@ -100,13 +100,13 @@ def note(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
         marks = [(plain((0.2, 0.2, 0.28), 0.9), ink)]
     pin = ball(0.006, 8, 5).scaled(1, 0.6, 1).moved(0, d / 2 - 0.004, h * 0.965)
     head = plain(TINTS[("red", "blue", "green", "yellow")[int(rng.integers(4))]], 0.35)
-    paper = plain(_tint(look, "paper"), 0.9, specular=0.2)
+    paper = plain(_tint(order, "paper"), 0.9, specular=0.2)
     return parts_of((paper, leaf), (head, pin), *marks)
 
 
-def notice_board(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def notice_board(order: Order) -> list[MeshPart]:
     """A framed cork board with notes and cards pinned to it."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     f, y = 0.022, d / 2
     left, right, top, bottom = frame(-w / 2, w / 2, 0, h, (y - 0.02, y), f, 0.002)
     cork = box([-w / 2 + f, y - 0.01, f], [w / 2 - f, y, h - f])
@@ -125,19 +125,19 @@ def notice_board(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Gen
         leaves.setdefault(names[int(rng.integers(len(names)))], []).append(leaf.moved(cx, y - 0.0105, cz))
         pins.append(ball(0.005, 8, 5).moved(cx, y - 0.014, cz + ph * 0.42))
     return parts_of(
-        (material(look, "wood", finish, "oak/0"), [left, right, bottom, top]),
+        (order.material("wood", "oak/0"), [left, right, bottom, top]),
         (plain((0.62, 0.45, 0.28), 0.95, specular=0.1), cork),
         *((plain(TINTS[n], 0.9), s) for n, s in sorted(leaves.items())),
         (plain((0.66, 0.16, 0.13), 0.35), pins),
     )
 
 
-def wall_calendar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def wall_calendar(order: Order) -> list[MeshPart]:
     """A picture above, the days of a month below, on a nail."""
-    w, d, h = size
+    w, d, h = order.size
     y = d / 2
     leaf = box([-w / 2, y - 0.004, 0], [w / 2, y, h * 0.97])
-    art = material(look, "art", finish, "art_sea/0")
+    art = order.material("art", "art_sea/0")
     a, b, c, e = -w / 2 + 0.01, w / 2 - 0.01, h * 0.52, h * 0.94
     picture = quads(
         [[(a, y - 0.0045, c), (b, y - 0.0045, c), (b, y - 0.0045, e), (a, y - 0.0045, e)]],
@@ -152,9 +152,9 @@ def wall_calendar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Ge
     return parts_of((PAPER, leaf), (art, picture), (plain((0.3, 0.3, 0.33), 0.8), days), (STEEL, nail))
 
 
-def folders(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def folders(order: Order) -> list[MeshPart]:
     """Ring binders side by side, each with a label on its spine."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     count = max(2, round(w / 0.07))
     t = w / count
     names = ("grey", "black", "blue", "red", "green", "grey")
@@ -173,9 +173,9 @@ def folders(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generato
 # ------------------------------------------------------------------ electric
 
 
-def cable(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def cable(order: Order) -> list[MeshPart]:
     """A charger with its cable in loops."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     t = np.linspace(0, 1, 40)
     turns = 2 * np.pi * (1.6 + rng.uniform(0, 0.6))
     r = 0.5 - 0.33 * t + 0.04 * np.sin(9 * t + rng.uniform(0, 6))
@@ -184,7 +184,7 @@ def cable(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     end = path[-1]
     plug = box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004).moved(end[0], end[1])
     tip = box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001).moved(*path[0, :2])
-    skin = plain(_tint(look), 0.45)
+    skin = plain(_tint(order), 0.45)
     return parts_of((skin, [tube(path, 0.0022, 6), plug]), (STEEL, tip))
 
 
@@ -212,19 +212,19 @@ def _crumpled(size: Size, cells: int, roundness: float, *, rng: np.random.Genera
     return joined(top, low.reversed(), between(up * [1, 1, 0], up)).shifted_uv(*rng.random(2))
 
 
-def thrown_clothes(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def thrown_clothes(order: Order) -> list[MeshPart]:
     """Clothes as they were taken off: two pieces, one over the other."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     under = _crumpled((w, d, h * 0.7), 14, 0.8, rng=rng)
     over = _crumpled((w * 0.6, d * 0.6, h * 0.55), 12, 0.6, rng=rng).turned(rng.uniform(0, 3))
     over = over.moved(0.06 * w, -0.05 * d, h * 0.45)
-    cloth, other = material(look, "cloth", finish, "denim/0"), material(look, "other", finish, "linen/4")
+    cloth, other = order.material("cloth", "denim/0"), order.material("other", "linen/4")
     return parts_of((cloth, under), (other, over))
 
 
-def duvet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def duvet(order: Order) -> list[MeshPart]:
     """A duvet pushed back in the morning: feathers in cotton, in a few long, round folds across the bed."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     cells = 34
     t = np.linspace(-1, 1, cells + 1)
     t = np.sign(t) * (1 - (1 - np.abs(t)) ** 1.5)  # close together at the rim, which is round
@@ -245,15 +245,15 @@ def duvet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator)
     rise = puff * h * (0.36 + 0.64 * lie.clip(-0.2, 1.0)) + 0.004
     top, low = sheet(np.stack([px, py, rise], -1)), sheet(np.stack([px, py, 0 * rise], -1))
     cloth = joined(top, low.reversed()).shifted_uv(*rng.random(2))
-    return parts_of((material(look, "cloth", finish, "cotton/0"), cloth))
+    return parts_of((order.material("cloth", "cotton/0"), cloth))
 
 
 # ------------------------------------------------------------------ kitchen and bath
 
 
-def dish_rack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def dish_rack(order: Order) -> list[MeshPart]:
     """A wire rack with plates on edge and two cups upside down."""
-    w, d, h = size
+    w, d, h = order.size
     wire = 0.003
     a, b, rim = w / 2 - wire, d / 2 - wire, h * 0.4
     wires = [tube([(-a, s * b, z), (a, s * b, z)], wire, 6) for s in (-1, 1) for z in (0.02, rim)]
@@ -267,16 +267,16 @@ def dish_rack(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Genera
     cup = lathe([(0.0, 0.08), (0.03, 0.08), (0.038, 0.0), (0.034, 0.0), (0.026, 0.076), (0, 0.076)], 18)
     cups = [cup.moved(0.32 * w, y, 0.024) for y in (-0.2 * d, 0.2 * d)]
     return parts_of(
-        (metal(look, finish, "chrome"), wires),
+        (order.metal("chrome"), wires),
         (BLACK, feet),
         (plain((0.92, 0.91, 0.89), 0.15), stand),
-        (plain(_tint(look, "cup", "blue"), 0.2), cups),
+        (plain(_tint(order, "cup", "blue"), 0.2), cups),
     )
 
 
-def jar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def jar(order: Order) -> list[MeshPart]:
     """A storage jar with a lid, full to three quarters."""
-    w, _, h = size
+    w, _, h = order.size
     r, body = w / 2, h * 0.86
     outside = [(0, 0), (r * 0.94, 0), (r, 0.006), (r, body * 0.88), (r * 0.86, body)]
     within = [(r * 0.82, body), (r * 0.96, body * 0.86), (r * 0.96, 0.008), (0, 0.006)]
@@ -291,46 +291,46 @@ def jar(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -
     lid = cylinder(r * 0.9, 0, h - body, 0.004, 20).moved(0, 0, body)
     return parts_of(
         (GLASS, shell),
-        (plain(grain[str(look.get("holds", "pasta"))], 0.9), inside),
-        (metal(look, finish, "steel") if "metal" in look else material(look, "wood", finish, "oak/0"), lid),
+        (plain(grain[order.word("holds", "pasta")], 0.9), inside),
+        (order.metal("steel") if "metal" in order.look else order.material("wood", "oak/0"), lid),
     )
 
 
-def tin(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def tin(order: Order) -> list[MeshPart]:
     """A tin of food with a paper label."""
-    w, _, h = size
+    w, _, h = order.size
     r = w / 2
     can = lathe([(0, 0), (r, 0), (r, h), (r * 0.93, h), (r * 0.92, h - 0.004), (0, h - 0.004)], 20, 0.6)
     label = lathe([(r + 0.0005, h * 0.06), (r + 0.0005, h * 0.94)], 20)
     band = lathe([(r + 0.0009, h * 0.3), (r + 0.0009, h * 0.55)], 20)
-    return parts_of((STEEL, can), (plain(_tint(look), 0.5), label), (PAPER, band))
+    return parts_of((STEEL, can), (plain(_tint(order), 0.5), label), (PAPER, band))
 
 
-def packet(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def packet(order: Order) -> list[MeshPart]:
     """A cardboard packet, printed: a field, a stripe and a picture's patch on its front."""
-    w, d, h = size
+    w, d, h = order.size
     y = -d / 2 - 0.0004
     stripe = box([-w / 2, y, h * 0.72], [w / 2, y + 0.001, h * 0.88])
     patch = box([-w * 0.34, y, h * 0.14], [w * 0.34, y + 0.001, h * 0.56])
     return parts_of(
-        (plain(_tint(look), 0.55), box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.0015)),
+        (plain(_tint(order), 0.55), box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.0015)),
         (PAPER, stripe),
-        (plain(_tint(look, "patch", "yellow"), 0.55), patch),
+        (plain(_tint(order, "patch", "yellow"), 0.55), patch),
     )
 
 
-def toilet_roll(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def toilet_roll(order: Order) -> list[MeshPart]:
     """A roll of toilet paper standing on end."""
-    w, _, h = size
+    w, _, h = order.size
     r = w / 2
     roll = lathe([(r * 0.36, 0), (r, 0), (r, h), (r * 0.36, h), (r * 0.36, 0)], 24, 0.7)
     card = lathe([(r * 0.35, h), (r * 0.35, 0)], 20)
     return parts_of((plain((0.93, 0.93, 0.92), 0.95, specular=0.05), roll), (plain((0.6, 0.5, 0.38), 0.9), card))
 
 
-def duck(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def duck(order: Order) -> list[MeshPart]:
     """A bath duck."""
-    w, d, h = size
+    w, d, h = order.size
     body = ball(0.5, 14, 9).scaled(w, d, h * 0.62).moved(0, 0, h * 0.31)
     head = ball(h * 0.24, 12, 8).moved(0, -d * 0.2, h * 0.74)
     tail = ball(0.5, 8, 6).scaled(w * 0.3, d * 0.24, h * 0.3).moved(0, d * 0.42, h * 0.5)
@@ -344,9 +344,9 @@ def duck(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) 
 # ------------------------------------------------------------------ toys and games
 
 
-def blocks(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def blocks(order: Order) -> list[MeshPart]:
     """Building blocks where a child left them: some on one another, the rest about."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     side = min(h / 2.02, 0.045)
     by: dict[str, list[Shape]] = {}
     names = ("red", "blue", "yellow", "green", "beige", "orange")
@@ -366,26 +366,26 @@ def blocks(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator
     return parts_of(*((plain(TINTS[n], 0.5), s) for n, s in sorted(by.items())))
 
 
-def board_game(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def board_game(order: Order) -> list[MeshPart]:
     """Flat boxes of games on one another."""
-    w, d, h = size
-    count = int(look.get("count", 2))
+    (w, d, h), rng = order.size, order.rng
+    count = int(order.look.get("count", 2))
     made: list[tuple[Finish, list[Shape] | Shape]] = []
     names = ("red", "blue", "green", "orange", "black")
-    order = rng.permutation(len(names))
+    turns = rng.permutation(len(names))
     for k in range(count):
         shrink = 1.0 - 0.07 * k
         a, b, t = w * shrink * 0.96, d * shrink * 0.96, h / count
         lean = 0.0 if k == 0 else rng.normal(0, 0.06)
         case = box([-a / 2, -b / 2, 0], [a / 2, b / 2, t - 0.0012], 0.002).turned(lean)
         title = box([-a * 0.3, -b * 0.12, t - 0.0014], [a * 0.3, b * 0.12, t]).turned(lean)
-        made += [(plain(TINTS[names[order[k % 5]]], 0.45), case.moved(z=k * t)), (PAPER, title.moved(z=k * t))]
+        made += [(plain(TINTS[names[turns[k % 5]]], 0.45), case.moved(z=k * t)), (PAPER, title.moved(z=k * t))]
     return parts_of(*made)
 
 
-def crayons(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def crayons(order: Order) -> list[MeshPart]:
     """Pencils of many colours on a sheet with a scribble."""
-    w, d, h = size
+    (w, d, h), rng = order.size, order.rng
     leaf = box([-w / 2, -d / 2, 0], [w / 2, d / 2, 0.0012])
     by: dict[str, list[Shape]] = {}
     for k, name in enumerate(("red", "blue", "green", "yellow", "orange", "pink")):

@@ -16,8 +16,6 @@ Size = tuple[float, float, float]
 """Width, depth, height, metres."""
 FinishOf = Callable[[str], Finish]
 Look = Mapping[str, str | float]
-Build = Callable[..., list[MeshPart]]
-"""build(size, look, finish, rng=...): parts in the asset's frame, base at z = 0, front along -y."""
 
 WHITE = Finish(color=(0.88, 0.87, 0.85, 1.0), roughness=0.35)
 PORCELAIN = Finish(color=(0.91, 0.90, 0.88, 1.0), roughness=0.12)
@@ -38,6 +36,33 @@ SHADE = (5.0, 4.0, 2.9)
 LIGHTS = {"bulb": BULB, "shade": SHADE, "panel": (6.0, 5.6, 5.0), "downlight": (26.0, 22.5, 18.0)}
 """What lamps emit, by name: linear relative radiance."""
 METALS = {"chrome": CHROME, "steel": STEEL, "brass": BRASS, "black": BLACK, "white": WHITE}
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What one thing should be."""
+
+    size: Size
+    look: Look
+    finish: FinishOf
+    rng: np.random.Generator
+
+    def word(self, name: str, default: str) -> str:
+        """What the look says under a name."""
+        return str(self.look.get(name, default))
+
+    def metal(self, default: str = "steel") -> Finish:
+        """The metal that look['metal'] names: one of METALS or a material key."""
+        name = self.word("metal", default)
+        return METALS[name] if name in METALS else self.finish(name)
+
+    def material(self, name: str, default: str) -> Finish:
+        """The finish of the material key in look[name]."""
+        return self.finish(self.word(name, default))
+
+
+Build = Callable[[Order], list[MeshPart]]
+"""Parts in the asset's frame, base at z = 0, front along -y."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +92,7 @@ def made(
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))
     x, y, z = size
-    return fitted(build((float(x), float(y), float(z)), told, finish, rng=rng), size)
+    return fitted(build(Order((float(x), float(y), float(z)), told, finish, rng)), size)
 
 
 def plain(
@@ -80,17 +105,6 @@ def plain(
 def tinted(finish: Finish, emission: Color) -> Finish:
     """The same finish, glowing."""
     return dataclasses.replace(finish, emission=emission)
-
-
-def metal(look: Look, finish: FinishOf, default: str = "steel") -> Finish:
-    """The metal that look['metal'] names: one of METALS or a material key."""
-    name = str(look.get("metal", default))
-    return METALS[name] if name in METALS else finish(name)
-
-
-def material(look: Look, name: str, finish: FinishOf, default: str) -> Finish:
-    """The finish of the material key in look[name]."""
-    return finish(str(look.get(name, default)))
 
 
 def whole_image(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import SOIL, FinishOf, Look, Size, parts_of, plain
+from assets.built.maker import SOIL, Order, Size, parts_of, plain
 from assets.built.primitives import Shape, lathe, sheet, tube
 from assets.records import MeshPart
 
@@ -23,18 +23,18 @@ POTS = {
 }
 
 
-def plant(size: Size, look: Look, finish: FinishOf, *, rng: np.random.Generator) -> list[MeshPart]:
+def plant(order: Order) -> list[MeshPart]:
     """A pot with leaves: 'broad', 'grass', 'trailing' or 'rubber'."""
-    w, _, h = size
-    kind = str(look.get("kind", "broad"))
+    w, _, h = order.size
+    kind = order.word("kind", "broad")
     pr, ph = (0.26 * w, 0.30 * h) if kind != "rubber" else (0.24 * w, 0.22 * h)
     pot = lathe([(0, 0), (pr * 0.78, 0), (pr, ph), (pr * 0.92, ph), (pr * 0.9, ph * 0.86), (0, ph * 0.86)], 28, 0.6)
     soil = lathe([(pr * 0.9, ph * 0.87), (0, ph * 0.87)], 20)
     soil = Shape(soil.vertices, soil.faces, np.tile([0.0, 0, 1.0], (len(soil.vertices), 1)), soil.uv)
-    leaves, stems = _leaves(kind, size, ph, rng=rng)
+    leaves, stems = _leaves(kind, order.size, ph, rng=order.rng)
     dark, light = GREENS[kind]
     return parts_of(
-        (POTS[str(look.get("pot", "white"))], pot),
+        (POTS[order.word("pot", "white")], pot),
         (SOIL, soil),
         (plain((0.28, 0.30, 0.16), 0.8), stems),
         (plain(dark, 0.4), leaves[::2]),
