@@ -18,7 +18,7 @@ from scipy.sparse.csgraph import connected_components
 
 from assets.importing.meshing import face_normals
 from assets.importing.mtl_finish import CLOTH
-from assets.materials.maps import blurred, fbm, noise
+from assets.materials.maps import Canvas, blurred
 from assets.materials.textile import folds, leather
 from assets.materials.wood import furniture
 
@@ -50,7 +50,7 @@ BEND = np.cos(np.radians(40.0))
 class Covering:
     tile: float
     """Side of the square that a tile covers, metres."""
-    draw: Callable[[int, float, np.random.Generator], np.ndarray]
+    draw: Callable[[Canvas], np.ndarray]
     """(n, n, 3) or (n, n, 1) factors, mean about 1."""
     detail: str
     """What it shows from nearby (assets.materials.detail)."""
@@ -58,39 +58,39 @@ class Covering:
     """Runs along the longest side of every board."""
 
 
-def _threads(n: int, rng: np.random.Generator, strength: float) -> np.ndarray:
-    up, level = noise(n, 0.7, 14, rng=rng), noise(n, 14, 0.7, rng=rng)
+def _threads(on: Canvas, strength: float) -> np.ndarray:
+    up, level = on.noise(0.7, 14), on.noise(14, 0.7)
     return (1 + strength * (up + level) / np.sqrt(2)).astype(np.float32)
 
 
-def _cloth(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
-    clouds = 1 + 0.02 * fbm(n, 4, 60, 1.2, rng=rng)
-    return (_threads(n, rng, 0.045) * clouds * folds(n, tile, 0.10, 0.028, rng=rng))[..., None]
+def _cloth(on: Canvas) -> np.ndarray:
+    clouds = 1 + 0.02 * on.fbm(4, 60, 1.2)
+    return (_threads(on, 0.045) * clouds * folds(on, 0.10, 0.028))[..., None]
 
 
-def _bedding(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
-    cloth = _threads(n, rng, 0.02) * folds(n, tile, 0.18, 0.065, rng=rng) * folds(n, tile, 0.05, 0.025, rng=rng)
+def _bedding(on: Canvas) -> np.ndarray:
+    cloth = _threads(on, 0.02) * folds(on, 0.18, 0.065) * folds(on, 0.05, 0.025)
     return cloth[..., None]
 
 
-def _leather(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
-    grain = leather(n, tile, (0.5, 0.5, 0.5), rng=rng).color[..., :1] / 0.5
-    return (1 + 0.5 * (grain - 1)) * folds(n, tile, 0.12, 0.018, rng=rng)[..., None]
+def _leather(on: Canvas) -> np.ndarray:
+    grain = leather(on, (0.5, 0.5, 0.5)).color[..., :1] / 0.5
+    return (1 + 0.5 * (grain - 1)) * folds(on, 0.12, 0.018)[..., None]
 
 
-def _wood(n: int, tile: float, rng: np.random.Generator, species: str) -> np.ndarray:
-    color = furniture(n, tile, species, 3, rng=rng).color
+def _wood(on: Canvas, species: str) -> np.ndarray:
+    color = furniture(on, species, 3).color
     return color / color.mean((0, 1))
 
 
-def _terry(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
-    loops = 1 + 0.10 * noise(n, 2.5, 2.5, rng=rng) + 0.03 * fbm(n, 4, 30, 1.2, rng=rng)
-    return (loops * folds(n, tile, 0.12, 0.04, rng=rng))[..., None]
+def _terry(on: Canvas) -> np.ndarray:
+    loops = 1 + 0.10 * on.noise(2.5, 2.5) + 0.03 * on.fbm(4, 30, 1.2)
+    return (loops * folds(on, 0.12, 0.04))[..., None]
 
 
-def _chipboard(n: int, tile: float, rng: np.random.Generator) -> np.ndarray:
-    chips = noise(n, 5, 2, rng=rng) + noise(n, 2, 5, rng=rng)
-    return (1 + 0.05 * chips + 0.03 * noise(n, 1, 1, rng=rng))[..., None]
+def _chipboard(on: Canvas) -> np.ndarray:
+    chips = on.noise(5, 2) + on.noise(2, 5)
+    return (1 + 0.05 * chips + 0.03 * on.noise(1, 1))[..., None]
 
 
 COVERS = {
@@ -156,7 +156,7 @@ def picture(cover: str, color: tuple[float, ...]) -> Image.Image:
 @functools.cache
 def _factors(cover: str) -> np.ndarray:
     made = COVERS[cover]
-    factors = made.draw(PIXELS, made.tile, np.random.default_rng(sorted(COVERS).index(cover)))
+    factors = made.draw(Canvas(PIXELS, made.tile, np.random.default_rng(sorted(COVERS).index(cover))))
     return np.broadcast_to(factors / factors.mean((0, 1)), (PIXELS, PIXELS, 3))
 
 

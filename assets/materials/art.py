@@ -7,12 +7,12 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from assets.materials.maps import Colors, Maps, fbm, maps_of, mix, noise, rgb, smooth_step
+from assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, rgb, smooth_step
 from assets.records import Color
 
 
-def _canvas(n: int, color: Color, *, rng: np.random.Generator, grain: float = 0.015) -> np.ndarray:
-    return rgb(color, (n, n)) * (1 + grain * noise(n, 1.2, 1.2, rng=rng))[..., None]
+def _canvas(on: Canvas, color: Color, grain: float = 0.015) -> np.ndarray:
+    return on.rgb(color) * (1 + grain * on.noise(1.2, 1.2))[..., None]
 
 
 def _fill(image: np.ndarray, points: np.ndarray, color: Color | np.ndarray, alpha: float = 1.0) -> np.ndarray:
@@ -67,9 +67,10 @@ def _blob(
 # ------------------------------------------------------------------ wall art
 
 
-def shapes(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.random.Generator) -> Maps:
+def shapes(on: Canvas, ground: Color, colors: Colors) -> Maps:
     """Cut-paper shapes and a few lines, as in prints of the 1950s."""
-    image = _canvas(n, ground, rng=rng)
+    rng = on.rng
+    image = _canvas(on, ground)
     spots = rng.permutation([(0.35, 0.35), (0.65, 0.3), (0.5, 0.62), (0.3, 0.72), (0.72, 0.7)])
     for k, at in enumerate(spots):
         shade = rgb(colors[k % len(colors)])
@@ -80,39 +81,31 @@ def shapes(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.random
         bends = (t, np.sin(np.pi * t), np.sin(2 * np.pi * t))
         line = start + sum(s * bend[:, None] for s, bend in zip(swing, bends))
         image = _stroke(image, line, 0.006, (0.12, 0.12, 0.13))
-    return maps_of(image * (1 + 0.02 * fbm(n, 8, 120, 1.0, rng=rng))[..., None], 0.0, 0.85)
+    return maps_of(image * (1 + 0.02 * on.fbm(8, 120, 1.0))[..., None], 0.0, 0.85)
 
 
-def fields(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> Maps:
+def fields(on: Canvas, colors: Colors) -> Maps:
     """Soft-edged fields of colour, one above the other."""
+    n = on.n
     y, x = np.mgrid[0:n, 0:n] / n
-    warp = 0.012 * fbm(n, 3, 60, 1.4, rng=rng)
-    image = rgb(colors[0], (n, n))
-    edges = np.cumsum([0.08, *rng.uniform(0.2, 0.34, len(colors) - 1)])
+    warp = 0.012 * on.fbm(3, 60, 1.4)
+    image = on.rgb(colors[0])
+    edges = np.cumsum([0.08, *on.rng.uniform(0.2, 0.34, len(colors) - 1)])
     edges = edges / edges[-1] * 0.93
     for k, c in enumerate(colors[1:]):
         top, bottom = edges[k] + 0.015, edges[k + 1] - 0.015
         inside = smooth_step(np.minimum(y + warp - top, bottom - y - warp), -0.012, 0.02)
         inside *= smooth_step(np.minimum(x + warp - 0.08, 0.92 - x - warp), -0.012, 0.02)
-        image = mix(image, rgb(c) * (1 + 0.05 * fbm(n, 2, 90, 1.2, rng=rng))[..., None], inside * 0.93)
+        image = mix(image, rgb(c) * (1 + 0.05 * on.fbm(2, 90, 1.2))[..., None], inside * 0.93)
     return maps_of(image, 0.0, 0.8)
 
 
-def hills(
-    n: int,
-    tile: float,
-    sky: Colors,
-    far: Color,
-    near: Color,
-    layers: int = 6,
-    sun: bool = True,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def hills(on: Canvas, sky: Colors, far: Color, near: Color, layers: int = 6, sun: bool = True) -> Maps:
     """Ridges behind ridges in haze under a graded sky."""
-    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
-    image = mix(rgb(sky[0], (n, n)), rgb(sky[1]), smooth_step(y, 0.0, 0.65))
-    image *= (1 + 0.03 * fbm(n, 1.5, 30, 1.5, 4.0, rng=rng) * (1 - y))[..., None]
+    n, rng = on.n, on.rng
+    y, x = on.shares()
+    image = mix(on.rgb(sky[0]), rgb(sky[1]), smooth_step(y, 0.0, 0.65))
+    image *= (1 + 0.03 * on.fbm(1.5, 30, 1.5, 4.0) * (1 - y))[..., None]
     if sun:
         d = np.hypot(x - rng.uniform(0.25, 0.75), (y - rng.uniform(0.28, 0.42)))
         image = mix(image, rgb((1.0, 0.96, 0.85)), 0.9 * (1 - smooth_step(d, 0.035, 0.042)) + 0.35 * np.exp(-d * 7))
@@ -126,27 +119,28 @@ def hills(
         inside = smooth_step(y - ridge[None].astype(np.float32), -0.001, 0.002)
         c = rgb(far) + (rgb(near) - rgb(far)) * (k / max(layers - 1, 1)) ** 1.1
         haze = np.clip((y - ridge[None]) * 2.2, 0, 1)
-        shade = mix(rgb(c, (n, n)), np.minimum(rgb(c) * 0.75 + rgb(sky[1]) * 0.25, 1.0), haze.astype(np.float32))
-        image = mix(image, shade * (1 + 0.03 * noise(n, 1.5, 1.5, rng=rng))[..., None], inside)
+        shade = mix(on.rgb(c), np.minimum(rgb(c) * 0.75 + rgb(sky[1]) * 0.25, 1.0), haze.astype(np.float32))
+        image = mix(image, shade * (1 + 0.03 * on.noise(1.5, 1.5))[..., None], inside)
     return maps_of(image, 0.0, 0.5)
 
 
-def sea(n: int, tile: float, sky: Colors, water: Colors, *, rng: np.random.Generator) -> Maps:
+def sea(on: Canvas, sky: Colors, water: Colors) -> Maps:
     """A level horizon, clouds and glittering water."""
-    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
-    clouds = smooth_step(fbm(n, 1.5, 60, 1.6, 2.5, rng=rng), 0.2, 2.0)
-    up = mix(mix(rgb(sky[0], (n, n)), rgb(sky[1]), smooth_step(y, 0, 0.55)), rgb((0.97, 0.95, 0.92)), 0.6 * clouds)
+    y, x = on.shares()
+    clouds = smooth_step(on.fbm(1.5, 60, 1.6, 2.5), 0.2, 2.0)
+    up = mix(mix(on.rgb(sky[0]), rgb(sky[1]), smooth_step(y, 0, 0.55)), rgb((0.97, 0.95, 0.92)), 0.6 * clouds)
     depth = np.clip((y - 0.55) / 0.45, 1e-3, 1)
-    waves = noise(n, 14, 1.2, rng=rng) * np.clip(depth * 2, 0.2, 1)
+    waves = on.noise(14, 1.2) * np.clip(depth * 2, 0.2, 1)
     path = np.exp(-(((x - 0.55) / (0.05 + 0.25 * depth)) ** 2))
-    down = mix(rgb(water[0], (n, n)), rgb(water[1]), depth) * (1 + 0.08 * waves)[..., None]
+    down = mix(on.rgb(water[0]), rgb(water[1]), depth) * (1 + 0.08 * waves)[..., None]
     down = mix(down, rgb((0.98, 0.93, 0.83)), 0.5 * path * smooth_step(waves, 0.4, 1.6))
     return maps_of(np.where((y < 0.55)[..., None], up, down), 0.0, 0.45)
 
 
-def botanical(n: int, tile: float, ground: Color, ink: Color, fern: bool = True, *, rng: np.random.Generator) -> Maps:
+def botanical(on: Canvas, ground: Color, ink: Color, fern: bool = True) -> Maps:
     """One pressed or drawn plant on paper, with a line of writing below."""
-    image = _canvas(n, ground, rng=rng)
+    rng = on.rng
+    image = _canvas(on, ground)
     t = np.linspace(0, 1, 50)
     bend = rng.uniform(-0.10, 0.10)
     stem = np.stack([0.5 + bend * np.sin(np.pi * t * 0.8), 0.86 - 0.70 * t], 1)
@@ -186,11 +180,12 @@ def _leaf_shape(at: np.ndarray, angle: float, length: float, half: float) -> np.
     return p @ np.array([[c, s], [-s, c]]) + at
 
 
-def brushwork(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.random.Generator) -> Maps:
+def brushwork(on: Canvas, ground: Color, colors: Colors) -> Maps:
     """Abstract painting: loaded brush strokes over one another, with relief."""
-    image = _canvas(n, ground, rng=rng, grain=0.03)
+    n, rng = on.n, on.rng
+    image = _canvas(on, ground, grain=0.03)
     height = np.zeros((n, n), np.float32)
-    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    y, x = on.shares()
     for _ in range(26):
         at, angle = rng.uniform(0.05, 0.95, 2), rng.normal(0.5, 0.6)
         long, wide = rng.uniform(0.15, 0.42), rng.uniform(0.03, 0.10)
@@ -205,12 +200,13 @@ def brushwork(n: int, tile: float, ground: Color, colors: Colors, *, rng: np.ran
     return maps_of(image, height, 0.55)
 
 
-def still_life(n: int, tile: float, ground: Color, table: Color, fruit: Colors, *, rng: np.random.Generator) -> Maps:
+def still_life(on: Canvas, ground: Color, table: Color, fruit: Colors) -> Maps:
     """A bowl of fruit against a dark wall, in soft paint."""
-    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    rng = on.rng
+    y, x = on.shares()
     lit = np.exp(-(((x - 0.35) / 0.4) ** 2) - ((y - 0.35) / 0.4) ** 2)
-    image = mix(rgb(ground, (n, n)), rgb(ground) * 1.6 + 0.03, lit)
-    below = smooth_step(y + 0.004 * fbm(n, 3, 40, 1.4, rng=rng), 0.66, 0.668)
+    image = mix(on.rgb(ground), rgb(ground) * 1.6 + 0.03, lit)
+    below = smooth_step(y + 0.004 * on.fbm(3, 40, 1.4), 0.66, 0.668)
     image = mix(image, rgb(table) * (1.1 - 0.4 * x)[..., None], below)
     for k in range(7):
         cx, cy = 0.28 + 0.075 * k + rng.normal(0, 0.015), 0.56 - 0.06 * (k % 2) + rng.normal(0, 0.012)
@@ -222,13 +218,14 @@ def still_life(n: int, tile: float, ground: Color, table: Color, fruit: Colors, 
     bowl = ((x - 0.5) / 0.30) ** 2 + ((y - 0.60) / 0.17) ** 2
     inside = (1 - smooth_step(bowl, 0.97, 1.03)) * smooth_step(y, 0.60, 0.606)
     image = mix(image, rgb((0.62, 0.66, 0.70)) * (1.05 - 0.9 * np.abs(x - 0.42))[..., None], inside)
-    image = image * (1 + 0.03 * fbm(n, 10, 200, 0.9, rng=rng))[..., None]
+    image = image * (1 + 0.03 * on.fbm(10, 200, 0.9))[..., None]
     return maps_of(image, 0.0, 0.5)
 
 
-def poster(n: int, tile: float, ground: Color, ink: Color, accent: Color, *, rng: np.random.Generator) -> Maps:
+def poster(on: Canvas, ground: Color, ink: Color, accent: Color) -> Maps:
     """A typographic poster: a large shape, a heading and lines of small print."""
-    image = _canvas(n, ground, rng=rng, grain=0.008)
+    rng = on.rng
+    image = _canvas(on, ground, grain=0.008)
     kind = int(rng.integers(3))
     a = np.linspace(0, 2 * np.pi, 100)
     if kind == 0:
@@ -257,18 +254,10 @@ def poster(n: int, tile: float, ground: Color, ink: Color, accent: Color, *, rng
 # ------------------------------------------------------------------ rugs, seen from above, u along the length
 
 
-def oriental(
-    n: int,
-    tile: float,
-    field: Color,
-    border: Color,
-    accent: Color,
-    line: Color = (0.12, 0.10, 0.10),
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def oriental(on: Canvas, field: Color, border: Color, accent: Color, line: Color = (0.12, 0.10, 0.10)) -> Maps:
     """A knotted rug: medallion, mirrored field ornaments, main and guard borders."""
-    s = n // 4
+    rng = on.rng
+    s = on.n // 4
     y, x = np.mgrid[0:s, 0:s].astype(np.float32) / s
     x, y = (x - 0.5) * 2, (y - 0.5) * 2
     ax, ay = np.abs(x), np.abs(y)
@@ -291,11 +280,12 @@ def oriental(
     motif = np.cos(along * np.pi * 13) * 0.04 - np.abs(edge - 0.12)
     image = mix(image, tints[3], (motif > -0.012).astype(np.float32) * (np.abs(edge - 0.12) < 0.05))
     image = mix(image, tints[1], (np.cos(along * np.pi * 26) > 0.3).astype(np.float32) * (np.abs(edge - 0.21) < 0.012))
-    return _pile(cv2.resize(image, (n, n), interpolation=cv2.INTER_CUBIC), 0.09, rng=rng)
+    return _pile(on, cv2.resize(image, (on.n, on.n), interpolation=cv2.INTER_CUBIC), 0.09)
 
 
-def kilim(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> Maps:
+def kilim(on: Canvas, colors: Colors) -> Maps:
     """Flat-woven bands of stepped diamonds."""
+    n, rng = on.n, on.rng
     s = 160
     image = np.zeros((s, s, 3), np.float32)
     edge, k = 0, 0
@@ -307,74 +297,67 @@ def kilim(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> M
         v = (np.arange(s)[rows] - edge - width / 2)[None]
         period = max(8, 2 * (width // 2))
         u = np.abs((np.arange(s) % period) - period / 2)[:, None]
-        on = (
+        stepped = (
             (np.floor(u / 2) + np.floor(np.abs(v) / 2)) * 2 < period / 2
             if width > 11
             else (np.arange(s)[:, None] // 4 % 2 == 0) & (v > -99)
         )
-        image[:, rows] = np.where(on[..., None], b, a)
+        image[:, rows] = np.where(stepped[..., None], b, a)
         edge, k = edge + width, k + 1
     image = cv2.resize(image, (n, n), interpolation=cv2.INTER_NEAREST)
-    return _pile(image, 0.05, rng=rng)
+    return _pile(on, image, 0.05)
 
 
-def berber(n: int, tile: float, ground: Color, line: Color, diamonds: int = 3, *, rng: np.random.Generator) -> Maps:
+def berber(on: Canvas, ground: Color, line: Color, diamonds: int = 3) -> Maps:
     """A shaggy light rug with a hand-drawn lattice of dark lines."""
-    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
-    wob = 0.006 * fbm(n, 3, 40, 1.4, rng=rng)
+    y, x = on.shares()
+    wob = 0.006 * on.fbm(3, 40, 1.4)
     f = np.minimum(*(np.abs(((x * diamonds * 1.5 + s * y * diamonds + wob * 4) % 1) - 0.5) for s in (1, -1)))
-    image = mix(rgb(ground, (n, n)), rgb(line), 1 - smooth_step(f, 0.018, 0.032))
-    return _pile(image, 0.13, rng=rng)
+    image = mix(on.rgb(ground), rgb(line), 1 - smooth_step(f, 0.018, 0.032))
+    return _pile(on, image, 0.13)
 
 
-def bordered(
-    n: int,
-    tile: float,
-    field: Color,
-    border: Color,
-    bands: tuple[tuple[float, float], ...] = ((0.0, 0.09),),
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def bordered(on: Canvas, field: Color, border: Color, bands: tuple[tuple[float, float], ...] = ((0.0, 0.09),)) -> Maps:
     """Plain with one or more bands along the edge."""
-    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n
+    y, x = on.shares()
     edge = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
-    image = rgb(field, (n, n))
+    image = on.rgb(field)
     for a, b in bands:
         image = mix(image, rgb(border), ((edge >= a) & (edge < b)).astype(np.float32))
-    return _pile(image, 0.09, rng=rng)
+    return _pile(on, image, 0.09)
 
 
-def modern(n: int, tile: float, colors: Colors, *, rng: np.random.Generator) -> Maps:
+def modern(on: Canvas, colors: Colors) -> Maps:
     """Large overlapping arcs and fields in a few muted colours."""
-    image = rgb(colors[0], (n, n))
+    rng = on.rng
+    image = on.rgb(colors[0])
     for k in range(6):
         blob = _blob(rng.uniform(0, 1, 2), rng.uniform(0.18, 0.4), 0.2, rng=rng)
         image = _fill(image, blob, colors[1 + k % (len(colors) - 1)])
-    return _pile(image, 0.09, rng=rng)
+    return _pile(on, image, 0.09)
 
 
-def striped(n: int, tile: float, colors: Colors, count: int = 14, *, rng: np.random.Generator) -> Maps:
+def striped(on: Canvas, colors: Colors, count: int = 14) -> Maps:
     """Cross stripes of several widths."""
-    widths = rng.uniform(0.4, 1.6, count)
+    n = on.n
+    widths = on.rng.uniform(0.4, 1.6, count)
     edges = np.cumsum(widths) / widths.sum()
     band = np.searchsorted(edges, (np.arange(n) + 0.5) / n)
     image = np.broadcast_to(rgb(colors)[band % len(colors)][None], (n, n, 3)).copy()
-    return _pile(image, 0.06, rng=rng)
+    return _pile(on, image, 0.06)
 
 
-def rings(n: int, tile: float, colors: Colors, count: int = 9, *, rng: np.random.Generator) -> Maps:
+def rings(on: Canvas, colors: Colors, count: int = 9) -> Maps:
     """Concentric rings for a round braided rug."""
-    y, x = np.mgrid[0:n, 0:n].astype(np.float32) / n - 0.5
+    y, x = on.shares() - 0.5
     r = np.hypot(x, y) * 2 * count
     image = rgb(colors)[np.clip(r.astype(int), 0, 99) % len(colors)]
     braid = 0.5 + 0.5 * np.cos(2 * np.pi * (r % 1 - 0.5)) * np.cos(np.arctan2(y, x) * 90 + (r.astype(int) % 2) * np.pi)
-    return _pile(image * (0.9 + 0.15 * braid)[..., None], 0.05, rng=rng)
+    return _pile(on, image * (0.9 + 0.15 * braid)[..., None], 0.05)
 
 
-def _pile(image: np.ndarray, depth: float, *, rng: np.random.Generator) -> Maps:
-    n = len(image)
-    tuft, fine, wear = noise(n, 2.2, 1.4, rng=rng), noise(n, 0.8, 0.8, rng=rng), fbm(n, 2, 30, 1.2, rng=rng)
+def _pile(on: Canvas, image: np.ndarray, depth: float) -> Maps:
+    tuft, fine, wear = on.noise(2.2, 1.4), on.noise(0.8, 0.8), on.fbm(2, 30, 1.2)
     out = image * (1 + depth * (0.5 * tuft + 0.5 * fine) + 0.02 * wear)[..., None]
     return maps_of(out, 1.2e-3 * tuft, 0.96, 0.01, 0.97)
 
@@ -382,18 +365,10 @@ def _pile(image: np.ndarray, depth: float, *, rng: np.random.Generator) -> Maps:
 # ------------------------------------------------------------------ dials and covers
 
 
-def dial(
-    n: int,
-    tile: float,
-    face: Color,
-    ink: Color,
-    numerals: bool = True,
-    hour: float = 10.15,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def dial(on: Canvas, face: Color, ink: Color, numerals: bool = True, hour: float = 10.15) -> Maps:
     """A clock face with hands."""
-    image = rgb(face, (n, n))
+    n = on.n
+    image = on.rgb(face)
     font, scale, thick = cv2.FONT_HERSHEY_SIMPLEX, n / 500, max(1, n // 170)
     for k in range(60):
         a = k * np.pi / 30
@@ -416,11 +391,12 @@ def dial(
     return maps_of(image, 0.0, 0.4)
 
 
-def cover(n: int, tile: float, ground: Color, ink: Color, picture: Color, *, rng: np.random.Generator) -> Maps:
+def cover(on: Canvas, ground: Color, ink: Color, picture: Color) -> Maps:
     """A magazine cover: a title, a photograph of sorts, teasers."""
+    n, rng = on.n, on.rng
     down = np.linspace(0, 1, n, dtype=np.float32)[:, None] * np.ones((n, n), np.float32)
-    sky = mix(rgb(picture, (n, n)), rgb(picture) * 0.45, down)
-    image = sky * (1 + 0.10 * fbm(n, 1.5, 60, 1.5, rng=rng))[..., None]
+    sky = mix(on.rgb(picture), rgb(picture) * 0.45, down)
+    image = sky * (1 + 0.10 * on.fbm(1.5, 60, 1.5))[..., None]
     image = _fill(image, _blob((0.5, 0.62), 0.26, 0.15, rng=rng), ground, 0.85)
     for x, w in ((0.08, 0.13), (0.23, 0.11), (0.36, 0.14), (0.52, 0.10), (0.64, 0.12), (0.78, 0.13)):
         image = _fill(image, _rectangle(x, 0.06, x + w, 0.19), ink)

@@ -10,7 +10,7 @@ import functools
 import cv2
 import numpy as np
 
-from assets.materials.maps import blurred, noise
+from assets.materials.maps import Canvas, blurred
 from assets.materials.textile import Weave, leather
 from assets.records import DETAILS
 
@@ -34,19 +34,18 @@ def pyramid(kind: str) -> tuple[np.ndarray, ...]:
 
 
 def _field(kind: str) -> np.ndarray:
-    rng, n = np.random.default_rng(DETAILS.index(kind)), PIXELS
-    grey = (0.5, 0.5, 0.5)
+    on, grey = Canvas(PIXELS, TILE, np.random.default_rng(DETAILS.index(kind))), (0.5, 0.5, 0.5)
     if kind == "weave":
-        threads = Weave(grey, grey, 170, irregular=0.09, slubs=1.2, fuzz=0.12)(n, TILE, rng=rng).color[..., 0]
-        return threads / threads.std() + noise(n, 1.2, 9, rng=rng) * 0.4 + noise(n, 9, 1.2, rng=rng) * 0.4
+        threads = Weave(grey, grey, 170, irregular=0.09, slubs=1.2, fuzz=0.12)(on).color[..., 0]
+        return threads / threads.std() + on.noise(1.2, 9) * 0.4 + on.noise(9, 1.2) * 0.4
     if kind == "nap":
-        return noise(n, 1.2, 1.2, rng=rng) + 1.1 * noise(n, 3.5, 3.5, rng=rng) + 0.5 * noise(n, 10, 10, rng=rng)
+        return on.noise(1.2, 1.2) + 1.1 * on.noise(3.5, 3.5) + 0.5 * on.noise(10, 10)
     if kind == "pores":
-        dashes = np.minimum(1.2 - noise(n, 24, 0.5, rng=rng), 0)
-        return dashes / dashes.std() + 0.7 * noise(n, 90, 1.2, rng=rng) + 0.4 * noise(n, 90, 4, rng=rng)
+        dashes = np.minimum(1.2 - on.noise(24, 0.5), 0)
+        return dashes / dashes.std() + 0.7 * on.noise(90, 1.2) + 0.4 * on.noise(90, 4)
     if kind == "pebbles":
-        return leather(n, TILE, grey, rng=rng).color[..., 0]
-    lumps = noise(n, 1.0, 1.0, rng=rng) + 0.8 * noise(n, 3, 3, rng=rng)
+        return leather(on, grey).color[..., 0]
+    lumps = on.noise(1.0, 1.0) + 0.8 * on.noise(3, 3)
     if kind == "plaster":
-        return lumps + 0.8 * noise(n, 16, 9, rng=rng)
+        return lumps + 0.8 * on.noise(16, 9)
     return blurred(lumps, 0.8)

@@ -115,6 +115,53 @@ def mix(a: np.ndarray, b: np.ndarray, t: np.ndarray) -> np.ndarray:
     return (a + (b - a) * t[..., None]).astype(np.float32)
 
 
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """What a material is drawn on: n pixels wide, over a square of `tile` metres."""
+
+    n: int
+    tile: float
+    rng: np.random.Generator
+
+    def noise(self, across: float, down: float) -> np.ndarray:
+        """As `noise`."""
+        return noise(self.n, across, down, rng=self.rng)
+
+    def fbm(self, low: float, high: float, slope: float = 1.6, stretch: float = 1.0) -> np.ndarray:
+        """As `fbm`."""
+        return fbm(self.n, low, high, slope, stretch, rng=self.rng)
+
+    def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
+        """As `coordinates`."""
+        return coordinates(self.n, self.tile)
+
+    def shares(self) -> np.ndarray:
+        """(2, n, n) float32 in [0, 1): y down and x to the right."""
+        return np.mgrid[0 : self.n, 0 : self.n].astype(np.float32) / self.n
+
+    def rgb(self, color: Color | np.ndarray) -> np.ndarray:
+        """(n, n, 3) of one colour."""
+        return rgb(color, (self.n, self.n))
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where on endless stone each pixel of a canvas is cut from."""
+
+    on: Canvas
+    x: np.ndarray
+    """(n, n) in tiles, as is y."""
+    y: np.ndarray
+
+    def noise(self, across: float, down: float) -> np.ndarray:
+        """As `noise`, at these places."""
+        return look_up(self.on.noise(across, down), self.x, self.y)
+
+    def fbm(self, low: float, high: float, slope: float = 1.6, stretch: float = 1.0) -> np.ndarray:
+        """As `fbm`, at these places."""
+        return look_up(self.on.fbm(low, high, slope, stretch), self.x, self.y)
+
+
 # ------------------------------------------------------------------ what goes to disk
 
 

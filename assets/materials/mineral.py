@@ -10,18 +10,17 @@ import cv2
 import numpy as np
 
 from assets.materials.maps import (
+    Canvas,
     Color,
     Colors,
     Layout,
     Maps,
+    Places,
     blurred,
     bricks,
-    coordinates,
-    fbm,
     look_up,
     maps_of,
     mix,
-    noise,
     rgb,
     smooth_step,
 )
@@ -36,7 +35,7 @@ class Tiles:
 
     layout: Callable[[int, float], Layout]
     surface: Callable[..., Face]
-    """surface(x, y, n, rng=rng) paints the faces: x, y (n, n) in tiles, shifted per piece."""
+    """surface(places) paints the faces; places are shifted per piece."""
     grout: Color = (0.72, 0.70, 0.66)
     joint: float = 0.003
     """Width of the grout, metres."""
@@ -47,19 +46,20 @@ class Tiles:
     waviness: float = 0.0
     """Hand-made unevenness, metres of height per piece."""
 
-    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+    def __call__(self, on: Canvas) -> Maps:
+        n, tile, rng = on.n, on.tile, on.rng
         pieces = self.layout(n, tile)
         pixel = tile / n
-        u, v = coordinates(n, tile)
+        u, v = on.coordinates()
         shift = rng.random((pieces.count, 2))
         x, y = u / tile + shift[pieces.piece, 0], v / tile + shift[pieces.piece, 1]
-        color, rough, height = self.surface(x, y, n, rng=rng)
+        color, rough, height = self.surface(Places(on, x, y))
         lightness = np.clip(rng.normal(0, self.tone, pieces.count), -2.2 * self.tone, 2.2 * self.tone)
         color = color * (1 + lightness[pieces.piece])[..., None]
         half = self.joint / 2
         inside = smooth_step(pieces.edge, half - pixel * 0.4, half + pixel * 0.6)
-        grain = noise(n, 1.2, 1.2, rng=rng)
-        dirt = fbm(n, 3, 30, 1.0, rng=rng)
+        grain = on.noise(1.2, 1.2)
+        dirt = on.fbm(3, 30, 1.0)
         filler = rgb(self.grout) * (1 + 0.05 * grain + 0.05 * dirt)[..., None]
         shade = 1 - 0.10 * (1 - smooth_step(pieces.edge, half, half + self.bevel + pixel))
         color = filler * (1 - inside)[..., None] + color * (inside * shade)[..., None]
@@ -71,12 +71,13 @@ class Tiles:
         return maps_of(color, height, np.clip(rough, 0.05, 1))
 
 
-def checker(n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+def checker(on: Canvas) -> Maps:
     """Black and white squares, six to the tile."""
+    n, tile = on.n, on.tile
     layout = functools.partial(bricks, columns=6, rows=6)
     white = functools.partial(glaze, color=(0.86, 0.85, 0.82), mottle=0.015)
-    made = Tiles(layout, white, tone=0.015, gloss=0.2)(n, tile, rng=rng)
-    u, v = coordinates(n, tile)
+    made = Tiles(layout, white, tone=0.015, gloss=0.2)(on)
+    u, v = on.coordinates()
     black = ((u // (tile / 6) + v // (tile / 6)) % 2 == 1)[..., None]
     joint = (layout(n, tile).edge < 0.0015)[..., None]
     dark = made.color * [0.10, 0.10, 0.105] + 0.01
@@ -86,44 +87,32 @@ def checker(n: int, tile: float, *, rng: np.random.Generator) -> Maps:
 # ------------------------------------------------------------------ faces of tiles and slabs
 
 
-def glaze(
-    x: np.ndarray, y: np.ndarray, n: int, color: Color, mottle: float = 0.008, *, rng: np.random.Generator
-) -> Face:
+def glaze(at: Places, color: Color, mottle: float = 0.008) -> Face:
     """Glazed ceramic, nearly one colour."""
-    cloud = look_up(fbm(n, 3, 60, 1.3, rng=rng), x, y)
+    cloud = at.fbm(3, 60, 1.3)
     return rgb(color) * (1 + mottle * cloud)[..., None], 0.01 * cloud, 2e-5 * cloud
 
 
-def matt(
-    x: np.ndarray,
-    y: np.ndarray,
-    n: int,
-    color: Color,
-    speck: float = 0.025,
-    cloudiness: float = 0.016,
-    *,
-    rng: np.random.Generator,
-) -> Face:
+def matt(at: Places, color: Color, speck: float = 0.025, cloudiness: float = 0.016) -> Face:
     """Unglazed stoneware and cement: clouds and fine grain."""
-    cloud = look_up(fbm(n, 2, 120, 1.2, rng=rng), x, y)
-    grain = look_up(noise(n, 0.8, 0.8, rng=rng), x, y)
+    cloud = at.fbm(2, 120, 1.2)
+    grain = at.noise(0.8, 0.8)
     return rgb(color) * (1 + cloudiness * cloud + speck * grain)[..., None], 0.03 * cloud, 3e-5 * grain
 
 
-def marble(
-    x: np.ndarray, y: np.ndarray, n: int, base: Color, vein: Color, amount: float = 0.7, *, rng: np.random.Generator
-) -> Face:
+def marble(at: Places, base: Color, vein: Color, amount: float = 0.7) -> Face:
     """Veined marble: ridges of warped noise, some sharp, most faint."""
     # Whole-number shears keep the period; veins run long along the diagonal.
+    x, y = at.x, at.y
     p, q = x + y, 2 * (x - y)
-    wx, wy = fbm(n, 1.5, 14, 1.8, rng=rng), fbm(n, 3, 40, 1.6, rng=rng)
+    wx, wy = at.on.fbm(1.5, 14, 1.8), at.on.fbm(3, 40, 1.6)
     p = p + 0.05 * look_up(wx, x, y) + 0.008 * look_up(wy, x, y)
     q = q + 0.06 * look_up(wx, y, x) + 0.012 * look_up(wy, y, x)
     x2, y2 = x + 0.03 * look_up(wx, x, y), y + 0.03 * look_up(wy, x, y)
-    wide = np.abs(look_up(fbm(n, 0.9, 7, 2.3, rng=rng), p, q))
-    thin = np.abs(look_up(fbm(n, 1.8, 16, 2.0, rng=rng), p, q + 0.3))
-    presence = smooth_step(look_up(fbm(n, 1.5, 8, 1.3, rng=rng), x, y), -0.6, 1.6)
-    cloud = look_up(fbm(n, 1.5, 90, 1.3, rng=rng), x2, y2)
+    wide = np.abs(look_up(at.on.fbm(0.9, 7, 2.3), p, q))
+    thin = np.abs(look_up(at.on.fbm(1.8, 16, 2.0), p, q + 0.3))
+    presence = smooth_step(at.fbm(1.5, 8, 1.3), -0.6, 1.6)
+    cloud = look_up(at.on.fbm(1.5, 90, 1.3), x2, y2)
     strong = np.exp(-((wide / 0.045) ** 2)) * (0.25 + 0.75 * presence) + 0.35 * np.exp(-wide / 0.22)
     faint = 0.45 * np.exp(-((thin / 0.05) ** 2)) * presence
     t = np.clip(amount * (0.75 * strong + faint) + 0.06 * cloud, 0, 1)
@@ -131,54 +120,29 @@ def marble(
     return color, 0.02 * t, 0 * t
 
 
-def slate(
-    x: np.ndarray,
-    y: np.ndarray,
-    n: int,
-    base: Color,
-    warm: Color = (0.40, 0.34, 0.28),
-    rust: float = 0.25,
-    *,
-    rng: np.random.Generator,
-) -> Face:
+def slate(at: Places, base: Color, warm: Color = (0.40, 0.34, 0.28), rust: float = 0.25) -> Face:
     """Cleft slate: layered relief and rusty patches."""
-    relief = look_up(fbm(n, 2, 150, 1.5, rng=rng), x, y)
+    relief = at.fbm(2, 150, 1.5)
     layers = np.abs((relief * 1.6) % 1.0 - 0.5)
-    cloud = look_up(fbm(n, 2, 40, 1.4, rng=rng), x, y)
+    cloud = at.fbm(2, 40, 1.4)
     color = rgb(base) * (1 + 0.10 * relief + 0.05 * cloud)[..., None]
     color = mix(color, rgb(warm), rust * smooth_step(cloud, 0.6, 2.0))
     return color, 0.06 * relief, 6e-4 * relief + 3e-4 * layers
 
 
-def terracotta(
-    x: np.ndarray,
-    y: np.ndarray,
-    n: int,
-    base: Color = (0.70, 0.42, 0.29),
-    pale: Color = (0.80, 0.58, 0.44),
-    *,
-    rng: np.random.Generator,
-) -> Face:
+def terracotta(at: Places, base: Color = (0.70, 0.42, 0.29), pale: Color = (0.80, 0.58, 0.44)) -> Face:
     """Fired clay: mottled from red to straw."""
-    cloud = look_up(fbm(n, 1.5, 50, 1.5, rng=rng), x, y)
-    grain = look_up(noise(n, 0.9, 0.9, rng=rng), x, y)
+    cloud = at.fbm(1.5, 50, 1.5)
+    grain = at.noise(0.9, 0.9)
     color = mix(rgb(base), rgb(pale), np.clip(0.35 + 0.28 * cloud, 0, 1)) * (1 + 0.025 * grain)[..., None]
     return color, 0.04 * cloud, 1.5e-4 * cloud + 3e-5 * grain
 
 
-def travertine(
-    x: np.ndarray,
-    y: np.ndarray,
-    n: int,
-    base: Color = (0.83, 0.76, 0.66),
-    dark: Color = (0.70, 0.60, 0.48),
-    *,
-    rng: np.random.Generator,
-) -> Face:
+def travertine(at: Places, base: Color = (0.83, 0.76, 0.66), dark: Color = (0.70, 0.60, 0.48)) -> Face:
     """Layered limestone with small holes."""
-    bands = look_up(fbm(n, 2, 60, 1.2, 7.0, rng=rng), x, y)
-    cloud = look_up(fbm(n, 2, 100, 1.3, rng=rng), x, y)
-    pits = smooth_step(look_up(noise(n, 5.0, 1.4, rng=rng), x, y) + 0.4 * bands, 2.1, 2.6)
+    bands = at.fbm(2, 60, 1.2, 7.0)
+    cloud = at.fbm(2, 100, 1.3)
+    pits = smooth_step(at.noise(5.0, 1.4) + 0.4 * bands, 2.1, 2.6)
     color = mix(rgb(base), rgb(dark), np.clip(0.3 + 0.25 * bands + 0.1 * cloud, 0, 1)) * (1 - 0.25 * pits)[..., None]
     return color, 0.2 * pits, -6e-4 * pits
 
@@ -186,51 +150,36 @@ def travertine(
 # ------------------------------------------------------------------ without joints
 
 
-def slab(n: int, tile: float, surface: Callable[..., Face], gloss: float, *, rng: np.random.Generator) -> Maps:
+def slab(on: Canvas, surface: Callable[..., Face], gloss: float) -> Maps:
     """One endless face of stone."""
-    u, v = coordinates(n, tile)
-    color, rough, height = surface(u / tile, v / tile, n, rng=rng)
+    tile = on.tile
+    u, v = on.coordinates()
+    color, rough, height = surface(Places(on, u / tile, v / tile))
     return maps_of(color, height, np.clip(gloss + rough, 0.05, 1))
 
 
-def granite(
-    n: int,
-    tile: float,
-    colors: Colors,
-    weights: tuple[float, ...],
-    grain: float = 0.004,
-    gloss: float = 0.12,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def granite(on: Canvas, colors: Colors, weights: tuple[float, ...], grain: float = 0.004, gloss: float = 0.12) -> Maps:
     """Crystals of several minerals: each pixel shows the mineral whose noise is largest there."""
-    size = grain / (tile / n)
+    n = on.n
+    size = grain / (on.tile / n)
     best, color = np.full((n, n), -np.inf, np.float32), np.zeros((n, n, 3), np.float32)
     for c, w in zip(colors, weights):
-        f = 0.75 * noise(n, size, size, rng=rng) + 0.5 * noise(n, size * 0.4, size * 0.4, rng=rng) + w
-        shade = rgb(c) * (1 + 0.08 * noise(n, size * 0.5, size * 0.5, rng=rng))[..., None]
+        f = 0.75 * on.noise(size, size) + 0.5 * on.noise(size * 0.4, size * 0.4) + w
+        shade = rgb(c) * (1 + 0.08 * on.noise(size * 0.5, size * 0.5))[..., None]
         edge = smooth_step(f - best, -0.08, 0.08)
         color = color * (1 - edge)[..., None] + shade * edge[..., None]
         best = np.maximum(best, f)
-    cloud = fbm(n, 3, 12, 1.0, rng=rng)
+    cloud = on.fbm(3, 12, 1.0)
     color *= (1 + 0.03 * cloud)[..., None]
     return maps_of(color, 0.0, gloss, 0.01, 0.97)
 
 
-def terrazzo(
-    n: int,
-    tile: float,
-    base: Color,
-    chips: Colors,
-    size: float = 0.009,
-    cover: float = 0.45,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def terrazzo(on: Canvas, base: Color, chips: Colors, size: float = 0.009, cover: float = 0.45) -> Maps:
     """Broken stone chips in cement, ground flat."""
-    color = np.round(rgb(base, (n, n)) * 255).astype(np.uint8)
+    n, rng = on.n, on.rng
+    color = np.round(on.rgb(base) * 255).astype(np.uint8)
     placed, area = 0.0, n * n
-    pixel = tile / n
+    pixel = on.tile / n
     for _ in range(20000):
         if placed > cover * area * 1.25:
             break
@@ -250,25 +199,17 @@ def terrazzo(
                     continue
                 cv2.fillPoly(color, [np.round(p * 16).astype(np.int32)], tint, cv2.LINE_AA, 4)
         placed += 1.6 * r * r
-    fine = noise(n, 0.8, 0.8, rng=rng)
+    fine = on.noise(0.8, 0.8)
     out = color.astype(np.float32) / 255 * (1 + 0.02 * fine)[..., None]
     return maps_of(out, 0.0, 0.22)
 
 
-def concrete(
-    n: int,
-    tile: float,
-    base: Color = (0.60, 0.59, 0.57),
-    contrast: float = 0.03,
-    gloss: float = 0.75,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def concrete(on: Canvas, base: Color = (0.60, 0.59, 0.57), contrast: float = 0.03, gloss: float = 0.75) -> Maps:
     """Cast or trowelled cement: clouds, fine grain, a few air holes."""
-    cloud = fbm(n, 3.5, 200, 1.05, rng=rng)
-    sweep = fbm(n, 3, 40, 1.5, 2.5, rng=rng)
-    grain = noise(n, 0.8, 0.8, rng=rng)
-    holes = smooth_step(noise(n, 2.2, 2.2, rng=rng), 3.15, 3.5)
+    cloud = on.fbm(3.5, 200, 1.05)
+    sweep = on.fbm(3, 40, 1.5, 2.5)
+    grain = on.noise(0.8, 0.8)
+    holes = smooth_step(on.noise(2.2, 2.2), 3.15, 3.5)
     color = rgb(base) * (1 + contrast * cloud + 0.6 * contrast * sweep + 0.018 * grain)[..., None]
     color = color * (1 - 0.45 * holes)[..., None]
     height = 1e-4 * cloud + 3e-5 * grain - 1e-3 * holes
@@ -288,9 +229,10 @@ class Brick:
     painted: bool = False
     """One coat covers bricks and mortar."""
 
-    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
-        u, v = coordinates(n, tile)
-        wave_x, wave_y = fbm(n, 8, 200, 1.0, rng=rng), fbm(n, 8, 200, 1.0, rng=rng)
+    def __call__(self, on: Canvas) -> Maps:
+        tile, rng = on.tile, on.rng
+        u, v = on.coordinates()
+        wave_x, wave_y = on.fbm(8, 200, 1.0), on.fbm(8, 200, 1.0)
         width, height = tile / self.columns, tile / self.rows
         uu, vv = u + 0.0011 * wave_x, v + 0.0011 * wave_y
         r = np.floor(vv / height).astype(int)
@@ -301,7 +243,7 @@ class Brick:
         piece = (r % self.rows) * self.columns + c % self.columns
         count = self.rows * self.columns
         face = smooth_step(edge, 0.0045, 0.0075)
-        cloud, grain = fbm(n, 4, 150, 1.1, rng=rng), noise(n, 1.0, 1.0, rng=rng)
+        cloud, grain = on.fbm(4, 150, 1.1), on.noise(1.0, 1.0)
         tone = np.clip(rng.normal(0, self.spread, count), -0.22, 0.2)
         burnt = (rng.random(count) < 0.10) * rng.uniform(0.1, 0.3, count)
         clay = rgb(self.color) * (1 + tone[piece] - burnt[piece] + 0.05 * cloud + 0.03 * grain)[..., None]
@@ -315,22 +257,15 @@ class Brick:
         return maps_of(mixed, relief, 0.6 if self.painted else 0.88, 0.02, 0.97)
 
 
-def rubble(
-    n: int,
-    tile: float,
-    base: Color = (0.62, 0.57, 0.50),
-    across: int = 5,
-    mortar: Color = (0.64, 0.61, 0.56),
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def rubble(on: Canvas, base: Color = (0.62, 0.57, 0.50), across: int = 5, mortar: Color = (0.64, 0.61, 0.56)) -> Maps:
     """Natural stone walling: cells of jittered points, flat courses, each stone its own shade."""
+    n, tile, rng = on.n, on.tile, on.rng
     rows = int(across * 1.7)
     py, px = np.meshgrid(np.arange(rows), np.arange(across), indexing="ij")
     at_x, at_y = px + 0.5 * (py % 2) + rng.uniform(-0.28, 0.28, px.shape), py + rng.uniform(-0.2, 0.2, px.shape)
     points = np.stack([at_x / across, at_y / rows], -1).reshape(-1, 2)
-    u, v = coordinates(n, tile)
-    bend = fbm(n, 4, 60, 1.5, rng=rng)
+    u, v = on.coordinates()
+    bend = on.fbm(4, 60, 1.5)
     x, y = u / tile + 0.0025 * bend, v / tile + 0.0025 * np.roll(bend, n // 3, 0)
     first, second = np.full((n, n), 9.0), np.full((n, n), 9.0)
     owner = np.zeros((n, n), int)
@@ -346,7 +281,7 @@ def rubble(
     face = smooth_step(edge, 0.004, 0.012)
     tone = np.clip(rng.normal(0, 0.10, len(points)), -0.2, 0.2)
     hue = rng.normal(0, 0.03, (len(points), 1)) * [1.0, 0.3, -1.0]
-    cloud, grain = fbm(n, 5, 200, 1.1, rng=rng), noise(n, 1, 1, rng=rng)
+    cloud, grain = on.fbm(5, 200, 1.1), on.noise(1, 1)
     stone = rgb(base) * (1 + tone[owner] + 0.07 * cloud + 0.03 * grain)[..., None] * (1 + hue[owner])
     color = rgb(mortar) * (1 + 0.05 * cloud)[..., None] * (1 - face)[..., None] + stone * face[..., None]
     dome = smooth_step(edge, 0.0, 0.03)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from assets.materials import art, maps, mineral, surface, textile, wood
-from assets.materials.material import ROLES, Material, Recipe
+from assets.materials.maps import Canvas, Maps
+from assets.materials.material import ROLES, Material
 from assets.rows import (
     DATA,
     WORD,
@@ -75,14 +78,14 @@ def _material(where: str, key: str, row: Row) -> Material:
         materials=tuple(row["materials"]),
         tile=float(row["tile"]),
         pixels=row["pixels"],
-        recipe=recipe_of(where, row["maps"]),
+        recipe=functools.partial(_drawn, recipe_of(where, row["maps"])),
         told=row["maps"],
         specular=float(row.get("specular", 0.5)),
         metallic=float(row.get("metallic", 0.0)),
     )
 
 
-def recipe_of(where: str, told: Row) -> Recipe:
+def recipe_of(where: str, told: Row) -> Callable[..., Any]:
     """What {"by": painter, argument: value, ...} stands for: a function that knows these arguments, or the record of
     a class; values may be such objects themselves, lists become tuples.
 
@@ -99,6 +102,10 @@ def recipe_of(where: str, told: Row) -> Recipe:
         raise CatalogueError(f"{where}: {name} does not take {unknown}; it takes {taken}")
     values = {argument: _value(where, value) for argument, value in arguments.items()}
     return painter(**values) if isinstance(painter, type) else functools.partial(painter, **values)
+
+
+def _drawn(painter: Callable[[Canvas], Maps], n: int, tile: float, *, rng: np.random.Generator) -> Maps:
+    return painter(Canvas(n, tile, rng))
 
 
 def painters_of(told: object) -> set[str]:

@@ -7,67 +7,55 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from assets.materials.maps import Colors, Maps, blurred, coordinates, fbm, maps_of, mix, noise, rgb, smooth_step
+from assets.materials.maps import Canvas, Colors, Maps, blurred, coordinates, maps_of, mix, rgb, smooth_step
 from assets.records import Color
 
 
-def paint(
-    n: int, tile: float, color: Color, rough: float = 0.85, nap: float = 1.0, *, rng: np.random.Generator
-) -> Maps:
+def paint(on: Canvas, color: Color, rough: float = 0.85, nap: float = 1.0) -> Maps:
     """Wall paint from a roller: one colour, a fine orange peel, hardly any shade."""
-    peel = fbm(n, 40, 220, 0.6, rng=rng)
-    cloud = fbm(n, 4, 12, 1.0, rng=rng)
+    peel = on.fbm(40, 220, 0.6)
+    cloud = on.fbm(4, 12, 1.0)
     out = rgb(color) * (1 + 0.004 * nap * peel + 0.002 * cloud)[..., None]
     return maps_of(out, 6e-5 * nap * peel, np.clip(rough + 0.02 * peel, 0.1, 1))
 
 
-def gloss_paint(n: int, tile: float, color: Color, rough: float = 0.35, *, rng: np.random.Generator) -> Maps:
+def gloss_paint(on: Canvas, color: Color, rough: float = 0.35) -> Maps:
     """Satin paint on joinery, with faint brush marks along u."""
-    brush = noise(n, 40, 1.2, rng=rng)
+    brush = on.noise(40, 1.2)
     out = rgb(color) * (1 + 0.0022 * brush)[..., None]
     return maps_of(out, 1e-5 * brush, np.clip(rough + 0.02 * brush, 0.05, 1))
 
 
-def plaster(
-    n: int, tile: float, color: Color, relief: float = 1.0, mottle: float = 0.009, *, rng: np.random.Generator
-) -> Maps:
+def plaster(on: Canvas, color: Color, relief: float = 1.0, mottle: float = 0.009) -> Maps:
     """Trowelled lime plaster or roughcast: sweeps, grain, soft clouds."""
-    sweep = fbm(n, 5, 90, 1.2, 1.6, rng=rng)
-    grain = noise(n, 1.6, 1.6, rng=rng)
+    sweep = on.fbm(5, 90, 1.2, 1.6)
+    grain = on.noise(1.6, 1.6)
     out = rgb(color) * (1 + mottle * sweep + 0.012 * relief * grain)[..., None]
     return maps_of(out, relief * (3e-4 * sweep + 1.2e-4 * grain), 0.92)
 
 
-def metal(
-    n: int,
-    tile: float,
-    color: Color,
-    rough: float = 0.28,
-    brushed: float = 1.0,
-    stain: float = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def metal(on: Canvas, color: Color, rough: float = 0.28, brushed: float = 1.0, stain: float = 0.0) -> Maps:
     """Brushed or polished metal; `stain` adds patina."""
-    lines = noise(n, 90, 0.5, rng=rng)
+    lines = on.noise(90, 0.5)
     out = rgb(color) * (1 + 0.02 * brushed * lines)[..., None]
     if stain:
-        cloud = fbm(n, 3, 80, 1.2, rng=rng)
+        cloud = on.fbm(3, 80, 1.2)
         out = mix(out, rgb(color) * 0.55, stain * smooth_step(cloud, -0.5, 2.0))
     return maps_of(out, 4e-6 * brushed * lines, np.clip(rough + 0.05 * brushed * lines, 0.04, 1))
 
 
-def wicker(n: int, tile: float, color: Color, strands: int = 24, *, rng: np.random.Generator) -> Maps:
+def wicker(on: Canvas, color: Color, strands: int = 24) -> Maps:
     """Basketwork: level strands over and under upright stakes."""
-    u, v = coordinates(n, tile)
+    tile = on.tile
+    u, v = on.coordinates()
     y = v / tile * strands + 0.5
     j = np.floor(y).astype(int)
     fy = y - j - 0.5
     x = u / tile * (strands // 3)
     over = np.cos(np.pi * (x + (j % 2)))
     bulge = np.cos(np.pi * fy) ** 0.7
-    fibre = noise(n, 12, 0.8, rng=rng)
-    tone = rng.normal(0, 0.05, strands)[j % strands]
+    fibre = on.noise(12, 0.8)
+    tone = on.rng.normal(0, 0.05, strands)[j % strands]
     out = rgb(color) * (0.5 + 0.42 * bulge * (0.72 + 0.28 * over) + tone + 0.06 * fibre)[..., None]
     return maps_of(out, 0.004 * bulge * (0.6 + 0.4 * over), 0.7, 0.01, 0.97)
 
@@ -76,21 +64,14 @@ def wicker(n: int, tile: float, color: Color, strands: int = 24, *, rng: np.rand
 
 
 def wallpaper(
-    n: int,
-    tile: float,
-    ground: Color,
-    inks: Colors,
-    motif: Callable[..., list[np.ndarray]],
-    woven: float = 0.5,
-    *,
-    rng: np.random.Generator,
+    on: Canvas, ground: Color, inks: Colors, motif: Callable[..., list[np.ndarray]], woven: float = 0.5
 ) -> Maps:
     """Paper with `motif(n, rng=rng)`: masks (n, n) printed one over the other in `inks`."""
-    grain = noise(n, 1.2, 1.2, rng=rng)
-    thread = noise(n, 0.6, 14, rng=rng)
-    out = rgb(ground, (n, n))
-    for mask, ink in zip(motif(n, rng=rng), inks):
-        out = mix(out, rgb(ink, (n, n)), np.clip(mask, 0, 1))
+    grain = on.noise(1.2, 1.2)
+    thread = on.noise(0.6, 14)
+    out = on.rgb(ground)
+    for mask, ink in zip(motif(on.n, rng=on.rng), inks):
+        out = mix(out, on.rgb(ink), np.clip(mask, 0, 1))
     out = out * (1 + 0.008 * grain + 0.012 * woven * thread)[..., None]
     return maps_of(out, 2e-5 * grain + 2e-5 * woven * thread, 0.85)
 
@@ -240,11 +221,11 @@ def leaves(n: int, count: int = 60, *, rng: np.random.Generator) -> list[np.ndar
     return [pale.done(), dark.done()]
 
 
-def grasscloth(n: int, tile: float, color: Color, *, rng: np.random.Generator) -> Maps:
+def grasscloth(on: Canvas, color: Color) -> Maps:
     """Woven grass on paper: level fibres of uneven thickness and colour."""
-    long, fine = noise(n, 120, 1.3, rng=rng), noise(n, 40, 0.6, rng=rng)
-    upright = noise(n, 0.8, 60, rng=rng)
-    knots = smooth_step(noise(n, 3, 1, rng=rng), 2.6, 3.2)
+    long, fine = on.noise(120, 1.3), on.noise(40, 0.6)
+    upright = on.noise(0.8, 60)
+    knots = smooth_step(on.noise(3, 1), 2.6, 3.2)
     shade = 1 + 0.06 * long + 0.045 * fine + 0.02 * upright - 0.12 * knots
     height = 1.5e-4 * (long + fine)
     return maps_of(rgb(color) * shade[..., None], blurred(height.astype(np.float32), 0.6), 0.9, 0.01, 0.97)

@@ -7,19 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.materials.maps import Colors, Maps, coordinates, fbm, maps_of, mix, noise, rgb, smooth_step
+from assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, rgb, smooth_step
 from assets.records import Color
 
 LIGHT_FROM = (0.55, 0.83)
 """Where light on folds comes from, in a tile, right and up: on upright cloth from above."""
 
 
-def folds(n: int, tile: float, width: float, strength: float, *, rng: np.random.Generator) -> np.ndarray:
+def folds(on: Canvas, width: float, strength: float) -> np.ndarray:
     """(n, n) factors with mean 1 of soft folds some `width` metres apart, lit from LIGHT_FROM, dark in hollows."""
-    cycles = tile / width
+    n = on.n
+    cycles = on.tile / width
     height = np.zeros((n, n), np.float32)
     for stretch, across in ((3.0, False), (3.0, True), (1.5, False)):
-        field = fbm(n, max(2.0, 0.35 * cycles), 1.6 * cycles, 1.6, stretch, rng=rng)
+        field = on.fbm(max(2.0, 0.35 * cycles), 1.6 * cycles, 1.6, stretch)
         height += 0.8 - np.abs(field.T if across else field) ** 0.8
     dx, dy = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / 2, (np.roll(height, 1, 0) - np.roll(height, -1, 0)) / 2
     lit = -(LIGHT_FROM[0] * dx + LIGHT_FROM[1] * dy)
@@ -48,19 +49,20 @@ class Weave:
     creases: float = 0.0
     """Standard deviation of lightness by soft folds, a hand's breadth apart."""
 
-    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
-        u, v = coordinates(n, tile)
+    def __call__(self, on: Canvas) -> Maps:
+        tile, rng = on.tile, on.rng
+        u, v = on.coordinates()
         x, y = u / tile * self.threads, v / tile * self.threads
-        swing = fbm(n, 3, 40, 1.2, rng=rng)
-        x, y = x + 0.12 * swing, y + 0.12 * np.roll(swing, n // 2, 1)
+        swing = on.fbm(3, 40, 1.2)
+        x, y = x + 0.12 * swing, y + 0.12 * np.roll(swing, on.n // 2, 1)
         i, j = np.floor(x).astype(int), np.floor(y).astype(int)
         fx, fy = x - i - 0.5, y - j - 0.5
         i, j = i % self.threads, j % self.threads
         up = ((i + j) % 2 == 0) if self.over == 1 else ((i + j) % (2 * self.over) < self.over)
         round_warp, round_weft = np.cos(np.pi * fx) ** 0.7, np.cos(np.pi * fy) ** 0.7
         tone_warp, tone_weft = rng.normal(0, self.irregular, self.threads), rng.normal(0, self.irregular, self.threads)
-        fibre_up, fibre_level = noise(n, 0.6, 9, rng=rng), noise(n, 9, 0.6, rng=rng)
-        thick_up, thick_level = noise(n, 1.5, 40, rng=rng), noise(n, 40, 1.5, rng=rng)
+        fibre_up, fibre_level = on.noise(0.6, 9), on.noise(9, 0.6)
+        thick_up, thick_level = on.noise(1.5, 40), on.noise(40, 1.5)
         span = 1 if self.over == 1 else 0.6
         lift_warp, lift_weft = np.cos(np.pi * fy * span), np.cos(np.pi * fx * span)
         grain_warp = 1 + tone_warp[i] + self.fuzz * fibre_up + 0.10 * self.slubs * thick_up
@@ -71,7 +73,7 @@ class Weave:
         color = np.where(up[..., None], a * shade_a[..., None], b * shade_b[..., None])
         height = np.where(up, round_warp * (0.5 + 0.5 * lift_warp), round_weft * (0.5 + 0.5 * lift_weft))
         if self.creases:
-            color = color * folds(n, tile, 0.1, self.creases, rng=rng)[..., None]
+            color = color * folds(on, 0.1, self.creases)[..., None]
         height = height * 0.35 * tile / self.threads + 0.02 * tile / self.threads * (fibre_up + fibre_level)
         return maps_of(color, height, self.rough, 0.01, 0.97)
 
@@ -97,71 +99,56 @@ class Pile:
     """How much the lightness varies with the way the pile is brushed."""
     rough: float = 0.97
 
-    def __call__(self, n: int, tile: float, *, rng: np.random.Generator) -> Maps:
-        size = self.loop / (tile / n)
-        tuft = noise(n, size, size, rng=rng)
-        fine = noise(n, size * 0.35, size * 0.35, rng=rng)
-        brushed = fbm(n, 3, 20, 1.2, rng=rng)
-        base = rgb(self.color, (n, n))
+    def __call__(self, on: Canvas) -> Maps:
+        size = self.loop / (on.tile / on.n)
+        tuft = on.noise(size, size)
+        fine = on.noise(size * 0.35, size * 0.35)
+        brushed = on.fbm(3, 20, 1.2)
+        base = on.rgb(self.color)
         if self.second is not None:
-            base = mix(base, rgb(self.second), smooth_step(noise(n, size * 0.8, size * 0.8, rng=rng), -0.3, 0.9))
+            base = mix(base, rgb(self.second), smooth_step(on.noise(size * 0.8, size * 0.8), -0.3, 0.9))
         out = base * (1 + self.depth * (0.6 * tuft + 0.55 * fine) / 1.6 + self.tracks * brushed)[..., None]
         height = self.loop * 0.25 * (tuft + 0.5 * fine)
         return maps_of(out, height, self.rough, 0.01, 0.97)
 
 
-def sisal(n: int, tile: float, color: Color = (0.70, 0.61, 0.47), ribs: int = 64, *, rng: np.random.Generator) -> Maps:
+def sisal(on: Canvas, color: Color = (0.70, 0.61, 0.47), ribs: int = 64) -> Maps:
     """Boucle of plant fibre in level ribs."""
-    u, v = coordinates(n, tile)
-    swing = fbm(n, 4, 60, 1.2, rng=rng)
+    tile = on.tile
+    u, v = on.coordinates()
+    swing = on.fbm(4, 60, 1.2)
     row = v / tile * ribs + 0.10 * swing
     j = np.floor(row).astype(int)
-    x = u / tile * ribs + 0.5 * (j % 2) + 0.15 * np.roll(swing, n // 3, 0)
+    x = u / tile * ribs + 0.5 * (j % 2) + 0.15 * np.roll(swing, on.n // 3, 0)
     lump = np.cos(np.pi * (row - j - 0.5)) ** 0.6 * (0.6 + 0.4 * np.cos(2 * np.pi * x))
-    tone = rng.normal(0, 0.02, ribs)[j % ribs] + 0.06 * noise(n, 3, 1, rng=rng)
+    tone = on.rng.normal(0, 0.02, ribs)[j % ribs] + 0.06 * on.noise(3, 1)
     out = rgb(color) * (0.6 + 0.45 * lump + tone)[..., None]
     return maps_of(out, 0.002 * lump, 0.95, 0.02, 0.97)
 
 
-def felt(
-    n: int,
-    tile: float,
-    color: Color,
-    mottle: float = 0.012,
-    rough: float = 0.95,
-    creases: float = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def felt(on: Canvas, color: Color, mottle: float = 0.012, rough: float = 0.95, creases: float = 0.0) -> Maps:
     """Velvet, felt, fleece: no threads to see, soft shading in the nap and, as in Weave, in creases."""
-    nap = noise(n, 1.6, 2.4, rng=rng)
-    cloud = fbm(n, 5, 60, 1.2, rng=rng)
+    nap = on.noise(1.6, 2.4)
+    cloud = on.fbm(5, 60, 1.2)
     out = rgb(color) * (1 + 0.05 * nap + mottle * cloud)[..., None]
     if creases:
-        out = out * folds(n, tile, 0.1, creases, rng=rng)[..., None]
+        out = out * folds(on, 0.1, creases)[..., None]
     return maps_of(out, 1.2e-4 * nap, rough, 0.01, 0.97)
 
 
-def leather(n: int, tile: float, color: Color, gloss: float = 0.45, *, rng: np.random.Generator) -> Maps:
+def leather(on: Canvas, color: Color, gloss: float = 0.45) -> Maps:
     """Grained leather: a net of fine creases around pebbles."""
-    a, b = noise(n, 4.5, 4.5, rng=rng), noise(n, 4.5, 4.5, rng=rng)
+    a, b = on.noise(4.5, 4.5), on.noise(4.5, 4.5)
     crease = np.exp(-((np.abs(a) / 0.16) ** 1.2)) + np.exp(-((np.abs(b) / 0.16) ** 1.2))
-    cloud = fbm(n, 6, 60, 1.1, rng=rng)
+    cloud = on.fbm(6, 60, 1.1)
     out = rgb(color) * (1 - 0.11 * np.clip(crease, 0, 1) + 0.018 * cloud)[..., None]
     return maps_of(out, -1.6e-4 * crease, np.clip(gloss + 0.12 * crease + 0.03 * cloud, 0.1, 1), 0.01, 0.97)
 
 
-def printed(
-    n: int,
-    tile: float,
-    cloth: Callable[..., Maps],
-    motif: Callable[[int], np.ndarray],
-    color: Color,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def printed(on: Canvas, cloth: Callable[..., Maps], motif: Callable[[int], np.ndarray], color: Color) -> Maps:
     """`cloth` with `motif(n)` (n, n) in [0, 1] printed in `color`, the threads still showing."""
-    base = cloth(n, tile, rng=rng)
+    n = on.n
+    base = cloth(on)
     shade = base.color.mean(-1, keepdims=True) / max(float(base.color.mean()), 1e-6)
     t = motif(n)[..., None]
     return maps_of(base.color * (1 - t) + rgb(color) * shade * t, base.height, base.roughness, 0.01, 0.97)

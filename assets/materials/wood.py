@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.materials.maps import Layout, Maps, coordinates, fbm, look_up, maps_of, mix, noise, planks, rgb, smooth_step
+from assets.materials.maps import Canvas, Layout, Maps, fbm, look_up, maps_of, mix, noise, planks, rgb, smooth_step
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,9 @@ SPECIES = {
 }
 
 
-def floor(
-    n: int,
-    tile: float,
-    layout: Callable[..., Layout],
-    species: str,
-    gloss: float = 0.38,
-    groove: float = 0.0012,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def floor(on: Canvas, layout: Callable[..., Layout], species: str, gloss: float = 0.38, groove: float = 0.0012) -> Maps:
     """A wooden floor: `layout(n, tile)` or `layout(n, tile, rng=rng)` gives the boards."""
+    n, tile, rng = on.n, on.tile, on.rng
     pieces = layout(n, tile, rng=rng) if _draws(layout) else layout(n, tile)
     return boards(n, tile, pieces, SPECIES[species], gloss, groove, rng=rng)
 
@@ -70,18 +62,10 @@ def _draws(layout: Callable[..., Layout]) -> bool:
     return inner is planks
 
 
-def furniture(
-    n: int,
-    tile: float,
-    species: str,
-    strips: int = 5,
-    gloss: float = 0.42,
-    lacquer: float = 0.0,
-    *,
-    rng: np.random.Generator,
-) -> Maps:
+def furniture(on: Canvas, species: str, strips: int = 5, gloss: float = 0.42, lacquer: float = 0.0) -> Maps:
     """Glued panels without grooves, the grain along u running on over the tile's border."""
-    u, v = coordinates(n, tile)
+    n, tile = on.n, on.tile
+    u, v = on.coordinates()
     width = tile / strips
     # Half a strip up: the tile's border lies within a strip, not on a joint.
     k = np.floor(v / width + 0.5).astype(int)
@@ -90,7 +74,7 @@ def furniture(
     layout = Layout(k % strips, u.astype(np.float32), across.astype(np.float32), edge, strips)
     kind = SPECIES[species]
     calm = dataclasses.replace(kind, tone=kind.tone * 0.25, knots=0.0)
-    maps = boards(n, tile, layout, calm, gloss, 0.0, endless=True, rng=rng)
+    maps = boards(n, tile, layout, calm, gloss, 0.0, endless=True, rng=on.rng)
     return Maps(maps.color, maps.height * (1 - lacquer), maps.roughness * (1 - 0.4 * lacquer))
 
 
