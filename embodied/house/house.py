@@ -15,6 +15,7 @@ import json
 import math
 import re
 import typing
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -281,142 +282,137 @@ def check(house: House) -> None:
         a room without a door or cut off from the others, an opening that is on no shared wall, a
         window between rooms, overlapping openings, an object outside its room.
     """
-    _check_numbers(house)
-    _check_ids(house)
-    _check_storeys(house)
+    for wrong in _complaints(house):
+        raise HouseError(wrong)
+
+
+def _complaints(house: House) -> Iterator[str]:
+    """What is wrong with a house; each rests on there being nothing before it."""
+    yield from _check_numbers(house)
+    yield from _check_ids(house)
+    yield from _check_storeys(house)
     polygons = {}
     for room in house.rooms:
         polygon = shapely.Polygon(room.polygon if len(room.polygon) > 2 else ())
         if not polygon.is_valid or polygon.area < 0.5 or not shapely.is_ccw(polygon.exterior):
-            raise HouseError(
-                f"room {room.id!r} needs a simple counter-clockwise polygon of at least 0.5 m2, got {room.polygon}"
-            )
+            yield f"room {room.id!r} needs a simple counter-clockwise polygon of at least 0.5 m2, got {room.polygon}"
         polygons[room.id] = polygon
-    _check_overlaps(house, polygons)
-    _check_openings(house, polygons)
-    _check_walls(house, polygons)
-    _check_reach(house)
+    yield from _check_overlaps(house, polygons)
+    yield from _check_openings(house, polygons)
+    yield from _check_walls(house, polygons)
+    yield from _check_reach(house)
     for p in house.placements:
-        _check_place(house, polygons, f"object {p.id!r} stands", p.room, p.position)
-        _check_size(house, polygons, p)
+        yield from _check_place(house, polygons, f"object {p.id!r} stands", p.room, p.position)
+        yield from _check_size(house, polygons, p)
     for x in house.lights:
-        _check_place(house, polygons, f"light {x.id!r} shines", x.room, x.position)
+        yield from _check_place(house, polygons, f"light {x.id!r} shines", x.room, x.position)
 
 
 def _check_place(
     house: House, polygons: dict[str, shapely.Polygon], what: str, room: str, position: tuple[float, float, float]
-) -> None:
+) -> Iterator[str]:
     """Refuse what is outside its room, by more than a wall or half a metre of height."""
     storey, above = house.storey_of(house.room_by_id[room]), 0.5
     if not storey.elevation - above <= position[2] <= storey.elevation + storey.height + above:
-        raise HouseError(f"{what} at {position} below or above its room {room!r}; change its height")
+        yield f"{what} at {position} below or above its room {room!r}; change its height"
     if polygons[room].distance(shapely.Point(position[:2])) > house.outer_wall:
-        raise HouseError(f"{what} at {position} outside its room {room!r}; move it inside or name the room it is in")
+        yield f"{what} at {position} outside its room {room!r}; move it inside or name the room it is in"
 
 
-def _check_size(house: House, polygons: dict[str, shapely.Polygon], p: Placement) -> None:
+def _check_size(house: House, polygons: dict[str, shapely.Polygon], p: Placement) -> Iterator[str]:
     """Refuse an object that no placing would fit into its room."""
     x0, y0, x1, y1 = polygons[p.room].bounds
     longest, height = math.hypot(x1 - x0, y1 - y0), house.storey_of(house.room_by_id[p.room]).height
     if max(p.size[:2]) > longest + house.outer_wall or p.size[2] > height + 0.5:
-        raise HouseError(
+        yield (
             f"object {p.id!r} of {p.size} m does not fit into its room {p.room!r}, {longest:.1f} m from corner to "
             f"corner and {height:.2f} m high; make it smaller"
         )
 
 
-def _check_storeys(house: House) -> None:
+def _check_storeys(house: House) -> Iterator[str]:
     if not house.storeys or any(not 1.8 <= s.height <= 20 for s in house.storeys):
-        raise HouseError(f"a house needs storeys of 1.8 to 20 m clear height, got {house.storeys}")
+        yield f"a house needs storeys of 1.8 to 20 m clear height, got {house.storeys}"
     for k, (below, above) in enumerate(itertools.pairwise(house.storeys)):
         if above.elevation < below.elevation + below.height - 1e-6:
-            raise HouseError(
+            yield (
                 f"storey {k + 1} begins at {above.elevation} m, below the ceiling of storey {k} at "
                 f"{below.elevation + below.height} m; list storeys from the ground up, each above the one before"
             )
     if empty := sorted(set(range(len(house.storeys))) - {r.storey for r in house.rooms}):
-        raise HouseError(f"the storeys {empty} have no room; put a room on each (Room.storey) or drop them")
+        yield f"the storeys {empty} have no room; put a room on each (Room.storey) or drop them"
 
 
-def _check_numbers(house: House) -> None:
+def _check_numbers(house: House) -> Iterator[str]:
+    sky = house.sky
     if not 0 <= house.disorder <= 1:
-        raise HouseError(f"disorder should lie between 0 and 1, got {house.disorder}")
+        yield f"disorder should lie between 0 and 1, got {house.disorder}"
     if not 0 < house.inner_wall < 1 or not house.inner_wall <= house.outer_wall < 2:
-        raise HouseError(
-            f"walls should be 0 < inner <= outer metres thick, got {house.inner_wall} and {house.outer_wall}"
-        )
-    if house.sky.weather not in WEATHERS or not 0 <= house.sky.hour < 24:
-        raise HouseError(f"sky should have a weather of {WEATHERS} and an hour in [0, 24), got {house.sky}")
-    if house.sky.landscape not in (None, *LANDSCAPES) or house.sky.season not in (None, *SEASONS):
-        raise HouseError(
-            f"sky should have a landscape of {LANDSCAPES} and a season of {SEASONS}, or leave them out, got {house.sky}"
-        )
+        yield f"walls should be 0 < inner <= outer metres thick, got {house.inner_wall} and {house.outer_wall}"
+    if sky.weather not in WEATHERS or not 0 <= sky.hour < 24:
+        yield f"sky should have a weather of {WEATHERS} and an hour in [0, 24), got {sky}"
+    if sky.landscape not in (None, *LANDSCAPES) or sky.season not in (None, *SEASONS):
+        yield f"sky should have a landscape of {LANDSCAPES} and a season of {SEASONS}, or leave them out, got {sky}"
     numbers = [(p.id, (*p.position, p.yaw, *p.size)) for p in house.placements]
     numbers += [(x.id, (*x.position, *x.color, x.power)) for x in house.lights]
     numbers += [(o.id, (*o.a, *o.b, o.sill, o.head, o.angle)) for o in house.openings]
     for name, values in numbers:
         if not all(map(math.isfinite, values)):
-            raise HouseError(f"{name!r} has a number that is not finite: {values}")
+            yield f"{name!r} has a number that is not finite: {values}"
     for p in house.placements:
         if not all(SMALLEST <= s <= LARGEST for s in p.size):
-            raise HouseError(
+            yield (
                 f"object {p.id!r} has the size {p.size}; all three must be positive, at least {SMALLEST} and "
                 f"at most {LARGEST:.0f} m"
             )
     for x in house.lights:
         if x.power < 0 or not all(0 <= c <= 1 for c in x.color):
-            raise HouseError(
-                f"light {x.id!r} should have a power of at least 0 and a colour in [0, 1], got {x.power}, {x.color}"
-            )
+            yield f"light {x.id!r} should have a power of at least 0 and a colour in [0, 1], got {x.power}, {x.color}"
 
 
-def _check_ids(house: House) -> None:
+def _check_ids(house: House) -> Iterator[str]:
     for what in ("rooms", "openings", "placements", "lights", "stairs"):
         ids = [x.id for x in getattr(house, what)]
         if len(set(ids)) < len(ids):
             twice = sorted({i for i in ids if ids.count(i) > 1})
-            raise HouseError(f"{what} share the ids {twice}; every id must be unique")
+            yield f"{what} share the ids {twice}; every id must be unique"
         if bad := [i for i in ids if not ID.fullmatch(i)]:
-            raise HouseError(f"{what} have the ids {bad}; an id is made of letters, digits and _ - . '")
+            yield f"{what} have the ids {bad}; an id is made of letters, digits and _ - . '"
     if not house.rooms:
-        raise HouseError("a house needs at least one room, got none")
+        yield "a house needs at least one room, got none"
     rooms = set(house.room_by_id)
     for r in house.rooms:
         if not 0 <= r.storey < len(house.storeys):
-            raise HouseError(f"room {r.id!r} is on storey {r.storey}, the house has {len(house.storeys)}")
+            yield f"room {r.id!r} is on storey {r.storey}, the house has {len(house.storeys)}"
         if r.kind not in ROOM_KINDS:
-            raise HouseError(f"room {r.id!r} has the unknown kind {r.kind!r}; use one of {ROOM_KINDS}")
+            yield f"room {r.id!r} has the unknown kind {r.kind!r}; use one of {ROOM_KINDS}"
         if r.accent_wall is not None and len(r.polygon) > 2 and not 0 <= r.accent_wall < len(r.polygon):
-            raise HouseError(
-                f"room {r.id!r} has the accent wall {r.accent_wall}; its walls are 0 to {len(r.polygon) - 1}"
-            )
+            yield f"room {r.id!r} has the accent wall {r.accent_wall}; its walls are 0 to {len(r.polygon) - 1}"
     places = [*((p.id, p.room) for p in house.placements), *((x.id, x.room) for x in house.lights)]
     for name, room in places:
         if room not in rooms:
-            raise HouseError(f"{name!r} names the unknown room {room!r}; rooms are {sorted(rooms)}")
+            yield f"{name!r} names the unknown room {room!r}; rooms are {sorted(rooms)}"
     for x in house.lights:
         if x.placement is not None and x.placement not in house.placement_by_id:
-            raise HouseError(
-                f"light {x.id!r} belongs to the unknown object {x.placement!r}; place that lamp or name none"
-            )
+            yield f"light {x.id!r} belongs to the unknown object {x.placement!r}; place that lamp or name none"
     for s in house.stairs:
         if not set(s.rooms) <= rooms or len(s.path) < 2 or s.width <= 0 or s.risers < 1:
-            raise HouseError(
+            yield (
                 f"stair {s.id!r} should join two of the rooms {sorted(rooms)} by a path of two points or more, got {s}"
             )
     for p in house.placements:
         if p.parent is not None and p.parent not in house.placement_by_id:
-            raise HouseError(f"object {p.id!r} rests on the unknown object {p.parent!r}")
+            yield f"object {p.id!r} rests on the unknown object {p.parent!r}"
         seen = {p.id}
         above = p
         while above.parent is not None:
             above = house.placement_by_id.get(above.parent, p)
             if above.id in seen:
-                raise HouseError(f"object {p.id!r} rests on itself, through {sorted(seen)}")
+                yield f"object {p.id!r} rests on itself, through {sorted(seen)}"
             seen.add(above.id)
 
 
-def _check_overlaps(house: House, polygons: dict[str, shapely.Polygon]) -> None:
+def _check_overlaps(house: House, polygons: dict[str, shapely.Polygon]) -> Iterator[str]:
     tree = shapely.STRtree([polygons[r.id] for r in house.rooms])
     for i, room in enumerate(house.rooms):
         for j in sorted(tree.query(polygons[room.id])):
@@ -425,52 +421,48 @@ def _check_overlaps(house: House, polygons: dict[str, shapely.Polygon]) -> None:
                 continue
             shared = polygons[room.id].intersection(polygons[other.id]).area
             if shared > 1e-3:
-                raise HouseError(f"rooms {room.id!r} and {other.id!r} overlap by {shared:.3f} m2")
+                yield f"rooms {room.id!r} and {other.id!r} overlap by {shared:.3f} m2"
 
 
-def _check_openings(house: House, polygons: dict[str, shapely.Polygon]) -> None:
+def _check_openings(house: House, polygons: dict[str, shapely.Polygon]) -> Iterator[str]:
     has_door = {end for s in house.stairs for end in s.rooms}
     for o in house.openings:
         if o.kind not in OPENING_KINDS:
-            raise HouseError(f"opening {o.id!r} has the unknown kind {o.kind!r}; use one of {OPENING_KINDS}")
+            yield f"opening {o.id!r} has the unknown kind {o.kind!r}; use one of {OPENING_KINDS}"
         segment = shapely.LineString([o.a, o.b])
         for name in o.rooms:
             if name is None:
                 continue
             if name not in polygons:
-                raise HouseError(f"opening {o.id!r} names the unknown room {name!r}")
+                yield f"opening {o.id!r} names the unknown room {name!r}"
             if not polygons[name].exterior.buffer(1e-3).covers(segment):
-                raise HouseError(f"opening {o.id!r} does not lie on a wall of room {name!r}")
+                yield f"opening {o.id!r} does not lie on a wall of room {name!r}"
             if o.kind in DOORS:
                 has_door.add(name)
         if not 0 <= o.sill < o.head:
-            raise HouseError(f"opening {o.id!r} needs 0 <= sill < head, got {o.sill} and {o.head}")
+            yield f"opening {o.id!r} needs 0 <= sill < head, got {o.sill} and {o.head}"
     for room in house.rooms:
         if room.id not in has_door:
-            raise HouseError(f"room {room.id!r} has no door; every room needs one, add an Opening or drop the room")
+            yield f"room {room.id!r} has no door; every room needs one, add an Opening or drop the room"
 
 
-def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> None:
+def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> Iterator[str]:
     """Openings to the outdoors on outer walls only, doors between two rooms of one storey, none through another."""
     tree = shapely.STRtree([polygons[r.id] for r in house.rooms])
     lines = [shapely.LineString([o.a, o.b]) for o in house.openings]
     for o, line in zip(house.openings, lines):
         first = house.room_by_id[o.rooms[0]]
         if line.length < 0.2:
-            raise HouseError(f"opening {o.id!r} is {line.length:.2f} m wide; at least 0.2 m is needed")
+            yield f"opening {o.id!r} is {line.length:.2f} m wide; at least 0.2 m is needed"
         if o.head > house.storey_of(first).height + 1e-6:
-            raise HouseError(
-                f"opening {o.id!r} reaches {o.head} m, its storey is {house.storey_of(first).height} m high"
-            )
+            yield f"opening {o.id!r} reaches {o.head} m, its storey is {house.storey_of(first).height} m high"
         if o.hinge not in ("a", "b") or not 0 <= o.angle <= math.pi:
-            raise HouseError(
-                f"opening {o.id!r} needs a hinge 'a' or 'b' and an angle in [0, pi], got {o.hinge!r}, {o.angle}"
-            )
+            yield f"opening {o.id!r} needs a hinge 'a' or 'b' and an angle in [0, pi], got {o.hinge!r}, {o.angle}"
         if o.rooms[1] is not None:
             if o.rooms[0] == o.rooms[1] or house.room_by_id[o.rooms[1]].storey != first.storey:
-                raise HouseError(f"opening {o.id!r} should join two rooms of one storey, got {o.rooms}")
+                yield f"opening {o.id!r} should join two rooms of one storey, got {o.rooms}"
             if o.kind not in ("door", "passage"):
-                raise HouseError(f"{o.kind} {o.id!r} should lead outdoors, it lies between the rooms {o.rooms}")
+                yield f"{o.kind} {o.id!r} should lead outdoors, it lies between the rooms {o.rooms}"
             continue
         for j in sorted(tree.query(line.buffer(1e-3))):
             other = house.rooms[j]
@@ -479,7 +471,7 @@ def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> None:
                 and other.storey == first.storey
                 and polygons[other.id].buffer(1e-3).intersection(line).length > 0.01
             ):
-                raise HouseError(f"{o.kind} {o.id!r} should lead outdoors, behind its wall lies room {other.id!r}")
+                yield f"{o.kind} {o.id!r} should lead outdoors, behind its wall lies room {other.id!r}"
     near = shapely.STRtree(lines)
     for i, o in enumerate(house.openings):
         for j in sorted(near.query(lines[i].buffer(1e-3))):
@@ -491,10 +483,10 @@ def _check_walls(house: House, polygons: dict[str, shapely.Polygon]) -> None:
                 and lines[i].buffer(1e-3).intersection(lines[j]).length > 0.01
                 and (min(o.head, other.head) > max(o.sill, other.sill))
             ):
-                raise HouseError(f"openings {o.id!r} and {other.id!r} overlap; move one along the wall")
+                yield f"openings {o.id!r} and {other.id!r} overlap; move one along the wall"
 
 
-def _check_reach(house: House) -> None:
+def _check_reach(house: House) -> Iterator[str]:
     """Every room can be reached from the first one through doors and stairs."""
     ways: dict[str, list[str]] = {r.id: [] for r in house.rooms}
     pairs = [o.rooms for o in house.openings if o.kind in DOORS]
@@ -508,7 +500,7 @@ def _check_reach(house: House) -> None:
         reached.update(new)
         todo += new
     if lost := [r.id for r in house.rooms if r.id not in reached]:
-        raise HouseError(f"rooms {lost} cannot be reached from {house.rooms[0].id!r} through doors; add one")
+        yield f"rooms {lost} cannot be reached from {house.rooms[0].id!r} through doors; add one"
 
 
 def rounded(value: typing.Any, digits: int = 4) -> typing.Any:

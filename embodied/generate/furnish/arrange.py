@@ -164,18 +164,9 @@ class _Trial:
 
     def _thing(self, item: Item) -> Thing:
         pose, c, s = self.pose, math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        return Thing(
-            asset=item.asset,
-            x=pose.x + c * item.x - s * item.y,
-            y=pose.y + s * item.x + c * item.y,
-            z=self.space.bottom + item.z,
-            yaw=pose.yaw + item.yaw,
-            size=item.extent,
-            params=item.params,
-            group=self.group,
-            role=item.role,
-            wall=pose.wall,
-        )
+        x, y = pose.x + c * item.x - s * item.y, pose.y + s * item.x + c * item.y
+        z, yaw, group = self.space.bottom + item.z, pose.yaw + item.yaw, self.group
+        return Thing(item.asset, x, y, z, yaw, item.extent, item.params, group=group, role=item.role, wall=pose.wall)
 
     def _stands(self, item: Item, b: Box, flat: bool) -> bool:
         """Whether an item finds room among what stands in the room and in the arrangement."""
@@ -257,20 +248,9 @@ def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thi
         return None
     u = min(max(item.x, x0 + w / 2), x1 - w / 2) if w < x1 - x0 else (x0 + x1) / 2
     v = min(max(item.y, y0 + d / 2), y1 - d / 2) if d < y1 - y0 else (y0 + y1) / 2
-    x, y = parent.local(u, v)
+    (x, y), z, yaw = parent.local(u, v), parent.z + surface.z * scale[2] + item.z, parent.yaw + item.yaw
     return Thing(
-        asset=item.asset,
-        x=x,
-        y=y,
-        z=parent.z + surface.z * scale[2] + item.z,
-        yaw=parent.yaw + item.yaw,
-        size=item.extent,
-        params=item.params,
-        parent=parent,
-        surface=surface.name,
-        group=group,
-        role=item.role,
-        wall=parent.wall,
+        item.asset, x, y, z, yaw, item.extent, item.params, parent, surface.name, group, item.role, parent.wall
     )
 
 

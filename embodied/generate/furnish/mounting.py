@@ -62,19 +62,8 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
         plan = None
     if plan is None:
         return None
-    role = hanging.role or hanging.group
-    thing = Thing(
-        asset=asset,
-        x=x,
-        y=y,
-        z=base,
-        yaw=wall.yaw,
-        size=(w, d, h),
-        params=ctx.looks(asset),
-        group=hanging.group,
-        role=role,
-        wall=wall,
-    )
+    role, looks = hanging.role or hanging.group, ctx.looks(asset)
+    thing = Thing(asset, x, y, base, wall.yaw, (w, d, h), looks, group=hanging.group, role=role, wall=wall)
     return ctx.add(thing, exact, plan)
 
 

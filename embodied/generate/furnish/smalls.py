@@ -190,20 +190,9 @@ class Tops:
     def _lay(
         self, asset: Asset, board: Board, taken: tuple[float, float, float, float], turn: float, own: Box, size: Size
     ) -> Thing:
-        carrier = board.carrier
-        thing = Thing(
-            asset=asset,
-            x=own.x,
-            y=own.y,
-            z=own.bottom,
-            yaw=carrier.yaw + turn,
-            size=size,
-            params=self.ctx.looks(asset),
-            parent=carrier,
-            surface=board.surface.name,
-            group=carrier.group,
-            role="small",
-        )
+        carrier, looks = board.carrier, self.ctx.looks(asset)
+        (x, y, z), yaw, name = (own.x, own.y, own.bottom), carrier.yaw + turn, board.surface.name
+        thing = Thing(asset, x, y, z, yaw, size, looks, carrier, name, carrier.group, role="small")
         self.taken.setdefault(board.key, []).append(taken)
         self.alike[asset.object_class] += 1
         return self.ctx.add(thing, own)
