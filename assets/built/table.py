@@ -7,6 +7,7 @@ import functools
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
+from assets import rows
 from assets.built import (
     appliances,
     basics,
@@ -27,24 +28,9 @@ from assets.built import (
 from assets.built.maker import LIGHTS, Build, Look, Maker, made, surface
 from assets.materials import MATERIALS
 from assets.records import Asset, SupportSurface
-from assets.rows import (
-    FIELDS,
-    LOOK,
-    REMADE_LICENCE,
-    WORD,
-    CatalogueError,
-    Field,
-    Row,
-    asset_of,
-    check_row,
-    is_number,
-    is_text,
-    made_in,
-    merged,
-    variant,
-)
+from assets.rows import CatalogueError, Field, Row
 
-BUILDS: Mapping[str, Build] = made_in(
+BUILDS: Mapping[str, Build] = rows.made_in(
     *(appliances, basics, bath, decor, entry, everyday, fittings, kitchen),
     *(lamps, luggage, papers, plants, soft, storage, tableware),
 )
@@ -61,17 +47,17 @@ def _is_surfaces(value: object) -> bool:
         return value in SURFACES
     return isinstance(value, list) and all(
         isinstance(s, dict)
-        and is_text(s.get("name"))
+        and rows.is_text(s.get("name"))
         and {"z", "width", "depth"} <= set(s)
         and set(s) <= {"name", *SURFACE_NUMBERS}
-        and all(is_number(s[n]) for n in set(s) & SURFACE_NUMBERS)
+        and all(rows.is_number(s[n]) for n in set(s) & SURFACE_NUMBERS)
         for s in value
     )
 
 
 BUILT_FIELDS = {
     **{
-        name: FIELDS[name]
+        name: rows.FIELDS[name]
         for name in ("class", "name", "size", "support", "on", "elevation", "clearance", "rooms")
         + ("synonyms", "colours", "materials", "tags")
     },
@@ -80,11 +66,11 @@ BUILT_FIELDS = {
         f"a list of {{name, z, width, depth, headroom, margin, x, y}}, or one of {sorted(SURFACES)}", _is_surfaces
     ),
     "emits": Field(f"one of {sorted(LIGHTS)}", lambda v: v in LIGHTS),
-    "after": WORD,
-    "set": WORD,
-    "look": LOOK,
+    "after": rows.WORD,
+    "set": rows.WORD,
+    "look": rows.LOOK,
 }
-SET_FIELDS = {name: BUILT_FIELDS[name] for name in ("colours", "materials", "tags", "look")} | {"word": WORD}
+SET_FIELDS = {name: BUILT_FIELDS[name] for name in ("colours", "materials", "tags", "look")} | {"word": rows.WORD}
 
 
 def read_makers(where: str, table: Row) -> Mapping[str, Maker]:
@@ -96,7 +82,7 @@ def read_makers(where: str, table: Row) -> Mapping[str, Maker]:
     Raises:
       CatalogueError: a field that is unknown or holds what it should not, a key twice.
     """
-    sets = {name: check_row(f"{where}: set {name!r}", row, SET_FIELDS) for name, row in table["sets"].items()}
+    sets = {name: rows.check_row(f"{where}: set {name!r}", row, SET_FIELDS) for name, row in table["sets"].items()}
     makers: dict[str, Maker] = {}
     for group in table["groups"]:
         shared = {name: value for name, value in group.items() if name != "rows"}
@@ -108,7 +94,7 @@ def read_makers(where: str, table: Row) -> Mapping[str, Maker]:
     return MappingProxyType(dict(sorted(makers.items())))
 
 
-def remade(where: str, rows: Mapping[str, Row], assets: Mapping[str, Asset]) -> Mapping[str, Maker]:
+def remade(where: str, table: Mapping[str, Row], assets: Mapping[str, Asset]) -> Mapping[str, Maker]:
     """The makers of those rows of the packs' catalogue that name a builder, by key.
 
     Such a thing keeps its key, words, size and surfaces, so that houses stay as they are; its mesh is built.
@@ -121,10 +107,10 @@ def remade(where: str, rows: Mapping[str, Row], assets: Mapping[str, Asset]) -> 
       CatalogueError: a builder that does not exist.
     """
     makers = {}
-    for key, given in rows.items():
-        row = variant(f"{where}: model {key!r}", given, rows) if "of" in given else given
+    for key, given in table.items():
+        row = rows.variant(f"{where}: model {key!r}", given, table) if "of" in given else given
         if "build" in row:
-            check_row(f"{where}: model {key!r}", {"build": row["build"]}, {"build": BUILT_FIELDS["build"]})
+            rows.check_row(f"{where}: model {key!r}", {"build": row["build"]}, {"build": BUILT_FIELDS["build"]})
             look: Look = row.get("look", {})
             make = functools.partial(made, key, BUILDS[row["build"]], look)
             makers[key] = Maker(assets[key], make, {"seed": 0.0, **look})
@@ -133,7 +119,7 @@ def remade(where: str, rows: Mapping[str, Row], assets: Mapping[str, Asset]) -> 
 
 def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
     """A row over its set over what its group shares, with the words of the material it is made after."""
-    check_row(where, {**shared, **row}, BUILT_FIELDS)
+    rows.check_row(where, {**shared, **row}, BUILT_FIELDS)
     chosen: Row = {}
     word = ""
     if "set" in row:
@@ -141,14 +127,14 @@ def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
             raise CatalogueError(f"{where} names the unknown set {row['set']!r}; use one of {sorted(sets)}")
         chosen = {name: value for name, value in sets[row["set"]].items() if name != "word"}
         word = sets[row["set"]]["word"]
-    out = merged(shared, chosen, row, deep=("look",))
+    out = rows.merged(shared, chosen, row, deep=("look",))
     if "after" in out:
         key = out.get("look", {}).get(out["after"])
         if key not in MATERIALS:
             raise CatalogueError(f"{where}: the look's {out['after']!r} should be a material's key, got {key!r}")
         made_of = MATERIALS[key]
         word = made_of.name
-        out = merged({"colours": list(made_of.colours), "materials": list(made_of.materials)}, out)
+        out = rows.merged({"colours": list(made_of.colours), "materials": list(made_of.materials)}, out)
     out["name"] = str(out.get("name", out["class"])).replace("{}", word)
     return out
 
@@ -156,7 +142,7 @@ def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
 def _maker(where: str, key: str, row: Row) -> Maker:
     look: Look = row.get("look", {})
     plain = {name: value for name, value in row.items() if name not in ("surfaces", "emits")}
-    asset = asset_of(where, key, plain | {"licence": REMADE_LICENCE})
+    asset = rows.asset_of(where, key, plain | {"licence": rows.REMADE_LICENCE})
     given = row.get("surfaces", [])
     surfaces = SURFACES[given](asset.size, look) if isinstance(given, str) else tuple(surface(**s) for s in given)
     asset = dataclasses.replace(asset, surfaces=surfaces, emits=LIGHTS[row["emits"]] if "emits" in row else None)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from assets import rows
 from assets.cache import digest
 from assets.importing.glb import read_glb
 from assets.importing.importer import RawPart, Reader, Tell, cached, import_model, obj_files, read_obj
@@ -13,31 +14,18 @@ from assets.importing.mtl_finish import corrected
 from assets.importing.obj import MeshError
 from assets.importing.sh3f import MAX_ENTRY, open_pack
 from assets.records import Asset, Finish, ImportRecipe, MeshPart
-from assets.rows import (
-    FIELDS,
-    TEXT,
-    WORD,
-    CatalogueError,
-    Field,
-    Row,
-    check_classes,
-    check_row,
-    objects,
-    read_json,
-    read_models,
-    shown,
-)
+from assets.rows import CatalogueError, Field, Row
 
 KINDS = (".glb", ".obj", ".sh3f")
 OWN_FIELDS = {
-    "pack": Field("a word without '/'", lambda v: WORD.holds(v) and "/" not in v and "\\" not in v),
-    "licence": TEXT,
-    "creator": TEXT,
+    "pack": Field("a word without '/'", lambda v: rows.WORD.holds(v) and "/" not in v and "\\" not in v),
+    "licence": rows.TEXT,
+    "creator": rows.TEXT,
     "classes": Field("an object of classes", lambda v: isinstance(v, dict)),
     "models": Field("an object of models", lambda v: isinstance(v, dict)),
 }
 """What a user's catalogue.json may hold."""
-ROW_FIELDS = FIELDS | {"file": TEXT, "model": TEXT}
+ROW_FIELDS = rows.FIELDS | {"file": rows.TEXT, "model": rows.TEXT}
 """What a model of it may hold."""
 
 
@@ -62,23 +50,23 @@ def read_own(
       CatalogueError: no catalogue.json, wrong fields, a file that is missing or outside the folder.
     """
     path = folder / "catalogue.json"
-    body = check_row(str(path), read_json(path), OWN_FIELDS)
-    added = check_classes(str(path), body.get("classes", {}))
-    models = objects(str(path), "models", body.get("models", {}))
+    body = rows.check_row(str(path), rows.read_json(path), OWN_FIELDS)
+    added = rows.check_classes(str(path), body.get("classes", {}))
+    models = rows.objects(str(path), "models", body.get("models", {}))
     pack = body.get("pack", folder.name)
-    rows, own = {}, {}
+    found, own = {}, {}
     for name, given in models.items():
         where = f"{path}: model {name!r}"
-        key, row = f"{pack}/{name}", dict(check_row(where, given, ROW_FIELDS))
+        key, row = f"{pack}/{name}", dict(rows.check_row(where, given, ROW_FIELDS))
         if row.get("of") in models:
-            base = check_row(where, models[row["of"]], ROW_FIELDS)
+            base = rows.check_row(where, models[row["of"]], ROW_FIELDS)
             row = {"file": base.get("file"), "model": base.get("model", ""), **row, "of": f"{pack}/{row['of']}"}
         own[key] = _model(folder, where, row.pop("file", None), row.pop("model", ""))
         row.setdefault("creator", body.get("creator", ""))
         if own[key].entry and "size" not in row:
             row["size"] = list(open_pack(own[key].file).entries[own[key].entry].size)
-        rows[key] = row
-    assets, recipes = read_models(str(path), rows, {**classes, **added}, {pack: body.get("licence", "")})
+        found[key] = row
+    assets, recipes = rows.read_models(str(path), found, {**classes, **added}, {pack: body.get("licence", "")})
     for recipe in recipes.values():
         _check_looks(f"{path}: model {recipe.key.removeprefix(f'{pack}/')!r}", recipe)
     return assets, recipes, own
@@ -157,7 +145,7 @@ def _check_looks(where: str, recipe: ImportRecipe) -> None:
 def _model(folder: Path, where: str, file: str | None, entry: str) -> OwnModel:
     path = _inside(folder, file) if file else None
     if path is None or path.suffix.lower() not in KINDS:
-        raise CatalogueError(f"{where} should name a file {KINDS} inside {folder}, got {shown(file)}")
+        raise CatalogueError(f"{where} should name a file {KINDS} inside {folder}, got {rows.shown(file)}")
     if not path.is_file():
         raise CatalogueError(f"{where} names {file!r}, which is not in {folder}")
     if path.suffix.lower() == ".sh3f":

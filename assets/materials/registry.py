@@ -10,38 +10,26 @@ from typing import Any
 
 import numpy as np
 
+from assets import rows
 from assets.materials import art, maps, mineral, surface, textile, wood
 from assets.materials.maps import Canvas, Maps
 from assets.materials.material import ROLES, Material
-from assets.rows import (
-    DATA,
-    WORD,
-    WORDS,
-    CatalogueError,
-    Field,
-    Row,
-    check_row,
-    is_list,
-    is_number,
-    made_in,
-    merged,
-    read_json,
-)
+from assets.rows import CatalogueError, Field, Row
 
-PAINTERS = made_in(art, maps, mineral, surface, textile, wood)
+PAINTERS = rows.made_in(art, maps, mineral, surface, textile, wood)
 """What a row may name with "by", as '<module>.<name>': recipes, and the layouts, faces, motifs and cloths they take."""
 MATERIAL_FIELDS = {
-    "family": WORD,
-    "name": WORD,
+    "family": rows.WORD,
+    "name": rows.WORD,
     "roles": Field(
-        f"a list of roles out of {', '.join(ROLES)}", lambda v: is_list(v, lambda r: r in ROLES) and bool(v)
+        f"a list of roles out of {', '.join(ROLES)}", lambda v: rows.is_list(v, lambda r: r in ROLES) and bool(v)
     ),
-    "colours": WORDS,
-    "materials": WORDS,
-    "tile": Field("a length from 0.01 to 10 metres", lambda v: is_number(v, 0.01, 10.0)),
+    "colours": rows.WORDS,
+    "materials": rows.WORDS,
+    "tile": Field("a length from 0.01 to 10 metres", lambda v: rows.is_number(v, 0.01, 10.0)),
     "pixels": Field("a whole number from 64 to 4096", lambda v: isinstance(v, int) and 64 <= v <= 4096),
-    "specular": Field("a number from 0 to 1", lambda v: is_number(v, 0.0, 1.0)),
-    "metallic": Field("a number from 0 to 1", lambda v: is_number(v, 0.0, 1.0)),
+    "specular": Field("a number from 0 to 1", lambda v: rows.is_number(v, 0.0, 1.0)),
+    "metallic": Field("a number from 0 to 1", lambda v: rows.is_number(v, 0.0, 1.0)),
     "maps": Field('an object with "by" and what that is told', lambda v: isinstance(v, dict)),
 }
 
@@ -61,12 +49,12 @@ def read_materials(where: str, table: Row) -> Mapping[str, Material]:
         for key, row in group["rows"].items():
             if key in materials:
                 raise CatalogueError(f"{where}: {key!r} stands there twice; give one of them another key")
-            materials[key] = _material(f"{where}: {key!r}", key, merged(shared, row, deep=("maps",)))
+            materials[key] = _material(f"{where}: {key!r}", key, rows.merged(shared, row, deep=("maps",)))
     return MappingProxyType(dict(sorted(materials.items())))
 
 
 def _material(where: str, key: str, row: Row) -> Material:
-    check_row(where, row, MATERIAL_FIELDS)
+    rows.check_row(where, row, MATERIAL_FIELDS)
     if missing := sorted(set(MATERIAL_FIELDS) - {"specular", "metallic"} - set(row)):
         raise CatalogueError(f"{where} should also say {missing}, itself or its group")
     return Material(
@@ -121,5 +109,5 @@ def _value(where: str, value: Any) -> Any:
     return tuple(_value(where, v) for v in value) if isinstance(value, list) else value
 
 
-MATERIALS: Mapping[str, Material] = read_materials("materials.json", read_json(DATA / "materials.json"))
+MATERIALS: Mapping[str, Material] = read_materials("materials.json", rows.read_json(rows.DATA / "materials.json"))
 """Every material by key, keys sorted."""
