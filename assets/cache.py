@@ -39,7 +39,9 @@ def default_cache() -> Path:
     Examples:
       >>> folder = embodied.default_cache()
     """
-    first, *others = (os.environ.get("EMBODIED_CACHE") or _users_cache()).split(os.pathsep)
+    first, *others = (
+        os.environ.get("EMBODIED_CACHE") or f"{os.environ.get('XDG_CACHE_HOME') or '~/.cache'}/embodied"
+    ).split(os.pathsep)
     try:
         cache = Path(first).expanduser()
     except RuntimeError:  # neither HOME nor an entry in the list of users
@@ -50,11 +52,6 @@ def default_cache() -> Path:
         except (OSError, RuntimeError) as e:
             log.warning("EMBODIED_CACHE names %s, which is left out: %s", other, e)
     return cache
-
-
-def _users_cache() -> str:
-    base = os.environ.get("XDG_CACHE_HOME")
-    return f"{base}/embodied" if base else "~/.cache/embodied"
 
 
 def link(shared: Path, cache: Path, above: frozenset[str] = frozenset()) -> None:

@@ -55,16 +55,8 @@ def _is_surface(value: object) -> bool:
     return all(is_number(v, -30.0, 30.0) for v in value[1:]) and x0 < x1 and y0 < y1 and headroom > 0
 
 
-def _is_weights(value: object) -> bool:
-    return isinstance(value, dict) and set(value) <= set(ROOM_KINDS) and all(is_number(v, 0.0) for v in value.values())
-
-
-def _is_look(value: object) -> bool:
-    return isinstance(value, dict) and all(is_text(v) or is_number(v) for v in value.values())
-
-
-def _is_looks(value: object) -> bool:
-    return isinstance(value, dict) and all(is_text(k) and is_text(v) for k, v in value.items())
+def _is_object(value: object, holds: Callable[[Any, Any], bool]) -> bool:
+    return isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
 
 
 TEXT = Field("one line of text of at most 200 characters", is_text)
@@ -75,8 +67,11 @@ SIZE = Field(
     f"a size of three lengths in metres, each from {SIZES[0]:g} to {SIZES[1]:g}",
     lambda v: is_list(v, lambda s: is_number(s, *SIZES), 3),
 )
-LOOK = Field("an object of words and numbers", _is_look)
-WEIGHTS = Field(f"room kinds with weights from 0 up; the room kinds are {', '.join(ROOM_KINDS)}", _is_weights)
+LOOK = Field("an object of words and numbers", lambda v: _is_object(v, lambda _, x: is_text(x) or is_number(x)))
+WEIGHTS = Field(
+    f"room kinds with weights from 0 up; the room kinds are {', '.join(ROOM_KINDS)}",
+    lambda v: _is_object(v, lambda kind, weight: kind in ROOM_KINDS and is_number(weight, 0.0)),
+)
 SUPPORT = Field(f"one of {', '.join(SUPPORTS)}", lambda v: v in SUPPORTS)
 FIELDS = {
     "class": WORD,
@@ -105,7 +100,9 @@ FIELDS = {
     "two_sided": WORDS,
     "flipped": WORDS,
     "dropped": WORDS,
-    "looks": Field("an object of material names and words", _is_looks),
+    "looks": Field(
+        "an object of material names and words", lambda v: _is_object(v, lambda k, x: is_text(k) and is_text(x))
+    ),
     "faces": Field("a whole number from 0 up", lambda v: is_number(v, 0) and v == int(v)),
     "of": WORD,
 }

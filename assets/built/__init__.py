@@ -17,19 +17,12 @@ from assets.rows import DATA, check_classes, read_json, read_models
 __all__ = ["BASICS", "MAKERS", "Maker"]
 
 
-def _remade() -> Mapping[str, Maker]:
-    rows, classes = read_json(DATA / "catalogue.json"), check_classes("classes.json", read_json(DATA / "classes.json"))
-    return remade("catalogue.json", rows, read_models("catalogue.json", rows, classes, {})[0])
-
-
-def _basic() -> Mapping[str, Maker]:
-    table, classes = read_json(DATA / "basics.json"), check_classes("classes.json", read_json(DATA / "classes.json"))
-    return read_makers("basics.json", table | {"groups": [classes[g["class"]] | g for g in table["groups"]]})
-
-
-_BASIC = _basic()
+_CLASSES = check_classes("classes.json", read_json(DATA / "classes.json"))
+_MODELS, _TABLE = read_json(DATA / "catalogue.json"), read_json(DATA / "basics.json")
+_BASIC = read_makers("basics.json", _TABLE | {"groups": [_CLASSES[g["class"]] | g for g in _TABLE["groups"]]})
+_REMADE = remade("catalogue.json", _MODELS, read_models("catalogue.json", _MODELS, _CLASSES, {})[0])
 BASICS = frozenset(_BASIC)
 """Keys of the simple furniture that houses get only where no furniture models are installed."""
-_ALL = {**read_makers("built.json", read_json(DATA / "built.json")), **_BASIC, **_remade()}
+_ALL = {**read_makers("built.json", read_json(DATA / "built.json")), **_BASIC, **_REMADE}
 MAKERS: Mapping[str, Maker] = MappingProxyType(dict(sorted(_ALL.items())))
 """Every maker by key, keys sorted."""

@@ -136,7 +136,7 @@ def read_obj(
     """
     folder = PurePosixPath(name).parent
     obj = parse_obj(decoded(read(name)), where)
-    own, say = tell is not None, tell or _silent
+    own, say = tell is not None, tell or (lambda words: None)
     materials: dict[str, MtlMaterial] = {}
     for statement in obj.libraries:
         whole, *several = (_read_if_there(read, n) for n in _library_names(folder, statement))
@@ -234,10 +234,6 @@ class _Pictures:
             if self._held[name] is None:
                 self._say(f"its texture {name!r} is not there; put it beside the model")
         return self._held[name]
-
-
-def _silent(words: str) -> None:
-    """For models that nobody has to be told of."""
 
 
 def obj_files(read: Reader, name: str) -> tuple[str, ...]:

@@ -126,7 +126,8 @@ def cut(
       points: (n, 3); faces: (m, 3); uv: (m, 3, 2), v up, repeating.
       least: opacity in [0, 1] from which a texel is there.
     """
-    outline = _outline(picture, least)
+    opacity = picture.getchannel("A")
+    outline = _outline(opacity.tobytes(), *opacity.size, least)
     new_points, new_uv, kept = [], [], np.ones(len(faces), bool)
     for i, triangle in enumerate(uv):
         piece = _covered(outline, triangle)
@@ -172,7 +173,7 @@ def _covered(outline: shapely.Geometry, triangle: np.ndarray) -> shapely.Geometr
 
 
 @functools.lru_cache(maxsize=8)
-def _outline_of(opacity: bytes, width: int, height: int, least: float) -> shapely.Geometry:
+def _outline(opacity: bytes, width: int, height: int, least: float) -> shapely.Geometry:
     mask = np.frombuffer(opacity, np.uint8).reshape(height, width)
     border = 2
     wide = np.pad(mask, border, mode="edge")
@@ -191,8 +192,3 @@ def _outline_of(opacity: bytes, width: int, height: int, least: float) -> shapel
     ]
     shape = shapely.union_all(polygons)
     return shapely.make_valid(shape).intersection(shapely.box(0, 0, 1, 1))
-
-
-def _outline(picture: Image.Image, least: float) -> shapely.Geometry:
-    opacity = picture.getchannel("A")
-    return _outline_of(opacity.tobytes(), *opacity.size, least)

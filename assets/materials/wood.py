@@ -53,13 +53,9 @@ SPECIES = {
 def floor(on: Canvas, layout: Callable[..., Layout], species: str, gloss: float = 0.38, groove: float = 0.0012) -> Maps:
     """A wooden floor: `layout(n, tile)` or `layout(n, tile, rng=rng)` gives the boards."""
     n, tile, rng = on.n, on.tile, on.rng
-    pieces = layout(n, tile, rng=rng) if _draws(layout) else layout(n, tile)
-    return boards(n, tile, pieces, SPECIES[species], gloss, groove, rng=rng)
-
-
-def _draws(layout: Callable[..., Layout]) -> bool:
     inner = layout.func if isinstance(layout, functools.partial) else layout
-    return inner is planks
+    pieces = layout(n, tile, rng=rng) if inner is planks else layout(n, tile)
+    return boards(n, tile, pieces, SPECIES[species], gloss, groove, rng=rng)
 
 
 def furniture(on: Canvas, species: str, strips: int = 5, gloss: float = 0.42, lacquer: float = 0.0) -> Maps:

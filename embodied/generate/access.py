@@ -131,8 +131,9 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tupl
     options: list[list[tuple[float, int, SharedWall]]] = [[] for _ in cells]
     for (i, j), wall in walls.items():
         for child, parent in ((i, j), (j, i)):
-            cost = _cost(cells, child, parent)
-            if cost is not None and wall.length >= _needed(cells, child, parent):
+            cost, kinds = _cost(cells, child, parent), {cells[child].kind, cells[parent].kind}
+            needed = 9 if kinds <= {"hall", "corridor"} else KINDS[cells[child].kind].wall
+            if cost is not None and wall.length >= needed:
                 options[parent].append((cost, child, wall))
     links: list[Link] = []
     reached = {start}
@@ -177,12 +178,6 @@ def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall], l
             _, _, other, wall = min(beside)
             found.append(Link(i, other, wall))
     return found
-
-
-def _needed(cells: list[Cell], child: int, parent: int) -> int:
-    if {cells[child].kind, cells[parent].kind} <= {"hall", "corridor"}:
-        return 9
-    return KINDS[cells[child].kind].wall
 
 
 def _cost(cells: list[Cell], child: int, parent: int) -> float | None:

@@ -36,7 +36,9 @@ def another_day(house: House, graph: NavGraph, catalogue: Catalogue, starts: Ite
     if day == 0:
         return house
     rng = stream(house.seed, "another day", house.name, day)
-    tidied = _moved(_put_away(house, rng), catalogue, rng)
+    gone = {p.id for p in _small(house) if rng.random() < GONE}
+    left = dataclasses.replace(house, placements=tuple(p for p in house.placements if p.id not in gone))
+    tidied = _moved(left, catalogue, rng)
     empty = dataclasses.replace(tidied, placements=tuple(p for p in tidied.placements if p.object_class != CLASS))
     if len(empty.placements) == len(tidied.placements):
         return tidied  # nobody was there
@@ -52,11 +54,6 @@ def _small(house: House) -> list[Placement]:
         for p in house.placements
         if p.id not in carry and max(p.size) <= SMALL and p.surface and p.object_class != CLASS
     ]
-
-
-def _put_away(house: House, rng: np.random.Generator) -> House:
-    gone = {p.id for p in _small(house) if rng.random() < GONE}
-    return dataclasses.replace(house, placements=tuple(p for p in house.placements if p.id not in gone))
 
 
 def _moved(house: House, catalogue: Catalogue, rng: np.random.Generator) -> House:

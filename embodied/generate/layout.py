@@ -91,18 +91,15 @@ def draw_plan(
     best: list[tuple[float, Genome, Plan]] = []
     for k in range(tries):
         if k < 0.45 * tries or not best:
-            genome = _random_genome(len(footprints), len(spaces), rng)
+            modules, rows, cuts = rng.integers(2**31, size=3).tolist()
+            which, privacy = int(rng.integers(len(footprints))), tuple(rng.normal(0, 0.45, len(spaces)).tolist())
+            genome = Genome(which, modules, rows, cuts, privacy)
         else:
             genome = _changed(best[int(rng.integers(len(best)))][1], len(footprints), rng)
         plan = _realised(footprints[genome.footprint], spaces, genome, best[-1][0] if len(best) == KEPT else -np.inf)
         if plan is not None and all(plan.score != other for other, _, _ in best):
             best = sorted([*best, (plan.score, genome, plan)], key=lambda b: -b[0])[:KEPT]
     return best[0][2] if best else None
-
-
-def _random_genome(footprints: int, spaces: int, rng: np.random.Generator) -> Genome:
-    modules, rows, cuts = rng.integers(2**31, size=3).tolist()
-    return Genome(int(rng.integers(footprints)), modules, rows, cuts, tuple(rng.normal(0, 0.45, spaces).tolist()))
 
 
 def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genome:

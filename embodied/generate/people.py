@@ -83,8 +83,8 @@ def meet(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: int) -> d
 def add_people(house: House, met: Mapping[int, Placement], starts: Iterable[int]) -> House:
     """The house with those of `met` who are met at one of the nodes `starts`."""
     known = {met[n].id for n in starts if n in met}
-    people = {p.id: p for p in met.values() if p.id in known}
-    placed = (dataclasses.replace(people[i], id=f"{CLASS}_{k + 1}") for k, i in enumerate(sorted(people, key=_number)))
+    people, number = {p.id: p for p in met.values() if p.id in known}, lambda name: int(name.rpartition("_")[2])
+    placed = (dataclasses.replace(people[i], id=f"{CLASS}_{k + 1}") for k, i in enumerate(sorted(people, key=number)))
     return dataclasses.replace(house, placements=(*house.placements, *placed))
 
 
@@ -131,7 +131,8 @@ class _Site:
             _disc(p.position[:2], APART / 2) for p in people if math.dist(p.position[:2], eye) < 2 * FARTHEST
         ]
         self.open = house.floor(room).intersection(around)
-        self.things = [p for p in house.placements if p.room == room.id and _in_the_way(p)]
+        self.things = [p for p in house.placements if p.room == room.id and p.position[2] < 1.8 and p.size[2] > 0.05]
+        """What a body would run into: below head height, and higher than a rug."""
         doors = [o for o in house.openings if o.kind == "door" and o.rooms[0] == room.id]
         self.leaves = [leaf for o in doors for leaf in leaves(house, o)]
 
@@ -143,7 +144,8 @@ class _Site:
             asset, body = figures[int(i)], max(figures[int(i)].size[:2]) / 2
             if body >= too_wide:
                 continue
-            where = _spots(free, self.edges, self.ring, body)
+            stopped = self.edges.buffer(body + RADIUS, quad_segs=4)  # where a walker would be
+            where = free.buffer(-body, quad_segs=4).intersection(self.ring).difference(stopped)
             if where.area >= ROOM:
                 away = where.intersection(self.polite)
                 where = away if away.area >= ROOM else where
@@ -237,13 +239,6 @@ def _passable(house: House, people: list[Placement]) -> list[Placement]:
     return kept
 
 
-def _spots(
-    free: shapely.Polygon, edges: shapely.MultiLineString, ring: shapely.Polygon, body: float
-) -> shapely.Geometry:
-    """Where in `ring` somebody of radius `body` may stand: on `free` floor, no walker on `edges` being stopped."""
-    return free.buffer(-body, quad_segs=4).intersection(ring).difference(edges.buffer(body + RADIUS, quad_segs=4))
-
-
 def _drawn(spots: shapely.Geometry, rng: np.random.Generator) -> tuple[float, float]:
     """A point of an area, drawn evenly; of a very thin one, some point."""
     x0, y0, x1, y1 = spots.bounds
@@ -252,14 +247,5 @@ def _drawn(spots: shapely.Geometry, rng: np.random.Generator) -> tuple[float, fl
     return float(x), float(y)
 
 
-def _in_the_way(p: Placement) -> bool:
-    """Whether a body would run into it: below head height, and higher than a rug."""
-    return p.position[2] < 1.8 and p.size[2] > 0.05
-
-
 def _disc(middle: Sequence[float] | np.ndarray, radius: float) -> shapely.Polygon:
     return shapely.Point(middle).buffer(radius, quad_segs=8)
-
-
-def _number(name: str) -> int:
-    return int(name.rpartition("_")[2])

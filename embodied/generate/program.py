@@ -56,7 +56,8 @@ def draw_program(area: float, config: HouseConfig, *, rng: np.random.Generator) 
     if area > rng.uniform(78, 105) and (config.rooms is None or config.rooms > bedrooms + 1):
         spaces.append(WantedRoom("dining_room", float(np.clip(0.105 * area, 9.5, 18))))
     spaces += _sleeping(bedrooms, area, rng)
-    wet = _bathrooms(area, bedrooms, rng)
+    usual = float(np.interp(area, (60, 85, 120, 200, 300, 600), (1, 1.2, 1.9, 2.5, 3.4, 5.2)))
+    wet = max(1, min(round(usual + rng.normal(0, 0.3)), bedrooms + 1))
     beds = [i for i, s in enumerate(spaces) if s.kind in BEDROOMS]
     suites = min(max(wet - 1 - (bedrooms > 4), 0), len(beds))
     for k in range(wet):
@@ -92,11 +93,6 @@ def _sleeping(count: int, area: float, rng: np.random.Generator) -> list[WantedR
         )
         spaces.append(WantedRoom(kind, float(np.clip(rng.normal(11.0, 0.8) + (area - 120) * 0.008, 9.0, 15.0))))
     return spaces
-
-
-def _bathrooms(area: float, bedrooms: int, rng: np.random.Generator) -> int:
-    wanted = float(np.interp(area, (60, 85, 120, 200, 300, 600), (1, 1.2, 1.9, 2.5, 3.4, 5.2)))
-    return max(1, min(round(wanted + rng.normal(0, 0.3)), bedrooms + 1))
 
 
 def _extras(spaces: list[WantedRoom], area: float, config: HouseConfig, rng: np.random.Generator) -> list[WantedRoom]:
@@ -152,17 +148,11 @@ def _another(
     return WantedRoom(kind, extras[kind].size * (1 + 0.35 * grow))
 
 
-def _within_usual(kind: str, area: float) -> float:
-    """An area, square metres, brought within a tenth of what is usual for a kind."""
-    least, most = KINDS[kind].area
-    return float(np.clip(area, 0.9 * least, 1.1 * most))
-
-
 def _scaled(spaces: list[WantedRoom], total: float) -> tuple[WantedRoom, ...]:
-    """The same rooms stretched to sum to `total`, none beyond its usual range while that can be met."""
-    factor = 1.0
+    """The same rooms stretched to sum to `total`, none more than a tenth beyond what is usual while that can be met."""
+    factor, usual = 1.0, [(s.area, *KINDS[s.kind].area) for s in spaces]
     for _ in range(12):
-        areas = [_within_usual(s.kind, s.area * factor) for s in spaces]
+        areas = [float(np.clip(area * factor, 0.9 * least, 1.1 * most)) for area, least, most in usual]
         factor *= (total / sum(areas)) ** 1.2
     rest = total / sum(areas)
     return tuple(replace(s, area=a * rest) for s, a in zip(spaces, areas))

@@ -208,15 +208,10 @@ def walls_of(house: House, rooms: list[Room]) -> shapely.Geometry:
     return hull.difference(inside)
 
 
-def _frame(house: House, o: Opening) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:
-    """Jambs a and b, the unit normal into the first room, and the wall's extent along it."""
-    half = house.inner_wall / 2
-    low = -(half if o.rooms[1] is not None else house.outer_wall - half)
-    return np.asarray(o.a, float), np.asarray(o.b, float), inward(house, o), low, half
-
-
 def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
-    a, b, n, low, high = _frame(house, o)
+    a, b, n = np.asarray(o.a, float), np.asarray(o.b, float), inward(house, o)
+    high = house.inner_wall / 2  # from here on, along n, the first room begins, and before `low` the other
+    low = -(high if o.rooms[1] is not None else house.outer_wall - high)
     rooms = [house.room_by_id[r] for r in o.rooms if r is not None]
     colour = ROOM_COLOURS.get(rooms[0].kind, PAPER)
     hole = [a + low * n, b + low * n, b + high * n, a + high * n]

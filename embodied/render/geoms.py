@@ -39,7 +39,9 @@ class Geoms:
         self._mjr = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._mjr)
         self._mjr.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
-        self._drawn = _empty_scene(model)
+        self._drawn = mujoco.MjvScene(model, maxgeom=model.ngeom + 16)
+        for name in ("SHADOW", "REFLECTION", "FOG", "HAZE"):
+            self._drawn.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{name}")] = 0
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0
         self._option.geomgroup[VISUAL] = 1
@@ -124,10 +126,3 @@ def depth_of_reversed_z(z: np.ndarray) -> np.ndarray:
     depth = NEAR * FAR / (NEAR + z * np.float32(FAR - NEAR))
     depth[z <= 0] = np.inf
     return depth
-
-
-def _empty_scene(model: mujoco.MjModel) -> mujoco.MjvScene:
-    scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 16)
-    for name in ("SHADOW", "REFLECTION", "FOG", "HAZE"):
-        scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{name}")] = 0
-    return scene

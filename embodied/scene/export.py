@@ -55,10 +55,10 @@ def export_mjcf(
         (folder / MESHES / name).write_bytes(data)
     for texture in spec.textures:
         if texture.data:
-            image = np.frombuffer(bytes(texture.data), np.uint8).reshape(
-                texture.height, texture.width, texture.nchannel
-            )
-            (folder / TEXTURES / f"{texture.name}.png").write_bytes(_png(image))
+            size = texture.height, texture.width, texture.nchannel
+            order = cv2.COLOR_RGBA2BGRA if texture.nchannel == 4 else cv2.COLOR_RGB2BGR
+            image = cv2.cvtColor(np.frombuffer(bytes(texture.data), np.uint8).reshape(size), order)
+            (folder / TEXTURES / f"{texture.name}.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
             texture.data = b""
             texture.file = f"{texture.name}.png"
     spec.modelfiledir, spec.meshdir, spec.texturedir = str(folder), MESHES, TEXTURES
@@ -82,8 +82,3 @@ def _add_cameras(spec: mujoco.MjSpec, house: House) -> None:
         spec.worldbody.add_camera(
             name=room.id, pos=[x, y, house.storey_of(room).elevation + EYE], quat=quat.tolist(), fovy=75
         )
-
-
-def _png(image: np.ndarray) -> bytes:
-    order = cv2.COLOR_RGBA2BGRA if image.shape[2] == 4 else cv2.COLOR_RGB2BGR
-    return cv2.imencode(".png", cv2.cvtColor(image, order))[1].tobytes()

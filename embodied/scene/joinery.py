@@ -58,11 +58,8 @@ class _Hole:
 
 def casing_width(opening: Opening) -> float:
     """How far the boards around a door reach beyond its hole, metres; skirting stops there."""
-    return CASING[0] if opening.kind in ("door", "front_door", "back_door") or _cased(opening) else 0.0
-
-
-def _cased(opening: Opening) -> bool:
-    return opening.kind == "passage" and opening.leaf_finish is not None
+    cased = opening.kind == "passage" and opening.leaf_finish is not None
+    return CASING[0] if opening.kind in ("door", "front_door", "back_door") or cased else 0.0
 
 
 def hole_frame(house: House, opening: Opening) -> _Hole:
@@ -93,7 +90,9 @@ def opening_parts(house: House, opening: Opening, finish: Callable[[str], Finish
     if opening.kind in ("window", "french_window"):
         return _window(house, hole, finish)
     if opening.kind == "passage" and opening.leaf_finish is None:
-        return _passage(house, hole, finish)
+        wall = finish(house.room_by_id[opening.rooms[0]].wall_finish)
+        reveal = _part(hole, "reveal", "wall", wall, _tunnel(hole, hole.outside, hole.inside, False))
+        return [reveal, *_threshold(house, hole, hole.outside, hole.inside, finish)]
     return _door(house, hole, finish)
 
 
@@ -133,12 +132,6 @@ def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable
         bar = box([lining, y1 - 0.028, -0.001], [hole.length - lining, y1 - 0.002, 0.0035], 0.0015)
         parts.append(Part(owner, "floor", first.id, part(METAL, hole.world(bar)), owner + "#bar"))
     return parts
-
-
-def _passage(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Part]:
-    room = house.room_by_id[hole.opening.rooms[0]]
-    reveal = _part(hole, "reveal", "wall", finish(room.wall_finish), _tunnel(hole, hole.outside, hole.inside, False))
-    return [reveal, *_threshold(house, hole, hole.outside, hole.inside, finish)]
 
 
 # ------------------------------------------------------------------ windows

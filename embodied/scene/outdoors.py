@@ -97,7 +97,8 @@ def _garden(house: House, place: Scenery, finish: Callable[[str], Finish]) -> li
     rng = stream(house.seed, "outdoors", "garden")
     dry = rng.random() < (0.5 if place.season == "summer" else 0.15)
     edge, z = plot(house), -place.height
-    parts = [_part("ground", finish("snow/0" if place.snow else f"lawn/{int(dry)}"), [_ground(house, z)])]
+    lawn = flat(shapely.box(*edge).difference(footprint(house, 0)), z)  # what lies beyond is painted on the sky
+    parts = [_part("ground", finish("snow/0" if place.snow else f"lawn/{int(dry)}"), [lawn])]
     street = place.table.neighbours in ("cottages", "terrace")
     open_side = place.outlook if street or place.table.water is not None else None
     sides = [k for k in range(4) if open_side is None or k != round(open_side / (math.pi / 2)) % 4]
@@ -162,11 +163,6 @@ def _seen_from(house: House, faces: Faces) -> np.ndarray:
     c = faces.corners
     normal = np.cross(c[:, 2] - c[:, 0], c[:, 3] - c[:, 1])
     return np.einsum("nk,nek->ne", normal, eyes[None] - c[:, :1]).max(1) > 0
-
-
-def _ground(house: House, z: float) -> Shape:
-    """The lawn from the house to the edge of its plot; what lies beyond is painted on the sky."""
-    return flat(shapely.box(*plot(house)).difference(footprint(house, 0)), z)
 
 
 def _street(edge: Bounds, place: Scenery, finish: Callable[[str], Finish]) -> list[Part]:

@@ -304,11 +304,8 @@ def _fridge_ends(
 def _put_line(ctx: Context, wall: Wall, items: list[tuple[float, Item]]) -> tuple[Thing, ...]:
     """Put (s, item) at their places along a wall."""
     x, y = wall.point(0.0, 0.005)
-    return ctx.put([_moved(item, -s) for s, item in items], [ScoredPose(0.0, x, y, wall.yaw, wall)], "kitchen")
-
-
-def _moved(item: Item, x: float) -> Item:
-    return item if item.on is not None else replace(item, x=item.x + x)
+    moved = [item if item.on is not None else replace(item, x=item.x - s) for s, item in items]
+    return ctx.put(moved, [ScoredPose(0.0, x, y, wall.yaw, wall)], "kitchen")
 
 
 def _slots(ctx: Context, line: UnitLine, count: int, start: float, view: float | None) -> list[UnitSlot]:

@@ -138,7 +138,11 @@ def page_of(number: int, composer: Composer) -> Ingredients:
     shown_by = (
         nearest_luxel if page.fineness == 1 else composer.kept("texels", number, lambda: sources(c.index, c.shape))
     )
-    page_like = lambda codes: _unpacked(codes[shown_by] if len(codes) else shown_by.astype(np.uint32), c.shape)
+
+    def page_like(codes: np.ndarray) -> np.ndarray:
+        codes = codes[shown_by] if len(codes) else shown_by.astype(np.uint32)
+        return cv2.cvtColor(codes.astype("<u4").view(np.uint8).reshape(*c.shape, 4), cv2.COLOR_RGBA2RGB)
+
     glow = solved.lux.glow[mine]
     glow = glow[nearest_luxel].reshape(*coarse.shape, 3) if glow.any() else np.zeros((0, 0, 3))
     half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)
@@ -227,11 +231,6 @@ def _linear(codes: Array) -> Array:
     mi, dr = mitsuba(), drjit()
     table = floats(linear(np.arange(256, dtype=np.float32) / 255))
     return mi.Color3f(*(dr.gather(mi.Float, table, (codes >> shift) & 255) for shift in (0, 8, 16)))
-
-
-def _unpacked(codes: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(h, w, 3) uint8 from (h * w,) uint32."""
-    return cv2.cvtColor(codes.astype("<u4").view(np.uint8).reshape(*shape, 4), cv2.COLOR_RGBA2RGB)
 
 
 def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirrors | None:

@@ -312,7 +312,9 @@ def solve_house(
     rows = len(outdoors.picture)
     outside = np.median(outdoors.picture[rows * 300 // 1024 : rows * 540 // 1024].reshape(-1, 3), axis=0)
     light_of_rooms = _light_of_rooms(house, atlas, lux, light)
-    _warn_of_darkness(house, light_of_rooms)
+    dark = [r.id for r in house.rooms if light_of_rooms[r.id] @ [0.2126, 0.7152, 0.0722] < tone.DARKEST]
+    if dark and 8 < house.sky.hour < 17:
+        warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
     exposure = expose(house, light_of_rooms, outside)
     return Solved(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
 
@@ -394,13 +396,6 @@ def brightest(e: np.ndarray) -> np.ndarray:
     """
     tail = np.percentile(e, np.linspace(93, 99, 25), axis=0)
     return np.exp(np.log(np.maximum(tail, 1e-9)).mean(axis=0))
-
-
-def _warn_of_darkness(house: House, light: dict[str, np.ndarray]) -> None:
-    """Tell of rooms that are dark by day. `light`: of every room, as `_light_of_rooms` has it."""
-    dark = [r.id for r in house.rooms if light[r.id] @ [0.2126, 0.7152, 0.0722] < tone.DARKEST]
-    if dark and 8 < house.sky.hour < 17:
-        warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
 
 
 def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:

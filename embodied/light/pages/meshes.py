@@ -6,7 +6,7 @@ import numpy as np
 
 from assets.records import DETAILS, Finish
 from embodied.light.pages.atlas import Atlas, Page
-from embodied.light.pages.unwrap import areas_of
+from embodied.light.pages.unwrap import areas_of, told_apart
 from embodied.scene.lit_pages import LitMesh
 
 
@@ -55,12 +55,7 @@ def welded(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     for column in (rows.astype(np.float64) + 0.0).view(np.uint64).T:  # + 0.0: -0 is 0
         mixed = (mixed ^ column) * np.uint64(0x9E3779B97F4A7C15)
         mixed ^= mixed >> np.uint64(29)
-    order = np.argsort(mixed, kind="stable")
-    in_order, new = rows[order], np.ones(len(rows), bool)
-    new[1:] = (in_order[1:] != in_order[:-1]).any(1)
-    which = np.empty(len(rows), np.int64)
-    which[order] = np.cumsum(new) - 1
-    return order[new], which
+    return told_apart(rows, np.argsort(mixed, kind="stable"))
 
 
 def gloss_of(finish: Finish) -> tuple[int, int, int]:

@@ -79,7 +79,11 @@ def areas_of(corners: np.ndarray) -> np.ndarray:
 def distinct(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(k,) first occurrence of each different row of (n, c) numbers, in the order of their columns, and (n,) which of
     these each row is: what np.unique returns of axis 0, in a tenth of the time."""
-    order = np.lexsort(rows.T[::-1])
+    return told_apart(rows, np.lexsort(rows.T[::-1]))
+
+
+def told_apart(rows: np.ndarray, order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`distinct` of rows that are brought side by side by an order where they are alike."""
     in_order, new = rows[order], np.ones(len(rows), bool)
     new[1:] = (in_order[1:] != in_order[:-1]).any(1)
     which = np.empty(len(rows), np.int64)
