@@ -115,6 +115,19 @@ def drjit() -> types.ModuleType:
     return dr
 
 
+class _Late:
+    """A module that is found when something of it is used."""
+
+    def __init__(self, find: Callable[[], types.ModuleType]) -> None:
+        self._find = find
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._find(), name)
+
+
+mi, dr = _Late(mitsuba), _Late(drjit)
+
+
 def device() -> str:
     """'cuda', 'llvm' or 'numpy': what the light is computed on, for fingerprints and tables."""
     return _module().variant().split("_")[0]
@@ -169,7 +182,7 @@ class Apart:
 
 
 def _evaluated(found: Any) -> Any:
-    drjit().eval(found)
+    dr.eval(found)
     return found
 
 
@@ -178,8 +191,8 @@ def looped(
 ) -> tuple[Array, ...]:
     """`while_loop` of Dr.Jit around rays: one kernel, or several for each round where `scene_of` keeps scenes apart."""
     if _one_scene_per_kernel():
-        return drjit().while_loop(state, cond, body, mode="evaluated")
-    return drjit().while_loop(state, cond, body)
+        return dr.while_loop(state, cond, body, mode="evaluated")
+    return dr.while_loop(state, cond, body)
 
 
 ALIGNED = 64
@@ -188,22 +201,22 @@ ALIGNED = 64
 
 def floats(a: ArrayLike) -> Array:
     """Numbers of any shape, flat on the device."""
-    return mitsuba().Float(_aligned(a, np.float32))
+    return mi.Float(_aligned(a, np.float32))
 
 
 def wholes(a: ArrayLike) -> Array:
     """`floats` for whole numbers from 0 to 2**32 - 1."""
-    return mitsuba().UInt32(_aligned(a, np.uint32))
+    return mi.UInt32(_aligned(a, np.uint32))
 
 
 def signed(a: ArrayLike) -> Array:
     """`floats` for whole numbers with a sign."""
-    return mitsuba().Int32(_aligned(a, np.int32))
+    return mi.Int32(_aligned(a, np.int32))
 
 
 def flags(a: ArrayLike) -> Array:
     """`floats` for truth values."""
-    return mitsuba().Bool(_aligned(a, np.bool_))
+    return mi.Bool(_aligned(a, np.bool_))
 
 
 def _aligned(a: ArrayLike, kind: type) -> np.ndarray:
@@ -223,12 +236,12 @@ def _aligned(a: ArrayLike, kind: type) -> np.ndarray:
 
 def vector(a: np.ndarray) -> Array:
     """(n, 3) array as mi.Vector3f."""
-    return mitsuba().Vector3f(*(floats(a[:, k]) for k in range(3)))
+    return mi.Vector3f(*(floats(a[:, k]) for k in range(3)))
 
 
 def array(v: Array) -> np.ndarray:
     """A Dr.Jit vector or colour as an (n, 3) float32 array."""
-    drjit().eval(v)
+    dr.eval(v)
     return np.ascontiguousarray(np.stack([np.asarray(v[k]) for k in range(3)], axis=-1), np.float32)
 
 
@@ -239,12 +252,12 @@ def brightness(e: np.ndarray) -> np.ndarray:
 
 def constant(x: float) -> Array:
     """A number that kernels read as data, so that changing it compiles nothing anew."""
-    return drjit().opaque(mitsuba().Float, float(x))
+    return dr.opaque(mi.Float, float(x))
 
 
 def rest() -> None:
     """Give back the memory of finished stages: Dr.Jit keeps freed arrays, and the C library freed pages, for later."""
-    drjit().flush_malloc_cache()
+    dr.flush_malloc_cache()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
@@ -252,13 +265,12 @@ def rest() -> None:
 
 def fraction(u: Array) -> Array:
     """The part of device numbers or points behind the decimal point."""
-    return u - drjit().floor(u)
+    return u - dr.floor(u)
 
 
 def bilinear(x: Array, y: Array) -> tuple[Array, Array, tuple[tuple[int, int, Array], ...]]:
     """Column and row of the first of the four pixels around places, and how far to the right and down each of the four
     lies, with its weight."""
-    dr = drjit()
     x0, y0 = dr.floor(x), dr.floor(y)
     fx, fy = x - x0, y - y0
     across, down = ((0, 1 - fx), (1, fx)), ((0, 1 - fy), (1, fy))
@@ -267,7 +279,7 @@ def bilinear(x: Array, y: Array) -> tuple[Array, Array, tuple[tuple[int, int, Ar
 
 def number(x: int) -> Array:
     """A whole number that kernels read as data, so that changing it compiles nothing anew."""
-    return drjit().opaque(mitsuba().UInt32, int(x))
+    return dr.opaque(mi.UInt32, int(x))
 
 
 def added_up(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Array) -> tuple[Array, ...]:
@@ -277,10 +289,9 @@ def added_up(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Arra
       one: from a device number k (UInt32) to as many arrays as there are `zeros`.
       zeros: device arrays to begin with.
     """
-    dr = drjit()
     last = number(count)
     body = lambda k, *totals: (k + 1, *(t + x for t, x in zip(totals, one(k))))
-    totals = looped((mitsuba().UInt32(0), *zeros), lambda k, *_: k < last, body)[1:]
+    totals = looped((mi.UInt32(0), *zeros), lambda k, *_: k < last, body)[1:]
     dr.eval(*totals)
     return totals
 

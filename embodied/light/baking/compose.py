@@ -19,11 +19,11 @@ from embodied.light.backend import (
     array,
     brightness,
     constant,
-    drjit,
+    dr,
     flags,
     floats,
     fraction,
-    mitsuba,
+    mi,
     number,
     vector,
     wholes,
@@ -164,7 +164,6 @@ def _painted(
     Args:
       soft, gain: (h luxels, w luxels, 3). sun: (n,) share, or None. glow: (n, 3) or None. mirrors: from `_mirrors`.
     """
-    mi, dr = mitsuba(), drjit()
     if not len(c.index):
         return np.zeros(0, np.uint32), np.zeros(0, np.uint32)
     face, b1, b2 = wholes(c.face), floats(c.b1), floats(c.b2)
@@ -198,7 +197,6 @@ class _Bilinear:
     """Reads pictures of a page's luxels at its texels."""
 
     def __init__(self, c: Cover, page: Page) -> None:
-        mi, dr = mitsuba(), drjit()
         row, column = np.divmod(c.index.astype(np.int32), np.int32(c.shape[1]))
         right, bottom, width, step = (number(x) for x in (page.width - 1, page.height - 1, page.width, page.fineness))
         at = lambda a, last: dr.clip((floats(a) + 0.5) / mi.Float(step) - 0.5, 0.0, mi.Float(last))
@@ -211,7 +209,6 @@ class _Bilinear:
         self._size = page.height, page.width
 
     def __call__(self, picture: np.ndarray) -> Array:
-        mi, dr = mitsuba(), drjit()
         assert picture.shape[:2] == self._size
         table, out = floats(picture), mi.Color3f(0.0)
         for spot, weight in self._terms:
@@ -221,14 +218,12 @@ class _Bilinear:
 
 def _packed(colour: Array) -> Array:
     """A colour in [0, 1] as red, green and blue bytes of one number, red lowest."""
-    mi, dr = mitsuba(), drjit()
     r, g, b = (mi.UInt32(dr.clip(x, 0.0, 1.0) * 255 + 0.5) for x in (colour.x, colour.y, colour.z))
     return r | (g << 8) | (b << 16)
 
 
 def _linear(codes: Array) -> Array:
     """The linear colour of packed sRGB."""
-    mi, dr = mitsuba(), drjit()
     table = floats(linear(np.arange(256, dtype=np.float32) / 255))
     return mi.Color3f(*(dr.gather(mi.Float, table, (codes >> shift) & 255) for shift in (0, 8, 16)))
 
@@ -243,7 +238,6 @@ def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirror
       None for a page without any, else device arrays: metallic share, least tint and whether dull of each face;
       radiance of sharp metals per texel; and (h luxels, w luxels, 3) radiance of dull ones.
     """
-    mi = mitsuba()
     metal = np.array([1.0 if f.mirror else f.metallic for f in page.finishes], np.float32)[page.finish]
     rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish]
     metal = np.where(metal > METAL, metal, 0.0).astype(np.float32)
@@ -276,7 +270,6 @@ def _mirrored(
       face: (k,) of the page. surfaces: position, normal and face normal, (k, 3) each. rough: (k,).
       turn: (2, k) of the samples at dull ones; None for sharp ones.
     """
-    mi, dr = mitsuba(), drjit()
     house, atlas, space = composer.solved.house, composer.solved.atlas, composer.space
     position, normal, face_normal = surfaces
     room = house.room_by_id.get(atlas.rooms[page.owner[face[0]]], house.rooms[0])

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from embodied.light.arrays import Array
-from embodied.light.backend import array, brightness, constant, drjit, floats, mitsuba, signed, vector
+from embodied.light.backend import array, brightness, constant, dr, floats, mi, signed, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels
 
@@ -38,7 +38,6 @@ def smooth_pages(
       variance: (n,) of each luxel's brightness; where given, likeness is widened by the noise that is
         left, as in SVGF (Schied et al. 2017, sec. 4.4): noise goes, contact shadows stay.
     """
-    mi, dr = mitsuba(), drjit()
     if not len(e):
         return e
     trust = floats(np.where(good, 1.0, 1e-4))
@@ -72,14 +71,13 @@ NOISES = 1.8
 
 def spatial_variance(e: np.ndarray, grid: Grid) -> np.ndarray:
     """(n,) variance of brightness among the 25 luxels around: noise where nothing else is known of it."""
-    dr, values = drjit(), floats(brightness(e))
+    values = floats(brightness(e))
     mean, square = _means(grid, (values, lambda v: v), (values, dr.square))
     return np.array(dr.maximum(square - dr.square(mean), 0.0))
 
 
 def _means(grid: Grid, *of: tuple[Array, Callable[[Array], Array]]) -> list[Array]:
     """For each table of luxels, and what becomes of its values, the mean over the 25 around every luxel."""
-    mi, dr = mitsuba(), drjit()
     sums, count = [mi.Float(0.0) for _ in of], mi.Float(0.0)
     for _, _, q, inside in grid.around(1):
         sums = [total + made(dr.gather(mi.Float, table, q, inside)) for total, (table, made) in zip(sums, of)]
@@ -93,7 +91,7 @@ def _relative_noise(grid: Grid, e: np.ndarray, variance: np.ndarray) -> tuple[np
     And (n,) what to add before logarithms are taken, more where there is more noise: a luxel whose rays
     all missed is no shadow.
     """
-    dr, own = drjit(), lambda v: v
+    own = lambda v: v
     mean, spread = _means(grid, (floats(brightness(e)), own), (floats(variance), own))
     relative = np.minimum(np.asarray(dr.sqrt(spread) / dr.maximum(mean, 1e-5)), 1.5)
     return relative, np.asarray(mean) * np.minimum(relative, 1.0)
@@ -124,7 +122,6 @@ class Grid:
 
     def around(self, step: int) -> Iterator[tuple[int, int, Array, Array]]:
         """The 25 luxels at multiples of `step`: offsets, luxel numbers, whether each is there and in the same plane."""
-        mi, dr = mitsuba(), drjit()
         if step not in self._together:
             self._together[step] = self._bits(step)
         for bit, (i, j, spot) in enumerate(self._spots(step)):
@@ -139,7 +136,6 @@ class Grid:
 
     def _bits(self, step: int) -> Array:
         """For each luxel one bit per luxel around: whether it is there and of the same surface."""
-        mi, dr = mitsuba(), drjit()
         places, normals = floats(self._position), floats(self._normal)
         p, n, out = vector(self._position), vector(self._normal), mi.UInt32(0)
         for bit, (i, _, spot) in enumerate(self._spots(step)):

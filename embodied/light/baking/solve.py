@@ -11,7 +11,7 @@ import numpy as np
 from embodied.house.house import House
 from embodied.house.shapes import inward
 from embodied.light.arrays import RayScene
-from embodied.light.backend import array, brightness, floats, mitsuba
+from embodied.light.backend import array, brightness, floats, mi
 from embodied.light.baking import denoise
 from embodied.light.memory import Memory, once
 from embodied.light.pages.atlas import Atlas
@@ -163,7 +163,7 @@ def outer_light(problem: Problem, samples: int = 24) -> np.ndarray:
         return e
     ways = portals_of(house)
     scene = Together((space.scene, radiosity.portal_scene(ways))) if ways else space.scene
-    e[mine] = radiosity.open_sky(scene, space.env, problem.at(mine), samples, mitsuba().Color3f(0.0))
+    e[mine] = radiosity.open_sky(scene, space.env, problem.at(mine), samples, mi.Color3f(0.0))
     return e
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light.arrays import RayScene
-from embodied.light.backend import constant, drjit, floats, mitsuba, scene_of, vector
+from embodied.light.backend import constant, dr, floats, mi, scene_of, vector
 from embodied.light.baking.compose import spread
 from embodied.light.pages.atlas import Atlas, atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps, albedo
@@ -120,7 +120,6 @@ def _flat(part: Part) -> Part:
 
 def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndarray, rays: int) -> np.ndarray:
     """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
-    mi, dr = mitsuba(), drjit()
     p = points_of(texels.position, texels.normal, texels.face_normal, thin)
     small = small_sky(outdoors.picture).astype(np.float32)
     hidden = mi.Color3f(*(constant(float(x) / 3) for x in small.mean((0, 1))))

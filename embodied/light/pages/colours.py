@@ -15,7 +15,7 @@ from assets.archives import read_picture
 from assets.cache import atomic_path, digest
 from assets.closure import code_digest
 from embodied.light.arrays import Array
-from embodied.light.backend import array, bilinear, drjit, floats, mitsuba, wholes
+from embodied.light.backend import array, bilinear, dr, floats, mi, wholes
 from embodied.light.pages.atlas import Page, flat_areas
 from embodied.light.pages.cover import Cover
 
@@ -91,7 +91,6 @@ def linear(srgb: np.ndarray) -> np.ndarray:
 
 def shown(x: Array) -> Array:
     """Linear to sRGB in [0, 1] (IEC 61966-2-1), a device colour or number."""
-    dr = drjit()
     x = dr.clip(x, 0.0, 1.0)
     return dr.select(x <= 0.0031308, x * 12.92, 1.055 * dr.power(dr.maximum(x, 1e-6), 1 / 2.4) - 0.055)
 
@@ -139,7 +138,6 @@ def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
 
 def colour_at(paints: Paints, face: Array, b1: Array, b2: Array) -> Array:
     """Reflectance (a Color3f) at places on faces: bilinear, repeating; v runs up."""
-    mi, dr = mitsuba(), drjit()
     at = lambda c: dr.gather(mi.Point2f, paints.uv, face * 3 + c)
     uv = at(0) * (1 - b1 - b2) + at(1) * b1 + at(2) * b2
     first, w, h = (dr.gather(mi.UInt32, a, face) for a in (paints.first, paints.width, paints.height))
@@ -198,6 +196,5 @@ def _coded(roots: np.ndarray) -> np.ndarray:
 
 
 def _decoded(code: Array) -> Array:
-    mi, dr = mitsuba(), drjit()
     part = lambda shift: dr.square(mi.Float((code >> shift) & CODE) * (1.0 / CODE))
     return mi.Color3f(part(0), part(10), part(20))

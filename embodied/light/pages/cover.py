@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import constant, drjit, floats, looped, mitsuba, number, scene_of
+from embodied.light.backend import constant, dr, floats, looped, mi, number, scene_of
 from embodied.light.pages.atlas import Page
 from embodied.light.pages.unwrap import face_normals
 
@@ -142,7 +142,6 @@ def _straight_down(
     sheet: Sheet, spot: np.ndarray, width: int, fineness: int, offsets: Sequence[tuple[float, float]]
 ) -> tuple[np.ndarray, ...]:
     """Face under each texel `spot` (-1 for none) at the first of `offsets` that shows one, and where on it."""
-    mi, dr = mitsuba(), drjit()
     if not len(spot) or not len(offsets) or sheet.scene is None:
         return np.full(len(spot), -1, np.int32), np.zeros(len(spot), np.float32), np.zeros(len(spot), np.float32)
     row, column = (floats(a) for a in np.divmod(spot.astype(np.int32), np.int32(width)))

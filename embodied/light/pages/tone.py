@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 
 from embodied.house.house import House
 from embodied.light.arrays import Array
-from embodied.light.backend import array, device, drjit, mitsuba, vector
+from embodied.light.backend import array, device, dr, mi, vector
 from embodied.light.pages.colours import shown
 
 TARGET = 1.05
@@ -59,7 +59,7 @@ class Exposure:
         """`at` for many points, on Mitsuba's device where it has one."""
         if device() == "numpy":
             return self.at(position)
-        mi, dr, (grid, low) = mitsuba(), drjit(), self._grid
+        grid, low = self._grid
         count = np.array(grid.shape[1:])
         where = ((np.asarray(position, np.float32) - low) / CELL + 0.5) / count
         field = mi.Texture3f(mi.TensorXf(np.ascontiguousarray(grid.transpose(3, 2, 1, 0))), False)
@@ -140,7 +140,7 @@ def _gain(light: np.ndarray, level: float) -> np.ndarray:
 def develop(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """Radiance times gain, (..., 3), as sRGB in [0, 1] float32: `developed`."""
     x = np.asarray(radiance, np.float32) * np.asarray(gain, np.float32)
-    return array(developed(mitsuba().Color3f(vector(x.reshape(-1, 3))))).reshape(x.shape)
+    return array(developed(mi.Color3f(vector(x.reshape(-1, 3))))).reshape(x.shape)
 
 
 def developed(x: Array) -> Array:
@@ -150,7 +150,6 @@ def developed(x: Array) -> Array:
 
     Source: Reinhard et al. 2002, eq. 4, with white at `WHITE`.
     """
-    dr = drjit()
     y = dr.maximum(x.x * 0.2126 + x.y * 0.7152 + x.z * 0.0722, 1e-9)
     by_luminance = x * (_curve(y) / y)
     lifted = shown(0.5 * (dr.minimum(by_luminance, 1.0) + _curve(x))) * LIFT

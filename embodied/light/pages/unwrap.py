@@ -23,7 +23,7 @@ from assets.closure import code_digest
 from assets.records import MeshPart
 from embodied.geometry import r2
 from embodied.light.arrays import Array
-from embodied.light.backend import added_up, drjit, floats, fraction, mitsuba, scene_of, vector
+from embodied.light.backend import added_up, dr, floats, fraction, mi, scene_of, vector
 from embodied.light.pages.records import load_record, save_record
 
 ONCE = 6000.0
@@ -392,7 +392,6 @@ def _on_the_face(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 def openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarray]:
     """Share of cosine-distributed rays that leave the model from the front and the back of each face."""
-    mi, dr = mitsuba(), drjit()
     scene, n, centre = scene_of(corners), vector(face_normals(corners)), vector(corners.mean(1))
     turn = np.random.default_rng(0).random((2, len(corners)), np.float32)
     r0, r1 = floats(turn[0]), floats(turn[1])

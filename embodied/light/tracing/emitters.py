@@ -19,7 +19,7 @@ from embodied.geometry import r2
 from embodied.house.house import House, Opening
 from embodied.house.shapes import inward
 from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import added_up, constant, drjit, fraction, mitsuba, vector
+from embodied.light.backend import added_up, constant, dr, fraction, mi, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.records import packed
 from embodied.light.pages.unwrap import areas_of, face_normals
@@ -129,7 +129,6 @@ def in_the_open(lamp: Lamp, scene: RayScene, *, rays: int = 48, reach: float = 0
     """
     if not lamp.normals.any():
         return lamp
-    mi, dr = mitsuba(), drjit()
     n = vector(lamp.normals)
     origin, frame = mi.Point3f(vector(lamp.points) + n * 2e-3), mi.Frame3f(n)
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import added_up, array, constant, drjit, flags, floats, mitsuba, number, vector, wholes
+from embodied.light.backend import added_up, array, constant, dr, flags, floats, mi, number, vector, wholes
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, Portal
 from embodied.light.tracing.luxels import AMBIENT, Luxels
@@ -135,8 +135,6 @@ def lights_of(
 
 def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator, picks: int = 2) -> Array:
     """e (a Color3f) at points straight from the lights: the sun, and `picks` others, by power over distance squared."""
-    mi = mitsuba()
-
     total = mi.Color3f(*(float(x) for x in AMBIENT))
     for _ in range(picks if lights.count else 0):
         total = total + _one_light(space, lights, p, rng) / picks
@@ -147,7 +145,6 @@ def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator,
 
 
 def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator) -> Array:
-    mi, dr = mitsuba(), drjit()
     u = rng.random((3, p.n), np.float32)
     count, zero = number(lights.count), dr.zeros(mi.Float, p.n)
 
@@ -206,7 +203,6 @@ def irradiance(
     active: Array = True,
 ) -> Array:
     """e (a Color3f) at points, 0 where not `active`, from all lights and any number of diffuse bounces: a path each."""
-    mi, dr = mitsuba(), drjit()
     sums = np.zeros((p.n, 3), np.float32)
     of = np.flatnonzero(np.broadcast_to(np.asarray(active), p.n))  # the point that each path began at
     p = radiosity.only(p, of)
@@ -255,7 +251,6 @@ def irradiance(
 
 def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Points) -> tuple[Array, Array, Points]:
     """Where rays meet the house from the front: luxel, whether they do, and the points there."""
-    mi, dr = mitsuba(), drjit()
     h = space.scene.ray_intersect_preliminary(ray, False, active)
     luxel, hit, front, _ = radiosity.hit_luxel(space, ray, active, h)
     flat = dr.gather(mi.Vector3f, space.normal, h.prim_index, hit)

@@ -21,11 +21,11 @@ from embodied.light.backend import (
     array,
     bilinear,
     constant,
-    drjit,
+    dr,
     flags,
     floats,
     fraction,
-    mitsuba,
+    mi,
     number,
     scene_of,
     vector,
@@ -64,7 +64,6 @@ def points_of(
     Args:
       turn: (2, n) float32 in [0, 1), random by default.
     """
-    mi, dr = mitsuba(), drjit()
     turn = np.random.default_rng(0).random((2, len(position)), np.float32) if turn is None else turn
     p = Points(
         len(position),
@@ -93,7 +92,7 @@ def only(p: Points, which: np.ndarray) -> Points:
     """Some of the points, by their numbers."""
     if len(which) == p.n:
         return p
-    dr, numbers = drjit(), wholes(which)
+    numbers = wholes(which)
     fields = (p.position, p.normal, p.face_normal, p.thin, p.turn0, p.turn1)
     some = Points(len(which), *(dr.gather(type(a), a, numbers) for a in fields))
     dr.eval(some.position, some.normal, some.face_normal, some.thin, some.turn0, some.turn1)
@@ -188,7 +187,6 @@ def _nearest_luxel(luxels: Sequence[Texels]) -> np.ndarray:
 
 def env_lookup(env: Array, d: Array, active: Array = True) -> Array:
     """Radiance in direction `d` of `Space.env`, bilinear."""
-    mi, dr = mitsuba(), drjit()
     h, w = ENV_ROWS, 2 * ENV_ROWS
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * w - 0.5
     y = dr.clip(dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * h - 0.5, 0, h - 1.001)
@@ -202,7 +200,6 @@ def env_lookup(env: Array, d: Array, active: Array = True) -> Array:
 
 def open_sky(scene: RayScene, env: Array, p: Points, samples: int, hidden: Array) -> np.ndarray:
     """(n, 3) e from the sky `env` on the points' front, by so many ways each; `hidden` (a Color3f) where things are."""
-    mi, dr = mitsuba(), drjit()
 
     def one(k: Array) -> tuple[Array, ...]:
         a, b = r2(mi.Float(k) + 1)
@@ -223,7 +220,6 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Mem
     One sample is clamped at 10 / samples and the sum at full view of the portal: without it, things
     a few centimetres from the glass turn into fireflies.
     """
-    mi, dr = mitsuba(), drjit()
     sides = portal.corner, portal.along, portal.up, portal.normal
     corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in sides)
     area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
@@ -253,7 +249,6 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Mem
 
 def lamp_light(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> Array:
     """e (a Color3f) from one lamp."""
-    mi, dr = mitsuba(), drjit()
     bare, count = not lamp.normals.any(), number(len(lamp.points))
     at = floats(lamp.points)
     out = floats(lamp.normals)
@@ -289,7 +284,6 @@ def sun_share(
       directions: rays over the disc, the same for all points: ragged shadow edges come from random ones.
       radius: of the disc, radians; a little over the real 0.0047 for soft edges at texel size.
     """
-    mi, dr = mitsuba(), drjit()
     frame = mi.Frame3f(mi.Vector3f(*(constant(x) for x in towards)))
     whole = constant(directions)
 
@@ -322,7 +316,6 @@ class Patches:
 
 def patch_light(scene: RayScene, p: Points, patches: Patches) -> np.ndarray:
     """(n, 3) e from sunlit patches, the same ones for all points and so free of noise."""
-    mi, dr = mitsuba(), drjit()
     lift = np.where(patches.thin[:, None], 0.0, LIFT)
     places, normals = floats(patches.position + patches.normal * lift), floats(patches.normal)
     both, flux, extent = flags(patches.thin), floats(patches.flux), floats(patches.extent)
@@ -363,7 +356,6 @@ def meet(space: Space, p: Points, rays: int, first: int = 0) -> Met:
     Args:
       first: index of the first point of the R2 sequence, so that later rays of the same points differ.
     """
-    mi, dr = mitsuba(), drjit()
     one_ray, found = _rays(space, p, first), dr.zeros(mi.UInt32, rays * p.n)
     lane, count = dr.arange(mi.UInt32, p.n), number(p.n)
 
@@ -383,7 +375,6 @@ def gather(met: Met, table: Array) -> tuple[np.ndarray, np.ndarray]:
     Args:
       table: flat (n luxels * 3), radiosity of the whole house on the device.
     """
-    mi, dr = mitsuba(), drjit()
     n = len(met.bad)
     lane, count = dr.arange(mi.UInt32, n), number(n)
 
@@ -399,7 +390,6 @@ def gather(met: Met, table: Array) -> tuple[np.ndarray, np.ndarray]:
 def _rays(space: Space, p: Points, first: int) -> Callable:
     """From the number of a sample to the luxels that cosine-distributed rays meet, whether they see them, and 1 where
     they meet a back face or something nearer than 12 mm."""
-    mi, dr = mitsuba(), drjit()
     start = number(first)
 
     def meet(k: Array) -> tuple[Array, ...]:
@@ -422,7 +412,6 @@ def hit_luxel(space: Space, ray: Ray, active: Array = True, met: Array = None) -
     Args:
       met: what the scene said of the ray, where it was asked before.
     """
-    mi, dr = mitsuba(), drjit()
     q, w, height, base, hit, front, near = _met(space, ray, active, met)
     x = mi.UInt32(dr.clip(q.x, 0.0, mi.Float(w) - 1))
     y = mi.UInt32(dr.clip(q.y, 0.0, mi.Float(height) - 1))
@@ -432,7 +421,6 @@ def hit_luxel(space: Space, ray: Ray, active: Array = True, met: Array = None) -
 def hit_colour(space: Space, table: Array, ray: Ray) -> Array:
     """Colour of a flat table of luxels where a ray hits a front, bilinear, black elsewhere; and whether it hits
     anything."""
-    mi, dr = mitsuba(), drjit()
     q, w, height, base, hit, front, _ = _met(space, ray, True)
     x, y = dr.clip(q.x - 0.5, 0.0, mi.Float(w) - 1), dr.clip(q.y - 0.5, 0.0, mi.Float(height) - 1)
     x0, y0, around = bilinear(x, y)
@@ -446,7 +434,6 @@ def hit_colour(space: Space, table: Array, ray: Ray) -> Array:
 def _met(space: Space, ray: Ray, active: Array, met: Array = None) -> Array:
     """Where on its page a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the
     front, within 12 mm."""
-    mi, dr = mitsuba(), drjit()
     h = space.scene.ray_intersect_preliminary(ray, False, active) if met is None else met
     hit = h.is_valid() & active
     f = h.prim_index
@@ -499,7 +486,7 @@ def towards(p: Points, q: Array, least: float = 1e-6) -> tuple[Array, ...]:
     Args:
       least: distance that is told from none, metres.
     """
-    dr, d = drjit(), q - p.position
+    d = q - p.position
     far = dr.norm(d)
     d /= dr.maximum(far, least)
     return d, far, *facing(p, d)
@@ -507,7 +494,6 @@ def towards(p: Points, q: Array, least: float = 1e-6) -> tuple[Array, ...]:
 
 def facing(p: Points, d: Array) -> Array:
     """Cosine at the point (half for each side of a thin one), the side it leaves from, whether it faces `d`."""
-    dr = drjit()
     cos, flat = dr.dot(p.normal, d), dr.dot(p.face_normal, d)
     cos = dr.select(p.thin, dr.abs(cos) * 0.5, cos)
     side = dr.select(p.thin, dr.sign(flat), 1.0)

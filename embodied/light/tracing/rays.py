@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.light.backend import drjit, mitsuba, scene_of, vector
+from embodied.light.backend import dr, mi, scene_of, vector
 from embodied.light.in_numpy import embree
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def rays_among(corners: np.ndarray) -> Rays:
 
 def mitsuba_among(corners: np.ndarray) -> Rays:
     """Rays among triangles by what bakes the light, on all cores."""
-    scene, mi, dr = scene_of(corners), mitsuba(), drjit()
+    scene = scene_of(corners)
 
     def first(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         if not len(start):

@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light.arrays import Array, Ray, Triple
-from embodied.light.backend import array, constant, drjit, floats, mitsuba, vector
+from embodied.light.backend import array, constant, dr, floats, mi, vector
 from embodied.light.pages.files import Bake
 from embodied.light.pages.tone import develop
 from embodied.light.tracing import paths, radiosity
@@ -134,8 +134,6 @@ class Tracer:
         Radiance is averaged before the film curve: the curve of a noisy mean is right, the mean of
         curved noise is too dark.
         """
-        dr = drjit()
-
         world = self._world
         hit = look(world, ray)
         inside = hit.ok & ~hit.outdoor
@@ -171,7 +169,7 @@ class Tracer:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Share of the light (n, 1) that the first pane of glass on each ray mirrors, and what it mirrors, exposed (n,
         3): nothing rough, one bounce."""
-        mi, dr, world = mitsuba(), drjit(), self._world
+        world = self._world
         there = dr.isfinite(first)
         normal = dr.gather(mi.Vector3f, panes.normal, face, there)
         surfaces = dr.gather(mi.Float, panes.surfaces, face, there)
@@ -204,7 +202,7 @@ class Tracer:
 
         Source: Walter et al. 2007 eq. 35 for the half vector, Schlick 1994 for F; F0 = 0.08 specular.
         """
-        mi, dr, world = mitsuba(), drjit(), self._world
+        world = self._world
         rough, specular, metal = hit.gloss.x, hit.gloss.y, hit.gloss.z
         if self.quality == "diffuse":
             specular = mi.Float(0.0)
@@ -241,7 +239,6 @@ class Tracer:
     def _surface_seen(self, ray: Ray, hit: Hit) -> tuple[np.ndarray, np.ndarray]:
         """(n, 3) normals and (n,) distances (m) of what rays show: where they meet a mirror, of what is seen in it, and
         the whole way there. Renderers guide Open Image Denoise so, too: by the first diffuse bounce."""
-        mi, dr = mitsuba(), drjit()
         mirror = hit.front & _is_mirror(hit)
         d = ray.d - 2 * dr.dot(ray.d, hit.normal) * hit.normal
         second = look(self._world, mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d), mirror)
@@ -306,7 +303,6 @@ def _camera_rays(
 ) -> Ray:
     """`each` rays per pixel, pixel by pixel and camera by camera within a round; through pixel centres without an
     rng."""
-    mi, dr = mitsuba(), drjit()
     h, w = size
     ahead, up = (np.asarray([v[k] for v in views], float) for k in (0, 1))
     of = (2, each, len(views), h * w)

@@ -9,7 +9,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import bilinear, drjit, flags, floats, mitsuba, scene_of, wholes
+from embodied.light.backend import bilinear, dr, flags, floats, mi, scene_of, wholes
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
 from embodied.light.pages.unwrap import distinct, face_normals
@@ -240,7 +240,6 @@ class Hit:
 
 def look(world: BakedScene, ray: Ray, active: Array = True) -> Hit:
     """Bilinear lookup of the pages where rays hit."""
-    mi, dr = mitsuba(), drjit()
     h = world.space.scene.ray_intersect_preliminary(ray, False, active)
     ok = h.is_valid() & active
     f = h.prim_index
@@ -285,7 +284,6 @@ def through(panes: Panes, ray: Ray, behind: Array, most: int = 6) -> Array:
       Their own share of the shown colour, the share of what lies behind, distance and face of the first (inf and 0
       without).
     """
-    mi, dr = mitsuba(), drjit()
     colour, left, start = mi.Color3f(0.0), mi.Float(1.0), mi.Float(0.0)
     first, face = mi.Float(dr.inf), mi.UInt32(0)
     for _ in range(most):
@@ -316,7 +314,6 @@ def through(panes: Panes, ray: Ray, behind: Array, most: int = 6) -> Array:
 
 def picture_at(table: Array, rows: int, d: Array, active: Array = True) -> Array:
     """Value of an outdoor picture (flat, rows x 2 rows) in direction d, nearest texel."""
-    mi, dr = mitsuba(), drjit()
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * (2 * rows)
     y = dr.acos(dr.clip(d.z, -1, 1)) / dr.pi * rows
     i = mi.UInt32(dr.clip(y, 0, rows - 1)) * (2 * rows) + mi.UInt32(dr.clip(x, 0, 2 * rows - 1))
@@ -325,7 +322,6 @@ def picture_at(table: Array, rows: int, d: Array, active: Array = True) -> Array
 
 def backdrop_at(table: Array, rows: int, d: Array) -> Array:
     """As `picture_at` for a picture as it is shown (flat, rows x 4 rows; `embodied.scene.far_canvas.share_down`)."""
-    mi, dr = mitsuba(), drjit()
     x = (dr.pi - dr.atan2(d.y, d.x)) / dr.two_pi * (4 * rows)
     up, y = dr.asin(dr.clip(d.z, -1, 1)), mi.Float(0.0)
     for k in range(len(KNOTS[0]) - 1):
