@@ -10,6 +10,9 @@ import numpy as np
 Color = tuple[float, float, float]
 """sRGB in [0, 1], or linear radiance where it says so."""
 
+Size = tuple[float, float, float]
+"""Width, depth and height, metres."""
+
 ROOM_KINDS = (
     "living_room",
     "kitchen",

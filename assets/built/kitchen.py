@@ -10,7 +10,6 @@ import numpy as np
 from assets.built.maker import (
     BLACK,
     CHROME,
-    GAP,
     GLASS,
     STEEL,
     WHITE,
@@ -46,7 +45,7 @@ def _base(
     return parts_of(
         (WHITE, body),
         (BLACK, plinth),
-        (GAP, joints(doors)),
+        joints(doors),
         (order.material("front", "lacquer_white/0"), doors),
         (order.metal(), grips),
         (order.material("worktop", "oak_worktop/0"), worktop),
@@ -220,7 +219,7 @@ def wall_cabinet(order: Order) -> list[MeshPart]:
         crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=order.rng)
     return parts_of(
         (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
-        (GAP, [] if order.look.get("glazed") else joints(doors)),
+        joints([] if order.look.get("glazed") else doors),
         (order.material("front", "lacquer_white/0"), doors),
         (order.metal(), grips),
         *crockery,
@@ -265,9 +264,7 @@ def tall_cabinet(order: Order) -> list[MeshPart]:
     doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in rows]
     grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
     side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
-    return parts_of(
-        (order.material("front", "lacquer_white/0"), [*doors, side]), (GAP, joints(doors)), (order.metal(), grips)
-    )
+    return parts_of((order.material("front", "lacquer_white/0"), [*doors, side]), joints(doors), (order.metal(), grips))
 
 
 def fridge(order: Order) -> list[MeshPart]:
@@ -395,7 +392,7 @@ def island(order: Order) -> list[MeshPart]:
     return parts_of(
         (order.material("front", "lacquer_white/0"), [*doors, body]),
         (BLACK, plinth),
-        (GAP, joints(doors)),
+        joints(doors),
         (order.metal(), grips),
         (order.material("worktop", "oak_worktop/0"), top),
     )

@@ -9,11 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, part, tube
-from assets.records import Asset, Color, Finish, MeshPart, SupportSurface
+from assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, outline, part, tube
+from assets.records import Asset, Color, Finish, MeshPart, Size, SupportSurface
 
-Size = tuple[float, float, float]
-"""Width, depth, height, metres."""
 FinishOf = Callable[[str], Finish]
 Look = Mapping[str, str | float]
 
@@ -149,21 +147,14 @@ def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "fl
     return joined(*frame(x0, x1, z0, z1, (y, y + thick), rail, 0.0015), panel)
 
 
-def joints(fronts: Sequence[Shape]) -> list[Shape]:
-    """The dark of the joints around doors and drawers (of the finish GAP): a narrow frame a little behind each."""
+def joints(fronts: Sequence[Shape]) -> tuple[Finish, list[Shape]]:
+    """The dark of the joints around doors and drawers with its finish: a narrow frame a little behind each."""
     frames = []
     for shape in fronts:
         (x0, y, z0), (x1, _, z1) = shape.vertices.min(0), shape.vertices.max(0)
-        y, out, into = y + 0.003, 0.003, 0.006
-        outer = [(x0 - out, y, z0 - out), (x1 + out, y, z0 - out), (x1 + out, y, z1 + out), (x0 - out, y, z1 + out)]
-        inner = [
-            (x0 + into, y, z0 + into),
-            (x1 - into, y, z0 + into),
-            (x1 - into, y, z1 - into),
-            (x0 + into, y, z1 - into),
-        ]
+        outer, inner = (outline(x0 + by, x1 - by, z0 + by, z1 - by, y + 0.003) for by in (-0.003, 0.006))
         frames.append(between(outer, inner))
-    return frames
+    return GAP, frames
 
 
 def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = False, length: float = 0.14) -> Shape:

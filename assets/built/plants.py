@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import SOIL, Order, Size, parts_of, plain
+from assets.built.maker import SOIL, Order, parts_of, plain
 from assets.built.primitives import Shape, lathe, sheet, tube
-from assets.records import MeshPart
+from assets.records import MeshPart, Size
 
 GREENS = {
     "broad": ((0.16, 0.30, 0.12), (0.26, 0.42, 0.16)),

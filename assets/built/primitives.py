@@ -119,9 +119,14 @@ def quads(corners: ArrayLike, uv: np.ndarray | None = None) -> Shape:
     return Shape(vertices, faces, normals, uv)
 
 
+def outline(x0: float, x1: float, z0: float, z1: float, y: float) -> list[tuple[float, float, float]]:
+    """Corners of an upright rectangle at y."""
+    return [(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]
+
+
 def upright(x0: float, x1: float, z0: float, z1: float, y: float) -> Shape:
     """A flat upright rectangle at y that looks along -y, or along +y where x1 is less than x0."""
-    return quads([[(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]])
+    return quads([outline(x0, x1, z0, z1, y)])
 
 
 def between(low: ArrayLike, high: ArrayLike, uv: np.ndarray | None = None) -> Shape:

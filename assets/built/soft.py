@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.built.maker import WHITE, Order, Size, parts_of, plain, whole_image
+from assets.built.maker import WHITE, Order, parts_of, plain, whole_image
 from assets.built.primitives import Shape, ball, box, cylinder, folds, joined, lathe, pillow, quads, sheet, tube
-from assets.records import MeshPart
+from assets.records import MeshPart, Size
 
 PLEAT = 0.095
 """Width of a fold of a drawn curtain, metres."""

@@ -6,23 +6,9 @@ import itertools
 
 import numpy as np
 
-from assets.built.maker import (
-    BLACK,
-    GAP,
-    MIRROR,
-    STEEL,
-    Look,
-    Order,
-    Size,
-    carcass,
-    front,
-    handle,
-    joints,
-    parts_of,
-    surface,
-)
+from assets.built.maker import BLACK, MIRROR, STEEL, Look, Order, carcass, front, handle, joints, parts_of, surface
 from assets.built.primitives import bar, box, pillow
-from assets.records import MeshPart, SupportSurface
+from assets.records import MeshPart, Size, SupportSurface
 
 BOARD = 0.022
 
@@ -98,7 +84,7 @@ def wardrobe(order: Order) -> list[MeshPart]:
     return parts_of(
         (order.material("front", "lacquer_white/0"), [*doors, body, top]),
         (BLACK, plinth),
-        (GAP, joints(doors)),
+        joints(doors),
         (order.metal("steel"), grips),
         (MIRROR, glass),
     )
@@ -136,7 +122,7 @@ def bedside(order: Order) -> list[MeshPart]:
     return parts_of(
         (wood, [*body, *feet]),
         (order.material("front", "oak/0") if "front" in order.look else wood, drawers),
-        (GAP, joints(drawers)),
+        joints(drawers),
         (order.metal("steel"), grips),
     )
 

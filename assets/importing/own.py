@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from assets import rows
 from assets.cache import digest
 from assets.importing.glb import read_glb
-from assets.importing.importer import RawPart, Reader, Tell, cached, import_model, obj_files, read_obj
+from assets.importing.importer import Reader, cached, import_model, obj_files, read_obj
 from assets.importing.mtl_finish import corrected
 from assets.importing.obj import MeshError
 from assets.importing.sh3f import MAX_ENTRY, open_pack
@@ -68,7 +68,12 @@ def read_own(
         found[key] = row
     assets, recipes = rows.read_models(str(path), found, {**classes, **added}, {pack: body.get("licence", "")})
     for recipe in recipes.values():
-        _check_looks(f"{path}: model {recipe.key.removeprefix(f'{pack}/')!r}", recipe)
+        for material, words in recipe.looks:
+            try:
+                corrected(Finish(), words)
+            except ValueError as e:
+                where = f"{path}: model {recipe.key.removeprefix(f'{pack}/')!r}"
+                raise CatalogueError(f"{where}: the looks of material {material!r}: {e}") from e
     return assets, recipes, own
 
 
@@ -82,8 +87,11 @@ def import_own(model: OwnModel, recipe: ImportRecipe, cache: Path) -> tuple[Mesh
         pack = open_pack(model.file)
         entry = pack.entries[model.entry]
         return import_model(pack, replace(recipe, rotation=entry.rotation), cache, entry.model)
-    read = read_glb if model.file.suffix.lower() == ".glb" else _read_obj_file
-    return cached(recipe, source_digest(model), cache, lambda tell: read(model.file, tell))
+    file, remedy = model.file, "save it again as PNG, JPEG, BMP or TGA"
+    if file.suffix.lower() == ".glb":
+        return cached(recipe, source_digest(model), cache, lambda tell: read_glb(file, tell))
+    read = lambda tell: read_obj(_reader(file), file.name, str(file), remedy, tell)
+    return cached(recipe, source_digest(model), cache, read)
 
 
 def source_digest(model: OwnModel) -> str:
@@ -111,10 +119,6 @@ def _digest_of(read: Reader, name: str) -> str | None:
         return None
 
 
-def _read_obj_file(path: Path, tell: Tell) -> tuple[RawPart, ...]:
-    return read_obj(_reader(path), path.name, str(path), "save it again as PNG, JPEG, BMP or TGA", tell)
-
-
 def _reader(path: Path) -> Reader:
     """Reads files named relative to `path`, none outside its folder. A file of another folder, or of a name in other
     capitals, is looked for beside `path`: models are moved, and made where capitals do not count."""
@@ -132,14 +136,6 @@ def _reader(path: Path) -> Reader:
         return file.read_bytes()
 
     return read
-
-
-def _check_looks(where: str, recipe: ImportRecipe) -> None:
-    for material, words in recipe.looks:
-        try:
-            corrected(Finish(), words)
-        except ValueError as e:
-            raise CatalogueError(f"{where}: the looks of material {material!r}: {e}") from e
 
 
 def _model(folder: Path, where: str, file: str | None, entry: str) -> OwnModel:

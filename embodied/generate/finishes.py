@@ -55,17 +55,14 @@ def draw_palette(style: str | None, novelty: str | None = None, *, rng: np.rando
     if rng.random() < 0.1:
         floor = stone
     soft = float(rng.random())
-    private = floor if soft < 0.5 else _one(taste.carpets, rng) if soft < 0.75 else _one(taste.woods, rng)
-    kitchen = floor if rng.random() < 0.45 else stone
-    hall = floor if rng.random() < 0.6 else stone
-    door = _one(taste.doors, rng)
-    frame = _one(taste.frames, rng)
-    return Palette(
+    return Palette(  # drawn in this order
         style=name,
         floor=floor,
-        hall_floor=hall,
-        kitchen_floor=kitchen,
-        private_floor=private,
+        private_floor=floor if soft < 0.5 else _one(taste.carpets, rng) if soft < 0.75 else _one(taste.woods, rng),
+        kitchen_floor=floor if rng.random() < 0.45 else stone,
+        hall_floor=floor if rng.random() < 0.6 else stone,
+        door=(door := _one(taste.doors, rng)),
+        frame=_one(taste.frames, rng),
         wet_floors=_some(taste.wet_floors, 2, rng),
         rough_floor=_one(TABLE.rough, rng),
         walls=_some(taste.walls, 3, rng),
@@ -74,9 +71,7 @@ def draw_palette(style: str | None, novelty: str | None = None, *, rng: np.rando
         papers=_some(taste.papers, 2, rng),
         ceiling=_one(taste.ceilings, rng),
         skirting="paint_white/0" if "paint" in door or rng.random() < 0.5 else door,
-        door=door,
         front_door=_one(taste.front_doors, rng),
-        frame=frame,
         boldness=float(rng.uniform(0.1, 0.6)),
     )
 

@@ -117,16 +117,6 @@ class _Openings:
             self.swings.append(_swing(w.axis, w.across, start, start + width, -w.side))
 
 
-@dataclass(frozen=True)
-class _LeafPlace:
-    """One way to hang a leaf."""
-
-    cost: float
-    start: float
-    at_low: bool
-    """Whether it hangs at the lower end of its hole."""
-
-
 def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], SharedWall]) -> list[list[OuterWall]]:
     """For each cell its stretches of outer wall, longest first."""
     return [
@@ -261,7 +251,7 @@ def _door(made: _Openings, link: Link, rng: np.random.Generator) -> None:
     cell = made.plan.cells[link.child]
     own, side = _span_and_side(cell, axis, across)
     width = min(KINDS[cell.kind].door, high - low - 2 * NIB)
-    best: _LeafPlace | None = None
+    places = []
     for start in (low + NIB, high - NIB - width, (low + high - width) / 2):
         corner = min(start - own[0], own[1] - start - width)
         crowd = sum(_overlap(_swing(axis, across, start, start + width, side), s) for s in made.swings)
@@ -273,17 +263,16 @@ def _door(made: _Openings, link: Link, rng: np.random.Generator) -> None:
             block = shut + sum(_overlap(leaf, z) for z in made.zones)
             cost = 60.0 * block + 2.0 * crowd + 0.8 * max(0.0, corner - 0.2) + 0.5 * (at_low != near_low)
             cost += float(rng.uniform(0, 0.15))
-            if best is None or cost < best.cost:
-                best = _LeafPlace(cost, start, at_low)
-    assert best is not None  # of six places
-    start, end = best.start, best.start + width
+            places.append((cost, start, at_low))
+    _, start, at_low = min(places, key=lambda place: place[0])
+    end = start + width
     made.swings.append(_swing(axis, across, start, end, side))
-    made.stands.append(_open_leaf(axis, across, start, end, side, best.at_low))
+    made.stands.append(_open_leaf(axis, across, start, end, side, at_low))
     made.zones.append(_front(axis, across, start, end))
     jambs = _jambs(cell, axis, across, start, end)
     open_by = math.radians(float(rng.uniform(82, 95)) if rng.random() < 0.8 else float(rng.uniform(60, 80)))
     ends = (made.names[link.child], made.names[link.parent])
-    made.add("door", ends, jambs, 0.0, 2.05, _hinge(jambs, best.at_low), open_by)
+    made.add("door", ends, jambs, 0.0, 2.05, _hinge(jambs, at_low), open_by)
 
 
 def _span_and_side(cell: Cell, axis: str, across: float) -> tuple[tuple[float, float], int]:
@@ -338,11 +327,9 @@ def _folded_door(made: _Openings, link: Link, rng: np.random.Generator) -> bool:
     return True
 
 
-def _without(
-    free: list[tuple[float, float]], low: float, high: float, margin: float = 0.25
-) -> list[tuple[float, float]]:
-    """`free` intervals without (low, high) and a margin on both sides."""
-    low, high = low - margin, high + margin
+def _without(free: list[tuple[float, float]], low: float, high: float) -> list[tuple[float, float]]:
+    """`free` intervals without (low, high) and a quarter of a metre on both sides."""
+    low, high = low - 0.25, high + 0.25
     return [(max(a, p), min(b, q)) for a, b in free for p, q in ((a, low), (high, b)) if min(b, q) > max(a, p)]
 
 

@@ -242,16 +242,10 @@ def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
 
 
 def _arc(
-    sheet: _Sheet,
-    centre: np.ndarray,
-    start: np.ndarray,
-    normal: np.ndarray,
-    radius: float,
-    angle: float,
-    colour: Colour,
+    sheet: _Sheet, centre: np.ndarray, start: np.ndarray, normal: np.ndarray, radius: float, angle: float, ink: Colour
 ) -> None:
     t = np.linspace(0, angle, 24)[:, None]
-    sheet.line(centre + radius * (np.cos(t) * start + np.sin(t) * normal), 0.018, colour)
+    sheet.line(centre + radius * (np.cos(t) * start + np.sin(t) * normal), 0.018, ink)
 
 
 def _draw_furniture(sheet: _Sheet, house: House, ids: set[str]) -> None:

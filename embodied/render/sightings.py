@@ -67,14 +67,8 @@ def _rows(node: int, depth: np.ndarray, ids: np.ndarray, placements: int) -> tup
     order = np.argsort(-pixels, kind="stable")
     order = order[: np.count_nonzero(pixels)]
     x, y, z = direction[order].T
-    return (
-        np.full(len(order), node),
-        order,
-        np.arctan2(y, x),
-        np.arctan2(z, np.hypot(x, y)),
-        distance[order],
-        pixels[order],
-    )
+    azimuth, elevation = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+    return np.full(len(order), node), order, azimuth, elevation, distance[order], pixels[order]
 
 
 def save_table(path: Path, table: SightingTable) -> None:

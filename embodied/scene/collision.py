@@ -157,12 +157,9 @@ def without(
     return pieces
 
 
-def levels(parts: Sequence[MeshPart], share: float = 0.1) -> tuple[float, ...]:
-    """Heights of large horizontal faces (undersides just below, tops just above), metres: where to cut the grid.
-
-    Args:
-      share: of the area of the thing's outline that faces at one height must cover.
-    """
+def levels(parts: Sequence[MeshPart]) -> tuple[float, ...]:
+    """Heights of horizontal faces (undersides just below, tops just above), metres: where to cut the grid. Faces at
+    one height must cover a tenth of the thing's outline."""
     corners = np.concatenate([p.vertices[p.faces] for p in parts]).astype(float)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     flat = np.abs(normals[:, 2]) > 0.98 * np.linalg.norm(normals, axis=1)
@@ -174,7 +171,7 @@ def levels(parts: Sequence[MeshPart], share: float = 0.1) -> tuple[float, ...]:
     mean = np.bincount(group.ravel(), heights, keys.shape[1]) / np.maximum(many, 1)
     outline = np.prod(np.ptp(corners.reshape(-1, 3), axis=0)[:2])
     large = np.argsort(-areas)[:8]
-    return tuple(float(mean[i] + 1e-5 * keys[1, i]) for i in large if areas[i] > share * outline)
+    return tuple(float(mean[i] + 1e-5 * keys[1, i]) for i in large if areas[i] > 0.1 * outline)
 
 
 def is_solid(points: np.ndarray) -> bool:

@@ -144,6 +144,11 @@ class Scenery:
         """Whether snow lies."""
         return self.season == "winter"
 
+    @property
+    def reach(self) -> float:
+        """From the edge of the plot to the face of the nearest building, metres."""
+        return NEAREST[self.table.neighbours]
+
 
 def scenery_of(house: House) -> Scenery:
     """What the house's sky names, the rest drawn from its seed; the same in every process.
@@ -198,7 +203,6 @@ def side_frame(
 STREET = (1.6, 5.6)
 """Where the carriageway begins and ends beyond the edge of the plot, metres."""
 NEAREST = {"villas": 7.5, "cottages": 8.2, "terrace": 8.6}
-"""From the edge of the plot to the face of the nearest building, metres."""
 
 
 def near_buildings(house: House, place: Scenery) -> list[Building]:
@@ -215,7 +219,7 @@ def near_buildings(house: House, place: Scenery) -> list[Building]:
         while t < half + 2.0:
             b, gap = _neighbour(kind, k == 0, rng=rng)
             stray = rng.uniform(0.0, 4.0) if kind == "villas" else rng.uniform(0.0, 0.8) * (kind == "cottages")
-            reach = NEAREST[kind] + stray
+            reach = place.reach + stray
             if kind != "villas" and k:
                 reach += 3.0 + 7.0 * (kind == "cottages")
             at = middle + along * (t + b.wide / 2) + away * (reach + b.deep / 2)

@@ -15,16 +15,7 @@ from assets.records import Finish
 from embodied.house.house import House
 from embodied.house.shapes import inward, room_union
 from embodied.scene.buildings import DOOR, LIT, PANE, ROOF, TRIM, WALL, Faces, faces_of
-from embodied.scene.landscapes import (
-    GROUND_DROP,
-    NEAREST,
-    STREET,
-    Scenery,
-    near_buildings,
-    plot,
-    scenery_of,
-    side_frame,
-)
+from embodied.scene.landscapes import GROUND_DROP, STREET, Scenery, near_buildings, plot, scenery_of, side_frame
 from embodied.scene.part import Part
 from embodied.scene.walls import hole_on, wall_face
 from embodied.seeds import stream
@@ -168,7 +159,6 @@ def _seen_from(house: House, faces: Faces) -> np.ndarray:
 def _street(edge: Bounds, place: Scenery, finish: Callable[[str], Finish]) -> list[Part]:
     """Pavements and a carriageway along one side of the plot."""
     middle, along, out, half = side_frame(edge, place.outlook)
-    reach = NEAREST[place.table.neighbours]
 
     def strip(near: float, far: float, up: float) -> Shape:
         ends = [middle + along * s + out * d for s, d in ((-1, near), (1, near), (1, far), (-1, far))]
@@ -177,7 +167,7 @@ def _street(edge: Bounds, place: Scenery, finish: Callable[[str], Finish]) -> li
 
     own = finish("snow/0") if place.snow else finish("paving/0")
     return [
-        _part("street", own, [strip(0.0, STREET[0], 0.0), strip(STREET[1], reach + 0.8, 0.0)]),
+        _part("street", own, [strip(0.0, STREET[0], 0.0), strip(STREET[1], place.reach + 0.8, 0.0)]),
         _part("street", ASPHALT, [strip(*STREET, -0.1)], "#road"),
     ]
 

@@ -286,17 +286,12 @@ def wall_poses(
 
 
 def floor_poses(
-    space: RoomSpace,
-    *,
-    score: Callable[[float, float, float], float],
-    yaws: Sequence[float],
-    step: float = 0.3,
-    margin: float = 0.3,
+    space: RoomSpace, *, score: Callable[[float, float, float], float], yaws: Sequence[float], step: float = 0.3
 ) -> list[ScoredPose]:
     """Poses on a grid over the floor, at each of `yaws`."""
     x0, y0, x1, y1 = space.polygon.bounds
-    nx = max(int((x1 - x0 - 2 * margin) / step), 1) + 1
-    ny = max(int((y1 - y0 - 2 * margin) / step), 1) + 1
+    nx = max(int((x1 - x0 - 0.6) / step), 1) + 1
+    ny = max(int((y1 - y0 - 0.6) / step), 1) + 1
     centre = ((x0 + x1) / 2, (y0 + y1) / 2)
     poses: list[ScoredPose] = []
     for i in range(nx):
@@ -305,8 +300,3 @@ def floor_poses(
             y = centre[1] + (j - (ny - 1) / 2) * step
             poses.extend(ScoredPose(score(x, y, yaw), x, y, yaw) for yaw in yaws)
     return poses
-
-
-def facing_point(x: float, y: float, tx: float, ty: float) -> float:
-    """Yaw of a thing at (x, y) that looks at (tx, ty)."""
-    return math.atan2(ty - y, tx - x) + math.pi / 2

@@ -11,21 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from assets.records import Asset
-from embodied.generate.furnish.arrange import (
-    RUG_HEIGHT,
-    Item,
-    ScoredPose,
-    facing_point,
-    floor_poses,
-    is_flat,
-    wall_poses,
-)
+from assets.records import Asset, Size
+from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, ScoredPose, floor_poses, is_flat, wall_poses
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import LIKES, Spot, depth_before
 from embodied.generate.furnish.space import Thing, Wall
 from embodied.generate.furnish.stock import LARGEST, SMALLEST
-from embodied.generate.furnish.tables import Group, Part, Size
+from embodied.generate.furnish.tables import Group, Part
 
 LARGE = 2.0
 """A thing with a larger base stands in the middle of the room if its group is placed in the open, square metres."""
@@ -206,7 +198,7 @@ class _Plan:
             item = dataclasses.replace(item, z=RUG_HEIGHT)
         x, y = anchor.local(u, v)
         if part.look:
-            turn += facing_point(x, y, anchor.x, anchor.y) - anchor.yaw
+            turn += _facing_point(x, y, anchor.x, anchor.y) - anchor.yaw
         yaw = turn if part.straight else anchor.yaw + turn
         self._keep(part, dataclasses.replace(item, x=x, y=y, yaw=yaw))
 
@@ -280,6 +272,11 @@ def _row(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Pl
         yield x, -anchor.size[1] / 2 - part.gap - size[1] / 2, 0.0
 
 
+def _facing_point(x: float, y: float, tx: float, ty: float) -> float:
+    """Yaw of a thing at (x, y) that looks at (tx, ty)."""
+    return math.atan2(ty - y, tx - x) + math.pi / 2
+
+
 def _seats(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
     """Chairs around a table, tucked in and a little askew: in a circle, or along its sides and now and then its ends.
 
@@ -295,7 +292,7 @@ def _seats(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> 
             angle = start + 2 * math.pi * ((k * 2) % count + (k * 2) // count) / count
             r = w / 2 + cd / 2 - tuck * (0.8 if is_round else 1.0) + _pulled(ctx.rng)
             x, y = r * math.cos(angle), r * math.sin(angle)
-            yield x, y, facing_point(x, y, 0, 0)
+            yield x, y, _facing_point(x, y, 0, 0)
         return
     per_side = max(1, int((w - 0.06) / max(cw + 0.12, 0.6)))
     for k, sign in itertools.product(range(per_side), (-1,) if plan.at_wall else (-1, 1)):

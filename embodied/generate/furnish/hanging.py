@@ -6,7 +6,7 @@ from assets.records import Asset
 from embodied.generate.furnish.ceilings import ceiling_lamps, detectors
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import has_window
-from embodied.generate.furnish.mounting import Hanging, along_walls, at, hang_first, longest_first, mount, stretches
+from embodied.generate.furnish.mounting import Hanging, along_walls, at, hang_first, mount, stretches
 from embodied.generate.furnish.pictures import above_furniture, mirrors, pictures
 from embodied.generate.furnish.smalls import leave
 from embodied.generate.furnish.space import Thing, Wall
@@ -99,7 +99,7 @@ def wall_lamps(ctx: Context) -> None:
     if ctx.kind not in SCONCED or not ctx.chance(0.45):
         return
     hanging = Hanging(ctx.pick("wall lamp", most=(0.5, 0.35, 0.7)), 1.75, "wall_lamp", "wall lamp", margin=0.15)
-    for wall, s in along_walls(longest_first(ctx.space)[:2], at(0.25, 0.75)):
+    for wall, s in along_walls(ctx.space.longest_walls[:2], at(0.25, 0.75)):
         mount(ctx, hanging, wall, s)
 
 
@@ -132,6 +132,6 @@ def sockets(ctx: Context) -> None:
         asset = ctx.pick("double socket", avoid=()) or asset
     hanging = Hanging(asset, z, "electric", "wall socket")
     left = 1 + (ctx.space.area > 9) + (ctx.space.area > 20)
-    for wall, s in along_walls(longest_first(ctx.space), at(0.12, 0.88)):
+    for wall, s in along_walls(ctx.space.longest_walls, at(0.12, 0.88)):
         if left and wall.length > 1.2:
             left -= mount(ctx, hanging, wall, s) is not None

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.records import Asset
+from assets.records import Asset, Size
 from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.space import RoomSpace, Thing, Wall, box, overlap
-from embodied.generate.furnish.tables import Size
+from embodied.generate.furnish.space import Thing, Wall, box, overlap
 
 DEEP, THIN = 0.12, 0.07
 """What comes farther out of the wall must leave room to walk past: as furniture must, and a narrow way, metres."""
@@ -70,11 +69,6 @@ def mount(ctx: Context, hanging: Hanging, wall: Wall, s: float) -> Thing | None:
 def hang_first(ctx: Context, hanging: Hanging, spots: Iterable[Spot]) -> Thing | None:
     """Hang it at the first of the spots where it fits."""
     return next((thing for wall, s in spots if (thing := mount(ctx, hanging, wall, s)) is not None), None)
-
-
-def longest_first(space: RoomSpace) -> list[Wall]:
-    """The walls of a room, the longest first."""
-    return sorted(space.walls, key=lambda w: -w.length)
 
 
 def along_walls(walls: Iterable[Wall], shares: Shares) -> Iterator[Spot]:

@@ -8,7 +8,7 @@ from assets.records import Asset
 from embodied.generate.furnish.ceilings import hang_from_ceiling
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.groups import put_group
-from embodied.generate.furnish.mounting import Hanging, about_the_middle, along_stretches, hang_first, longest_first
+from embodied.generate.furnish.mounting import Hanging, about_the_middle, along_stretches, hang_first
 from embodied.generate.furnish.tables import Group, Part
 
 GROUP = "own"
@@ -35,7 +35,7 @@ def place_own(ctx: Context) -> None:
 
 def _place(ctx: Context, asset: Asset) -> None:
     if asset.support == "wall":
-        spots = along_stretches(longest_first(ctx.space), about_the_middle(ctx.rng))
+        spots = along_stretches(ctx.space.longest_walls, about_the_middle(ctx.rng))
         hang_first(ctx, Hanging(asset, asset.elevation, GROUP, role=asset.object_class), spots)
         return
     if asset.support == "ceiling":

@@ -4,21 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 
-from assets.records import Asset
+from assets.records import Asset, Size
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import free_stretch
-from embodied.generate.furnish.mounting import (
-    Hanging,
-    along_stretches,
-    at,
-    hang_first,
-    longest_first,
-    mount,
-    spot_behind,
-    stretches,
-)
+from embodied.generate.furnish.mounting import Hanging, along_stretches, at, hang_first, mount, spot_behind, stretches
 from embodied.generate.furnish.space import Thing, Wall
-from embodied.generate.furnish.tables import Size
 
 MIDDLE = 1.5
 """Height of the middle of a picture, metres."""
@@ -80,7 +70,7 @@ def pictures(ctx: Context) -> None:
         return
     target = sum(w.length for w in ctx.space.walls) / (4.5 if ctx.kind in ("corridor", "hall") else 6.0)
     hung = sum(t.role in ("picture", "mirror") for t in ctx.things)
-    for wall in longest_first(ctx.space):
+    for wall in ctx.space.longest_walls:
         for s in _picture_spots(wall) if wall.length >= 0.9 else ():
             if hung >= target:
                 return
@@ -154,7 +144,7 @@ def mirrors(ctx: Context) -> None:
     low = 1.2 if "round" in mirror.tags else 0.25
     for w, h in (*sizes, (0.6, 1.6), (0.5, 1.3)):
         hanging = Hanging(mirror, low, "mirror", size=_mirror_size(mirror, w, h), margin=0.03)
-        if hang_first(ctx, hanging, along_stretches(longest_first(ctx.space), at(0.5, 0.25, 0.75))):
+        if hang_first(ctx, hanging, along_stretches(ctx.space.longest_walls, at(0.5, 0.25, 0.75))):
             return
 
 

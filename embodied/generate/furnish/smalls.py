@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from assets.records import Asset, SupportSurface
+from assets.records import Asset, Size, SupportSurface
 from embodied.generate.furnish.arrange import Item, ScoredPose, floor_poses, wall_poses
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import door_distance, nearest
-from embodied.generate.furnish.mounting import Hanging, Spot, along_stretches, hang_first, longest_first
+from embodied.generate.furnish.mounting import Hanging, Spot, along_stretches, hang_first
 from embodied.generate.furnish.space import CELL, Box, Thing, Wall, box, overlap, same_box
-from embodied.generate.furnish.tables import Size, Small
+from embodied.generate.furnish.tables import Small
 
 EDGE, APART = 0.012, 0.008
 """Free strip at the edge of a surface, and between two things on it, metres."""
@@ -463,7 +463,7 @@ def _wall_spots(ctx: Context, small: Small, asset: Asset) -> Iterator[Spot]:
     """Spots on the walls: beside what it keeps close to, the nearest first, else about the middles of free walls."""
     anchors = ctx.called(*small.near)
     if not anchors:
-        yield from along_stretches(longest_first(ctx.space), lambda: ctx.rng.uniform(0.12, 0.88, 5).tolist())
+        yield from along_stretches(ctx.space.longest_walls, lambda: ctx.rng.uniform(0.12, 0.88, 5).tolist())
         return
     spots: list[tuple[float, int, float]] = []
     for k, wall in enumerate(ctx.space.walls):

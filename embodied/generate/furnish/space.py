@@ -201,6 +201,11 @@ class RoomSpace:
         """Of the floor between the walls, square metres."""
         return self.polygon.area
 
+    @property
+    def longest_walls(self) -> list[Wall]:
+        """The walls, the longest first."""
+        return sorted(self.walls, key=lambda w: -w.length)
+
     def inside(self, b: Box) -> bool:
         """Whether the box stays between the walls, a millimetre forgiven."""
         if self.rectangle is not None:

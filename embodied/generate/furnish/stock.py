@@ -10,9 +10,9 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from assets.catalogue import Catalogue
-from assets.records import Asset
+from assets.records import Asset, Size
 from embodied.generate.furnish.style import Style, liking
-from embodied.generate.furnish.tables import Size, Tables
+from embodied.generate.furnish.tables import Tables
 
 SMALLEST, LARGEST = (0.0, 0.0, 0.0), (99.0, 99.0, 99.0)
 """Bounds where no others are asked for, metres."""

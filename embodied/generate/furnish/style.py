@@ -25,33 +25,21 @@ class Style:
 
 
 PREFERENCES: Mapping[str, Style] = {
-    style.name: style
-    for style in (
-        Style(
+    name: Style(name, tuple(favours.split()), tuple(shuns.split()))
+    for name, favours, shuns in (
+        (
             "light",
-            ("white", "beige", "cream", "light", "pine", "birch", "grey", "scandinavian", "modern"),
-            ("black", "dark", "antique", "red", "gothic", "ornate"),
+            "white beige cream light pine birch grey scandinavian modern",
+            "black dark antique red gothic ornate",
         ),
-        Style(
-            "warm",
-            ("brown", "wood", "wooden", "oak", "beige", "leather", "orange", "rustic"),
-            ("black", "metal", "glass", "plastic", "purple"),
-        ),
-        Style(
-            "dark",
-            ("black", "grey", "dark", "leather", "glass", "metal", "walnut", "modern"),
-            ("pine", "pink", "rustic", "beige"),
-        ),
-        Style(
+        ("warm", "brown wood wooden oak beige leather orange rustic", "black metal glass plastic purple"),
+        ("dark", "black grey dark leather glass metal walnut modern", "pine pink rustic beige"),
+        (
             "classic",
-            ("brown", "dark", "antique", "classic", "ornate", "red", "wood", "oriental", "chesterfield"),
-            ("plastic", "modern", "white", "glass", "metal"),
+            "brown dark antique classic ornate red wood oriental chesterfield",
+            "plastic modern white glass metal",
         ),
-        Style(
-            "colourful",
-            ("blue", "green", "red", "yellow", "orange", "white", "modern"),
-            ("brown", "dark", "antique", "black"),
-        ),
+        ("colourful", "blue green red yellow orange white modern", "brown dark antique black"),
     )
 }
 """Name of a style to what its owner prefers; the names are those of embodied.house.validation.STYLES."""

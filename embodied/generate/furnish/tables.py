@@ -15,6 +15,7 @@ from typing import Any
 
 from assets.catalogue import Catalogue
 from assets.json_file import RecordError, from_plain, read_toml
+from assets.records import Size
 
 FILES = ("groups.toml", "rooms.toml", "smalls.toml")
 BUILT = ("kitchen_line",)
@@ -41,8 +42,6 @@ LIKES = (
     "noise",
 )
 PER = ("room", "carrier", "person", "adult", "child", "young")
-Size = tuple[float, float, float]
-"""Width, depth and height, metres."""
 
 
 @dataclass(frozen=True)

@@ -11,23 +11,9 @@ import cv2
 import numpy as np
 import shapely
 
-from embodied.geometry import r2
 from embodied.house.house import House
 from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import (
-    added_up,
-    array,
-    brightness,
-    constant,
-    dr,
-    flags,
-    floats,
-    fraction,
-    mi,
-    number,
-    vector,
-    wholes,
-)
+from embodied.light.backend import added_up, array, brightness, constant, dr, flags, floats, mi, number, vector, wholes
 from embodied.light.baking.solve import Radiosity
 from embodied.light.memory import Memory, once
 from embodied.light.pages.atlas import Atlas, Page
@@ -288,9 +274,7 @@ def _mirrored(
     spread_of, straight = floats(width), vector(bounced)
 
     def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k) + 1)
-        ball = mi.warp.square_to_uniform_sphere(fraction(mi.Point2f(p.turn0 + a, p.turn1 + b)))
-        d = dr.normalize(straight + ball * spread_of)
+        d = dr.normalize(straight + mi.warp.square_to_uniform_sphere(p.sample(k)) * spread_of)
         d = dr.select(dr.dot(d, p.normal) < 0.02, straight, d)
         near, hit = radiosity.hit_colour(space, table, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
         return (dr.select(hit, near, radiosity.env_lookup(space.env, d, ~hit) * radiosity.GLASS),)

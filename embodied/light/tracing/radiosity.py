@@ -55,6 +55,11 @@ class Points:
     turn1: Array
     """Per-point rotation of the sample sequences (Cranley and Patterson 1976)."""
 
+    def sample(self, k: Array) -> Array:
+        """Two numbers in [0, 1) for every point (a Point2f), the k-th of its sequence."""
+        a, b = r2(mi.Float(k) + 1)
+        return fraction(mi.Point2f(self.turn0 + a, self.turn1 + b))
+
 
 def points_of(
     position: np.ndarray, normal: np.ndarray, face_normal: np.ndarray, thin: np.ndarray, turn: np.ndarray | None = None
@@ -202,9 +207,7 @@ def open_sky(scene: RayScene, env: Array, p: Points, samples: int, hidden: Array
     """(n, 3) e from the sky `env` on the points' front, by so many ways each; `hidden` (a Color3f) where things are."""
 
     def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k) + 1)
-        u = fraction(mi.Point2f(p.turn0 + a, p.turn1 + b))
-        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        d = mi.Frame3f(p.normal).to_world(mi.warp.square_to_cosine_hemisphere(p.sample(k)))
         free = ~scene.ray_test(mi.Ray3f(p.position + p.face_normal * LIFT, d))
         return (dr.select(free, env_lookup(env, d, free), hidden),)
 
@@ -225,9 +228,8 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Mem
     area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
-        a, b = r2(mi.Float(k) + 1)
-        q = corner + along * fraction(p.turn0 + a) + up * fraction(p.turn1 + b)
-        d, far, cos, side, active = towards(p, q)
+        u = p.sample(k)
+        d, far, cos, side, active = towards(p, corner + along * u.x + up * u.y)
         leaving = -dr.dot(n, d)
         active &= leaving > 0
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 4 * LIFT, 0.0, [])
@@ -256,8 +258,7 @@ def lamp_light(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> Array:
     strength, most = constant(lamp.area / np.pi / samples), constant((400.0 if bare else 4.0) / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
-        pick = fraction(p.turn0 + r2(mi.Float(k) + 1)[0])
-        i = dr.minimum(mi.UInt32(pick * mi.Float(count)), count - 1)
+        i = dr.minimum(mi.UInt32(p.sample(k).x * mi.Float(count)), count - 1)
         d, far, cos, side, active = towards(p, dr.gather(mi.Point3f, at, i))
         if bare:
             g = cos / dr.maximum(dr.square(far), 0.06)
@@ -275,20 +276,21 @@ def lamp_light(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> Array:
     return mi.Color3f(*(constant(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
 
 
-def sun_share(
-    scene: RayScene, p: Points, portals: RayScene, towards: np.ndarray, directions: int, radius: float = 0.006
-) -> Array:
+SUN = 0.006
+"""Radius of the sun's disc, radians; a little over the real 0.0047 for soft edges at texel size."""
+
+
+def sun_share(scene: RayScene, p: Points, portals: RayScene, towards: np.ndarray, directions: int) -> Array:
     """Cosine-weighted share (a Float) of the sun's disc that a point sees through a portal.
 
     Args:
       directions: rays over the disc, the same for all points: ragged shadow edges come from random ones.
-      radius: of the disc, radians; a little over the real 0.0047 for soft edges at texel size.
     """
     frame = mi.Frame3f(mi.Vector3f(*(constant(x) for x in towards)))
     whole = constant(directions)
 
     def one(k: Array) -> tuple[Array, ...]:
-        r, turn = constant(radius * (directions > 1)) * dr.sqrt((mi.Float(k) + 0.5) / whole), mi.Float(k) * 2.399963
+        r, turn = constant(SUN * (directions > 1)) * dr.sqrt((mi.Float(k) + 0.5) / whole), mi.Float(k) * 2.399963
         d = dr.normalize(frame.n + frame.s * (r * dr.cos(turn)) + frame.t * (r * dr.sin(turn)))
         cos, side, active = facing(p, d)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d)
@@ -393,10 +395,8 @@ def _rays(space: Space, p: Points, first: int) -> Callable:
     start = number(first)
 
     def meet(k: Array) -> tuple[Array, ...]:
-        u0, u1 = r2(mi.Float(k + start) + 1)
         side = dr.select(p.thin & (((k + start) & 1) == 1), -1.0, 1.0)
-        u = fraction(mi.Point2f(p.turn0 + u0, p.turn1 + u1))
-        d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        d = mi.Frame3f(p.normal * side).to_world(mi.warp.square_to_cosine_hemisphere(p.sample(k + start)))
         out = p.face_normal * side
         rise = dr.dot(d, out)
         d = dr.normalize(dr.select(rise < 0.01, d - out * (rise - 0.02), d))
