@@ -651,6 +651,8 @@ Observations = Sequence[Observation | None]
 """Of a batch of episodes; None where one has ended."""
 Situations = Sequence[Situation | None]
 Actions = list[Action | None]
+Rngs = Sequence[np.random.Generator]
+"""One for each episode of a batch."""
 
 
 class Policy(Protocol):
@@ -662,9 +664,7 @@ class Policy(Protocol):
     that an episode does not depend on the batch around it.
     """
 
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]: ...
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]: ...
 
 
 @runtime_checkable
@@ -672,7 +672,7 @@ class PrivilegedPolicy(Protocol):
     """A skyline or baseline that is shown the situations as well; otherwise as Policy."""
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]: ...
 
 
@@ -681,12 +681,7 @@ Agent = Policy | PrivilegedPolicy
 
 
 def act(
-    agent: Agent,
-    observations: Observations,
-    situations: Situations,
-    memory: Any,
-    *,
-    rngs: Sequence[np.random.Generator],
+    agent: Agent, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
 ) -> tuple[Actions, Any]:
     """What an agent does; it is shown the situations only if it says that it needs them."""
     if isinstance(agent, PrivilegedPolicy):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from embodied.interface import (
     Intention,
     Observation,
     Observations,
+    Rngs,
     Situation,
     Situations,
     Stop,
@@ -90,7 +91,7 @@ class Foresight:
         self._make_env, self._note, self._doubts, self._learner = make_env, note, doubts, learner
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         if memory is None:
             memory = []

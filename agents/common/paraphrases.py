@@ -20,7 +20,7 @@ import numpy as np
 
 from assets.catalogue import Catalogue
 from assets.json_file import from_plain, read_toml
-from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedPolicy, Situations
+from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedPolicy, Rngs, Situations
 from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
 from embodied.language.grammar import kind_of, normalised, parse
 from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
@@ -190,9 +190,7 @@ class Reworded:
     policy: Policy
     say: Callable[[str], str]
 
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
         return self.policy.act(_heard(observations, self.say), memory, rngs=rngs)
 
 
@@ -204,7 +202,7 @@ class RewordedPrivileged:
     say: Callable[[str], str]
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         return self.policy.act_privileged(_heard(observations, self.say), situations, memory, rngs=rngs)
 

@@ -7,11 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import rollout
-from embodied.interface import Actions, Agent, Episode, Observations, Place, Situations, Task, act
+from embodied.interface import Actions, Agent, Episode, Observations, Place, Rngs, Situations, Task, act
 
 
 class _MemoryKeeper:
@@ -23,7 +21,7 @@ class _MemoryKeeper:
         self.seconds = 0.0
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         began = time.perf_counter()
         actions, self.memory = act(self._agent, observations, situations, memory, rngs=rngs)

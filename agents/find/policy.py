@@ -20,7 +20,7 @@ from agents.common.vocabulary import Vocabulary
 from agents.find.network import SeekNetwork
 from agents.find.way_map import WayMap, directions
 from agents.vision.bank import FeatureBank
-from embodied.interface import Action, Move, Observation, Situation, Stop
+from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Situation, Situations, Stop
 
 STOP = -1
 """Stands for a way where an option is to stop."""
@@ -96,19 +96,13 @@ class FindPolicy:
     """What places are known again by."""
     choose: Chooser = choose_greedily
 
-    def act(
-        self, observations: Sequence[Observation | None], memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[list[Action | None], dict[int, Search]]:
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, dict[int, Search]]:
         """One step of every running episode; see embodied.interface.Policy."""
         return self._act(observations, [None] * len(observations), memory, rngs)
 
     def _act(
-        self,
-        observations: Sequence[Observation | None],
-        situations: Sequence[Situation | None],
-        memory: dict[int, Search] | None,
-        rngs: Sequence[np.random.Generator],
-    ) -> tuple[list[Action | None], dict[int, Search]]:
+        self, observations: Observations, situations: Situations, memory: dict[int, Search] | None, rngs: Rngs
+    ) -> tuple[Actions, dict[int, Search]]:
         running = [(i, o) for i, o in enumerate(observations) if o is not None]
         memory = memory or {i: Search(self.vocabulary.encode(o.instruction, WORDS)) for i, o in running}
         looks = self.looks.gather([o.sight for _, o in running]).float().numpy()
@@ -120,7 +114,7 @@ class FindPolicy:
                 memory[i].ends.append(s.candidate_nodes)
                 costs = left_after(s.pose.node, s.candidate_nodes, s)
                 memory[i].right.append((s.pose.node in s.targets, wanted(costs)))
-        actions: list[Action | None] = [None] * len(observations)
+        actions: Actions = [None] * len(observations)
         for i, o in running:
             actions[i] = self._next(memory[i], o, situations[i], rngs[i])
         return actions, memory
@@ -206,13 +200,8 @@ class Watched:
     policy: FindPolicy
 
     def act_privileged(
-        self,
-        observations: Sequence[Observation | None],
-        situations: Sequence[Situation | None],
-        memory: Any,
-        *,
-        rngs: Sequence[np.random.Generator],
-    ) -> tuple[list[Action | None], dict[int, Search]]:
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
+    ) -> tuple[Actions, dict[int, Search]]:
         return self.policy._act(observations, situations, memory, rngs)
 
 

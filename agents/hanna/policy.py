@@ -21,7 +21,20 @@ from agents.hanna.percept import COPIES, DO_NOTHING, HEADINGS, REQUEST, SLOTS, S
 from agents.hanna.recognition import Likeness, PlaceMap
 from agents.hanna.trail import Trail, weigh, weigh_by_image
 from agents.vision.bank import FeatureBank
-from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Situation, Stop, Thought
+from embodied.interface import (
+    Actions,
+    Ask,
+    Intention,
+    Mode,
+    Move,
+    Observation,
+    Observations,
+    Rngs,
+    Situation,
+    Situations,
+    Stop,
+    Thought,
+)
 from embodied.teachers.shortest import shortest_action
 
 
@@ -83,12 +96,12 @@ class HannaPolicy:
 
     def act(
         self,
-        observations: Sequence[Observation | None],
+        observations: Observations,
         memory: HannaMemory | None,
         *,
-        rngs: Sequence[np.random.Generator],
+        rngs: Rngs,
         imposed: Sequence[int | None] | None = None,
-    ) -> tuple[list[Action | None], HannaMemory]:
+    ) -> tuple[Actions, HannaMemory]:
         """One step of every running episode; see embodied.interface.Policy.
 
         Args:
@@ -108,7 +121,7 @@ class HannaPolicy:
         said = None if scores.reasons is None else scores.reasons.detach().sigmoid().tolist()  # (k, 3)
         reasons = [None] * len(seen) if said is None else [tuple(r) for r in said]
         trails = self._trails(memory.trails, seen) if memory.trails else []
-        actions: list[Action | None] = [None] * len(observations)
+        actions: Actions = [None] * len(observations)
         guided = round(self.guided_asking * len(observations))
         chosen, last_ask = [], []
         for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
@@ -264,13 +277,8 @@ class PerfectInterpretation:
     policy: HannaPolicy
 
     def act_privileged(
-        self,
-        observations: Sequence[Observation | None],
-        situations: Sequence[Situation | None],
-        memory: HannaMemory | None,
-        *,
-        rngs: Sequence[np.random.Generator],
-    ) -> tuple[list[Action | None], HannaMemory]:
+        self, observations: Observations, situations: Situations, memory: HannaMemory | None, *, rngs: Rngs
+    ) -> tuple[Actions, HannaMemory]:
         imposed = [None if s is None or s.mode is Mode.MAIN else _teacher_index(s) for s in situations]
         return self.policy.act(observations, memory, rngs=rngs, imposed=imposed)
 

@@ -6,7 +6,7 @@ The belief b^s advances at every time step (appendix E), so that what CUR answer
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +25,7 @@ from embodied.interface import (
     Move,
     Observation,
     Observations,
+    Rngs,
     Situations,
     Stop,
     Thought,
@@ -193,9 +194,7 @@ class HariPolicy:
     def __post_init__(self) -> None:
         self._reader = Reader(self.executor)
 
-    def act(
-        self, observations: Observations, memory: Mind | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Mind]:
+    def act(self, observations: Observations, memory: Mind | None, *, rngs: Rngs) -> tuple[Actions, Mind]:
         """See embodied.interface.Policy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)
         return self._choose(observations, considered, {}, belief, memory, rngs)
@@ -207,7 +206,7 @@ class HariPolicy:
         led: Mapping[int, int | None],
         belief: Belief,
         memory: Mind | None,
-        rngs: Sequence[np.random.Generator],
+        rngs: Rngs,
     ) -> tuple[Actions, Mind]:
         mind = memory or Mind(
             belief, self.actor.begin(len(observations)), torch.zeros(len(observations), dtype=torch.long)
@@ -257,12 +256,7 @@ class PerfectOnSubgoals(HariPolicy):
     """The skyline of Table 4.7: on a sub-goal, DO walks the shortest path to it, one node each, and stops there."""
 
     def act_privileged(
-        self,
-        observations: Observations,
-        situations: Situations,
-        memory: Mind | None,
-        *,
-        rngs: Sequence[np.random.Generator],
+        self, observations: Observations, situations: Situations, memory: Mind | None, *, rngs: Rngs
     ) -> tuple[Actions, Mind]:
         """See embodied.interface.PrivilegedPolicy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from agents.hari.agent import Executor
 from agents.hari.networks import INTENTIONS
 from agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider
-from embodied.interface import Actions, Observations
+from embodied.interface import Actions, Observations, Rngs
 
 CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]
 
@@ -134,9 +134,7 @@ class RuleAgent:
     def __post_init__(self) -> None:
         self._reader = Reader(self.executor)
 
-    def act(
-        self, observations: Observations, memory: RuleMemory | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, RuleMemory]:
+    def act(self, observations: Observations, memory: RuleMemory | None, *, rngs: Rngs) -> tuple[Actions, RuleMemory]:
         """See embodied.interface.Policy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)
         mind = memory or self._begin(belief, rngs)
@@ -154,7 +152,7 @@ class RuleAgent:
             described[i] = chosen == CUR or (described[i] and chosen != DO)
         return actions, RuleMemory(carry(considered, belief), taken, described, mind.budgets)
 
-    def _begin(self, belief: Belief, rngs: Sequence[np.random.Generator]) -> RuleMemory:
+    def _begin(self, belief: Belief, rngs: Rngs) -> RuleMemory:
         shape = (len(rngs), len(INTENTIONS))
         budgets = np.stack([self.rule.budget(rng) for rng in rngs])
         return RuleMemory(belief, np.zeros(shape, dtype=np.int64), np.zeros(len(rngs), dtype=bool), budgets)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from agents.language_models.client import Answer, Client
 from agents.language_models.telling import Teller, action_in, schema_of, told
-from embodied.interface import Action, Actions, Move, Observation, Observations, Stop, Thought
+from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Stop, Thought
 
 PATIENCE = 4
 """Answers in a row that are none, after which the agent stops."""
@@ -31,9 +30,7 @@ class LanguageModelAgent:
     def __init__(self, client: Client, teller: Teller | None = None) -> None:
         self._client, self._teller = client, teller or Teller()
 
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
         trails = memory or [_Trail() for _ in observations]
         playing = [(o, i) for i, o in enumerate(observations) if o is not None]
         asked = [(self._teller.messages(o, trails[i].said), schema_of(o)) for o, i in playing]

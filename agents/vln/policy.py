@@ -27,6 +27,7 @@ from embodied.interface import (
     Move,
     Observation,
     Observations,
+    Rngs,
     Situation,
     Situations,
     Stop,
@@ -75,9 +76,7 @@ class VlnPolicy:
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all (Tan et al. 2019). For training."""
 
-    def act(
-        self, observations: Observations, memory: VlnMemory | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, VlnMemory]:
+    def act(self, observations: Observations, memory: VlnMemory | None, *, rngs: Rngs) -> tuple[Actions, VlnMemory]:
         """One step of every running episode; see embodied.interface.Policy."""
         return self.play(observations, None, memory, rngs=rngs)
 
@@ -87,7 +86,7 @@ class VlnPolicy:
         situations: Situations | None,
         memory: VlnMemory | None,
         *,
-        rngs: Sequence[np.random.Generator],
+        rngs: Rngs,
         guided: Guided | None = None,
     ) -> tuple[Actions, VlnMemory]:
         """One step of every running episode.
@@ -169,12 +168,7 @@ class SupervisedVln:
     guided: Guided
 
     def act_privileged(
-        self,
-        observations: Observations,
-        situations: Situations,
-        memory: VlnMemory | None,
-        *,
-        rngs: Sequence[np.random.Generator],
+        self, observations: Observations, situations: Situations, memory: VlnMemory | None, *, rngs: Rngs
     ) -> tuple[Actions, VlnMemory]:
         return self.policy.play(observations, situations, memory, rngs=rngs, guided=self.guided)
 

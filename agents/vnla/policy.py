@@ -41,7 +41,7 @@ from embodied.interface import (
     Observation,
     Observations,
     Pose,
-    Situation,
+    Rngs,
     Situations,
     Stop,
     Thought,
@@ -99,9 +99,7 @@ class VnlaPolicy:
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all. For training."""
 
-    def act(
-        self, observations: Observations, memory: VnlaMemory | None, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, VnlaMemory]:
+    def act(self, observations: Observations, memory: VnlaMemory | None, *, rngs: Rngs) -> tuple[Actions, VnlaMemory]:
         """One step of every running episode; see embodied.interface.Policy."""
         none = [None] * len(observations)
         return self.play(observations, none, memory, rngs=rngs, decide=self.wants)
@@ -120,7 +118,7 @@ class VnlaPolicy:
         situations: Situations,
         memory: VnlaMemory | None,
         *,
-        rngs: Sequence[np.random.Generator],
+        rngs: Rngs,
         decide: Decide,
         teacher: VnlaTeacher | None = None,
     ) -> tuple[Actions, VnlaMemory]:
@@ -161,9 +159,7 @@ class VnlaPolicy:
             memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
         return actions, _after(memory, seen, set(asking))
 
-    def start(
-        self, positions: tuple[int, ...], situations: Situations, rngs: Sequence[np.random.Generator]
-    ) -> VnlaMemory:
+    def start(self, positions: tuple[int, ...], situations: Situations, rngs: Rngs) -> VnlaMemory:
         """Memory before the first step of the episodes at `positions`."""
         k, device = len(positions), next(self.network.parameters()).device
         drawn = [
@@ -263,12 +259,7 @@ class SupervisedVnla:
     """The learned asker asks when the teacher would, as in training."""
 
     def act_privileged(
-        self,
-        observations: Observations,
-        situations: Situations,
-        memory: VnlaMemory | None,
-        *,
-        rngs: Sequence[np.random.Generator],
+        self, observations: Observations, situations: Situations, memory: VnlaMemory | None, *, rngs: Rngs
     ) -> tuple[Actions, VnlaMemory]:
         def wants(
             position: int, o: Observation, thought: Thought, times: frozenset[int], rng: np.random.Generator
@@ -323,7 +314,7 @@ def _after(memory: VnlaMemory, seen: Sequence[Observation], asking: set[int]) ->
 
 def _moment(
     teacher: VnlaTeacher,
-    situations: Sequence[Situation | None],
+    situations: Situations,
     thoughts: dict[int, Thought],
     asks: Tensor,
     able: Sequence[int],

@@ -7,11 +7,9 @@ import importlib.util
 import json
 import sys
 import urllib.parse
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from embodied.errors import UnableError
 from embodied.interface import (
@@ -24,6 +22,7 @@ from embodied.interface import (
     Observation,
     Observations,
     Place,
+    Rngs,
     Stop,
     Task,
 )
@@ -115,9 +114,7 @@ class HttpAgent:
         if not self._url.hostname:
             raise ValueError(f"{url!r} is no address; write http://HOST:PORT/PATH")
 
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
         names = memory or [f"{rng.integers(2**63):x}" for rng in rngs]
         return [None if o is None else self._one(o, name) for o, name in zip(observations, names, strict=True)], names
 

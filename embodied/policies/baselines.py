@@ -7,7 +7,7 @@ others see Observations only.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -25,6 +25,7 @@ from embodied.interface import (
     Observation,
     Observations,
     PrivilegedPolicy,
+    Rngs,
     Situation,
     Situations,
     Stop,
@@ -40,18 +41,14 @@ from embodied.teachers.vnla import ask_reason
 class RandomWalk:
     """Uniform over the candidates and stop at every step (docs/sources.md, S42); never asks."""
 
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
         return [None if o is None else _random_move(o, rng) for o, rng in zip(observations, rngs)], ()
 
 
 class Forward10:
     """The candidate nearest the middle of the view for ten steps, then stop (docs/sources.md, S42)."""
 
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
         return [None if o is None else self._one(o) for o in observations], ()
 
     def _one(self, observation: Observation) -> Action:
@@ -71,7 +68,7 @@ class OneByOne:
         raise NotImplementedError
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         minds = memory or [self.mind() for _ in observations]
         return [
@@ -131,7 +128,7 @@ class PrivilegedAsking:
         self._navigation, self._rule = navigation, rule
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         last, inner = memory or ([-1] * len(observations), None)
         actions, inner = self._navigation.act_privileged(observations, situations, inner, rngs=rngs)
@@ -186,9 +183,7 @@ class SubgoalListener:
     it goes back to the request when it has done what was said.
     """
 
-    def act(
-        self, observations: Observations, memory: Any, *, rngs: Sequence[np.random.Generator]
-    ) -> tuple[Actions, Any]:
+    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
         pending = memory or [("", (), False) for _ in observations]
         actions: Actions = []
         for i, o in enumerate(observations):
@@ -242,7 +237,7 @@ class VnlaAsking:
         self._navigation, self._ask = navigation, ask
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         times, inner = memory or (self._times(situations, rngs), None)
         actions, inner = act(self._navigation, observations, situations, inner, rngs=rngs)
@@ -253,7 +248,7 @@ class VnlaAsking:
                 actions[i] = Ask(o.can_ask[0], planned.thought)
         return actions, (times, inner)
 
-    def _times(self, situations: Situations, rngs: Sequence[np.random.Generator]) -> list[frozenset[int]]:
+    def _times(self, situations: Situations, rngs: Rngs) -> list[frozenset[int]]:
         random = self._ask == "random"
         return [random_times(s, rng) if random and s else frozenset() for s, rng in zip(situations, rngs, strict=True)]
 

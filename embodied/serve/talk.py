@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from embodied.interface import (
     Observations,
     Place,
     Reply,
+    Rngs,
     Situation,
     Situations,
     Subtask,
@@ -133,7 +134,7 @@ class Follower:
         self._shortest, self._every = Shortest(), every
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Sequence[np.random.Generator]
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         actions, _ = self._shortest.act_privileged(observations, situations, None, rngs=rngs)
         asked = memory or [-self._every] * len(observations)
