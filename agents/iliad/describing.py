@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Generic, TypeVar
+from typing import Any
 
 import numpy as np
 
-from agents.iliad.protocol import NOTHING
-
-T = TypeVar("T")
-E = TypeVar("E")
+from agents.iliad.protocol import NOTHING, Executions, Tasks
 
 
 def kept(candidates: Sequence[str], performances: Sequence[float], threshold: float) -> list[str]:
@@ -32,7 +29,7 @@ def by_the_program(pragmatic: Sequence[str]) -> str:
     return pragmatic[0] if pragmatic else NOTHING
 
 
-class DescribingNetworks(ABC, Generic[T, E]):
+class DescribingNetworks(ABC):
     """Eq 3.15 and 3.16: a describer whose words count where an executor carries them out as the execution went."""
 
     threshold: float
@@ -44,28 +41,28 @@ class DescribingNetworks(ABC, Generic[T, E]):
         self.candidates, self.pragmatics = candidates, pragmatics
 
     @abstractmethod
-    def spoken_of(self, task: T, execution: E) -> bool:
+    def spoken_of(self, task: Any, execution: Any) -> bool:
         """Whether there is anything to say."""
 
     @abstractmethod
-    def near_optimal(self, task: T, execution: E) -> bool:
+    def near_optimal(self, task: Any, execution: Any) -> bool:
         """perf >= tau of Eq 3.15: people's own words describe it."""
 
     @abstractmethod
-    def human(self, task: T, *, rng: np.random.Generator) -> str:
+    def human(self, task: Any, *, rng: np.random.Generator) -> str:
         """Unif(D*)."""
 
     @abstractmethod
     def candidates_of(
-        self, tasks: Sequence[T], executions: Sequence[E], uniforms: np.ndarray | None = None
+        self, tasks: Tasks, executions: Executions, uniforms: np.ndarray | None = None
     ) -> list[list[str]]:
         """The likeliest description of each execution, or different ones sampled with `uniforms` (B, K, words)."""
 
     @abstractmethod
-    def performances(self, cases: Sequence[tuple[T, E, str]]) -> list[float]:
+    def performances(self, cases: Sequence[tuple[Any, Any, str]]) -> list[float]:
         """perf(e^d, e): how nearly the executor, told d, does the same."""
 
-    def describe(self, tasks: Sequence[T], executions: Sequence[E], *, rng: np.random.Generator) -> list[str | None]:
+    def describe(self, tasks: Tasks, executions: Executions, *, rng: np.random.Generator) -> list[str | None]:
         uniforms = rng.random((len(tasks), self.candidates - 1, self.longest))
         said: list[str | None] = [None] * len(tasks)
         left = []
@@ -81,7 +78,7 @@ class DescribingNetworks(ABC, Generic[T, E]):
             said[i] = text or None
         return said
 
-    def _pragmatic(self, tasks: Sequence[T], executions: Sequence[E], uniforms: np.ndarray) -> list[list[str]]:
+    def _pragmatic(self, tasks: Tasks, executions: Executions, uniforms: np.ndarray) -> list[list[str]]:
         """D_prag of each execution, the likeliest description first; of the program's rule, which wants the first one
         only, no more than that."""
         if not tasks:
@@ -95,7 +92,7 @@ class DescribingNetworks(ABC, Generic[T, E]):
                 found[i] = list(dict.fromkeys([*found[i], *more]))
         return found
 
-    def _kept(self, tasks: Sequence[T], executions: Sequence[E], several: Sequence[Sequence[str]]) -> list[list[str]]:
+    def _kept(self, tasks: Tasks, executions: Executions, several: Sequence[Sequence[str]]) -> list[list[str]]:
         """Those that the executor carries out as the execution went."""
         cases = [(q, e, d) for q, e, many in zip(tasks, executions, several) for d in many]
         scores = iter(self.performances(cases))

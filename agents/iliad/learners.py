@@ -8,46 +8,50 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from agents.common.losses import Decisions, actor_loss
-from agents.iliad.protocol import NOTHING, DescribingTeacher, E, ExecutionScores, Marginal, Q, RequestWorld, Student
+from agents.iliad.protocol import (
+    NOTHING,
+    DescribingTeacher,
+    Executions,
+    ExecutionScores,
+    Marginal,
+    RequestWorld,
+    Student,
+    Tasks,
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Asked(Generic[Q]):
+class Asked:
     """One batch: what is to be done, in what words."""
 
-    tasks: Sequence[Q]
+    tasks: Tasks
     requests: Sequence[str]
     rng: np.random.Generator
     """What is drawn of this batch."""
 
 
 @dataclass(frozen=True, eq=False)
-class IliadLesson(Generic[Q, E]):
+class IliadLesson:
     """What came of one batch."""
 
     loss: Tensor
     """Whose gradient is followed; a scalar."""
-    executions: Sequence[E]
+    executions: Executions
     """What the agent did for the requests."""
     descriptions: Sequence[str | None] = ()
     """What the teacher said of it, where there is one."""
 
 
 def adel(
-    asked: Asked[Q],
-    teacher: DescribingTeacher[Q, E],
-    marginal: Marginal[Q, E],
-    explorer: Student[Q, E],
-    student: Student[Q, E],
-    mixing: float,
-) -> IliadLesson[Q, E]:
+    asked: Asked, teacher: DescribingTeacher, marginal: Marginal, explorer: Student, student: Student, mixing: float
+) -> IliadLesson:
     """Lines 6 to 10 of Algorithm 9; `explorer` is pi_beta, `student` pi_theta, the loss is of both."""
     done = explorer.sample(asked.tasks, asked.requests, rng=asked.rng)  # line 6
     said = teacher.describe(asked.tasks, done, rng=asked.rng)  # line 7
@@ -57,12 +61,12 @@ def adel(
 
 
 def adel_loss(
-    tasks: Sequence[Q],
-    done: Sequence[E],
+    tasks: Tasks,
+    done: Executions,
     said: Sequence[str | None],
-    unlabeled: Sequence[E],
-    explorer: Student[Q, E],
-    student: Student[Q, E],
+    unlabeled: Executions,
+    explorer: Student,
+    student: Student,
     mixing: float,
 ) -> Tensor:
     """-L(theta) - L(beta) of line 9: summed over actions, averaged over the batch.
@@ -83,7 +87,7 @@ def adel_loss(
     return loss / len(said)
 
 
-def described_loss(tasks: Sequence[Q], done: Sequence[E], said: Sequence[str | None], student: Student[Q, E]) -> Tensor:
+def described_loss(tasks: Tasks, done: Executions, said: Sequence[str | None], student: Student) -> Tensor:
     """-log pi_theta of the executions that were described, summed over actions; 0 where nothing was said."""
     loss = 0 * next(iter(student.network.parameters())).sum()
     heard = [i for i, d in enumerate(said) if d]
@@ -94,8 +98,8 @@ def described_loss(tasks: Sequence[Q], done: Sequence[E], said: Sequence[str | N
 
 
 def mixture(
-    asked: Asked[Q], teacher: DescribingTeacher[Q, E], marginal: Marginal[Q, E], student: Student[Q, E], mixing: float
-) -> IliadLesson[Q, E]:
+    asked: Asked, teacher: DescribingTeacher, marginal: Marginal, student: Student, mixing: float
+) -> IliadLesson:
     """Algorithm 5: the execution of each task comes from the mixture of Eq 3.14, and the student learns what was said.
 
     With `mixing` 1 this is Algorithm 4, with 0 Algorithm 8 whose epochs are one batch long. What was said is learned
@@ -108,7 +112,7 @@ def mixture(
     return IliadLesson(described_loss(tasks, done, said, student) / len(tasks), done, said)
 
 
-def dagger(asked: Asked[Q], world: RequestWorld[Q, E], student: Student[Q, E]) -> IliadLesson[Q, E]:
+def dagger(asked: Asked, world: RequestWorld, student: Student) -> IliadLesson:
     """Imitation: the student acts and is shown the best action in every state that it came to."""
     done = student.practise(asked.tasks, asked.requests, rng=asked.rng)
     shown = [world.demonstrate(q, e) for q, e in zip(asked.tasks, done, strict=True)]
@@ -117,8 +121,8 @@ def dagger(asked: Asked[Q], world: RequestWorld[Q, E], student: Student[Q, E]) -
 
 
 def reinforce(
-    asked: Asked[Q], reward: Callable[[Q, E], float], mean: RunningMean, student: Student[Q, E], entropy: float
-) -> IliadLesson[Q, E]:
+    asked: Asked, reward: Callable[[Any, Any], float], mean: RunningMean, student: Student, entropy: float
+) -> IliadLesson:
     """REINFORCE against the mean of all rewards so far, those of this batch included."""
     done = student.sample(asked.tasks, asked.requests, rng=asked.rng)
     rewards = [float(reward(q, e)) for q, e in zip(asked.tasks, done, strict=True)]

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from torch import Tensor, nn
 
-Q = TypeVar("Q")
-"""A task q = (R, s_1, d*)."""
-E = TypeVar("E")
-"""An execution e = (s_1, a_1, .., s_H, a_H)."""
-Q_in = TypeVar("Q_in", contravariant=True)
-E_in = TypeVar("E_in", contravariant=True)
-"""The same where they are only taken, never given."""
+Tasks = Sequence[Any]
+"""Tasks q = (R, s_1, d*)."""
+Executions = Sequence[Any]
+"""Executions e = (s_1, a_1, .., s_H, a_H)."""
 NOTHING = ""
 """The empty description."""
 
@@ -43,56 +40,50 @@ class ExecutionScores:
         return self.log_probabilities if self.besides is None else self.log_probabilities - self.besides
 
 
-class RequestWorld(Protocol[Q_in, E]):
+class RequestWorld(Protocol):
     """Where requests are fulfilled. Only imitation asks for `demonstrate`, only REINFORCE for `reward`."""
 
-    def request(self, task: Q_in, *, rng: np.random.Generator) -> str:
+    def request(self, task: Any, *, rng: np.random.Generator) -> str:
         """d*: one of the task's requests."""
 
-    def success(self, task: Q_in, execution: E) -> bool:
+    def success(self, task: Any, execution: Any) -> bool:
         """Whether the task is fulfilled."""
 
-    def reward(self, task: Q_in, execution: E) -> float:
+    def reward(self, task: Any, execution: Any) -> float:
         """Nearness to the goal, at most 1 (C.1, C.2)."""
 
-    def demonstrate(self, task: Q_in, execution: E) -> E:
+    def demonstrate(self, task: Any, execution: Any) -> Any:
         """The best actions in the states of an execution, one for each, the last one stopping."""
 
 
-class DescribingTeacher(Protocol[Q_in, E_in]):
+class DescribingTeacher(Protocol):
     """P_T(d | e)."""
 
-    def describe(
-        self, tasks: Sequence[Q_in], executions: Sequence[E_in], *, rng: np.random.Generator
-    ) -> list[str | None]:
+    def describe(self, tasks: Tasks, executions: Executions, *, rng: np.random.Generator) -> list[str | None]:
         """What was done; None where the teacher has nothing to say."""
 
 
-class Marginal(Protocol[Q_in, E]):
+class Marginal(Protocol):
     """P_omega(e | s_1), which knows nothing of requests."""
 
-    def draw(self, tasks: Sequence[Q_in], *, rng: np.random.Generator) -> list[E]:
+    def draw(self, tasks: Tasks, *, rng: np.random.Generator) -> list[Any]:
         """An execution that begins where each task begins."""
 
 
-class Student(Protocol[Q_in, E]):
+class Student(Protocol):
     """pi(a | s, d)."""
 
-    def sample(self, tasks: Sequence[Q_in], requests: Sequence[str], *, rng: np.random.Generator) -> list[E]:
+    def sample(self, tasks: Tasks, requests: Sequence[str], *, rng: np.random.Generator) -> list[Any]:
         """e ~ P_pi(. | s_1, d)."""
 
-    def greedy(self, tasks: Sequence[Q_in], requests: Sequence[str]) -> list[E]:
+    def greedy(self, tasks: Tasks, requests: Sequence[str]) -> list[Any]:
         """The likeliest action in every state."""
 
-    def practise(self, tasks: Sequence[Q_in], requests: Sequence[str], *, rng: np.random.Generator) -> list[E]:
+    def practise(self, tasks: Tasks, requests: Sequence[str], *, rng: np.random.Generator) -> list[Any]:
         """What it does to be shown better in every state that it comes to."""
 
     def scores(
-        self,
-        tasks: Sequence[Q_in],
-        requests: Sequence[str],
-        executions: Sequence[E],
-        actions: Sequence[E] | None = None,
+        self, tasks: Tasks, requests: Sequence[str], executions: Executions, actions: Executions | None = None
     ) -> ExecutionScores:
         """Of the actions of executions, or of other `actions` in their states."""
 

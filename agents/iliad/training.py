@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic
 
 import numpy as np
 import torch
@@ -22,7 +21,7 @@ from agents.common.session import (
 )
 from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.learners import Asked, IliadLesson, RunningMean, adel, dagger, mixture, reinforce
-from agents.iliad.protocol import DescribingTeacher, E, Marginal, Q, RequestWorld, Student
+from agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
 from embodied.identity import Identity
 from embodied.seeds import stream
 
@@ -31,24 +30,24 @@ BATCH = 256
 
 
 @dataclass(frozen=True, eq=False)
-class IliadProblem(Generic[Q, E]):
+class IliadProblem:
     """A world with everybody in it."""
 
-    world: RequestWorld[Q, E]
-    teacher: DescribingTeacher[Q, E]
-    marginal: Marginal[Q, E]
-    student: Student[Q, E]
+    world: RequestWorld
+    teacher: DescribingTeacher
+    marginal: Marginal
+    student: Student
     """pi_theta, which is judged."""
-    explorer: Student[Q, E]
+    explorer: Student
     """pi_beta, which only ADEL has."""
-    training: Sequence[Q]
-    validation: Sequence[Q]
+    training: Tasks
+    validation: Tasks
     identity: Identity
     """What a run depends on besides the learner's settings."""
 
 
 def train(
-    problem: IliadProblem[Q, E],
+    problem: IliadProblem,
     config: LearnerConfig,
     folder: Path,
     keep: Callable[[Path, Identity], None],
@@ -91,12 +90,12 @@ def train(
     return session.history
 
 
-def success_rate(world: RequestWorld[Q, E], student: Student[Q, E], tasks: Sequence[Q]) -> float:
+def success_rate(world: RequestWorld, student: Student, tasks: Tasks) -> float:
     """Share of tasks that the student fulfils; see `successes`."""
     return sum(successes(world, student, tasks)) / len(tasks)
 
 
-def successes(world: RequestWorld[Q, E], student: Student[Q, E], tasks: Sequence[Q]) -> list[bool]:
+def successes(world: RequestWorld, student: Student, tasks: Tasks) -> list[bool]:
     """Which tasks the student fulfils, acting greedily on their first (for held-out tasks, only) request."""
     good: list[bool] = []
     for at in range(0, len(tasks), BATCH):
@@ -112,10 +111,10 @@ def episodes_to(history: Sequence[Mapping[str, float]], threshold: float) -> flo
     return next((h["episodes"] for h in history if h["success"] >= threshold), float("inf"))
 
 
-class _Learner(Generic[Q, E]):
+class _Learner:
     """Owns the optimizer and what is counted; one update of whichever learner the settings name."""
 
-    def __init__(self, problem: IliadProblem[Q, E], config: LearnerConfig) -> None:
+    def __init__(self, problem: IliadProblem, config: LearnerConfig) -> None:
         self.problem, self.config = problem, config
         self.modules = {"student": problem.student.network}
         if config.learner == "adel":
@@ -146,7 +145,7 @@ class _Learner(Generic[Q, E]):
             numbers["described"] = sum(d is not None for d in lesson.descriptions) / len(tasks)
         return numbers | ({"reward": self.mean.total - before} if self.mean.count else {})
 
-    def _learn(self, asked: Asked[Q], mixing: float) -> IliadLesson[Q, E]:
+    def _learn(self, asked: Asked, mixing: float) -> IliadLesson:
         p, c = self.problem, self.config
         if c.learner == "adel":
             return adel(asked, p.teacher, p.marginal, p.explorer, p.student, mixing)

@@ -84,12 +84,22 @@ class Bridge(nn.Module):
 
 @torch.no_grad()
 def write(
-    writer: Writer, state: tuple[Tensor, Tensor], memories: list[Remembered], choose: Choice, longest: int, stop: int
+    writer: Writer,
+    state: tuple[Tensor, Tensor],
+    memories: list[Remembered],
+    choose: Choice,
+    longest: int,
+    stop: int,
+    copies: int = 1,
 ) -> Tensor:
-    """(B, at most `longest`) numbers, `stop` last unless cut, padded; padding is never written before the end.
+    """(copies B, at most `longest`) numbers, `stop` last unless cut, padded; the copies of a row stand one behind the
+    other. Padding is never written before the end.
 
     Rows that have ended are carried along only until they are half of all: leaving them out costs a copy.
     """
+    if copies > 1:
+        rows = torch.arange(len(memories[0].mask)).repeat_interleave(copies)
+        state, memories = (state[0][:, rows], state[1][:, rows]), [m.select(rows) for m in memories]
     count = memories[0].mask.shape[0]
     said = torch.zeros((count, longest), dtype=torch.int64)
     rows, number = torch.arange(count), torch.full((count,), stop)

@@ -36,16 +36,11 @@ class WalkDescriber(nn.Module):
 
     def forward(self, views: Tensor, actions: Tensor, mask: Tensor, written: Tensor) -> Tensor:
         """Logits (B, W, V) before each of the given words (B, W)."""
-        state, memories = self.read(views, actions, mask)
-        return self.writer(before(written, END_NUMBER), state, memories)[0]
+        return self.writer(before(written, END_NUMBER), *self.read(views, actions, mask))[0]
 
     @torch.no_grad()
     def write(
         self, views: Tensor, actions: Tensor, mask: Tensor, choose: Choice, longest: int, copies: int = 1
     ) -> Tensor:
         """(copies B, at most `longest`) words; the copies of one description stand one behind the other."""
-        (hidden, cell), memories = self.read(views, actions, mask)
-        if copies > 1:
-            rows = torch.arange(len(mask)).repeat_interleave(copies)
-            hidden, cell, memories = hidden[:, rows], cell[:, rows], [m.select(rows) for m in memories]
-        return write(self.writer, (hidden, cell), memories, choose, longest, END_NUMBER)
+        return write(self.writer, *self.read(views, actions, mask), choose, longest, END_NUMBER, copies)

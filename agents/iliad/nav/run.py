@@ -18,7 +18,7 @@ from agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, na
 from agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from agents.iliad.nav.student import LoopFree, NavStudent
 from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
-from agents.iliad.nav.world import NavMarginal, NavWalk, NavWorld, Trip
+from agents.iliad.nav.world import NavMarginal, NavWorld
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.training import IliadProblem, train
 from assets.catalogue import load_catalogue
@@ -59,7 +59,7 @@ class NavGrounds:
 
     config: NavConfig
     data: NavData
-    teacher: DescribingTeacher[Trip, NavWalk]
+    teacher: DescribingTeacher
     cache: Path
     """Where the catalogue is."""
 
@@ -77,9 +77,7 @@ def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = 
     return NavGrounds(config, data, _teacher(config, data, source.cache, Path(folder), note), source.cache)
 
 
-def _teacher(
-    config: NavConfig, data: NavData, cache: Path, folder: Path, note: Note
-) -> DescribingTeacher[Trip, NavWalk]:
+def _teacher(config: NavConfig, data: NavData, cache: Path, folder: Path, note: Note) -> DescribingTeacher:
     world = NavWorld(data.eyes.places)
     if config.teacher != "learned":
         wording = People().route if config.teacher == "people" else RouteDescriber().describe
@@ -112,7 +110,7 @@ def spoken(grounds: NavGrounds, novelty: str, cache: Path) -> NavGrounds:
     return dataclasses.replace(grounds, data=dataclasses.replace(data, splits={**data.splits, "test": test}))
 
 
-def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem[Trip, NavWalk]:
+def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     """A student of this seed with everything around it."""
     c, data = grounds.config, grounds.data
     eyes, splits = data.eyes.blind() if c.blind else data.eyes, data.splits

@@ -41,7 +41,7 @@ class NavTold:
 
 
 def tell(
-    student: NavStudent, teacher: DescribingTeacher[Trip, NavWalk], trip: Trip, *, seed: int, sample: bool = True
+    student: NavStudent, teacher: DescribingTeacher, trip: Trip, *, seed: int, sample: bool = True
 ) -> tuple[NavTold, NavWalk]:
     """Play one episode; the student itself stays as it is.
 

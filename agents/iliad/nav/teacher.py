@@ -62,7 +62,7 @@ def said(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
     return [" ".join(vocabulary.decode(row)) for row in numbers.tolist()]
 
 
-class LearnedNavTeacher(DescribingNetworks[Trip, NavWalk]):
+class LearnedNavTeacher(DescribingNetworks):
     """Eq 3.15 and 3.16 with two networks."""
 
     threshold, longest = THRESHOLD, LONGEST

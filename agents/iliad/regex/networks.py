@@ -40,14 +40,12 @@ class Speller(nn.Module):
 
     def forward(self, word: Tensor, request: Tensor, written: Tensor) -> Tensor:
         """Logits (B, T, V) before each of the given characters (B, T)."""
-        state, memories = self.read(word, request)
-        return self.writer(before(written, END), state, memories)[0]
+        return self.writer(before(written, END), *self.read(word, request))[0]
 
     @torch.no_grad()
     def write(self, word: Tensor, request: Tensor, choose: Choice, longest: int) -> Tensor:
         """(B, at most `longest`) characters, END last unless cut, padded."""
-        state, memories = self.read(word, request)
-        return write(self.writer, state, memories, choose, longest, END)
+        return write(self.writer, *self.read(word, request), choose, longest, END)
 
 
 class ChangeDescriber(nn.Module):
@@ -79,14 +77,9 @@ class ChangeDescriber(nn.Module):
 
     def forward(self, changed: Tensor, written: Tensor) -> Tensor:
         """Logits (B, T, V) before each of the given words (B, T)."""
-        state, memories = self.read(changed)
-        return self.writer(before(written, END_NUMBER), state, memories)[0]
+        return self.writer(before(written, END_NUMBER), *self.read(changed))[0]
 
     @torch.no_grad()
     def write(self, changed: Tensor, choose: Choice, longest: int, copies: int = 1) -> Tensor:
         """(copies B, at most `longest`) words; the copies of one description stand one behind the other."""
-        (hidden, cell), memories = self.read(changed)
-        if copies > 1:
-            rows = torch.arange(len(changed)).repeat_interleave(copies)
-            hidden, cell, memories = hidden[:, rows], cell[:, rows], [m.select(rows) for m in memories]
-        return write(self.writer, (hidden, cell), memories, choose, longest, END_NUMBER)
+        return write(self.writer, *self.read(changed), choose, longest, END_NUMBER, copies)

@@ -25,7 +25,7 @@ from agents.iliad.regex.stages import (
 )
 from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
 from agents.iliad.regex.words import read_words
-from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written
+from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld
 from agents.iliad.training import IliadProblem, train
 from assets.cache import digest
 from assets.json_file import read_text
@@ -44,7 +44,7 @@ class Grounds:
     config: RegexConfig
     data: RegexData
     requests: Requests
-    teacher: DescribingTeacher[WordTask, Written]
+    teacher: DescribingTeacher
     digest: str
     """Of the data."""
 
@@ -65,7 +65,7 @@ def prepare(
     if config.teacher == "grammar":
         if templates:
             raise ValueError("the grammar knows no templates but its own; use --teacher learned with --templates")
-        teacher: DescribingTeacher[WordTask, Written] = GrammarTeacher(config)
+        teacher: DescribingTeacher = GrammarTeacher(config)
     else:
         executor = teach_executor(data, config, requests, folder, note=note)
         describer = teach_describer(data, config, requests, folder, note=note)
@@ -73,7 +73,7 @@ def prepare(
     return Grounds(config, data, requests, teacher, _digest(data))
 
 
-def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print) -> IliadProblem[WordTask, Written]:
+def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print) -> IliadProblem:
     """A student of this seed with everything around it; it is pretrained in `folder` where the settings say so."""
     c = grounds.config
 

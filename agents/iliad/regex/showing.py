@@ -13,7 +13,7 @@ from embodied.seeds import stream
 if TYPE_CHECKING:
     from agents.iliad.protocol import DescribingTeacher
     from agents.iliad.regex.data import WordTask
-    from agents.iliad.regex.world import RegexStudent, Written
+    from agents.iliad.regex.world import RegexStudent
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,7 @@ class Told:
     """Probability of the rule, given the description, before and after learning from this episode alone."""
 
 
-def tell(
-    student: RegexStudent,
-    teacher: DescribingTeacher[WordTask, Written],
-    item: WordTask,
-    *,
-    seed: int,
-    sample: bool = True,
-) -> Told:
+def tell(student: RegexStudent, teacher: DescribingTeacher, item: WordTask, *, seed: int, sample: bool = True) -> Told:
     """Play one episode with an item; the student itself stays as it is.
 
     Args:

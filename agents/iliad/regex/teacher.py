@@ -37,7 +37,7 @@ def human(task: WordTask, *, rng: np.random.Generator) -> str:
     return task.requests[int(rng.integers(len(task.requests)))]
 
 
-class LearnedTeacher(DescribingNetworks[WordTask, Written]):
+class LearnedTeacher(DescribingNetworks):
     """Eq 3.15 and 3.16 with two networks; it sees words before and after, never a rule."""
 
     threshold, longest = 1.0, LONGEST_REQUEST
