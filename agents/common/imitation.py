@@ -7,10 +7,10 @@ for update in session:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, TypedDict, Unpack
+from typing import Any, ClassVar, Unpack
 
 import torch
 from torch import Tensor
@@ -19,12 +19,12 @@ from agents.common import parallel
 from agents.common.playing import TaskSet, play_with_memory
 from agents.common.session import (
     Clock,
-    Note,
+    Options,
     Progress,
     Session,
     descend,
     episode_seed,
-    scheduled_rate,
+    run,
     seeded_dropout,
     set_learning_rate,
     tasks_of_update,
@@ -36,8 +36,6 @@ from embodied.evaluation.rollout import play
 from embodied.identity import Identity
 from embodied.interface import Agent, Ask, Episode, Place, Task
 from embodied.seeds import stream
-
-OnValidation = Callable[[int, Sequence[Episode]], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,8 +111,8 @@ class Learner:
                 clock.move(thinking, "environment", "network")
                 with clock.on("backward"):
                     batch_loss = self.loss_of(episodes, experience)
-                    rate = scheduled_rate(config.learning_rate, update, config.iterations, config.cooldown)
-                    set_learning_rate(self.optimizer, rate)
+                    rate = config.learning_rate
+                    set_learning_rate(self.optimizer, rate, update, config.iterations, config.cooldown)
                     norm = descend(batch_loss.loss, self.optimizer, f"update {update}")
         except torch.OutOfMemoryError as e:
             raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
@@ -123,60 +121,24 @@ class Learner:
         return parallel.reduce_metrics(numbers, REPORTED, SUMMED, batch_loss.loss.device)
 
 
-class Options(TypedDict, total=False):
-    """Of a session of training."""
-
-    minutes: float | None
-    """Stop after this long, as if interrupted."""
-    note: Note
-    on_validation: OnValidation | None
-    """Called with the update and the validation episodes, e.g. to record them."""
-
-
 def train(
     learner: Learner, validation: TaskSet, folder: Path, identity: Identity, **options: Unpack[Options]
 ) -> Progress:
-    """Train in place, from `folder`'s checkpoint if there is one; one process at a time.
+    """Train in place, from `folder`'s checkpoint if there is one (agents.common.session.run); one process at a time.
 
     Writes best.safetensors (see `validate`) and what agents.common.session writes into `folder`.
-
-    Args:
-      identity: all that the run depends on.
-
-    Raises:
-      DivergedError: a loss or gradient is not a number any more.
-      UnableError: memory ran out.
-      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
-      LockedError: another process trains in `folder`.
-      CheckpointError, OSError.
     """
-    config, on_validation = learner.config, options.get("on_validation")
-    note = parallel.rank_zero(options.get("note", print))
     tasks, about = learner.training.tasks, learner.agent.about
     size = sum(p.numel() for p in learner.network.parameters())
-    note(
+    parallel.rank_zero(options.get("note", print))(
         f"{len(tasks)} tasks in {len({t.world for t in tasks})} houses, {len(about.words)} words, {size:,} parameters, "
         f"pictures: {about.pictures}"
     )
-    with Session(
-        folder,
-        identity,
-        {"network": learner.network, "optimizer": learner.optimizer},
-        config.iterations,
-        may_change=MAY_CHANGE,
-        minutes=options.get("minutes"),
-        checkpoint_minutes=config.checkpoint_minutes,
-        note=note,
-    ) as session:
-        for update in session:
-            session.add(learner.learn(update, session.clock))
-            if session.due(config.validate_every) and parallel.rank() == 0:
-                with session.clock.on("validation"):
-                    episodes = validate(learner, validation, session)
-                if on_validation is not None:
-                    on_validation(session.done, episodes)
+    parts: dict[str, Any] = {"network": learner.network, "optimizer": learner.optimizer}
+    judge = lambda session: validate(learner, validation, session)
+    done = run(folder, identity, parts, learner.config, learner.learn, judge, may_change=MAY_CHANGE, **options)
     learner.network.eval()
-    return session.progress
+    return done
 
 
 REPORTED = (
@@ -221,7 +183,7 @@ def validate(learner: Learner, split: TaskSet, session: Session) -> Sequence[Epi
     config = learner.config
     tasks = [learner.evaluation_task(t) for t in split.tasks[: config.validation_tasks]]
     learner.network.eval()
-    with torch.inference_mode():
+    with torch.inference_mode(), session.clock.on("validation"):
         batch = learner.evaluation.evaluation_batch
         episodes = play(split.make_env, learner.evaluated_agent(split), tasks, seed=config.seed, batch=batch)
     values = {

@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar, Unpack
 
 import torch
 
@@ -29,6 +29,7 @@ from assets.cache import write_bytes, write_json
 from assets.json_file import read_text
 from embodied.errors import UnableError
 from embodied.identity import Identity
+from embodied.interface import Episode
 from embodied.locks import locked
 from embodied.records import from_plain
 from embodied.seeds import stream
@@ -279,6 +280,57 @@ class Session:
                 writer.writerow([at, round(self.progress.seconds / 60, 2), f"{kind}/{name}", repr(float(value))])
 
 
+class Options(TypedDict, total=False):
+    """Of a session of training."""
+
+    minutes: float | None
+    """Stop after this long, as if interrupted."""
+    note: Note
+    on_validation: Callable[[int, Sequence[Episode]], None] | None
+    """Called with the update and the validation episodes, e.g. to record them."""
+
+
+def run(
+    folder: Path,
+    identity: Identity,
+    parts: Mapping[str, Stateful],
+    config: Any,
+    step: Callable[[int, Clock], Mapping[str, float]],
+    validate: Callable[[Session], Sequence[Episode]],
+    *,
+    total: int | None = None,
+    may_change: Collection[str],
+    **options: Unpack[Options],
+) -> Progress:
+    """Train `parts` in place, from `folder`'s checkpoint if there is one.
+
+    Args:
+      identity: all that the run depends on.
+      config: settings over ValidatedRunSettings.
+      step: does an update, and returns the numbers to report.
+      validate: records and keeps; the first of several processes does it.
+      total: updates, if not `iterations`.
+      may_change: names of settings that may differ on resuming.
+
+    Raises:
+      DivergedError: a loss or gradient is not finite; the last checkpoint is intact.
+      UnableError: memory ran out.
+      LockedError: another process trains in `folder`.
+      CheckpointError, OSError: the folder's run has other settings, or is damaged.
+      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
+    """
+    how: dict[str, Any] = {"minutes": options.get("minutes"), "note": options.get("note", print)}
+    how |= {"may_change": may_change, "checkpoint_minutes": config.checkpoint_minutes}
+    with Session(folder, identity, parts, total or config.iterations, **how) as session:
+        for update in session:
+            session.add(step(update, session.clock))
+            if session.due(config.validate_every) and parallel.rank() == 0:
+                episodes, watch = validate(session), options.get("on_validation")
+                if watch is not None:
+                    watch(session.done, episodes)
+    return session.progress
+
+
 def _lines(path: Path) -> list[list[str]]:
     """The lines of a CSV file; raises ValueError, with its name, where there are none to be told apart."""
     try:
@@ -389,6 +441,9 @@ def descend(loss: torch.Tensor, optimizer: torch.optim.Optimizer, what: str, cli
     return float(norm)
 
 
-def set_learning_rate(optimizer: torch.optim.Optimizer, rate: float) -> None:
+def set_learning_rate(
+    optimizer: torch.optim.Optimizer, rate: float, update: int, updates: int, cooldown: float
+) -> None:
+    """Let an optimizer learn as fast as its schedule has it (see `scheduled_rate`)."""
     for group in optimizer.param_groups:
-        group["lr"] = rate
+        group["lr"] = scheduled_rate(rate, update, updates, cooldown)

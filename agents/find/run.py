@@ -14,16 +14,7 @@ import torch.nn.functional as F
 from agents.common import imitation
 from agents.common.choosing import choose_sampled
 from agents.common.playing import play_with_memory
-from agents.common.session import (
-    Clock,
-    Note,
-    descend,
-    episode_seed,
-    scheduled_rate,
-    seeded_dropout,
-    set_learning_rate,
-    tasks_of_update,
-)
+from agents.common.session import Clock, Note, descend, episode_seed, seeded_dropout, set_learning_rate, tasks_of_update
 from agents.common.settings import EvaluationSettings
 from agents.common.sighted import About, SightedAgent
 from agents.common.tensor_file import load_into
@@ -130,7 +121,7 @@ class FindLearner(imitation.Learner):
                 searches, numbers = self._search(update)
         self.network.train()
         with clock.on("backward"), seeded_dropout(c.seed, update):
-            set_learning_rate(self.optimizer, scheduled_rate(c.learning_rate, update, c.iterations, c.cooldown))
+            set_learning_rate(self.optimizer, c.learning_rate, update, c.iterations, c.cooldown)
             loss = self._labels.loss(self.network, looks_of(self._labels, c.seed, update))
             numbers["reading"] = float(loss.detach())
             if searches:
@@ -229,7 +220,7 @@ def explorer_of(finder: Finder, labels: Labels, validation: Split, *, note: Note
     optimizer = torch.optim.AdamW(explorer.parameters(), c.learning_rate, weight_decay=c.weight_decay)
     for update in range(c.iterations):
         with seeded_dropout(c.seed, update):
-            set_learning_rate(optimizer, scheduled_rate(c.learning_rate, update, c.iterations, c.cooldown))
+            set_learning_rate(optimizer, c.learning_rate, update, c.iterations, c.cooldown)
             descend(labels.loss(explorer, looks_of(labels, c.seed, update)), optimizer, f"update {update}", CLIP)
     explorer.eval()
     scores = {}

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, Unpack
 
 import torch
 from torch import Tensor
@@ -20,7 +21,7 @@ from torch import Tensor
 from agents.common.checkpoint import Stateful
 from agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from agents.common.playing import TaskSet
-from agents.common.session import Note, Progress, Session, descend, episode_seed, tasks_of_update
+from agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
 from agents.hari.agent import HariAgent, save_agent
 from agents.hari.networks import INTENTIONS, RecurrentHead
 from agents.hari.policy import Choice, policy_of
@@ -40,50 +41,29 @@ def train(
     validation: TaskSet,
     folder: Path,
     identity: Identity,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+    **options: Unpack[Options],
 ) -> Progress:
-    """Train `agent.actor` and `critic` in place, from `folder`'s checkpoint if there is one.
+    """Train `agent.actor` and `critic` in place (see agents.common.session.run).
 
     Writes best.safetensors (least validation cost) and what agents.common.session writes.
-
-    Args:
-      identity: all that the run depends on.
-      minutes: stop after this long in this session, as if interrupted.
-      on_validation: is given the update and the episodes of each validation (to record some).
-
-    Raises:
-      DivergedError: a loss or gradient is not finite; the last checkpoint is intact.
-      LockedError: another process trains in `folder`.
-      CheckpointError: the folder's run has other settings or another execution policy, or is damaged.
-      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
     config = agent.config
     agent.executor.network.eval()
-    run = IntentionRun(agent, critic)
-    with Session(
-        folder,
-        identity,
-        run.parts,
-        config.updates,
-        may_change=MAY_CHANGE,
-        minutes=minutes,
-        checkpoint_minutes=config.checkpoint_minutes,
-        note=note,
-    ) as session:
-        for update in session:
-            session.add(train_step(run, training, update))
-            if session.due(config.validate_every):
-                episodes = _validation_of(agent, validation)
-                cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
-                session.record({"episodes": len(episodes), "cost": cost, **numbers_of(episodes, validation.worlds)})
-                if session.improved(-cost):  # what is optimised: the mean cost, task errors included
-                    save_agent(agent, session.folder / "best.safetensors", identity)
-                if on_validation:
-                    on_validation(session.done, episodes)
-    return session.progress
+    learning = IntentionRun(agent, critic)
+
+    def validate(session: Session) -> Sequence[Episode]:
+        tasks = validation.tasks[: config.validation_tasks]
+        with torch.inference_mode():
+            episodes = play(validation.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)
+        cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
+        session.record({"episodes": len(episodes), "cost": cost, **numbers_of(episodes, validation.worlds)})
+        if session.improved(-cost):  # what is optimised: the mean cost, task errors included
+            save_agent(agent, session.folder / "best.safetensors", identity)
+        return episodes
+
+    step = lambda update, clock: train_step(learning, training, update)
+    how: dict[str, Any] = {"total": config.updates, "may_change": MAY_CHANGE}
+    return run(folder, identity, learning.parts, config, step, validate, **how, **options)
 
 
 class IntentionRun:
@@ -177,9 +157,3 @@ def numbers_of(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict
     """Success and the mean number of each intention."""
     success = sum(metrics.success(e, places[e.task.world].graph) for e in episodes) / len(episodes)
     return {"success": success, **counts_of(episodes)}
-
-
-def _validation_of(agent: HariAgent, ground: TaskSet) -> Sequence[Episode]:
-    config, tasks = agent.config, ground.tasks[: agent.config.validation_tasks]
-    with torch.inference_mode():
-        return play(ground.make_env, policy_of(agent), tasks, seed=config.seed, batch=config.batch)

@@ -14,17 +14,19 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from agents.common.checkpoint import Stateful
 from agents.common.session import (
-    Note,
+    Options,
     Progress,
     Session,
     descend,
-    scheduled_rate,
+    run,
     seeded_dropout,
     set_learning_rate,
     tasks_of_update,
@@ -36,7 +38,7 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.assistants.hari import LONGEST, described_subgoal
 from embodied.identity import Identity
-from embodied.interface import Candidates, Description, FindObject, Move, Place, Pose, Task
+from embodied.interface import Candidates, Description, Episode, FindObject, Move, Place, Pose, Task
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action
 
@@ -68,50 +70,28 @@ class Walk:
 
 
 def pretrain(
-    executor: Executor,
-    lessons: PretrainingData,
-    folder: Path,
-    identity: Identity,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
+    executor: Executor, lessons: PretrainingData, folder: Path, identity: Identity, **options: Unpack[Options]
 ) -> Progress:
-    """Train `executor` in place, from `folder`'s checkpoint if there is one.
+    """Train `executor` in place (see agents.common.session.run).
 
     Writes best.safetensors (by validation success) and what agents.common.session writes.
-
-    Args:
-      identity: all that the run depends on.
-      minutes: stop after this long in this session, as if interrupted.
-
-    Raises:
-      DivergedError: the loss or a gradient is not finite; the last checkpoint is intact.
-      LockedError: another process trains in `folder`.
-      CheckpointError: the folder's run has other settings or words, or is damaged.
-      KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
     config, network = executor.config, executor.network
     optimizer = torch.optim.Adam(network.parameters(), config.learning_rate)
-    with Session(
-        folder,
-        identity,
-        {"network": network, "optimizer": optimizer},
-        config.iterations,
-        may_change=MAY_CHANGE,
-        minutes=minutes,
-        checkpoint_minutes=config.checkpoint_minutes,
-        note=note,
-    ) as session:
-        for update in session:
-            session.add(train_step(executor, optimizer, lessons, update))
-            if session.due(config.validate_every):
-                tasks = lessons.validation[: config.validation_tasks]
-                success = pretraining_success(executor, lessons, tasks)
-                session.record({"success": success, "episodes": len(tasks)})
-                if session.improved(success):
-                    save_executor(executor, session.folder / "best.safetensors", identity)
+
+    def validate(session: Session) -> Sequence[Episode]:
+        tasks = lessons.validation[: config.validation_tasks]
+        success = pretraining_success(executor, lessons, tasks)
+        session.record({"success": success, "episodes": len(tasks)})
+        if session.improved(success):
+            save_executor(executor, session.folder / "best.safetensors", identity)
+        return ()
+
+    parts: dict[str, Stateful] = {"network": network, "optimizer": optimizer}
+    step = lambda update, clock: train_step(executor, optimizer, lessons, update)
+    done = run(folder, identity, parts, config, step, validate, may_change=MAY_CHANGE, **options)
     network.eval()
-    return session.progress
+    return done
 
 
 def train_step(
@@ -133,7 +113,7 @@ def train_step(
     with seeded_dropout(config.seed, update):
         losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
     loss = torch.cat(losses).mean()
-    set_learning_rate(optimizer, scheduled_rate(config.learning_rate, update, config.iterations, config.cooldown))
+    set_learning_rate(optimizer, config.learning_rate, update, config.iterations, config.cooldown)
     descend(loss, optimizer, f"update {update}", config.clip)
     steps = torch.cat(right)
     return {"loss": float(loss.detach()), "right moves": float(steps.float().mean()), "steps": float(len(steps))}

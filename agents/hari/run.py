@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Unpack
 
 from agents.common.playing import TaskSet
-from agents.common.session import Note, Progress
+from agents.common.session import Options, Progress
 from agents.common.tensor_file import checksum_of
 from agents.common.weights import weights_digest
 from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
@@ -19,7 +20,7 @@ from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
 from embodied.evaluation.evaluate import spread
 from embodied.identity import identity_of
-from embodied.interface import Episode, Place
+from embodied.interface import Place
 
 CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
 """What validation and test splits are named by, after 'val_' and 'test_' (4.3.5)."""
@@ -59,13 +60,7 @@ def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[
 
 
 def train_execution(
-    data: Dataset,
-    config: ExecutionConfig,
-    folder: Path,
-    *,
-    begin: Path | None = None,
-    minutes: float | None = None,
-    note: Note = print,
+    data: Dataset, config: ExecutionConfig, folder: Path, *, begin: Path | None = None, **options: Unpack[Options]
 ) -> Progress:
     """Train, or go on training, the execution policy of a run folder.
 
@@ -79,30 +74,23 @@ def train_execution(
     words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
     executor = new_executor(config, words) if begin is None else begun_with(config, load_executor(begin))
     size = sum(p.numel() for p in executor.network.parameters())
+    note = options.get("note", print)
     note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(executor.words)} names, {size:,} parameters")
     more = {} if begin is None else {"begin": weights_digest(begin)}
     identity = identity_of("agents.hari.run", settings=config, data=data.digest, **more)
-    return pretrain(executor, lessons, folder, identity, minutes=minutes, note=note)
+    return pretrain(executor, lessons, folder, identity, **options)
 
 
 def train_intention(
-    data: Dataset,
-    executor: Executor,
-    config: IntentionConfig,
-    folder: Path,
-    *,
-    minutes: float | None = None,
-    note: Note = print,
-    on_validation: Callable[[int, Sequence[Episode]], None] | None = None,
+    data: Dataset, executor: Executor, config: IntentionConfig, folder: Path, **options: Unpack[Options]
 ) -> Progress:
-    """Train, or go on training, the intention policy of a run folder over a trained execution policy; `on_validation`
-    is given the episodes of each validation."""
+    """Train, or go on training, the intention policy of a run folder over a trained execution policy."""
     actor, critic = new_heads(config, executor.config.hidden_size)
     training = task_split_of(data, ["train"], config)
     validation = task_split_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)
     size = sum(p.numel() for p in actor.parameters())
+    note = options.get("note", print)
     note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {size:,} parameters of each head")
-    agent, watch = HariAgent(executor, actor, config), on_validation
     begin = checksum_of(executor.network.state_dict(), {})
     identity = identity_of("agents.hari.run", settings=config, data=data.digest, begin=begin)
-    return train(agent, critic, training, validation, folder, identity, minutes=minutes, note=note, on_validation=watch)
+    return train(HariAgent(executor, actor, config), critic, training, validation, folder, identity, **options)

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.checkpoint import Stateful
-from agents.common.session import Note, Session, descend, scheduled_rate, seeded_dropout, set_learning_rate
+from agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate
 from agents.common.tensor_file import load_into, read_weights
 from agents.common.weights import origin_of, save_weights
 from embodied.identity import Identity, differences
@@ -65,7 +65,7 @@ class TeachingStage:
             self.folder / self.name, self.identity, parts, self.updates, checkpoint_minutes=2.0, every=REPORT, note=note
         ) as session:
             for update in session:
-                set_learning_rate(optimizer, scheduled_rate(self.rate, update, self.updates, COOLDOWN))
+                set_learning_rate(optimizer, self.rate, update, self.updates, COOLDOWN)
                 with seeded_dropout(self.seed, update):
                     loss = loss_of(stream(self.seed, self.world, self.name, update))
                 descend(loss, optimizer, f"{self.name}, update {update}", CLIP)

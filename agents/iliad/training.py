@@ -10,15 +10,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from agents.common.session import (
-    Note,
-    Session,
-    descend,
-    scheduled_rate,
-    seeded_dropout,
-    set_learning_rate,
-    tasks_of_update,
-)
+from agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from agents.iliad.config import LearnerConfig, mixing_at
 from agents.iliad.learners import Asked, IliadLesson, RunningMean, adel, dagger, mixture, reinforce
 from agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
@@ -130,7 +122,7 @@ class _Learner:
     def update(self, update: int) -> dict[str, float]:
         """One update; returns numbers to add up."""
         c, world = self.config, self.problem.world
-        set_learning_rate(self.optimizer, scheduled_rate(c.rate, update, c.iterations, c.cooldown))
+        set_learning_rate(self.optimizer, c.rate, update, c.iterations, c.cooldown)
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
         asked = Asked(tasks, [world.request(q, rng=rng) for q in tasks], rng)
