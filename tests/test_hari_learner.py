@@ -46,7 +46,7 @@ from embodied.identity import identity_of
 from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
 from embodied.records import read_json
-from embodied.tasks.hari import HariConfig, hari_pool, hari_task
+from embodied.tasks.hari import PRETRAINING, hari_pool, hari_task
 
 SMALL = ExecutionConfig(
     hidden_size=32, layers=1, heads=2, dropout=0.0, learning_rate=2e-3, iterations=2, batch=8, validate_every=2
@@ -95,9 +95,8 @@ def fork_lessons() -> PretrainingData:
 
 def grid_lessons() -> tuple[HandWorld, PretrainingData]:
     world = grid_world()
-    config = HariConfig(fewest_nodes=1)
-    pool = hari_pool(world, seed=0, config=config)
-    tasks = [hari_task(pool, i, seed=0, language=PlainLanguage(), config=config) for i in range(48)]
+    pool = hari_pool(world, seed=0, config=PRETRAINING)
+    tasks = [hari_task(pool, i, seed=0, language=PlainLanguage()) for i in range(48)]
     return world, PretrainingData({"grid": world}, Describer(frequent_classes([world], 0.5)), tasks, tasks[:24])
 
 

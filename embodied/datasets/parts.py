@@ -12,7 +12,7 @@ from embodied.seeds import stream
 from embodied.tasks.ask import ask_pool, ask_tasks
 from embodied.tasks.find import Pool, find_pool, find_task
 from embodied.tasks.hanna import hanna_pool, hanna_task
-from embodied.tasks.hari import HariConfig, hari_pool, hari_task
+from embodied.tasks.hari import HARI, PRETRAINING, hari_pool, hari_task
 from embodied.tasks.vln import vln_task
 from embodied.tasks.vnla import VnlaConfig, vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
@@ -73,10 +73,9 @@ def _vln(world: Place, routes: Sequence[Route], part: str, n: int) -> list[Task]
 
 def _hari(world: Place, part: str, n: int, *, seed: int, language: Language) -> list[Task]:
     """HARI's conditions (4.3.5): unseen start room, unseen object class, unseen environment."""
-    config = HariConfig(fewest_nodes=1) if part.startswith("pretrain") else HariConfig()
-    pool = hari_pool(world, seed=seed, config=config)
+    pool = hari_pool(world, seed=seed, config=PRETRAINING if part.startswith("pretrain") else HARI)
     chosen = itertools.islice((i for i in range(len(pool)) if _belongs(pool, i, part, world, seed)), n)
-    return [hari_task(pool, i, seed=seed, language=language, config=config) for i in chosen]
+    return [hari_task(pool, i, seed=seed, language=language) for i in chosen]
 
 
 def _belongs(pool: Pool, i: int, part: str, world: Place, seed: int) -> bool:

@@ -13,13 +13,16 @@ from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 
 @dataclass(frozen=True)
 class FindConfig:
-    """What a find task may be."""
+    """What a task of finding something may be."""
 
+    kind: str = "find"
     reach: float = 2.0
     """A goal node lies within this many metres of the object and in its room."""
     fewest_nodes: int = 4
     """Nodes on the shortest path to the nearest goal, start and goal included."""
     most_nodes: int = 15
+    radius: float = 0.0
+    """Metres from a goal node within which the task is fulfilled."""
     horizon: int = 40
 
 
@@ -58,7 +61,7 @@ def build_pool(world: Place, classes: tuple[GoalClass, ...], *, seed: int, fewes
 
 def find_pool(world: Place, *, seed: int, config: FindConfig = FindConfig()) -> Pool:
     classes = goal_classes(find_instances(world, config.reach), by_room=False, nearest_only=False)
-    return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="find")
+    return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind=config.kind)
 
 
 def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: FindConfig = FindConfig()) -> Task:
@@ -67,20 +70,21 @@ def find_task(pool: Pool, index: int, *, seed: int, language: Language, config: 
     Raises:
       ValueError: the pool has no such task.
     """
-    limits = TaskLimits(radius=0.0, horizon=config.horizon)
-    return task_of_pair("find", pool, index, seed=seed, language=language, limits=limits)
+    c = config
+    return task_of_pair(c.kind, pool, index, seed=seed, language=language, radius=c.radius, horizon=c.horizon)
 
 
-@dataclass(frozen=True)
-class TaskLimits:
-    """Task.radius, horizon and budget."""
-
-    radius: float
-    horizon: int
-    budget: float | None = None
-
-
-def task_of_pair(kind: str, pool: Pool, index: int, *, seed: int, language: Language, limits: TaskLimits) -> Task:
+def task_of_pair(
+    kind: str,
+    pool: Pool,
+    index: int,
+    *,
+    seed: int,
+    language: Language,
+    radius: float,
+    horizon: int,
+    budget: float | None = None,
+) -> Task:
     """Pair `index` of the pool as a task of a kind, in words.
 
     Raises:
@@ -96,9 +100,9 @@ def task_of_pair(kind: str, pool: Pool, index: int, *, seed: int, language: Lang
         goal=what,
         goal_nodes=goal.goal_nodes,
         request=language.request(what, rng=rng),
-        radius=limits.radius,
-        horizon=limits.horizon,
-        budget=limits.budget,
+        radius=radius,
+        horizon=horizon,
+        budget=budget,
     )
 
 

@@ -2,38 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import functools
 
-from embodied.interface import Language, Place, Task
-from embodied.tasks.find import Pool, TaskLimits, build_pool, task_of_pair
+from embodied.interface import Place
+from embodied.tasks.find import FindConfig, Pool, build_pool, find_task
 from embodied.tasks.goals import find_instances, goal_classes
 
-
-@dataclass(frozen=True)
-class HannaConfig:
-    """Limits of 4.2.5 and Table D.1."""
-
-    fewest_nodes: int = 5
-    most_nodes: int = 15
-    """Nodes on the shortest path to the nearest goal."""
-    radius: float = 2.0
-    """epsilon_success, metres."""
-    horizon: int = 50
-    """Evaluation steps; training uses 20."""
-    reach: float = 2.5
-    """An instance counts when a node of its room is within this many metres; that node is its goal."""
+HANNA = FindConfig("hanna", reach=2.5, fewest_nodes=5, most_nodes=15, radius=2.0, horizon=50)
+"""Limits of 4.2.5 and Table D.1; training takes 20 steps. An instance counts when a node of its room is within reach;
+that node is its goal."""
 
 
-def hanna_pool(world: Place, *, seed: int, config: HannaConfig = HannaConfig()) -> Pool:
-    classes = goal_classes(find_instances(world, config.reach), by_room=False, nearest_only=True)
-    return build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_nodes, kind="hanna")
+def hanna_pool(world: Place, *, seed: int) -> Pool:
+    classes = goal_classes(find_instances(world, HANNA.reach), by_room=False, nearest_only=True)
+    return build_pool(world, classes, seed=seed, fewest=HANNA.fewest_nodes, most=HANNA.most_nodes, kind=HANNA.kind)
 
 
-def hanna_task(pool: Pool, index: int, *, seed: int, language: Language, config: HannaConfig = HannaConfig()) -> Task:
-    """Task `index` of the pool: a pure function of its arguments.
-
-    Raises:
-      ValueError: the pool has no such task.
-    """
-    limits = TaskLimits(config.radius, config.horizon)
-    return task_of_pair("hanna", pool, index, seed=seed, language=language, limits=limits)
+hanna_task = functools.partial(find_task, config=HANNA)
+"""Task `index` of the pool, as find_task."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from embodied.interface import TURNS, VIEWS, FindObject, Language, Place, Task
-from embodied.tasks.find import Pool, TaskLimits, build_pool, draw, task_of_pair
+from embodied.tasks.find import Pool, build_pool, draw, task_of_pair
 from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 from embodied.teachers.vnla import MonocularPlan
 
@@ -82,8 +83,8 @@ def vnla_task(
     goal, start, _ = draw(pool, index, seed=seed, kind="vnla")
     horizon = plan.count(start, goal.goal_nodes)
     budget = config.help_ratio * horizon / config.help_steps
-    limits = TaskLimits(config.radius, horizon, budget)
-    return task_of_pair("vnla", pool, index, seed=seed, language=language, limits=limits)
+    how: dict[str, Any] = {"radius": config.radius, "horizon": horizon, "budget": budget}
+    return task_of_pair("vnla", pool, index, seed=seed, language=language, **how)
 
 
 def room_kind(world: Place, node: int) -> str:
