@@ -229,7 +229,8 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
         target = min(float(world.graph.distance[step.pose.node, g]) for g in step.targets)
         recording.log("plot/distance/target", rr.Scalars(target))
     state.before(step)
-    recording.log("mode", rr.StateChange(state=mode_name(step)))
+    mode = "asks" if isinstance(step.action, Ask) else "sub-task" if step.mode is Mode.SUB else "main task"
+    recording.log("mode", rr.StateChange(state=mode))
     told = instruction_text(step, state.left)
     recording.log("text/instruction", markdown(told))
     if task.kind == "hari":
@@ -348,13 +349,6 @@ def log_thought(recording: rr.RecordingStream, step: Step) -> None:
 
 def markdown(text: str) -> rr.TextDocument:
     return rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
-
-
-def mode_name(step: Step) -> str:
-    """What the mode bar says; asking is a colour of its own, so that its moment is seen."""
-    if isinstance(step.action, Ask):
-        return "asks"
-    return "sub-task" if step.mode is Mode.SUB else "main task"
 
 
 def instruction_text(step: Step, left: int | None = None) -> str:

@@ -17,8 +17,9 @@ from torch import Tensor
 
 from agents.common.losses import IGNORE
 from agents.hanna.losses import help_loss, navigation_loss
+from agents.hanna.percept import action_index
 from agents.hanna.policy import Moment
-from embodied.interface import Episode, Move, Place, Stop, Teacher
+from embodied.interface import Episode, Place, Teacher
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +67,6 @@ def labelled(
         right_asks=torch.tensor([IGNORE if r.ask is None else int(r.ask) for r in rows], device=device),
         true_reasons=torch.from_numpy(true_reasons).to(device),
     )
-
-
-def action_index(action: Move | Stop) -> int:
-    """Place of a navigation action in the networks' scores: stop is 0."""
-    return 0 if isinstance(action, Stop) else action.candidate + 1
 
 
 def imitation_loss(

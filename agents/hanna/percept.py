@@ -13,6 +13,7 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.rows import Rows
+from embodied.interface import Move, Stop
 
 VIEWS = 36
 HEADINGS = 12
@@ -90,3 +91,8 @@ def slot_distribution(logits: Tensor, slots: Tensor) -> Tensor:
     return torch.zeros(*logits.shape[:-1], SLOTS, dtype=logits.dtype, device=logits.device).scatter_add(
         -1, slots, probabilities
     )
+
+
+def action_index(action: Move | Stop) -> int:
+    """Place of a navigation action in the networks' scores: stop is 0."""
+    return 0 if isinstance(action, Stop) else action.candidate + 1

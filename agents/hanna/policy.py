@@ -17,7 +17,18 @@ from agents.common.vocabulary import Vocabulary
 from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
 from agents.hanna.lstm import LstmNetwork
 from agents.hanna.network import HannaNetwork, Scores
-from agents.hanna.percept import COPIES, DO_NOTHING, HEADINGS, REQUEST, SLOTS, START, VIEWS, Percept, orientation
+from agents.hanna.percept import (
+    COPIES,
+    DO_NOTHING,
+    HEADINGS,
+    REQUEST,
+    SLOTS,
+    START,
+    VIEWS,
+    Percept,
+    action_index,
+    orientation,
+)
 from agents.hanna.recognition import Likeness, PlaceMap
 from agents.hanna.trail import Trail, weigh, weigh_by_image
 from agents.vision.bank import FeatureBank
@@ -30,12 +41,11 @@ from embodied.interface import (
     Observation,
     Observations,
     Rngs,
-    Situation,
     Situations,
     Stop,
     Thought,
 )
-from embodied.teachers.shortest import shortest_action
+from embodied.teachers.shortest import shortest_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,10 +289,5 @@ class PerfectInterpretation:
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: HannaMemory | None, *, rngs: Rngs
     ) -> tuple[Actions, HannaMemory]:
-        imposed = [None if s is None or s.mode is Mode.MAIN else _teacher_index(s) for s in situations]
+        imposed = [None if s is None or s.mode is Mode.MAIN else action_index(shortest_of(s)) for s in situations]
         return self.policy.act(observations, memory, rngs=rngs, imposed=imposed)
-
-
-def _teacher_index(s: Situation) -> int:
-    action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
-    return 0 if isinstance(action, Stop) else action.candidate + 1

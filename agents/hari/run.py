@@ -26,13 +26,6 @@ CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
 """What validation and test splits are named by, after 'val_' and 'test_' (4.3.5)."""
 
 
-def lessons_of(data: Dataset, kept: float) -> PretrainingData:
-    """The pre-training splits; sparse descriptions keep a share of the object classes."""
-    places: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
-    validation = spread(data.tasks("pretrain_val"), None)
-    return PretrainingData(places, data.describer(kept), data.tasks("pretrain"), validation)
-
-
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
     costs = Costs.alike(config.cost)
@@ -67,7 +60,9 @@ def train_execution(
     Args:
       begin: with the words and weights of this execution policy, not with random ones.
     """
-    lessons = lessons_of(data, config.kept)
+    where: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
+    validation = spread(data.tasks("pretrain_val"), None)
+    lessons = PretrainingData(where, data.describer(config.kept), data.tasks("pretrain"), validation)
     describe = lessons.describer.dense
     houses = {t.world for t in lessons.training}
     places = [lessons.places[name] for name in sorted(houses)]

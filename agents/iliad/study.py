@@ -145,10 +145,6 @@ class NavStudyWorld:
     def prepare(self, folder: Path, note: Note) -> nav.NavGrounds:
         return nav.prepare(self.config, self.houses, folder, note=note)
 
-    def with_speakers(self, train: Mapping[str, Any]) -> NavStudyWorld:
-        """In which those people are learned from whom a row names."""
-        return dataclasses.replace(self, config=dataclasses.replace(self.config, **_of(train, (SPEAKERS,))))
-
     def begin(self, grounds: nav.NavGrounds, seed: int, folder: Path, note: Note) -> None:
         """Students of NAV begin with random weights."""
 
@@ -262,7 +258,10 @@ class IliadStudy(StudyLearner):
 
     def _world(self, train: Mapping[str, Any] | None) -> StudyWorld:
         """What a row learns in."""
-        return self.world.with_speakers(train) if train and isinstance(self.world, NavStudyWorld) else self.world
+        world = self.world
+        if not train or not isinstance(world, NavStudyWorld):
+            return world
+        return dataclasses.replace(world, config=dataclasses.replace(world.config, **_of(train, (SPEAKERS,))))
 
     def about(self) -> str:
         x = self.config

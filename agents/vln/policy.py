@@ -14,7 +14,7 @@ from agents.common.choosing import Chooser, choose_greedily
 from agents.common.losses import IGNORE
 from agents.common.rows import RunningRows, hidden_channels
 from agents.common.vocabulary import Vocabulary
-from agents.hanna.percept import orientation
+from agents.hanna.percept import action_index, orientation
 from agents.vision.bank import FeatureBank
 from agents.vln.network import COPIES, FollowerNetwork, Heard, Said, Seen
 from assets.records import ROOM_KINDS
@@ -22,7 +22,6 @@ from embodied.geometry import wrap
 from embodied.interface import (
     VIEW_PITCHES,
     VIEW_YAWS,
-    Action,
     Actions,
     Move,
     Observation,
@@ -34,7 +33,7 @@ from embodied.interface import (
     Thought,
 )
 from embodied.seeds import stream
-from embodied.teachers.shortest import shortest_action
+from embodied.teachers.shortest import shortest_of
 
 SPOKEN = "_spoken_"
 """In the ids of tasks that a speaker worded."""
@@ -119,7 +118,8 @@ class VlnPolicy:
                     numbers = [wanted if guided(s, rngs[p]) else own for own, wanted, s, p in drawn]
             taken = said.tokens[torch.arange(len(seen)), torch.tensor(numbers)]
         for position, number, chance, o in zip(positions, numbers, chances, seen, strict=True):
-            actions[position] = _action(number, chance[: 1 + len(o.candidates)])
+            thought = Thought(np.append(chance[1 : 1 + len(o.candidates)], chance[0]))
+            actions[position] = Stop(thought) if number == 0 else Move(number - 1, thought)
         return actions, dataclasses.replace(memory, heard=dataclasses.replace(heard, taken=taken))
 
     def _begin(
@@ -183,19 +183,13 @@ def _directions(like: Tensor, yaws: np.ndarray, pitches: np.ndarray) -> Tensor:
     return orientation(torch.tensor(yaws, device=like.device), torch.tensor(pitches, device=like.device), COPIES)
 
 
-def _action(number: int, chances: np.ndarray) -> Action:
-    thought = Thought(np.append(chances[1:], chances[0]))
-    return Stop(thought) if number == 0 else Move(number - 1, thought)
-
-
 def _moment(said: Said, situations: Sequence[Situation]) -> VlnMoment:
     device = said.moves.device
     moves, left = [], []
     rooms = torch.full(said.moves.shape, IGNORE)
     for row, s in enumerate(situations):
         graph, house, goal = s.world.graph, s.world.house, s.targets
-        wanted = shortest_action(graph, s.pose, goal, s.candidate_nodes)
-        moves.append(0 if isinstance(wanted, Stop) else 1 + wanted.candidate)
+        moves.append(action_index(shortest_of(s)))
         whole, rest = (min(float(graph.distance[n, g]) for g in goal) for n in (s.task.start.node, s.pose.node))
         left.append(min(1.0, rest / max(whole, 1e-6)))
         for k, node in enumerate((s.pose.node, *s.candidate_nodes)):

@@ -7,6 +7,7 @@ the text that is there after asking. Asking is an action of its own, so the seco
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -34,7 +35,6 @@ from agents.vnla.network import (
 from embodied.action_spaces import WORDS
 from embodied.interface import (
     TURNS,
-    Action,
     Actions,
     Ask,
     Move,
@@ -153,7 +153,8 @@ class VnlaPolicy:
         for chance, row in zip(chances, acting, strict=True):
             place = positions[row]
             said = thoughts[row].asks if row in thoughts else None
-            actions[place] = _taken(self.choose(chance, rngs[place]), Thought(chance, said))
+            number, thought = self.choose(chance, rngs[place]), Thought(chance, said)
+            actions[place] = Stop(thought) if number == STOP else Move(number, thought)
         if teacher is not None:
             moment = _moment(teacher, now, thoughts, asks, able, moves, acting)
             memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
@@ -292,15 +293,6 @@ def carried_out(before: Observation, now: Observation) -> int:
     return STOP
 
 
-def move_index(action: Move | Stop) -> int:
-    """Number of a navigation action."""
-    return STOP if isinstance(action, Stop) else action.candidate
-
-
-def _taken(index: int, thought: Thought) -> Action:
-    return Stop(thought) if index == STOP else Move(index, thought)
-
-
 def _after(memory: VnlaMemory, seen: Sequence[Observation], asking: set[int]) -> VnlaMemory:
     """The memory after the actions: who asked goes on with the same step, who moved will see what came of it."""
     asked = memory.previous_ask.tolist()
@@ -325,11 +317,6 @@ def _moment(
     there = [s for s in situations if s is not None]
     assert len(there) == len(situations), "a teacher sees situations"
     wished = [int(ask_reason(there[row], thoughts[row], teacher.rules) is not None) for row in able]
-    wanted = [move_index(teacher.reference(there[row])) for row in acting]
-    device = moves.device
-    return VnlaMoment(
-        asks,
-        torch.tensor(wished, dtype=torch.long, device=device),
-        moves,
-        torch.tensor(wanted, dtype=torch.long, device=device),
-    )
+    wanted = [STOP if isinstance(a := teacher.reference(there[row]), Stop) else a.candidate for row in acting]
+    whole = functools.partial(torch.tensor, dtype=torch.long, device=moves.device)
+    return VnlaMoment(asks, whole(wished), moves, whole(wanted))

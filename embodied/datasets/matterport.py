@@ -55,14 +55,10 @@ def scan_name(world: str) -> str:
     return world.replace("_", "")
 
 
-def heading_bin(turn: int) -> int:
-    """Matterport's heading bin (clockwise from +y) of our turn (counter-clockwise from +x)."""
-    return (TURNS // 4 - turn) % TURNS
-
-
 def view_index(view: int) -> int:
-    """Matterport's viewIndex of our view; it is its own inverse."""
-    return TURNS * (view // TURNS) + heading_bin(view % TURNS)
+    """Matterport's viewIndex of our view, whose headings go clockwise from +y, ours counter-clockwise from +x; it is
+    its own inverse."""
+    return TURNS * (view // TURNS) + (TURNS // 4 - view) % TURNS
 
 
 VIEW_OF_INDEX = np.array([view_index(v) for v in range(VIEWS)])

@@ -7,25 +7,17 @@ its world; tables over many episodes are in embodied.evaluation.tables.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from embodied.assistants.ask import QUESTIONS
 from embodied.interface import Ask, Episode, FollowRoute, Intention, Mode, Move, Stop, Usage
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
-
-
-ASK_QUESTIONS = (
-    Intention.CONFIRM,
-    Intention.APPEARANCE,
-    Intention.REGION,
-    Intention.ROUTE,
-    Intention.DISAMBIGUATE,
-    Intention.FREE,
-)
 
 
 def navigation_error(episode: Episode, graph: NavGraph) -> float:
@@ -166,16 +158,14 @@ def without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(v for i, v in enumerate(nodes) if i == 0 or v != nodes[i - 1])
 
 
-def route_ndtw(episode: Episode, graph: NavGraph) -> float:
-    """nDTW of the walk against the route that was described; NaN for other tasks."""
-    goal = episode.task.goal
-    return ndtw(without_repeats(episode.nodes), goal.path, graph) if isinstance(goal, FollowRoute) else float("nan")
+def on_route(measure: Callable[..., float]) -> Callable[[Episode, NavGraph], float]:
+    """nDTW or SDTW of a walk against the route that was described; NaN for other tasks."""
 
+    def judged(episode: Episode, graph: NavGraph) -> float:
+        goal = episode.task.goal
+        return measure(without_repeats(episode.nodes), goal.path, graph) if isinstance(goal, FollowRoute) else math.nan
 
-def route_sdtw(episode: Episode, graph: NavGraph) -> float:
-    """SDTW of the walk against the route that was described; NaN for other tasks."""
-    goal = episode.task.goal
-    return sdtw(without_repeats(episode.nodes), goal.path, graph) if isinstance(goal, FollowRoute) else float("nan")
+    return judged
 
 
 def asked(intention: Intention) -> Callable[[Episode, NavGraph], float]:
@@ -247,13 +237,13 @@ def usage(episode: Episode) -> Usage | None:
 PER_KIND: dict[str, dict[str, Callable[[Episode, NavGraph], float]]] = {
     "hanna": {"subtask success": subtask_success},
     "vnla": {"room success": room_success},
-    "vln": {"nDTW": route_ndtw, "SDTW": route_sdtw},
+    "vln": {"nDTW": on_route(ndtw), "SDTW": on_route(sdtw)},
     "hari": {"CUR": asked(Intention.CUR), "GOAL": asked(Intention.GOAL), "SUB": asked(Intention.SUB), "DO": moves},
     "ask": {
         "weighted success": weighted_success,
         "success progress": success_progress,
         "price": price,
-        **{f"asks {q.value}": asked(q) for q in ASK_QUESTIONS},
+        **{f"asks {q.value}": asked(q) for q in QUESTIONS},
     },
 }
 """What only some kinds of task report."""

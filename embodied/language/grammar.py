@@ -109,7 +109,8 @@ def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator
         template = _pick(_BY_KINDS[kinds], speaker, rng)
         pieces.append((_fill(template, phrases[i:to], again[i:to], speaker, rng), kinds))
         i = to
-    return _slip(_sentences(pieces, speaker, rng), speaker, rng)
+    words = _sentences(pieces, speaker, rng).split(" ")  # now and then a misspelt one
+    return " ".join(WORDS.slips.get(w, w) if rng.random() < speaker.slips else w for w in words)
 
 
 def _misleads(pair: tuple[str, ...], after: Sequence[Phrase]) -> bool:
@@ -226,12 +227,6 @@ def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
     return links[int(rng.integers(len(links)))]
 
 
-def _slip(text: str, speaker: Speaker, rng: np.random.Generator) -> str:
-    """Now and then a misspelt word."""
-    words = text.split(" ")
-    return " ".join(WORDS.slips.get(w, w) if rng.random() < speaker.slips else w for w in words)
-
-
 # Reading back -----------------------------------------------------------------------------------
 
 
@@ -247,7 +242,8 @@ def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
         if heard is None:
             rest = rest.partition(" ")[2]
             continue
-        clauses += _clauses(heard)
+        rooms = iter([ROOM_OF_NOUN[noun] for slot in ("room", "other") if (noun := heard.said.get(slot))])
+        clauses += [MAKERS[kind](heard.said, rooms, heard.thing) for kind in heard.template.kinds]
         rest = rest[heard.length :].lstrip()
     if not clauses:
         raise ValueError(
@@ -382,8 +378,3 @@ MAKERS: Mapping[str, Callable[[Mapping[str, str], Iterator[str], Any], Clause]] 
     "stop_here": lambda said, rooms, thing: StopHere(),
 }
 """The clause that each name of the templates means, of what its slots held: words, kinds of rooms in turn, a thing."""
-
-
-def _clauses(heard: _Heard) -> list[Clause]:
-    rooms = iter([ROOM_OF_NOUN[noun] for slot in ("room", "other") if (noun := heard.said.get(slot))])
-    return [MAKERS[kind](heard.said, rooms, heard.thing) for kind in heard.template.kinds]

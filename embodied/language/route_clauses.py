@@ -130,7 +130,9 @@ def _within_a_room(telling: _Telling, leg: Leg, *, last: bool) -> Phrase:
     if mark is not None:
         return mark
     if telling.chance(telling.speaker.metres) or last:
-        return Phrase(Metres(max(round(_length(telling.world, leg.nodes)), 1)))
+        graph = telling.world.graph
+        length = float(sum(graph.distance[a, b] for a, b in itertools.pairwise(leg.nodes)))
+        return Phrase(Metres(max(round(length), 1)))
     here = telling.kind(leg.nodes[0])
     return Phrase(Cross(here)) if here in PASSAGES and telling.chance(0.5) else Phrase(Forward())
 
@@ -310,7 +312,3 @@ def _wrong_room(telling: _Telling, path: Sequence[int]) -> str | None:
     right = {telling.kind(n) for n in path}
     wrong = sorted({w.kind for n in path[-3:] for w in telling.eyes.at(n).ways if w.leaves} - right)
     return wrong[0] if wrong else None
-
-
-def _length(world: SeenPlace, nodes: Sequence[int]) -> float:
-    return float(sum(world.graph.distance[a, b] for a, b in itertools.pairwise(nodes)))

@@ -61,11 +61,8 @@ NOVEL_HABIT = "formal"
 
 def draw_speaker(rng: np.random.Generator, novelty: str | None = None) -> Speaker:
     """One of the speakers of a novelty by their shares."""
-    known = [s for s in SPEAKERS if novelty is None or _is_one(s, novelty)]
+    kept = lambda s: s.habit != NOVEL_HABIT if novelty == FAMILIAR else s.habit in ("", NOVEL_HABIT)
+    known = [s for s in SPEAKERS if novelty is None or kept(s)]
     shares = np.array([s.share for s in known])
     speaker = known[int(rng.choice(len(known), p=shares / shares.sum()))]
     return dataclasses.replace(speaker, novelty=novelty)
-
-
-def _is_one(speaker: Speaker, novelty: str) -> bool:
-    return speaker.habit != NOVEL_HABIT if novelty == FAMILIAR else speaker.habit in ("", NOVEL_HABIT)

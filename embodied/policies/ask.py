@@ -100,25 +100,13 @@ def never(o: Observation, thing: Detection | None, trail: Mind) -> Action | None
     return Stop() if thing and thing.score >= LIKELY else None
 
 
-def always_route(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
-    """Asks for the way whenever none is shown."""
-    return None if o.advised else Ask(Intention.ROUTE)
-
-
-def confirm_on_sight(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
-    """Asks at everything that looks like it whether this is it."""
-    return between(LIKELY - 0.1, 2.0)(o, thing, trail)
-
-
 def between(low: float, high: float) -> AskRule:
     """Stops at a thing whose score is at least `high`, passes by below `low`, and asks between."""
 
     def rule(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
         if thing is None:
             return None
-        if (
-            trail.asked_at.get(Intention.CONFIRM) == trail.moment
-        ):  # it was asked at this very place: a no has lowered the score
+        if trail.asked_at.get(Intention.CONFIRM) == trail.moment:  # asked at this very place: a no lowered the score
             return Stop() if thing.score >= trail.before else None
         if thing.score >= high:
             return Stop()
@@ -138,6 +126,8 @@ def first(question: Intention, rule: AskRule) -> AskRule:
     return both
 
 
+confirm_on_sight = between(LIKELY - 0.1, 2.0)
+"""Asks at everything that looks like it whether this is it."""
 RULES: Mapping[str, AskRule] = {
     "never ask": never,
     "confirm on sight": confirm_on_sight,
@@ -146,7 +136,7 @@ RULES: Mapping[str, AskRule] = {
     "appearance first": first(Intention.APPEARANCE, never),
     "region first": first(Intention.REGION, never),
     "appearance, then confirm": first(Intention.APPEARANCE, between(0.5, 0.95)),
-    "always route": always_route,
+    "always route": lambda o, thing, trail: None if o.advised else Ask(Intention.ROUTE),
 }
 
 

@@ -34,7 +34,7 @@ from embodied.interface import (
     act,
 )
 from embodied.language.plain import heard_subgoal
-from embodied.teachers.shortest import ShortestTeacher, shortest_action
+from embodied.teachers.shortest import ShortestTeacher, shortest_of
 from embodied.teachers.vnla import ask_reason
 
 
@@ -49,10 +49,8 @@ class Forward10:
     """The candidate nearest the middle of the view for ten steps, then stop (docs/sources.md, S42)."""
 
     def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
-        return [None if o is None else self._one(o) for o in observations], ()
-
-    def _one(self, observation: Observation) -> Action:
-        return Move(0) if observation.time < 10 and len(observation.candidates) else Stop()
+        ahead = lambda o: Move(0) if o.time < 10 and len(o.candidates) else Stop()
+        return [None if o is None else ahead(o) for o in observations], ()
 
 
 class OneByOne:
@@ -164,7 +162,7 @@ class PerfectInterpreter(OneByOne):
         here, trail = s.pose.node, mind
         trail.visited[here] += 1
         if o.mode is Mode.SUB:
-            return _teacher_move(s)
+            return shortest_of(s)
         distance = s.world.graph.distance
         if min(distance[s.pose.node, g] for g in s.task.goal_nodes) <= s.task.radius:
             return Stop()
@@ -239,7 +237,8 @@ class VnlaAsking:
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
-        times, inner = memory or (self._times(situations, rngs), None)
+        drawn = (self._ask == "random" and s for s in situations)
+        times, inner = memory or ([random_times(s, rng) if s else frozenset() for s, rng in zip(drawn, rngs)], None)
         actions, inner = act(self._navigation, observations, situations, inner, rngs=rngs)
         for i, (o, s, planned) in enumerate(zip(observations, situations, actions, strict=True)):
             if o is None or s is None or planned is None:
@@ -247,10 +246,6 @@ class VnlaAsking:
             if o.can_ask and self._wants(s, planned, times[i]):
                 actions[i] = Ask(o.can_ask[0], planned.thought)
         return actions, (times, inner)
-
-    def _times(self, situations: Situations, rngs: Rngs) -> list[frozenset[int]]:
-        random = self._ask == "random"
-        return [random_times(s, rng) if random and s else frozenset() for s, rng in zip(situations, rngs, strict=True)]
 
     def _wants(self, s: Situation, planned: Action, times: frozenset[int]) -> bool:
         if self._ask == "teacher":
@@ -268,11 +263,7 @@ class HalfwaySkyline(OneByOne):
     def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
         if len(s.goals) == 1 and s.pose.node != s.goals[0] and Intention.SUB in o.can_ask:
             return Ask(Intention.SUB)
-        return _teacher_move(s)
-
-
-def _teacher_move(s: Situation) -> Move | Stop:
-    return shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
+        return shortest_of(s)
 
 
 def _random_move(observation: Observation, rng: np.random.Generator) -> Move | Stop:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Sight, Situation, Step, viewpoint
+from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Situation, Step, viewpoint
 from embodied.language.prose import prose
 from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game
@@ -83,17 +83,12 @@ def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     }
 
 
-def _picture_of(sight: Sight, pictures: Pictures) -> str:
-    """The name under which the browser gets what a sight shows."""
-    at = viewpoint(sight)
-    return pictures.name(at.world, at.node)
-
-
 def agent_of(game: Game, pictures: Pictures) -> Screen:
     """What the agent sees, and nothing that an agent may not know."""
     part, seen = game.table.part, game.observation
     assert seen is not None
-    target = None if seen.target is None else _picture_of(seen.target, pictures)
+    aim = None if seen.target is None else viewpoint(seen.target)
+    target = None if aim is None else pictures.name(aim.world, aim.node)
     drives = {"live": live_name(game, pictures), "moves": [{"candidate": k} for k in range(len(ACTIONS))]}
     moves = {"live": None, "moves": moves_of(seen, game.situation, pictures)}
     return {

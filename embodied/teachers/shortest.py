@@ -24,6 +24,11 @@ def shortest_action(graph: NavGraph, pose: Pose, targets: Sequence[int], candida
     return Stop() if node == pose.node else Move(candidate_nodes.index(node))
 
 
+def shortest_of(s: Situation) -> Move | Stop:
+    """The shortest path's action in a situation."""
+    return shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
+
+
 class ShortestTeacher:
     """Labels every step with the reference action; has no opinion about asking.
 
@@ -32,8 +37,7 @@ class ShortestTeacher:
     """
 
     def label(self, situation: Situation) -> Label:
-        s = situation
-        return Label(shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes))
+        return Label(shortest_of(situation))
 
     def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         return tuple(Label(shortest_action(world.graph, s.pose, s.targets, s.candidate_nodes)) for s in episode.steps)

@@ -54,12 +54,6 @@ def new_follower(config: NavConfig, eyes: NavEyes, seed: int, name: str) -> Foll
         return network
 
 
-def new_describer(config: NavConfig, eyes: NavEyes) -> WalkDescriber:
-    """An untrained describer."""
-    with seeded(_beginning(config.data_seed, "describer")):
-        return WalkDescriber(len(eyes.vocabulary), config.hidden_size, config.heads, eyes.size, HORIZON)
-
-
 def _beginning(seed: int, name: str) -> int:
     """Names the first weights of a network."""
     return int(stream(seed, "nav", "begin", name).integers(2**31))
@@ -88,7 +82,8 @@ def teach_describer(
 ) -> WalkDescriber:
     """P~_T(d | e) (3.2.4.1): the walk along a path to one of its requests; judged by who follows what it says."""
     eyes, world = data.eyes, NavWorld(data.eyes.places)
-    describer = new_describer(config, eyes)
+    with seeded(_beginning(config.data_seed, "describer")):
+        describer = WalkDescriber(len(eyes.vocabulary), config.hidden_size, config.heads, eyes.size, HORIZON)
     trips = data.splits["train"]
 
     def loss_of(rng: np.random.Generator) -> Tensor:
