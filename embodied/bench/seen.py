@@ -16,7 +16,7 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.gym.env import HelpGymEnv, make
 from embodied.gym.eyes import CameraSensor, PanoramaStore, Sensor, ViewSettings
 from embodied.gym.in_step import make_vec
-from embodied.gym.playground import flat_playground
+from embodied.gym.playground import Asked, flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain import PlainLanguage
@@ -85,7 +85,7 @@ def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
     """One environment against batches of them, all in the flat that `make` generates from `seed`."""
     drawn = PictureSettings(kind=kind)
     asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": drawn}
-    for world in flat_playground("find", seed, cache=cache, pictures=asked["pictures"], sees=("rgb",)).worlds.values():
+    for world in flat_playground("find", seed, Asked(cache, pictures=drawn, sees=("rgb",))).worlds.values():
         assert isinstance(world, World), "generated, so it can be drawn"
         with world:
             world.render_all()

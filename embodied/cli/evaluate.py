@@ -234,15 +234,14 @@ def _stages(
 ) -> Iterable[SplitData]:
     """The splits of a data set, Ask-v0's hidden houses, or a generated flat."""
     from embodied.datasets.store import SplitData
-    from embodied.gym.playground import Variants, flat_playground
+    from embodied.gym.playground import Asked, flat_playground
 
     if data is None and args.seeds:
         yield _hidden_houses(args, args.seeds, limit or FEW_TASKS)
     elif data is None:
         seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
-        variants = Variants(args.rules, hari=args.hari_rules())
-        how: dict[str, Any] = {"cache": args.cache, "sees": seen, "variants": variants, "assistant": assistant}
-        flat = flat_playground(args.kind, args.seed, **how)
+        how = Asked(args.cache, sees=seen, rules=args.rules, hari=args.hari_rules(), assistant=assistant)
+        flat = flat_playground(args.kind, args.seed, how)
         yield SplitData(f"flat_{args.seed}", flat.worlds, tuple(flat.tasks), flat.make_env)
     else:
         catalogue = catalogue_of(args) if looks else None

@@ -29,7 +29,7 @@ from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import data_worlds, flat_worlds
 from embodied.gym.eyes import LARGE, check_live, live_pixels, pixel_spaces
-from embodied.gym.playground import flat_playground
+from embodied.gym.playground import Asked, flat_playground
 from embodied.gym.spaces import codes_of
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
@@ -271,7 +271,7 @@ def make_course(
             raise ValueError(f"{data} is a data set of {whole.kind!r}; VLNCE-v0 plays those of 'vln', or give episodes")
         found = route_excursions(whole.tasks(split), worlds)
     else:
-        found = route_excursions(flat_playground("vln", seed, cache=where, worlds=worlds).tasks, worlds)
+        found = route_excursions(flat_playground("vln", seed, Asked(where, worlds)).tasks, worlds)
     seen = (sees,) if isinstance(sees, str) else tuple(sees)
     return Course(kind, dict(worlds), tuple(found), body, lens, seen, grounds)
 

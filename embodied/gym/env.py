@@ -43,7 +43,7 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.playground import Playground, Variants, flat_playground, split_playground
+from embodied.gym.playground import Asked, Playground, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
@@ -362,15 +362,8 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     own = {name: options.pop(name) for name in OWN if name in options}
     check_options(render_mode, **own)
     shared = open_resources(kind, **options)
-    return HelpGymEnv(
-        shared.make_env,
-        shared.tasks,
-        shared.sensor,
-        layout=shared.layout,
-        render_mode=render_mode,
-        opened=shared.opened,
-        **own,
-    )
+    how: dict[str, Any] = {"layout": shared.layout, "render_mode": render_mode, "opened": shared.opened, **own}
+    return HelpGymEnv(shared.make_env, shared.tasks, shared.sensor, **how)
 
 
 @dataclass(frozen=True, eq=False)
@@ -416,18 +409,12 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
     seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
-    asked: dict[str, Any] = {
-        "cache": where,
-        "worlds": wanted.worlds,
-        "pictures": wanted.pictures,
-        "sees": seen,
-        "variants": Variants(wanted.rules, wanted.rooms, wanted.hari),
-        "assistant": assistant_of(wanted.assistant),
-    }
-    if wanted.data:
-        play = split_playground(kind, Path(wanted.data), wanted.split, **asked)
+    w, helper = wanted, assistant_of(wanted.assistant)
+    asked = Asked(where, w.worlds, w.pictures, seen, w.rules, w.rooms, w.hari, helper)
+    if w.data:
+        play = split_playground(kind, Path(w.data), w.split, asked)
     else:
-        play = flat_playground(kind, wanted.seed, **asked)
+        play = flat_playground(kind, w.seed, asked)
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
     layout = wanted.layout or layout_of(kind, max(SpaceLayout.stack, wanted.hari.stack))
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]

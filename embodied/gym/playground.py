@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -48,73 +48,53 @@ class Playground:
 
 
 @dataclass(frozen=True)
-class Variants:
-    """Of the kinds of task that can be played in several ways."""
+class Asked:
+    """How houses are opened, and what is played in them."""
 
-    vnla: str = AS_PUBLISHED
+    cache: Path
+    worlds: Mapping[str, SeenPlace] | None = None
+    """Worlds to play in; otherwise opened."""
+    pictures: PictureSettings | str | None = None
+    """How the houses are drawn; by default as a data set's pictures are, and 'fast' for a flat."""
+    sees: Sequence[str] = ("oracle",)
+    """Some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only."""
+    rules: str = AS_PUBLISHED
     """VNLA's rule of play."""
     rooms: bool = True
     """Whether VNLA's requests in a generated flat name the room."""
     hari: HariRules = AS_PRINTED
+    assistant: Assistant | None = None
+    """Who answers, instead of the kind's own assistant."""
 
 
-def split_playground(
-    kind: str,
-    data: Path,
-    split: str,
-    *,
-    cache: Path,
-    worlds: Mapping[str, SeenPlace] | None = None,
-    pictures: PictureSettings | str | None = None,
-    sees: Sequence[str] = ("oracle",),
-    variants: Variants = Variants(),
-    assistant: Assistant | None = None,
-) -> Playground:
+def split_playground(kind: str, data: Path, split: str, asked: Asked) -> Playground:
     """A split of a data set.
-
-    Args:
-      pictures: how the houses are drawn; as the data set's pictures are where not given.
-      sees: some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only.
-      assistant: who answers, instead of the kind's own assistant.
 
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
     """
-    catalogue, whole = load_catalogue(cache), Dataset(data)
+    catalogue, whole = load_catalogue(asked.cache), Dataset(data)
     if whole.kind != kind:
         raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
-    if (rooms := variants.rooms) != whole.config.rooms:
+    if (rooms := asked.rooms) != whole.config.rooms:
         raise ValueError(
             f"{data} was built with rooms={whole.config.rooms}, not {rooms}; say so, or build another data set"
         )
+    worlds = asked.worlds
     if worlds is None:
         names = whole.names(split)
-        drawn = pictures or pictures_of(whole, names, wanted=bool(set(sees) - {"oracle"}))
-        worlds = {n: whole.open_world(n, catalogue, cache, drawn) for n in names}
-    chosen = whole.split(split, worlds=worlds, vnla=variants.vnla, hari=variants.hari, assistant=assistant)
-    return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, cache, sees))
+        drawn = asked.pictures or pictures_of(whole, names, wanted=bool(set(asked.sees) - {"oracle"}))
+        worlds = {n: whole.open_world(n, catalogue, asked.cache, drawn) for n in names}
+    chosen = whole.split(split, worlds=worlds, vnla=asked.rules, hari=asked.hari, assistant=asked.assistant)
+    return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, asked))
 
 
-def flat_playground(
-    kind: str,
-    seed: int,
-    *,
-    cache: Path,
-    worlds: Mapping[str, SeenPlace] | None = None,
-    pictures: PictureSettings | str | None = None,
-    sees: Sequence[str] = ("oracle",),
-    variants: Variants = Variants(),
-    assistant: Assistant | None = None,
-) -> Playground:
+def flat_playground(kind: str, seed: int, asked: Asked) -> Playground:
     """One world (generated from `seed` unless given) and tasks in it.
 
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
-
-    Args:
-      pictures: how the flat is drawn; 'fast' where not given.
-      sees, assistant: as for `split_playground`.
     """
-    catalogue = load_catalogue(cache)
+    catalogue, worlds = load_catalogue(asked.cache), asked.worlds
     language: Language = PlainLanguage() if worlds is not None else People(tries=1)
     paths = None
     if worlds is None:
@@ -124,8 +104,8 @@ def flat_playground(
             met = meet(house, graph, catalogue, seed=seed)
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
-        drawn = PictureSettings.of(pictures or ("fast" if set(sees) - {"oracle"} else "unlit"))
-        world = open_world(house, catalogue, cache, graph=graph, pictures=drawn)
+        drawn = PictureSettings.of(asked.pictures or ("fast" if set(asked.sees) - {"oracle"} else "unlit"))
+        world = open_world(house, catalogue, asked.cache, graph=graph, pictures=drawn)
         if drawn.lit:
             world.baked(progress=True)
         worlds = {name: world}
@@ -135,18 +115,17 @@ def flat_playground(
         paths = paths or route_paths(place.graph, place.house.name, seed=seed, house_split="test")
         routes = worded(place, paths, WORDINGS["test"], seed=seed, language=language)
     part = "main_unseen" if kind == "hari" else "main"
-    tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language, rooms=variants.rooms)[part]
-    make_env = environment_maker(
-        kind, worlds, routes={name: routes}, vnla=variants.vnla, hari=variants.hari, assistant=assistant
-    )
-    played = tasks_under(kind, tasks, worlds, variants.vnla, variants.hari)
-    return Playground(worlds, played, make_env, _oracle(worlds, catalogue, cache, sees))
+    tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language, rooms=asked.rooms)[part]
+    how: dict[str, Any] = {"vnla": asked.rules, "hari": asked.hari}
+    make_env = environment_maker(kind, worlds, routes={name: routes}, assistant=asked.assistant, **how)
+    played = tasks_under(kind, tasks, worlds, **how)
+    return Playground(worlds, played, make_env, _oracle(worlds, catalogue, asked))
 
 
-def _oracle(
-    worlds: Mapping[str, SeenPlace], catalogue: Catalogue, cache: Path, sees: Sequence[str]
-) -> Mapping[str, np.ndarray]:
-    return {name: seen_features(w, catalogue, cache) for name, w in worlds.items()} if "oracle" in sees else {}
+def _oracle(worlds: Mapping[str, SeenPlace], catalogue: Catalogue, asked: Asked) -> Mapping[str, np.ndarray]:
+    if "oracle" not in asked.sees:
+        return {}
+    return {name: seen_features(w, catalogue, asked.cache) for name, w in worlds.items()}
 
 
 def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> PictureSettings:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -31,21 +31,39 @@ DRIVEN = ("motion", "touched", "goal")
 """Parts of what Drive-v0 shows that agent_pos has, where they are there."""
 
 
-E = TypeVar("E", continuous.ContinuousGymEnv, drive.DriveEnv)
+class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
+    """What both environments have in common: `pixels`, which are black for a blind agent, and `agent_pos`. They say
+    what the policy's `_command` means and what `_state` the policy is shown."""
 
-
-class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray], Generic[E]):
-    """What both environments have in common: `pixels`, which are black for a blind agent, and `agent_pos`."""
-
-    def __init__(self, env: E, height: int, width: int, numbers: int) -> None:
+    def __init__(self, env: Any, height: int, width: int, numbers: int) -> None:
         """`numbers`: of agent_pos."""
-        self.env: E = env
+        self.env = env
         self.render_mode, self.metadata = env.render_mode, env.metadata
         self._black = np.zeros((height, width, 3), np.uint8)
         seen = spaces.Box(0, 255, self._black.shape, np.uint8)
         self.observation_space = spaces.Dict(
             {"pixels": seen, "agent_pos": spaces.Box(-LARGE, LARGE, (numbers,), np.float32)}
         )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        super().reset(seed=seed)
+        o, info = self.env.reset(seed=seed, options=options)
+        return self._seen(o), info | {"is_success": False}
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        o, reward, terminated, truncated, info = self.env.step(self._command(action))
+        return self._seen(o), reward, terminated, truncated, {"is_success": False} | info
+
+    def _seen(self, o: dict[str, Any]) -> dict[str, Any]:
+        return {"pixels": o.get("rgb", self._black), "agent_pos": self._state(o)}
+
+    def _command(self, action: np.ndarray) -> Any:
+        return action
+
+    def _state(self, o: dict[str, Any]) -> np.ndarray:
+        raise NotImplementedError
 
     def render(self) -> np.ndarray | None:
         return self.env.render()
@@ -54,7 +72,7 @@ class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray], Generic[E]):
         self.env.close()
 
 
-class ContinuousForLeRobot(_ForLeRobot[continuous.ContinuousGymEnv]):
+class ContinuousForLeRobot(_ForLeRobot):
     """VLNCE-v0 or ObjectNav-v0 for LeRobot's policies; agent_pos is embodied.envs.continuous.POSITION."""
 
     def __init__(self, env: continuous.ContinuousGymEnv) -> None:
@@ -73,22 +91,14 @@ class ContinuousForLeRobot(_ForLeRobot[continuous.ContinuousGymEnv]):
         """The name of the task."""
         return self.env.course.kind
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        super().reset(seed=seed)
-        _, info = self.env.reset(seed=seed, options=options)
-        return self._seen(), info
+    def _command(self, action: np.ndarray) -> int:
+        return int(np.argmax(action))
 
-    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        _, reward, terminated, truncated, info = self.env.step(int(np.argmax(action)))
-        return self._seen(), reward, terminated, truncated, info
-
-    def _seen(self) -> dict[str, Any]:
-        return {"pixels": self.env.pixels().get("rgb", self._black), "agent_pos": self.env.own_way()}
+    def _state(self, o: dict[str, Any]) -> np.ndarray:
+        return self.env.own_way()
 
 
-class DriveForLeRobot(_ForLeRobot[drive.DriveEnv]):
+class DriveForLeRobot(_ForLeRobot):
     """Drive-v0 for LeRobot's policies; agent_pos is its motion, and the direction of the goal where there is one."""
 
     def __init__(self, env: drive.DriveEnv) -> None:
@@ -107,20 +117,8 @@ class DriveForLeRobot(_ForLeRobot[drive.DriveEnv]):
     def task(self) -> str:
         return self.env.driving.settings.task
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
-        super().reset(seed=seed)
-        o, info = self.env.reset(seed=seed, options=options)
-        return self._seen(o), info | {"is_success": False}
-
-    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        o, reward, terminated, truncated, info = self.env.step(action)
-        return self._seen(o), reward, terminated, truncated, {"is_success": False} | info
-
-    def _seen(self, o: dict[str, Any]) -> dict[str, Any]:
-        state = np.concatenate([o[name] for name in self._parts]).astype(np.float32)
-        return {"pixels": o.get("rgb", self._black), "agent_pos": state}
+    def _state(self, o: dict[str, Any]) -> np.ndarray:
+        return np.concatenate([o[name] for name in self._parts]).astype(np.float32)
 
 
 def _driven(settings: DriveSettings) -> int:
