@@ -36,8 +36,10 @@ from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
 Step = Callable[[np.ndarray, int, int], Mapping[str, float]]
+"""Is given sentences, the pass and the number of the update, does it, and returns numbers to add up."""
 History = Sequence[Mapping[str, float]]
 Finish = Callable[[int, Mapping[str, float], History], Mapping[str, float]]
+"""Is given a pass, the sums of its numbers and what the passes before gave; returns what is kept of it."""
 LEARNERS = ("reference", "supervised", "a2c")
 """'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
 _PRETRAINING = (
@@ -137,8 +139,8 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
             "learning rate": optimizer.param_groups[0]["lr"],
         }
 
-    plan = Passes("pretrain", config.pretraining_passes, step, finish)
-    return _run(plan, folder, identity, parts, config, data, note)
+    passes = config.pretraining_passes
+    return _run("pretrain", passes, step, finish, folder, identity, parts, config, data, note)
 
 
 def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
@@ -155,8 +157,7 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source = rows(data.source, chosen)
-        said = sampled(translator, m, data, chosen, "critic", turn)
-        scores = scores_of(said, m, data, chosen)
+        said, scores = rated_samples(translator, m, data, chosen, "critic", turn)
         target = padded(said)
         values = critic(source, target)
         rated = Decisions(torch.zeros_like(values), values, torch.tensor(scores), target != 0)
@@ -168,8 +169,7 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
         save_network(critic, m.config, m.lexicons, folder / "critic.safetensors", identity)
         return {"mean square error": sums["error"] / sums["words"]}
 
-    plan = Passes("critic", config.critic_passes, step, finish)
-    return _run(plan, folder, identity, parts, config, data, note)
+    return _run("critic", config.critic_passes, step, finish, folder, identity, parts, config, data, note)
 
 
 def bandit(
@@ -208,17 +208,19 @@ def bandit(
     identity = m.identity("bandit", "critic_passes", "bandit_rate", "bandit_set", ratings=m.bandit_digest, **about)
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
-        said = sampled(translator, m, data, chosen, "bandit", turn)
-        scores = scores_of(said, m, data, chosen)
+        said, scores = rated_samples(translator, m, data, chosen, "bandit", turn)
         numbers = {"score": float(sum(scores)), "sentences": len(chosen)}
         source, where = rows(data.source, chosen), f"{learner}, update {update}"
         if learner == "supervised":
             loss = supervised_loss(translator, source, rows(data.target, chosen))
             descend(loss, optimizers["translator"], where, config.clip)
-        if learner == "a2c":
+        if learner == "a2c":  # lines 5 and 6 of Algorithm 2
             rngs = [stream(config.seed, "rating", turn, int(i)) for i in chosen]
             ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs)]
-            learn_from_ratings(translator, critic, optimizers, source, padded(said), ratings, config.clip, where)
+            target, returns = padded(said), torch.tensor(ratings, dtype=torch.float32)
+            rated = Decisions(translator(source, target), critic(source, target), returns, target != 0)
+            descend(actor_loss(rated), optimizers["translator"], f"{where}, translator", config.clip)
+            descend(critic_loss(rated), optimizers["critic"], f"{where}, critic", config.clip)
             numbers["rating"] = float(sum(ratings))
         return numbers
 
@@ -227,27 +229,9 @@ def bandit(
         found |= {"held-out BLEU": judged(translator, m, "test"), "dev BLEU": judged(translator, m, "dev")}
         return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
-    found = _run(Passes("bandit", passes, step, finish), folder, identity, parts, config, data, note)
+    found = _run("bandit", passes, step, finish, folder, identity, parts, config, data, note)
     save_network(translator, m.config, m.lexicons, folder / "best.safetensors", identity)
     return found
-
-
-def learn_from_ratings(
-    translator: Translator,
-    critic: Critic,
-    optimizers: Mapping[str, torch.optim.Optimizer],
-    source: Tensor,
-    said: Tensor,
-    ratings: Sequence[float],
-    clip: float,
-    where: str,
-) -> None:
-    """Lines 5 and 6 of Algorithm 2, for a batch of sampled translations `said` (B, T)."""
-    rated = Decisions(
-        translator(source, said), critic(source, said), torch.tensor(ratings, dtype=torch.float32), said != 0
-    )
-    descend(actor_loss(rated), optimizers["translator"], f"{where}, translator", clip)
-    descend(critic_loss(rated), optimizers["critic"], f"{where}, critic", clip)
 
 
 def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> Tensor:
@@ -264,9 +248,13 @@ def sampled(
     return decode(translator, rows(data.source, chosen), sampled_choice(uniforms), longest)
 
 
-def scores_of(said: Sequence[Sequence[int]], m: NumberedCorpus, data: Numbered, chosen: np.ndarray) -> list[float]:
-    """What a perfect rater would say: smoothed sentence BLEU of the words against the reference."""
-    return [sentence_bleu(m.lexicons[1].decode(s), data.references[i]) for s, i in zip(said, chosen, strict=True)]
+def rated_samples(
+    translator: Translator, m: NumberedCorpus, data: Numbered, chosen: np.ndarray, purpose: str, turn: int
+) -> tuple[list[list[int]], list[float]]:
+    """Sampled translations, and what a perfect rater would say: smoothed sentence BLEU of the words."""
+    said = sampled(translator, m, data, chosen, purpose, turn)
+    words = map(m.lexicons[1].decode, said)
+    return said, [sentence_bleu(w, data.references[i]) for w, i in zip(words, chosen, strict=True)]
 
 
 def judged(translator: Translator, m: NumberedCorpus, split: str) -> float:
@@ -283,21 +271,11 @@ def adam(module: torch.nn.Module, rate: float) -> torch.optim.Adam:
     return torch.optim.Adam(module.parameters(), rate, fused=True)
 
 
-@dataclass(frozen=True)
-class Passes:
-    """What a stage does in its passes over the sentences."""
-
-    purpose: str
-    """Names the random order of the sentences, anew in every pass."""
-    count: int
-    step: Step
-    """Is given sentences, the pass and the number of the update, does it, and returns numbers to add up."""
-    finish: Finish
-    """Is given a pass, the sums of its numbers and what the passes before gave; returns what is kept of it."""
-
-
 def _run(
-    plan: Passes,
+    purpose: str,
+    passes: int,
+    step: Step,
+    finish: Finish,
     folder: Path,
     identity: Identity,
     parts: Mapping[str, Stateful],
@@ -305,12 +283,12 @@ def _run(
     data: Numbered,
     note: Note,
 ) -> list[dict[str, float]]:
-    """Go on with a run until it has had its passes over `data`; returns what `finish` said of each.
+    """Go on with a run until it has had its passes over `data`, whose random orders are named by `purpose`; returns
+    what `finish` said of each.
 
     Raises:
       KeyboardInterrupt: after Ctrl-C, once the update at hand is done and saved.
     """
-    purpose, passes, step, finish = plan.purpose, plan.count, plan.step, plan.finish
     lengths = [len(s) for s in data.source]
     each, order = -(-len(lengths) // config.batch), None
     minutes = config.checkpoint_minutes

@@ -40,10 +40,7 @@ def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Vocab
 
 def padded(sentences: Sequence[Sequence[int]]) -> Tensor:
     """(B, longest) int64, PAD behind each sentence's end."""
-    out = np.full((len(sentences), max(map(len, sentences))), PAD_NUMBER, dtype=np.int64)
-    for row, sentence in enumerate(sentences):
-        out[row, : len(sentence)] = sentence
-    return torch.from_numpy(out)
+    return torch.nn.utils.rnn.pad_sequence([torch.tensor(s) for s in sentences], True, PAD_NUMBER)
 
 
 def batches(lengths: Sequence[int], size: int, rng: np.random.Generator) -> list[np.ndarray]:

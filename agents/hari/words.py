@@ -82,34 +82,29 @@ def move_angles(candidates: Candidates, turn: int) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Inputs:
-    """What the execution policy reads of B agents at one step; padding rows are zeros."""
+class PerceptRows:
+    """What one agent has before it, or B agents side by side, whose padding rows are zeros."""
 
     state: np.ndarray
-    """(B, S, 5) int64: d^s."""
+    """(S, 5) or (B, S, 5) int64: d^s."""
     goal: np.ndarray
-    """(B, G, 5) int64: d^g."""
+    """(G, 5) or (B, G, 5) int64: d^g."""
     moves: np.ndarray
-    """(B, C + 1, 5) int64: the candidates and, always last, stopping."""
+    """(C + 1, 5) or (B, C + 1, 5) int64: the candidates and, always last, stopping."""
     angles: np.ndarray
-    """(B, C + 1, 4) float32."""
+    """(C + 1, 4) or (B, C + 1, 4) float32."""
     allowed: np.ndarray
-    """(B, C + 1) bool."""
+    """(C + 1) or (B, C + 1) bool."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs(PerceptRows):
+    """What the execution policy reads of B agents at one step."""
+
     state_shared: np.ndarray
     """(B, S) int64: 1 where a feature set's name stands in the other description, too, 2 where the whole set does."""
     goal_shared: np.ndarray
     """(B, G) int64, likewise."""
-
-
-@dataclass(frozen=True, eq=False)
-class PerceptRows:
-    """What one agent has before it."""
-
-    state: np.ndarray
-    goal: np.ndarray
-    moves: np.ndarray
-    angles: np.ndarray
-    allowed: np.ndarray
 
 
 def percept(
@@ -133,15 +128,8 @@ def collate(percepts: Sequence[PerceptRows]) -> Inputs:
     state, goal = padded([p.state for p in percepts]), padded([p.goal for p in percepts])
     named = (state[:, :, None, 0] == goal[:, None, :, 0]) & (goal[:, None, :, 0] > UNKNOWN)  # (B, S, G)
     same = named.astype(np.int64) + (named & (state[:, :, None] == goal[:, None]).all(-1))
-    return Inputs(
-        state,
-        goal,
-        np.stack([_stop_last(p.moves, most) for p in percepts]),
-        np.stack([_stop_last(p.angles, most) for p in percepts]),
-        np.stack([_stop_last(p.allowed, most) for p in percepts]),
-        same.max(2),
-        same.max(1),
-    )
+    stacked = lambda name: np.stack([_stop_last(getattr(p, name), most) for p in percepts])
+    return Inputs(state, goal, stacked("moves"), stacked("angles"), stacked("allowed"), same.max(2), same.max(1))
 
 
 def padded(rows: Sequence[np.ndarray]) -> np.ndarray:

@@ -80,35 +80,30 @@ class ServerSettings:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """What came back for one request."""
+class _Kept:
+    """An answer as the cache holds it."""
 
-    value: Mapping[str, Any] | None
-    """The object that was wanted; None for an answer that is none."""
-    problem: str = ""
-    """Why it is none."""
     text: str = ""
     """What the model wrote."""
+    problem: str = ""
+    """Why it is no answer."""
     refused: bool = False
     tokens_in: int = 0
     tokens_out: int = 0
+
+
+@dataclass(frozen=True)
+class Answer(_Kept):
+    """What came back for one request."""
+
+    value: Mapping[str, Any] | None = None
+    """The object that was wanted; None for an answer that is none."""
 
     def usage(self, s: ServerSettings) -> Usage:
         """What it cost and what was wrong with it."""
         price = (self.tokens_in * s.price_in + self.tokens_out * s.price_out) / 1e6
         invalid = self.value is None and not self.refused
         return Usage(1, self.tokens_in, self.tokens_out, round(price, 9), int(invalid), int(self.refused))
-
-
-@dataclass(frozen=True)
-class _Kept:
-    """An answer as the cache holds it."""
-
-    text: str = ""
-    problem: str = ""
-    refused: bool = False
-    tokens_in: int = 0
-    tokens_out: int = 0
 
 
 class Client:
@@ -137,6 +132,8 @@ class Client:
         if kept is None:
             with self._gate:
                 said = self._send(request)
+            with self._lock:
+                self.sent += 1
             kept = self.cache.put(key, json.dumps(_without_pictures(request), sort_keys=True), to_json(said))
         return understood(from_json(_Kept, kept), schema)
 
@@ -187,11 +184,11 @@ class Client:
                     raise UnableError(f"{s.base_url} refuses the request: {problem}") from None
                 told = _seconds(e.response.headers.get("retry-after"))
             except httpx.DecodingError:
-                return self._counted(_Kept(problem="the response cannot be decompressed"))
+                return _Kept(problem="the response cannot be decompressed")
             except (openai.APIConnectionError, httpx.HTTPError) as e:
                 problem = type(e).__name__
             else:
-                return self._counted(_said(body))
+                return _said(body)
         raise UnableError(
             f"no answer from {s.base_url} after {s.tries} tries ({problem}); start the server and run the same command "
             f"again: {len(self.cache)} answers are kept in {self.cache.path}, it goes on from there"
@@ -200,11 +197,6 @@ class Client:
     def _received(self, request: Mapping[str, Any]) -> bytes | None:
         with self._connection().chat.completions.with_streaming_response.create(**request) as response:
             return _body(response.iter_bytes(), time.monotonic() + self.settings.timeout)
-
-    def _counted(self, said: _Kept) -> _Kept:
-        with self._lock:
-            self.sent += 1
-        return said
 
     def _connection(self) -> Any:
         with self._lock:
@@ -233,7 +225,7 @@ def understood(kept: _Kept, schema: Mapping[str, Any]) -> Answer:
         except RecordError as e:
             problem = str(e)
     value = value if isinstance(value, dict) and not problem and not kept.refused else None
-    return Answer(value, problem, kept.text, kept.refused, kept.tokens_in, kept.tokens_out)
+    return Answer(kept.text, problem, kept.refused, kept.tokens_in, kept.tokens_out, value)
 
 
 def misfit(value: object, schema: Mapping[str, Any], where: str = "the answer") -> str:
