@@ -124,7 +124,6 @@ class Place(Protocol):
     @property
     def name(self) -> str:
         """House.name."""
-        ...
 
     @property
     def house(self) -> House: ...
@@ -141,7 +140,6 @@ class SeenPlace(Place, Protocol):
 
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first."""
-        ...
 
 
 PlaceT = TypeVar("PlaceT", bound=Place)
@@ -156,7 +154,6 @@ class FeatureSource(Protocol):
 
     def features(self, sight: Sight) -> np.ndarray:
         """(36, D) float32; row k belongs to view k, in absolute order (not turned to the agent)."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -616,7 +613,6 @@ class Assistant(Protocol):
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         """What may be asked here and now."""
-        ...
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply: ...
 
@@ -640,11 +636,9 @@ class Teacher(Protocol):
 
     def label(self, situation: Situation) -> Label:
         """The reference action now."""
-        ...
 
     def relabel(self, episode: Episode, world: Place) -> tuple[Label, ...]:
         """Labels of every step of a finished episode (the retrospective mode of 4.2.3)."""
-        ...
 
 
 Observations = Sequence[Observation | None]
@@ -697,12 +691,9 @@ class Language(Protocol[PlaceT_contra]):
 
     def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
         """The words of a task: 'find a mug in the kitchen'."""
-        ...
 
     def route(self, world: PlaceT_contra, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
         """How a person describes walking along `path` (nodes), starting to look along `yaw` (radians)."""
-        ...
 
     def subgoal(self, words: Sequence[str]) -> str:
         """VNLA: primitive actions ('left', 'left', 'forward', 'stop') as a sentence."""
-        ...

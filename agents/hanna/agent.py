@@ -13,7 +13,7 @@ from agents.common.weights import check_features
 from agents.common.word_vectors import take_weights as take_into
 from agents.hanna.asking import RULES, ask_patiently
 from agents.hanna.lstm import LstmNetwork
-from agents.hanna.network import HannaNetwork
+from agents.hanna.network import AgentNetwork, HannaNetwork
 from agents.hanna.policy import HannaPolicy
 from agents.hanna.recognition import Likeness
 from agents.hanna.training_config import HannaEvaluation, TrainingConfig
@@ -24,7 +24,7 @@ SIZES = (
     *("reset_inter_task", "predict_reasons", "similarity_attention"),
 )
 """Settings of which the networks are made."""
-NETWORKS: Mapping[str, type[HannaNetwork] | type[LstmNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
+NETWORKS: Mapping[str, type[AgentNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +36,11 @@ class HannaAbout(About):
 @dataclass(frozen=True, eq=False)
 class HannaAgent(SightedAgent):
     about: HannaAbout
-    network: HannaNetwork | LstmNetwork
+    network: AgentNetwork
     kind, about_kind = "hanna", HannaAbout
 
     @staticmethod
-    def network_of(about: HannaAbout) -> HannaNetwork | LstmNetwork:
+    def network_of(about: HannaAbout) -> AgentNetwork:
         return NETWORKS[about.config.model](about.config, len(about.words), about.feature_size)
 
     def policy(self, bank: FeatureBank) -> HannaPolicy:

@@ -21,7 +21,6 @@ class HannaAskRule(Protocol):
           observation: what the agent sees.
           last_asked: time of the last request, -1 before any.
         """
-        ...
 
 
 def ask_sampled(probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:

@@ -14,8 +14,8 @@ from torch import Tensor, nn
 from agents.common.rows import Rows
 from agents.common.word_vectors import WordEmbedding
 from agents.hanna.attention import DotAttend
-from agents.hanna.network import Scores
-from agents.hanna.percept import SLOTS, VIEWS, Percept, action_size, slot_distribution, target_similarity
+from agents.hanna.network import AgentNetwork
+from agents.hanna.percept import SLOTS, VIEWS, Percept, action_size
 from agents.hanna.training_config import TrainingConfig
 
 
@@ -57,9 +57,9 @@ class LstmStateNetwork(nn.Module):
         return LstmMemory(zero[:, None].expand(-1, length, -1), mask, zero, zero)
 
     def forward(
-        self, m: LstmMemory, percept: Percept, delta: Tensor, previous: Tensor, extra: Tensor
+        self, m: LstmMemory, percept: Percept, delta: Tensor, previous: Tensor, extra: Tensor, similar: Tensor
     ) -> tuple[Tensor, LstmMemory]:
-        """State (B, h) of this step, and the memory after it; arguments as in StateNetwork."""
+        """State (B, h) of this step, and the memory after it; arguments as of StateNetwork, `similar` is not used."""
         text, text_mask = m.text, m.text_mask
         rows = percept.new_task.nonzero()[:, 0]
         if len(rows):
@@ -70,20 +70,15 @@ class LstmStateNetwork(nn.Module):
         inputs = self.dropout(torch.cat([previous, scene, delta, extra], -1))
         hidden, cell = self.decoder(inputs, (m.hidden, m.cell))  # (B, h)
         seen = self.dropout(hidden)
-        said = _attend_words(self.text_attend, seen, text, text_mask)  # (B, h)
+        scores = torch.einsum("bh,blh->bl", self.text_attend.query(seen) @ self.text_attend.row.weight, text)
+        said = torch.einsum("bl,blh->bh", scores.masked_fill(~text_mask, -torch.inf).softmax(-1), text)  # (B, h)
         here = self.current_attend(said, percept.current)  # (B, D)
         there = self.target_attend(said, percept.target)  # (B, D)
         state = torch.tanh(self.out(torch.cat([seen, said, here, there], -1)))
         return state, LstmMemory(text, text_mask, hidden, cell)
 
 
-def _attend_words(attend: DotAttend, query: Tensor, text: Tensor, mask: Tensor) -> Tensor:
-    """DOTATTEND that skips padding: query (B, h), text (B, L, h), mask (B, L) -> (B, h)."""
-    scores = torch.einsum("bh,blh->bl", attend.query(query) @ attend.row.weight, text)
-    return torch.einsum("bl,blh->bh", scores.masked_fill(~mask, -torch.inf).softmax(-1), text)
-
-
-class LstmNetwork(nn.Module):
+class LstmNetwork(AgentNetwork):
     """Navigation and help-request decoders of the baseline."""
 
     def __init__(self, config: TrainingConfig, words: int, feature_size: int) -> None:
@@ -96,19 +91,8 @@ class LstmNetwork(nn.Module):
         self.ask_embedding = nn.Embedding(3, config.ask_embedding)
         self.ask_out = nn.Linear(h, 2)
 
-    def start(self, batch: int, length: int) -> tuple[LstmMemory, LstmMemory]:
-        """Memories of both decoders before the first step of `batch` agents."""
-        return self.navigation.start(batch, length), self.help.start(batch, length)
+    def scores_of(self, state: Tensor, actions: Tensor) -> Tensor:
+        return self.action_out(state[:, None] * self.action_in(actions))[..., 0]
 
-    def forward(
-        self, memory: tuple[LstmMemory, LstmMemory], percept: Percept
-    ) -> tuple[Scores, tuple[LstmMemory, LstmMemory]]:
-        """One step of B agents; no gradient flows from asking into navigation."""
-        delta = target_similarity(percept.current, percept.target)
-        nothing = percept.current.new_zeros(len(delta), 0)
-        state, navigation_memory = self.navigation(memory[0], percept, delta, percept.previous_action, nothing)
-        logits = self.action_out(state[:, None] * self.action_in(percept.actions))[..., 0]  # (B, A)
-        logits = logits.masked_fill(~percept.action_mask, -torch.inf)
-        slots = slot_distribution(logits.detach(), percept.action_slots)
-        state, help_memory = self.help(memory[1], percept, delta, self.ask_embedding(percept.previous_ask), slots)
-        return Scores(logits, self.ask_out(state), None), (navigation_memory, help_memory)
+    def asking(self, state: Tensor) -> tuple[Tensor, None]:
+        return self.ask_out(state), None

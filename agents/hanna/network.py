@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 import torch.nn.functional as F
@@ -207,8 +208,41 @@ class StateNetwork(nn.Module):
         )
 
 
-class HannaNetwork(nn.Module):
+class AgentNetwork(nn.Module):
     """Navigation policy and help-request policy: two networks that share nothing."""
+
+    action_size: int
+    navigation: Any
+    help: Any
+    ask_embedding: nn.Embedding
+
+    def scores_of(self, state: Tensor, actions: Tensor) -> Tensor:
+        """(B, A) logits of navigation actions, by state (B, h) and actions (B, A, E)."""
+        raise NotImplementedError
+
+    def asking(self, state: Tensor) -> tuple[Tensor, Tensor | None]:
+        """(B, 2) logits of DO_NOTHING and REQUEST, and (B, 3) of reasons, by state (B, h)."""
+        raise NotImplementedError
+
+    def start(self, batch: int, length: int) -> tuple[Any, Any]:
+        """Memories of both networks before the first step of `batch` agents."""
+        return self.navigation.start(batch, length), self.help.start(batch, length)
+
+    def forward(self, memory: tuple[Any, Any], percept: Percept) -> tuple[Scores, tuple[Any, Any]]:
+        """One step of B agents; no gradient flows from asking into navigation."""
+        delta = target_similarity(percept.current, percept.target)  # (B, 36)
+        everywhere, asked = torch.ones_like(percept.new_task), percept.previous_ask == REQUEST
+        nothing = percept.current.new_zeros(len(delta), 0)
+        state, walking = self.navigation(memory[0], percept, delta, percept.previous_action, nothing, everywhere)
+        logits = self.scores_of(state, percept.actions).masked_fill(~percept.action_mask, -torch.inf)
+        slots = slot_distribution(logits.detach(), percept.action_slots)  # (B, 37) P^nav
+        before = self.ask_embedding(percept.previous_ask)
+        state, asking = self.help(memory[1], percept, delta, before, slots, asked)
+        return Scores(logits, *self.asking(state)), (walking, asking)
+
+
+class HannaNetwork(AgentNetwork):
+    """That of the text."""
 
     def __init__(self, config: TrainingConfig, words: int, feature_size: int) -> None:
         """
@@ -232,29 +266,10 @@ class HannaNetwork(nn.Module):
         # An agent that asks at every second step hears a new text each time and learns to walk by none.
         self.ask_out.bias.data = torch.tensor([1.0, -1.0])  # one request in eight chances (docs/sources.md, S30)
 
-    def start(self, batch: int, length: int) -> tuple[NetworkMemory, NetworkMemory]:
-        """Memories of both networks before the first step of `batch` agents."""
-        return self.navigation.start(batch, length), self.help.start(batch, length)
+    def scores_of(self, state: Tensor, actions: Tensor) -> Tensor:
+        action = self.action_in(actions)  # (B, A, e) W^act E^nav
+        return torch.einsum("be,bae->ba", self.action_out(state), action)  # (B, A) D.18
 
-    def forward(
-        self, memory: tuple[NetworkMemory, NetworkMemory], percept: Percept
-    ) -> tuple[Scores, tuple[NetworkMemory, NetworkMemory]]:
-        """One step of B agents; no gradient flows from asking into navigation."""
-        delta = target_similarity(percept.current, percept.target)  # (B, 36)
-        everywhere = torch.ones_like(percept.new_task)
-        nothing = percept.current.new_zeros(len(delta), 0)
-        state, navigation_memory = self.navigation(
-            memory[0], percept, delta, percept.previous_action, nothing, everywhere
-        )
-        action = self.action_in(percept.actions)  # (B, A, e) W^act E^nav
-        logits = torch.einsum("be,bae->ba", self.action_out(state), action)  # (B, A) D.18
-        logits = logits.masked_fill(~percept.action_mask, -torch.inf)
-        slots = slot_distribution(logits.detach(), percept.action_slots)  # (B, 37) P^nav
-
-        asked = percept.previous_ask == REQUEST
-        state, help_memory = self.help(
-            memory[1], percept, delta, self.ask_embedding(percept.previous_ask), slots, asked
-        )
+    def asking(self, state: Tensor) -> tuple[Tensor, Tensor | None]:
         reasons = self.reason_out(state) if self.config.predict_reasons else None  # (B, 3) D.20
-        ask = self.ask_out(state if reasons is None else reasons)  # (B, 2) D.19
-        return Scores(logits, ask, reasons), (navigation_memory, help_memory)
+        return self.ask_out(state if reasons is None else reasons), reasons  # (B, 2) D.19

@@ -6,14 +6,16 @@ level, 30 degrees up; column k % 12 turns clockwise in steps of 30 degrees.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 import torch.nn.functional as F
 from torch import Tensor
 
 from agents.common.rows import Rows
-from embodied.interface import Move, Stop
+from embodied.interface import Move, Observation, Stop
 
 VIEWS = 36
 HEADINGS = 12
@@ -91,6 +93,19 @@ def slot_distribution(logits: Tensor, slots: Tensor) -> Tensor:
     return torch.zeros(*logits.shape[:-1], SLOTS, dtype=logits.dtype, device=logits.device).scatter_add(
         -1, slots, probabilities
     )
+
+
+def candidate_rows(observations: Sequence[Observation]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The actions of k agents, 0 is stop: (k, A) int64 views, (2, k, A) float32 bearings and slopes, (k, A) bool which
+    of them are allowed."""
+    shape = len(observations), 1 + max(len(o.candidates) for o in observations)
+    views, angles, mask = np.zeros(shape, np.int64), np.zeros((2, *shape), np.float32), np.zeros(shape, bool)
+    mask[:, 0] = True
+    for row, o in enumerate(observations):
+        c, some = o.candidates, slice(1, 1 + len(o.candidates))
+        views[row, some], angles[0, row, some], angles[1, row, some] = c.view, c.bearing, c.slope
+        mask[row, some] = c.allowed
+    return views, angles, mask
 
 
 def action_index(action: Move | Stop) -> int:

@@ -15,8 +15,7 @@ from agents.common.choosing import Chooser, choose_greedily, choose_sampled
 from agents.common.rows import RunningRows, hidden_channels
 from agents.common.vocabulary import Vocabulary
 from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
-from agents.hanna.lstm import LstmNetwork
-from agents.hanna.network import HannaNetwork, Scores
+from agents.hanna.network import AgentNetwork, Scores
 from agents.hanna.percept import (
     COPIES,
     DO_NOTHING,
@@ -27,6 +26,7 @@ from agents.hanna.percept import (
     VIEWS,
     Percept,
     action_index,
+    candidate_rows,
     orientation,
 )
 from agents.hanna.recognition import Likeness, PlaceMap
@@ -76,7 +76,7 @@ class HannaMemory(RunningRows):
 class HannaPolicy:
     """A trained (or training) pair of networks that acts."""
 
-    network: HannaNetwork | LstmNetwork
+    network: AgentNetwork
     vocabulary: Vocabulary
     bank: FeatureBank
     choose: Chooser = choose_greedily
@@ -199,16 +199,8 @@ class HannaPolicy:
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
         """The tensors of one step, from observations of running episodes and their memory."""
-        k = len(observations)
-        most = 1 + max(len(o.candidates) for o in observations)
-        angles = np.zeros((2, k, most), dtype=np.float32)  # bearing and slope
-        views = np.zeros((k, most), dtype=np.int64)
-        mask = np.zeros((k, most), dtype=bool)
-        mask[:, 0] = True  # stop
-        for row, o in enumerate(observations):
-            n = len(o.candidates)
-            angles[0, row, 1 : n + 1], angles[1, row, 1 : n + 1] = o.candidates.bearing, o.candidates.slope
-            views[row, 1 : n + 1], mask[row, 1 : n + 1] = o.candidates.view, o.candidates.allowed
+        views, angles, mask = candidate_rows(observations)
+        k, most = views.shape
         turns = np.array([o.turn for o in observations])[:, None]  # (k, 1)
         slots = views // HEADINGS * HEADINGS + (views - turns) % HEADINGS
         slots[:, 0] = SLOTS - 1

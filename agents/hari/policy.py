@@ -112,12 +112,8 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     seen = [o for o in observations if o is not None]
     states = [reader("state", o.state_description) for o in seen]
     goals = [reader("goal", o.goal_descriptions[-1]) for o in seen]
-    inputs = collate(
-        [
-            percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn)
-            for s, g, o in zip(states, goals, seen, strict=True)
-        ]
-    )
+    together = zip(states, goals, seen, strict=True)
+    inputs = collate([percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn) for s, g, o in together])
     state, goal = (Encoded.together([r.encoded for r in some]) for some in (states, goals))
     belief, log_moves = network(memory.carried[rows], inputs, state, goal)
     return Considered(rows, belief, log_moves), memory
@@ -140,10 +136,7 @@ def carry(considered: Considered, memory: Belief) -> Belief:
 
 def available(observation: Observation) -> np.ndarray:
     """(5,) bool: the intentions that are possible now."""
-    possible = np.ones(len(INTENTIONS), dtype=bool)
-    for name, k in ASKS.items():
-        possible[k] = Intention(name) in observation.can_ask
-    return possible
+    return np.array([name in ("do", "done") or Intention(name) in observation.can_ask for name in INTENTIONS])
 
 
 def action_of(intention: int, move: int | None, thought: Thought | None = None) -> Action:
@@ -213,12 +206,9 @@ class HariPolicy:
         )
         rows = considered.rows
         seen = [observations[i] for i in rows]
-        inputs = (
-            considered.belief.clone(),
-            shown_probabilities(considered.log_moves).clone(),
-            mind.last[rows],
-            torch.tensor([len(o.goal_descriptions) for o in seen if o is not None]),
-        )
+        depth = torch.tensor([len(o.goal_descriptions) for o in seen if o is not None])
+        shown = shown_probabilities(considered.log_moves).clone()
+        inputs = considered.belief.clone(), shown, mind.last[rows], depth
         possible = torch.from_numpy(np.stack([available(o) for o in seen if o is not None]))
         before = (mind.actor[0][rows], mind.actor[1][rows])
         scores, after = self.actor(*inputs, before)
@@ -232,15 +222,8 @@ class HariPolicy:
         stops = considered.would_stop
         for k, i in enumerate(rows):
             thought = Thought(asks=dict(zip(INTENTIONS, p[k].tolist(), strict=True)))
-            move: int | None
-            if drawn[k] != DO:
-                move = None
-            elif k in led:
-                move = led[k]
-            elif stops[k]:
-                move = None
-            else:
-                move = considered.move(k)
+            own = None if stops[k] else considered.move(k)
+            move = led.get(k, own) if drawn[k] == DO else None
             actions[i] = action_of(drawn[k], move, thought)
         intentions = torch.tensor(drawn)
         if self.choices is not None:

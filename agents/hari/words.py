@@ -134,10 +134,8 @@ def collate(percepts: Sequence[PerceptRows]) -> Inputs:
 
 def padded(rows: Sequence[np.ndarray]) -> np.ndarray:
     """(B, M, 5) of B descriptions of up to M rows, zeros behind their ends."""
-    out = np.zeros((len(rows), max(map(len, rows)), COLUMNS), dtype=np.int64)
-    for i, r in enumerate(rows):
-        out[i, : len(r)] = r
-    return out
+    longest = max(map(len, rows))
+    return np.stack([np.pad(r, ((0, longest - len(r)), (0, 0))) for r in rows])
 
 
 def _stop_last(rows: np.ndarray, most: int) -> np.ndarray:

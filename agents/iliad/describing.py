@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.iliad.protocol import NOTHING, Executions, Tasks
+from agents.iliad.protocol import NOTHING, Executions, Tasks, one_request
 
 
 def kept(candidates: Sequence[str], performances: Sequence[float], threshold: float) -> list[str]:
@@ -49,10 +49,6 @@ class DescribingNetworks(ABC):
         """perf >= tau of Eq 3.15: people's own words describe it."""
 
     @abstractmethod
-    def human(self, task: Any, *, rng: np.random.Generator) -> str:
-        """Unif(D*)."""
-
-    @abstractmethod
     def candidates_of(
         self, tasks: Tasks, executions: Executions, uniforms: np.ndarray | None = None
     ) -> list[list[str]]:
@@ -69,7 +65,7 @@ class DescribingNetworks(ABC):
         for i, (task, execution) in enumerate(zip(tasks, executions, strict=True)):
             if self.spoken_of(task, execution):
                 if self.near_optimal(task, execution):
-                    said[i] = self.human(task, rng=rng)
+                    said[i] = one_request(task, rng=rng)
                 else:
                     left.append(i)
         found = self._pragmatic([tasks[i] for i in left], [executions[i] for i in left], uniforms[left])
@@ -97,3 +93,14 @@ class DescribingNetworks(ABC):
         cases = [(q, e, d) for q, e, many in zip(tasks, executions, several) for d in many]
         scores = iter(self.performances(cases))
         return [kept(many, [next(scores) for _ in many], self.threshold) for many in several]
+
+
+class EachDescribed(ABC):
+    """A teacher who describes execution by execution."""
+
+    @abstractmethod
+    def one(self, task: Any, execution: Any, *, rng: np.random.Generator) -> str | None:
+        """What was done; None where there is nothing to say."""
+
+    def describe(self, tasks: Tasks, executions: Executions, *, rng: np.random.Generator) -> list[str | None]:
+        return [self.one(q, e, rng=rng) for q, e in zip(tasks, executions, strict=True)]

@@ -21,6 +21,11 @@ NOTHING = ""
 """The empty description."""
 
 
+def one_request(task: Any, *, rng: np.random.Generator) -> str:
+    """Unif(D*)."""
+    return task.requests[int(rng.integers(len(task.requests)))]
+
+
 @dataclass(frozen=True, eq=False)
 class ExecutionScores:
     """What a policy thinks of B executions of at most T actions; zero behind the end of each."""

@@ -41,38 +41,32 @@ DAGGER, BLIND = LEARNERS[0], StudyRow("DAgger, blind", {"learner": "dagger", "bl
 OWN = ("blind", "word_vectors", "varied_words")
 """Settings of NAV's students in which rows differ."""
 CHANCE = StudyRow("chance: a random shortest path of 2 to 6 edges", None)
+
+
+def _table(title: str, *rows: StudyRow) -> StudyTable:
+    return StudyTable(title, rows, ("success",), ("test",), pooled=(NEEDED,))
+
+
 TABLES: Mapping[str, StudyTable] = {
-    "3.4": StudyTable(
-        "Learning from descriptions, demonstrations and rewards", LEARNERS, ("success",), ("test",), pooled=(NEEDED,)
+    "3.4": _table("Learning from descriptions, demonstrations and rewards", *LEARNERS),
+    "3.5": _table(
+        "The mixing weight", StudyRow("λ = 0", {"mixing": 0.0}), StudyRow("λ = 1", {"mixing": 1.0}), StudyRow("λ = 0.5")
     ),
-    "3.5": StudyTable(
-        "The mixing weight",
-        (StudyRow("λ = 0", {"mixing": 0.0}), StudyRow("λ = 1", {"mixing": 1.0}), StudyRow("λ = 0.5")),
-        ("success",),
-        ("test",),
-        pooled=(NEEDED,),
-    ),
-    "C.1": StudyTable(
+    "C.1": _table(
         "Annealing the mixing weight",
-        (StudyRow("every 2000", {"annealed": 2000}), StudyRow("every 5000", {"annealed": 5000}), StudyRow("never")),
-        ("success",),
-        ("test",),
-        pooled=(NEEDED,),
+        StudyRow("every 2000", {"annealed": 2000}),
+        StudyRow("every 5000", {"annealed": 5000}),
+        StudyRow("never"),
     ),
-    "algorithms": StudyTable(
+    "algorithms": _table(
         "The algorithms of the text (docs/sources.md, S176)",
-        (
-            StudyRow("Algorithm 4, executions of the marginal", {"learner": "mixture", "mixing": 1.0}),
-            StudyRow(
-                "Algorithm 5, mixture annealed to 0",
-                {"learner": "mixture", "mixing": 1.0, "annealed": 5000, "least_mixing": 0.0},
-            ),
-            StudyRow("Algorithm 8, own executions", {"learner": "mixture", "mixing": 0.0}),
-            StudyRow("Algorithm 9, ADEL"),
+        StudyRow("Algorithm 4, executions of the marginal", {"learner": "mixture", "mixing": 1.0}),
+        StudyRow(
+            "Algorithm 5, mixture annealed to 0",
+            {"learner": "mixture", "mixing": 1.0, "annealed": 5000, "least_mixing": 0.0},
         ),
-        ("success",),
-        ("test",),
-        pooled=(NEEDED,),
+        StudyRow("Algorithm 8, own executions", {"learner": "mixture", "mixing": 0.0}),
+        StudyRow("Algorithm 9, ADEL"),
     ),
     "figure 3.7": StudyTable(
         "Success over the course of training",

@@ -22,7 +22,6 @@ class Namer(Protocol):
 
     def names(self, sight: Sight) -> Sequence[tuple[str, float, float]]:
         """(object class, yaw in radians, metres), the largest in view first."""
-        ...
 
 
 class SeenNames:

@@ -217,9 +217,8 @@ def _run(learner: StudyLearner, out: Path, note: Note, job: _Job) -> str:
     name = home.name
     if row.train is not None:
         identity = learner.trained(row.train, seed, out)
-        done = finished(home / "trained.json", identity, (CODE, MAKERS))
-        weights = home / str(done["weights"]) if done else None
-        if weights is None or not weights.exists():
+        weights = _weights(home, identity)
+        if weights is None:
             weights = learner.train(row.train, seed, out, home, lambda line: note(f"{name}: {line}"))
             facts = {"weights": os.path.relpath(weights, home), "seconds": _processor(home)}
             write_finished(home / "trained.json", identity, facts)
@@ -238,6 +237,12 @@ def _home(learner: StudyLearner, out: Path, row: StudyRow, seed: int) -> Path:
         return out / "runs" / "without_learning"
     settings = "_".join(f"{k}_{v}" for k, v in sorted(row.train.items())) or "as_it_is"
     return out / "runs" / f"{_slug(settings)}_seed_{seed}_{key_of(learner.trained(row.train, seed, out))}"
+
+
+def _weights(home: Path, identity: Identity) -> Path | None:
+    """Of a run that was trained under this identity."""
+    done = finished(home / "trained.json", identity, (CODE, MAKERS))
+    return home / str(done["weights"]) if done and (home / str(done["weights"])).exists() else None
 
 
 def _judged(
@@ -369,13 +374,8 @@ def _samples(learner: StudyLearner, row: StudyRow, split: str, out: Path) -> lis
     found: list[Measured] = []
     for seed in learner.seeds(row):
         home, weights = _home(learner, out, row, seed), None
-        if row.train is not None:
-            done = finished(home / "trained.json", learner.trained(row.train, seed, out), (CODE, MAKERS))
-            if done is None:
-                return None
-            weights = home / str(done["weights"])
-            if not weights.exists():
-                return None
+        if row.train is not None and (weights := _weights(home, learner.trained(row.train, seed, out))) is None:
+            return None
         path, mine = _judged(learner, home, weights, row, split)
         body = finished(path, mine)
         if body is None:

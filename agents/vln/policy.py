@@ -14,7 +14,7 @@ from agents.common.choosing import Chooser, choose_greedily
 from agents.common.losses import IGNORE
 from agents.common.rows import RunningRows, hidden_channels
 from agents.common.vocabulary import Vocabulary
-from agents.hanna.percept import action_index, orientation
+from agents.hanna.percept import action_index, candidate_rows, orientation
 from agents.vision.bank import FeatureBank
 from agents.vln.network import COPIES, FollowerNetwork, Heard, Said, Seen
 from assets.records import ROOM_KINDS
@@ -141,21 +141,13 @@ class VlnPolicy:
     def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> Seen:
         views = self.bank.gather([o.sight for o in seen])  # (k, 36, D)
         views = views if channels is None else views * channels[:, None]
-        most, rows = max(len(o.candidates) for o in seen), np.arange(len(seen))
-        view = np.zeros((len(seen), most), dtype=np.int64)
-        angles = np.zeros((2, len(seen), most), dtype=np.float32)
-        mask = np.zeros((len(seen), 1 + most), dtype=bool)
-        mask[:, 0] = True
-        for row, o in zip(rows, seen, strict=True):
-            c, n = o.candidates, len(o.candidates)
-            view[row, :n], angles[0, row, :n], angles[1, row, :n] = c.view, c.bearing, c.slope
-            mask[row, 1 : 1 + n] = c.allowed
+        view, angles, mask = candidate_rows(seen)
         yaws = wrap(VIEW_YAWS - np.array([o.turn for o in seen])[:, None] * (np.pi / 6)).astype(np.float32)
         pitches = np.broadcast_to(VIEW_PITCHES.astype(np.float32), yaws.shape)
-        towards = views[torch.from_numpy(rows)[:, None], torch.from_numpy(view)]
+        towards = views[torch.arange(len(seen))[:, None], torch.from_numpy(view[:, 1:])]
         return Seen(
             torch.cat([views, _directions(views, yaws, pitches)], -1),
-            torch.cat([towards, _directions(views, angles[0], angles[1])], -1),
+            torch.cat([towards, _directions(views, *angles[:, :, 1:])], -1),
             torch.from_numpy(mask).to(views.device),
         )
 

@@ -89,39 +89,41 @@ def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
         assert isinstance(world, World), "generated, so it can be drawn"
         with world:
             world.render_all()
-    walk = _Alone(make("find", **asked))
+    walk = _alone(make("find", **asked))
     alone = measure("steps of one environment, rgb, 128 x 128", walk, "1/s", per=STEPS, warm=ROUNDS)
     yield alone
     envs = make_vec("find", BATCH, **asked)
     name = f"steps of {BATCH} environments in one process"
-    together = measure(name, _Together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
+    together = measure(name, _together(envs), "1/s", per=ROUND * BATCH, warm=ROUNDS)
     envs.close()
     yield together
     yield share(f"{name} against one", together, alone, "x")
 
 
-class _Alone:
-    """Goes STEPS steps on: the first move there is, again and again."""
+def _alone(env: HelpGymEnv) -> Callable[[], None]:
+    """Goes STEPS steps on at each call: the first move there is, again and again."""
+    seen = env.reset(seed=0)[0]
 
-    def __init__(self, env: HelpGymEnv) -> None:
-        self._env, self._seen = env, env.reset(seed=0)[0]
-
-    def __call__(self) -> None:
+    def walk() -> None:
+        nonlocal seen
         for _ in range(STEPS):
-            self._seen, _, terminated, truncated, _ = self._env.step(int(self._seen["action_mask"].argmax()))
+            seen, _, terminated, truncated, _ = env.step(int(seen["action_mask"].argmax()))
             if terminated or truncated:
-                self._seen, _ = self._env.reset()
+                seen, _ = env.reset()
+
+    return walk
 
 
-class _Together:
+def _together(envs: Any) -> Callable[[], None]:
     """The same in every slot, ROUND steps on."""
+    seen = envs.reset(seed=0)[0]
 
-    def __init__(self, envs: Any) -> None:
-        self._envs, self._seen = envs, envs.reset(seed=0)[0]
-
-    def __call__(self) -> None:
+    def walk() -> None:
+        nonlocal seen
         for _ in range(ROUND):
-            self._seen, *_ = self._envs.step(self._seen["action_mask"].argmax(1))
+            seen, *_ = envs.step(seen["action_mask"].argmax(1))
+
+    return walk
 
 
 def _env(world: World, tasks: list[Task], sensor: Sensor) -> HelpGymEnv:

@@ -202,20 +202,11 @@ def read_vlnce(path: Path) -> list[Excursion]:
         goals = _field(item, "goals", list, where)
         expert = experts.get(str(item.get("episode_id")), {"locations": ()})
         try:
-            found.append(
-                Excursion(
-                    str(item["episode_id"]),
-                    scene_name(item["scene_id"]),
-                    from_habitat(item["start_position"]),
-                    yaw_of(item["start_rotation"]),
-                    item["instruction"]["instruction_text"],
-                    tuple(Aim(from_habitat(g["position"])) for g in goals),
-                    float(goals[0].get("radius") or 3.0),
-                    tuple(from_habitat(p) for p in item.get("reference_path") or ()),
-                    tuple(from_habitat(p) for p in expert["locations"]),
-                    trajectory=str(item.get("trajectory_id", "")),
-                )
-            )
+            aims, radius = tuple(Aim(from_habitat(g["position"])) for g in goals), float(goals[0].get("radius") or 3.0)
+            reference = tuple(from_habitat(p) for p in item.get("reference_path") or ())
+            passed, route = tuple(from_habitat(p) for p in expert["locations"]), str(item.get("trajectory_id", ""))
+            text = item["instruction"]["instruction_text"]
+            found.append(Excursion(*_begun(item), text, aims, radius, reference, passed, trajectory=route))
         except (KeyError, TypeError, ValueError, IndexError) as e:
             raise RecordError(f"{where} is not one of VLN-CE's: {type(e).__name__} {e}") from e
     return found
@@ -245,15 +236,16 @@ def read_objectnav(path: Path) -> list[Excursion]:
                     )
                     for g in goals[f"{scene.rsplit('/', 1)[-1]}_{name}"]
                 )
-                start, yaw = from_habitat(item["start_position"]), yaw_of(item["start_rotation"])
-                found.append(
-                    Excursion(
-                        str(item["episode_id"]), scene_name(scene), start, yaw, name, aims, AT_VIEW, object_class=name
-                    )
-                )
+                found.append(Excursion(*_begun(item), name, aims, AT_VIEW, object_class=name))
             except (KeyError, TypeError, ValueError, AttributeError) as e:
                 raise RecordError(f"{where} is not one of ObjectNav's: {type(e).__name__} {e}") from e
     return found
+
+
+def _begun(item: Mapping[str, Any]) -> tuple[str, str, Point, float]:
+    """Id, house, start and yaw of an episode."""
+    start, yaw = from_habitat(item["start_position"]), yaw_of(item["start_rotation"])
+    return str(item["episode_id"]), scene_name(item["scene_id"]), start, yaw
 
 
 def scene_name(scene_id: str) -> str:

@@ -27,7 +27,7 @@ from embodied.datasets.store import Dataset
 from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Lens, Move, own_way
 from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
-from embodied.gym.drive import data_worlds, flat_worlds
+from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
 from embodied.gym.eyes import LARGE, check_live, live_pixels, pixel_spaces
 from embodied.gym.playground import Asked, flat_playground
 from embodied.gym.spaces import codes_of
@@ -46,10 +46,6 @@ KEPT = 4
 OBJECTS = 100
 """Episodes of ObjectNav in each house where no file says otherwise."""
 SEES = ("rgb", "depth")
-VIEW = (480, 640)
-"""Height and width of what `render` shows, pixels."""
-
-
 PRESETS: dict[str, tuple[Body, Lens]] = {
     "vlnce": (Body(), Lens()),
     "streamvln": (Body(), Lens(480, 640, 79.0)),
@@ -92,7 +88,7 @@ class Course:
         return self.worlds[name]
 
 
-class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
+class ContinuousGymEnv(LiveEnv):
     """Continuous navigation as a Gymnasium environment.
 
     Reward: 1 on success, minus 0.01 an action, plus a tenth for every metre nearer to the goal along the floor. STOP
@@ -103,13 +99,8 @@ class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
 
     def __init__(self, course: Course, *, render_mode: str | None = None) -> None:
-        """
-        Raises:
-          ValueError: an unknown render mode.
-        """
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
-        self.course, self.render_mode = course, render_mode
+        super().__init__(render_mode)
+        self.course = course
         self.play = ContinuousEnv(course.body, course.grounds)
         """The pose of the body, and what is privileged: distance, ways, the walk so far."""
         self.action_space: gym.Space[Any] = spaces.Discrete(course.body.actions)
@@ -183,11 +174,7 @@ class ContinuousGymEnv(gym.Env[dict[str, Any], Any]):
         """Who knows the way from wherever the body is, for training."""
         return Follower(self.play, along=along)
 
-    def render(self) -> np.ndarray | None:
-        """(h, w, 3) uint8: what the camera sees, larger."""
-        if self.render_mode is None:
-            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
-            return None
+    def _picture(self) -> np.ndarray:
         lens = dataclasses.replace(self.course.lens, height=VIEW[0], width=VIEW[1])
         camera = camera_at(self.play.eye, self.play.yaw, self.play.pitch, lens.vfov)
         return self.course.world(self.play.excursion.world).renderer.rgb(camera, VIEW)

@@ -32,7 +32,30 @@ VIEW = (480, 640)
 """Height and width of what `render` shows, pixels."""
 
 
-class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
+class LiveEnv(gym.Env[dict[str, Any], Any]):
+    """An environment with live pictures; it says what `_picture` shows to people."""
+
+    def __init__(self, render_mode: str | None) -> None:
+        """
+        Raises:
+          ValueError: an unknown render mode.
+        """
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
+        self.render_mode = render_mode
+
+    def _picture(self) -> np.ndarray:
+        raise NotImplementedError
+
+    def render(self) -> np.ndarray | None:
+        """(*VIEW, 3) uint8: what its camera sees, larger."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
+            return None
+        return self._picture()
+
+
+class DriveEnv(LiveEnv):
     """Driving as a Gymnasium environment.
 
     Reward: 1 on success, minus 0.01 a command and 0.05 for every collision, plus a tenth for every
@@ -43,13 +66,8 @@ class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, driving: Driving, *, render_mode: str | None = None) -> None:
-        """
-        Raises:
-          ValueError: an unknown render mode.
-        """
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"render_mode should be 'rgb_array' or None, got {render_mode!r}")
-        self.driving, self.render_mode = driving, render_mode
+        super().__init__(render_mode)
+        self.driving = driving
         self.action_space: spaces.Box = spaces.Box(-1.0, 1.0, (driving.settings.numbers,), np.float32)
         self.observation_space = spaces.Dict({**seen_space(driving.settings)})
 
@@ -73,11 +91,7 @@ class DriveEnv(gym.Env[dict[str, Any], np.ndarray]):
             info["is_success"] = info["success"] > 0
         return self.driving.look(), outcome.reward, terminated, ended == "limit", info
 
-    def render(self) -> np.ndarray | None:
-        """(h, w, 3) uint8: what its camera sees, larger."""
-        if self.render_mode is None:
-            gym.logger.warn("render() needs render_mode='rgb_array' when the environment is made")
-            return None
+    def _picture(self) -> np.ndarray:
         return self.driving.picture(*VIEW)
 
     def close(self) -> None:

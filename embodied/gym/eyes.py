@@ -48,12 +48,10 @@ class Sensor(Protocol):
 
     def spaces(self) -> dict[str, spaces.Space]:
         """The space of each array."""
-        ...
 
     def look(self, o: Observation) -> Callable[[], Arrays]:
         """What is seen, in two halves: now, in this thread, places are drawn or read where nobody has them; what is
         returned makes the arrays, one for each space, and may be called in any thread."""
-        ...
 
 
 def pixel_spaces(shape: tuple[int, ...], sees: Sequence[str]) -> dict[str, spaces.Box]:

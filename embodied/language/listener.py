@@ -114,9 +114,7 @@ class _Walk:
         return self.path[-1], self.path[-2:-1], self.clause, self.steps, self.pending
 
     def next_clause(self, pending: float) -> _Walk:
-        return _Walk(
-            path=self.path, facing=self.facing, clause=self.clause + 1, begun=len(self.path) - 1, pending=pending
-        )
+        return dataclasses.replace(self, clause=self.clause + 1, begun=len(self.path) - 1, pending=pending)
 
 
 def runnable(clauses: Sequence[Clause]) -> tuple[Clause, ...]:
@@ -146,16 +144,8 @@ def _onward(eyes: Lookout, clause: Clause, walk: _Walk) -> Iterator[tuple[float,
             added = _step_cost(clause, way, walk) + 1.5 * (way.node in path)
             if way.leaves and not isinstance(clause, Exit | Enter):
                 added += 0.4 * (not isinstance(clause, Cross))
-            yield (
-                added,
-                _Walk(
-                    path=(*path, way.node),
-                    facing=way.yaw,
-                    clause=walk.clause,
-                    begun=walk.begun,
-                    pending=0.0 if steps else pending,
-                ),
-            )
+            left = 0.0 if steps else pending
+            yield added, dataclasses.replace(walk, path=(*path, way.node), facing=way.yaw, pending=left)
 
 
 def _step_cost(clause: Clause, way: Way, walk: _Walk) -> float:

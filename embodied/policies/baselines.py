@@ -101,7 +101,6 @@ class AskRule(Protocol):
 
     def __call__(self, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
         """`last_asked` is the time of the last request, -1 before any."""
-        ...
 
 
 def never_ask(observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from agents.common.choosing import greedy_choice, sampled_choice
 from agents.common.vocabulary import Vocabulary
-from agents.iliad.describing import DescribingNetworks
+from agents.iliad.describing import DescribingNetworks, EachDescribed
 from agents.iliad.nav.network import WalkDescriber
 from agents.iliad.nav.student import NavEyes, NavStudent, Track
 from agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
@@ -79,9 +79,6 @@ class LearnedNavTeacher(DescribingNetworks):
     def near_optimal(self, task: Trip, execution: NavWalk) -> bool:
         return performance(self.world, task, execution.nodes, task.path) >= THRESHOLD
 
-    def human(self, task: Trip, *, rng: np.random.Generator) -> str:
-        return self.world.request(task, rng=rng)
-
     def candidates_of(
         self, tasks: Sequence[Trip], executions: Sequence[NavWalk], uniforms: np.ndarray | None = None
     ) -> list[list[str]]:
@@ -103,18 +100,13 @@ class Wording(Protocol):
     def __call__(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str: ...
 
 
-class PeopleNavTeacher:
+class PeopleNavTeacher(EachDescribed):
     """A second teacher: whoever words routes here describes every walk, truly."""
 
     def __init__(self, world: NavWorld, places: Mapping[str, SeenPlace], wording: Wording) -> None:
         self.world, self.places, self.wording = world, places, wording
 
-    def describe(
-        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
-    ) -> list[str | None]:
-        return [self._one(trip, walk, rng=rng) for trip, walk in zip(tasks, executions, strict=True)]
-
-    def _one(self, trip: Trip, walk: NavWalk, *, rng: np.random.Generator) -> str | None:
+    def one(self, trip: Trip, walk: NavWalk, *, rng: np.random.Generator) -> str | None:
         if performance(self.world, trip, walk.nodes, trip.path) >= THRESHOLD:
             return self.world.request(trip, rng=rng)
         if len(walk.nodes) < 2:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from agents.iliad.protocol import one_request
 from embodied.interface import FollowRoute, Place, Pose, Task
 from embodied.navigation.graph import NavGraph, count_hops
 from embodied.teachers.shortest import next_node
@@ -84,8 +85,7 @@ class NavWorld:
     def __init__(self, places: Mapping[str, Place]) -> None:
         self.places = places
 
-    def request(self, task: Trip, *, rng: np.random.Generator) -> str:
-        return task.requests[int(rng.integers(len(task.requests)))]
+    request = staticmethod(one_request)
 
     def success(self, task: Trip, execution: NavWalk) -> bool:
         """Whether the walk ended within RADIUS of the path's end."""

@@ -138,16 +138,13 @@ class _OwnTemplates:
     def draw(self, part: str, places: _Places, count: int, *, rng: np.random.Generator) -> tuple[str, list[str]] | None:
         rules = sorted(self._own[part])
         rule = rules[int(rng.integers(len(rules)))]
-        letters = {name: _letters(rng=rng) for name in ("BEFORE", "AFTER")}
+        some = lambda: "".join(LETTERS[int(k)] for k in rng.integers(26, size=int(rng.integers(1, 3))))
+        letters = {name: some() for name in ("BEFORE", "AFTER")}
         fill = lambda text: re.sub("BEFORE|AFTER", lambda m: letters[m.group()], text)
         spaced = {name: " ".join(value) for name, value in letters.items()}
         said = lambda text: re.sub("BEFORE|AFTER", lambda m: f"[{spaced[m.group()]}]", text)
         texts = self._own[part][rule]
         return fill(rule), [said(texts[int(rng.integers(len(texts)))]) for _ in range(count)]
-
-
-def _letters(*, rng: np.random.Generator) -> str:
-    return "".join(LETTERS[int(k)] for k in rng.integers(26, size=int(rng.integers(1, 3))))
 
 
 class _Places:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from agents.common.choosing import greedy_choice, sampled_choice
-from agents.iliad.describing import DescribingNetworks
-from agents.iliad.protocol import NOTHING
+from agents.iliad.describing import DescribingNetworks, EachDescribed
+from agents.iliad.protocol import NOTHING, one_request
 from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
 from agents.iliad.regex.config import RegexConfig
 from agents.iliad.regex.data import Grammar, WordTask
@@ -32,11 +32,6 @@ def near_optimal(task: WordTask, execution: Written) -> bool:
     return execution.outputs == task.outputs
 
 
-def human(task: WordTask, *, rng: np.random.Generator) -> str:
-    """Unif(D*)."""
-    return task.requests[int(rng.integers(len(task.requests)))]
-
-
 class LearnedTeacher(DescribingNetworks):
     """Eq 3.15 and 3.16 with two networks; it sees words before and after, never a rule."""
 
@@ -50,7 +45,6 @@ class LearnedTeacher(DescribingNetworks):
 
     spoken_of = staticmethod(describable)
     near_optimal = staticmethod(near_optimal)
-    human = staticmethod(human)
 
     def candidates_of(
         self, tasks: Sequence[WordTask], executions: Sequence[Written], uniforms: np.ndarray | None = None
@@ -92,7 +86,7 @@ class LearnedTeacher(DescribingNetworks):
         return [a == expected for a, (_, expected, _) in zip(written, cases)]
 
 
-class GrammarTeacher:
+class GrammarTeacher(EachDescribed):
     """Whoever made the requests of the data: it can read rules of our shapes and says what they do.
 
     A second, consistent teacher (docs/sources.md, S101): P_T(d | e) is P*(d | e).
@@ -101,16 +95,11 @@ class GrammarTeacher:
     def __init__(self, config: RegexConfig) -> None:
         self.grammar = Grammar(config.data_seed)
 
-    def describe(
-        self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator
-    ) -> list[str | None]:
-        return [self._one(q, e, rng=rng) for q, e in zip(tasks, executions, strict=True)]
-
-    def _one(self, task: WordTask, execution: Written, *, rng: np.random.Generator) -> str | None:
+    def one(self, task: WordTask, execution: Written, *, rng: np.random.Generator) -> str | None:
         if not describable(task, execution):
             return None
         if near_optimal(task, execution):
-            return human(task, rng=rng)
+            return one_request(task, rng=rng)
         parsed = parse(execution.rule)
         return None if parsed is None else self.grammar.request("train", *parsed, rng=rng)
 

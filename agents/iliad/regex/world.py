@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from agents.common.choosing import Choice, greedy_choice, sampled_choice
-from agents.iliad.protocol import ExecutionScores
+from agents.iliad.protocol import ExecutionScores, one_request
 from agents.iliad.regex.coding import PAD, Requests, characters, texts
 from agents.iliad.regex.data import WordTask
 from agents.iliad.regex.networks import Speller
@@ -29,8 +29,7 @@ class Written:
 class RegexWorld:
     """Requests to change words."""
 
-    def request(self, task: WordTask, *, rng: np.random.Generator) -> str:
-        return task.requests[int(rng.integers(len(task.requests)))]
+    request = staticmethod(one_request)
 
     def success(self, task: WordTask, execution: Written) -> bool:
         """Whether the episode's word, the first one, became what it should."""
