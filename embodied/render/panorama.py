@@ -181,7 +181,8 @@ def padded_plane(
     s: int, write: Callable[[int, np.ndarray], object], ratio: np.ndarray | None = None, kind: type = np.float32
 ) -> np.ndarray:
     """(6 (s + 2), s + 2) of `kind`: as `padded_rgba`, with borders of the nearest pixels beyond, times `ratio`."""
-    padded, pad = np.empty((6, s + 2, s + 2), kind), pad_grid(s)
+    padded: np.ndarray = np.empty((6, s + 2, s + 2), kind)
+    pad = pad_grid(s)
     for k, whole in enumerate(padded):
         write(k, whole[1:-1, 1:-1])
     flat = padded.reshape(6 * (s + 2), s + 2)
