@@ -113,7 +113,7 @@ def test_of_more_houses_than_the_budget_some_viewpoints_are_drawn(data, tmp_path
 
 
 def test_an_encoder_that_the_study_trains_keeps_its_name(setting):
-    with pytest.raises(ValueError, match=r"\['8 houses'\] are trained by the study"):
+    with pytest.raises(ValueError, match=r"several rows are called \['8 houses'\]"):
         dataclasses.replace(setting, houses=(8,), ready={"8 houses": [setting.source.folder]})
 
 

@@ -40,7 +40,8 @@ def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Vocab
 
 def padded(sentences: Sequence[Sequence[int]]) -> Tensor:
     """(B, longest) int64, PAD behind each sentence's end."""
-    return torch.nn.utils.rnn.pad_sequence([torch.tensor(s) for s in sentences], True, PAD_NUMBER)
+    rows = [torch.tensor(s, dtype=torch.long) for s in sentences]
+    return torch.nn.utils.rnn.pad_sequence(rows, batch_first=True, padding_value=PAD_NUMBER)
 
 
 def batches(lengths: Sequence[int], size: int, rng: np.random.Generator) -> list[np.ndarray]:

@@ -308,7 +308,8 @@ def run(
       identity: all that the run depends on.
       config: settings over ValidatedRunSettings.
       step: does an update, and returns the numbers to report.
-      validate: records and keeps; the first of several processes does it.
+      validate: evaluates, keeps the weights if they are the best, and returns the episodes; called in the first of
+        several processes.
       total: updates, if not `iterations`.
       may_change: names of settings that may differ on resuming.
 

@@ -209,7 +209,8 @@ class StateNetwork(nn.Module):
 
 
 class AgentNetwork(nn.Module):
-    """Navigation policy and help-request policy: two networks that share nothing."""
+    """Navigation policy and help-request policy: two networks that share nothing. Subclasses supply both, the
+    embedding of requests and what is read from the networks' states."""
 
     action_size: int
     navigation: Any
@@ -242,7 +243,7 @@ class AgentNetwork(nn.Module):
 
 
 class HannaNetwork(AgentNetwork):
-    """That of the text."""
+    """The networks of appendix D.2."""
 
     def __init__(self, config: TrainingConfig, words: int, feature_size: int) -> None:
         """

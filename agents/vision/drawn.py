@@ -79,7 +79,7 @@ class StripSource:
     lights: int = 1
     """Lightings that every house is seen in; the first is its own."""
     share: float = 1.0
-    """Of the viewpoints of each house, in regular steps."""
+    """Share of the viewpoints of each house that is drawn, in regular steps."""
 
     def strips(
         self, names: Sequence[str], *, workers: int = 1, note: Callable[[str], None] = print

@@ -1,5 +1,5 @@
-"""Encoders by the number of houses that they learn in, from as many pictures, judged on the same houses (no counterpart
-in the dissertation, whose features are a ResNet-152's).
+"""Encoders by the number of houses that they learn in, all from the same number of pictures, judged on the same houses
+(no counterpart in the dissertation, whose features are a ResNet-152's).
 
     embodied study vision --data DATA --out STUDY --pictures unlit --houses 12 48 128 --test-pictures unlit fast
 
@@ -55,8 +55,8 @@ class EncoderStudy(StudyLearner):
     repeats: tuple[int, ...]
     split: str = "val_unseen"
     """Whose houses they are judged on; choose on validation houses."""
-    pictures: tuple[str, ...] = tuple(RENDER_PRESETS)
-    """What is judged on."""
+    pictures: tuple[str, ...] = ("unlit", "fast")
+    """Kinds of pictures that encoders are judged on."""
     threads: int = 1
     device: str = "cpu"
     workers: int = 1
@@ -64,8 +64,8 @@ class EncoderStudy(StudyLearner):
     houses: tuple[int, ...] = ()
     """Numbers of houses that encoders learn in."""
     budget: int = 0
-    """All learn from as many pictures as so many houses have in all epochs; 0: the most of `houses`. Of more houses,
-    only some viewpoints are seen."""
+    """All learn from as many pictures as so many houses have in all epochs; 0: the most of `houses`. Of more houses
+    than this times the epochs, only some viewpoints are seen."""
     lit_houses: int = 12
     """So many houses are seen in light by one more encoder, and by readers."""
     ready: Mapping[str, Sequence[Path]] = field(default_factory=dict)
@@ -76,8 +76,10 @@ class EncoderStudy(StudyLearner):
 
     def __post_init__(self) -> None:
         labels = [row.label for row in self.tables()["houses"].rows]
+        if not labels:
+            raise ValueError("nothing to compare: give --houses, or --encoders that are there")
         if twice := {name for name in labels if labels.count(name) > 1}:
-            raise ValueError(f"encoders of the names {sorted(twice)} are trained by the study; give --encoders others")
+            raise ValueError(f"several rows are called {sorted(twice)}; each of --houses and --encoders is one")
 
     @property
     def _budget(self) -> int:
@@ -102,14 +104,20 @@ class EncoderStudy(StudyLearner):
         return range(len(self.ready[train[READY]])) if READY in train else self.repeats
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
-        """Strips are drawn before encoders share the cores."""
+        """Strips are drawn before encoders share the cores.
+
+        Raises:
+          ValueError: more houses than the data set has.
+        """
         data = Dataset(self.source.data)
+        if max(self.houses, default=0) > (there := len(houses_of(data, ("train",)))):
+            raise ValueError(f"--houses {max(self.houses)}: the data set has {there} training houses")
         seen, unseen = self._known(data), houses_of(data, (self.split,))
         self.source.strips([*unseen, *seen], workers=self.workers, note=note)
         for way in splits:
             self._source(way).strips([*unseen, *seen[: self.lit_houses]], workers=self.workers, note=note)
         for row in rows:
-            if SHARE in (row.train or {}):
+            if {SHARE, LIT} & (row.train or {}).keys():
                 self._strips(row.train or {}, 0, note)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
@@ -139,7 +147,7 @@ class EncoderStudy(StudyLearner):
         """What an encoder learns from."""
         names, lit = training_houses(Dataset(self.source.data), self._settings(train, seed)), train.get(LIT, 0)
         unlit = dataclasses.replace(self.source, share=train.get(SHARE, 1.0))
-        lit_ones = self._lit().strips(names[:lit], note=note)
+        lit_ones = self._lit().strips(names[:lit], workers=self.workers, note=note)
         return [*lit_ones, *unlit.strips(names[lit:], workers=self.workers, note=note)]
 
     def _settings(self, train: Mapping[str, Any], seed: int) -> VisionConfig:
@@ -169,8 +177,8 @@ class EncoderStudy(StudyLearner):
         data = Dataset(self.source.data)
         return (
             f"Linear readers fitted in {self.lit_houses} training houses in the pictures that are judged, judged in "
-            f"{len(houses_of(data, (self.split,)))} of {self.split}; seeds {', '.join(map(str, self.repeats))}; rooms "
-            "in per cent."
+            f"{len(houses_of(data, (self.split,)))} houses of {self.split}; seeds "
+            f"{', '.join(map(str, self.repeats))}; rooms in per cent."
         )
 
     def _drawn(self) -> dict[str, object]:

@@ -10,7 +10,7 @@ from assets.records import MeshPart
 
 
 def bed(order: Order) -> list[MeshPart]:
-    """A frame with a headboard at the back, a mattress and one pillow for each 0.8 m of width; `size` is the whole."""
+    """A frame with a headboard at the back, a mattress and one pillow for each 0.8 m of its width."""
     w, d, h = order.size
     top = float(order.look.get("lying", 0.48))
     rail, thick = top - 0.24, 0.035

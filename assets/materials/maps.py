@@ -150,8 +150,9 @@ class Places:
 
     on: Canvas
     x: np.ndarray
-    """(n, n) in tiles, as is y."""
+    """(n, n), in tiles."""
     y: np.ndarray
+    """(n, n), in tiles."""
 
     def noise(self, across: float, down: float) -> np.ndarray:
         """As `noise`, at these places."""

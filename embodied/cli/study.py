@@ -2,7 +2,7 @@
 
     embodied study hanna 4.5 --data DATA --judged-in OTHER --out STUDY --seeds 3
     embodied study find --data DATA --out STUDY
-    embodied study vision --data DATA --houses 12 48 --out STUDY
+    embodied study vision --data DATA --pictures unlit --houses 12 48 --out STUDY
     embodied study hari 4.7 4.8 --data DATA --out STUDY
     embodied study vnla askers interventions rules --data DATA --out STUDY
     embodied study vln followers speaker --data DATA --out STUDY
@@ -41,7 +41,7 @@ from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, IntentionConf
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.vision.config import RENDER_PRESETS, VisionConfig
+from agents.vision.config import VisionConfig
 from agents.vln.config import SCALES as VLN_SCALES
 from agents.vln.config import SPEAKER_SCALES, FollowerSettings
 from agents.vnla.config import SCALES as VNLA_SCALES
@@ -154,14 +154,14 @@ class VisionOptions(Study, Trained, Strips, WithData):
     houses: Annotated[tuple[int, ...], Option(whole(1), "N")] = ()
     """Numbers of training houses to compare."""
     budget: Count = 0
-    """Train every encoder on as many pictures as N houses have in all epochs; of more houses only some viewpoints are
-    drawn (default: the largest of --houses)."""
+    """Train every encoder on as many pictures as N houses have in all epochs; of more houses than N times --epochs,
+    only some viewpoints are drawn (default: the largest of --houses)."""
     lit_houses: Count = 12
     """N houses are lit for one more encoder, and for linear readers."""
     encoders: NamedFiles = ()
     """Evaluate these encoders, too; those of one name are training seeds of one kind."""
-    test_pictures: tuple[Annotated[str, PRESETS], ...] = tuple(RENDER_PRESETS)
-    """Kinds of pictures to evaluate on (default: all)."""
+    test_pictures: tuple[Annotated[str, PRESETS], ...] = ("unlit", "fast")
+    """Kinds of pictures to evaluate on (default: unlit and fast)."""
     split: str = "val_unseen"
     """Evaluate on the houses of this split."""
     config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig())]

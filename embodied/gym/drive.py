@@ -33,7 +33,7 @@ VIEW = (480, 640)
 
 
 class LiveEnv(gym.Env[dict[str, Any], Any]):
-    """An environment with live pictures; it says what `_picture` shows to people."""
+    """An environment with live pictures. Subclasses define `_picture`, what people are shown."""
 
     def __init__(self, render_mode: str | None) -> None:
         """

@@ -409,12 +409,20 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
     seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
-    w, helper = wanted, assistant_of(wanted.assistant)
-    asked = Asked(where, w.worlds, w.pictures, seen, w.rules, w.rooms, w.hari, helper)
-    if w.data:
-        play = split_playground(kind, Path(w.data), w.split, asked)
+    asked = Asked(
+        cache=where,
+        worlds=wanted.worlds,
+        pictures=wanted.pictures,
+        sees=seen,
+        rules=wanted.rules,
+        rooms=wanted.rooms,
+        hari=wanted.hari,
+        assistant=assistant_of(wanted.assistant),
+    )
+    if wanted.data:
+        play = split_playground(kind, Path(wanted.data), wanted.split, asked)
     else:
-        play = flat_playground(kind, w.seed, asked)
+        play = flat_playground(kind, wanted.seed, asked)
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
     layout = wanted.layout or layout_of(kind, max(SpaceLayout.stack, wanted.hari.stack))
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]

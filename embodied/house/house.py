@@ -287,7 +287,8 @@ def check(house: House) -> None:
 
 
 def _complaints(house: House) -> Iterator[str]:
-    """What is wrong with a house; each rests on there being nothing before it."""
+    """What is wrong with a house. Each check assumes that the earlier ones found nothing: only the first complaint may
+    be used."""
     yield from _check_numbers(house)
     yield from _check_ids(house)
     yield from _check_storeys(house)

@@ -108,7 +108,8 @@ class Skyboxes:
     ) -> np.ndarray:
         """(h, w, 1) uint16, quarters of a millimetre along the optical axis; 0 where nothing is.
 
-        Distances along the ray are mixed linearly before they are shortened, also across edges, as its shader does.
+        Distances along the ray are mixed linearly before they are shortened, also across edges, as in that simulator
+        (its src/lib/fragment.sh).
         """
         padded = self.distances(scan, viewpoint)
         _, x, y = read_maps(padded, _grid(padded, heading, elevation, vfov, size))

@@ -236,8 +236,7 @@ class VnlaAsking:
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
-        drawn = (self._ask == "random" and s for s in situations)
-        times, inner = memory or ([random_times(s, rng) if s else frozenset() for s, rng in zip(drawn, rngs)], None)
+        times, inner = memory or (self._times(situations, rngs), None)
         actions, inner = act(self._navigation, observations, situations, inner, rngs=rngs)
         for i, (o, s, planned) in enumerate(zip(observations, situations, actions, strict=True)):
             if o is None or s is None or planned is None:
@@ -245,6 +244,10 @@ class VnlaAsking:
             if o.can_ask and self._wants(s, planned, times[i]):
                 actions[i] = Ask(o.can_ask[0], planned.thought)
         return actions, (times, inner)
+
+    def _times(self, situations: Situations, rngs: Rngs) -> list[frozenset[int]]:
+        random = self._ask == "random"
+        return [random_times(s, rng) if random and s else frozenset() for s, rng in zip(situations, rngs, strict=True)]
 
     def _wants(self, s: Situation, planned: Action, times: frozenset[int]) -> bool:
         if self._ask == "teacher":

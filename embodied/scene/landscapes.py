@@ -203,6 +203,7 @@ def side_frame(
 STREET = (1.6, 5.6)
 """Where the carriageway begins and ends beyond the edge of the plot, metres."""
 NEAREST = {"villas": 7.5, "cottages": 8.2, "terrace": 8.6}
+"""From the edge of the plot to the face of the nearest building, metres."""
 
 
 def near_buildings(house: House, place: Scenery) -> list[Building]:

@@ -16,6 +16,7 @@ class FindConfig:
     """What a task of finding something may be."""
 
     kind: str = "find"
+    """Names the shuffle of the pool."""
     reach: float = 2.0
     """A goal node lies within this many metres of the object and in its room."""
     fewest_nodes: int = 4

@@ -166,7 +166,18 @@ class _Trial:
         pose, c, s = self.pose, math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         x, y = pose.x + c * item.x - s * item.y, pose.y + s * item.x + c * item.y
         z, yaw, group = self.space.bottom + item.z, pose.yaw + item.yaw, self.group
-        return Thing(item.asset, x, y, z, yaw, item.extent, item.params, group=group, role=item.role, wall=pose.wall)
+        return Thing(
+            asset=item.asset,
+            x=x,
+            y=y,
+            z=z,
+            yaw=yaw,
+            size=item.extent,
+            params=item.params,
+            group=group,
+            role=item.role,
+            wall=pose.wall,
+        )
 
     def _stands(self, item: Item, b: Box, flat: bool) -> bool:
         """Whether an item finds room among what stands in the room and in the arrangement."""
@@ -250,7 +261,18 @@ def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thi
     v = min(max(item.y, y0 + d / 2), y1 - d / 2) if d < y1 - y0 else (y0 + y1) / 2
     (x, y), z, yaw = parent.local(u, v), parent.z + surface.z * scale[2] + item.z, parent.yaw + item.yaw
     return Thing(
-        item.asset, x, y, z, yaw, item.extent, item.params, parent, surface.name, group, item.role, parent.wall
+        asset=item.asset,
+        x=x,
+        y=y,
+        z=z,
+        yaw=yaw,
+        size=item.extent,
+        params=item.params,
+        parent=parent,
+        surface=surface.name,
+        group=group,
+        role=item.role,
+        wall=parent.wall,
     )
 
 

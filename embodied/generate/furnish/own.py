@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 from assets.records import Asset
@@ -28,9 +29,13 @@ def place_own(ctx: Context) -> None:
         weights = {a.key: a.rooms.get(ctx.kind, 0.0) for a in ctx.stock.of_role(name) if a.support != "surface"}
         if ctx.chance(min(max(weights.values(), default=0.0), 1.0)):
             placed = frozenset(key for key, weight in weights.items() if weight > 0)
-            asset = ctx.pick(name, where=lambda a, placed=placed: a.key in placed)  # type: ignore[misc]
+            asset = ctx.pick(name, where=functools.partial(_is_one_of, placed))
             if asset is not None:
                 _place(ctx, asset)
+
+
+def _is_one_of(keys: frozenset[str], asset: Asset) -> bool:
+    return asset.key in keys
 
 
 def _place(ctx: Context, asset: Asset) -> None:

@@ -32,8 +32,8 @@ DRIVEN = ("motion", "touched", "goal")
 
 
 class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
-    """What both environments have in common: `pixels`, which are black for a blind agent, and `agent_pos`. They say
-    what the policy's `_command` means and what `_state` the policy is shown."""
+    """What both environments have in common: `pixels`, which are black for a blind agent, and `agent_pos`. Subclasses
+    define `_command`, what an action of the policy does, and `_state`, the numbers of agent_pos."""
 
     def __init__(self, env: Any, height: int, width: int, numbers: int) -> None:
         """`numbers`: of agent_pos."""
