@@ -44,7 +44,7 @@ class VnlaAgent(SightedAgent):
         return VnlaPolicy(
             self.network,
             self.vocabulary,
-            bank,
+            bank.blind() if config.blind else bank,
             asker=asker or config.asker,
             ask_threshold=judged.ask_threshold,
             choose=choose_at(judged.evaluation_temperature),

@@ -52,6 +52,8 @@ class VnlaSettings(ImitationSettings):
     """Who decides when to ask, in training and evaluation: 'none', 'first', 'random', 'teacher' or 'learned'."""
     ask_rules: str = "all"
     """Rules of the asking teacher: 'all', 'a and e' or 'b to d'."""
+    blind: bool = False
+    """Ablation without vision: all features are zero."""
     rules: str = "indirect"
     """Rule of play in evaluation: indirect, direct, direct-mute, goal-aware or algorithm-6."""
     validate_every: int = 1000

@@ -46,7 +46,8 @@ class VnlaLearner(imitation.Learner):
         self._player = for_training(agent.policy(training.bank), teacher, config.environment_dropout)
 
     def player(self, update: int, bank: FeatureBank) -> Agent:
-        return dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=bank))
+        seen = bank.blind() if self.config.blind else bank
+        return dataclasses.replace(self._player, policy=dataclasses.replace(self._player.policy, bank=seen))
 
     def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VnlaMoment]) -> imitation.BatchLoss:
         losses = losses_of(experience, self.config.batch)

@@ -40,6 +40,7 @@ def _table(title: str, *rows: StudyRow, compared: Sequence[tuple[StudyRow, Study
 
 
 RANDOM_ASKER, LEARNED_ASKER = _row("random", asker="random"), _row("learned")
+BLIND = _row("learned, blind", blind=True)
 PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
 TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
@@ -49,9 +50,10 @@ TABLES: Mapping[str, StudyTable] = {
         RANDOM_ASKER,
         _row("teacher", TEACHER),
         LEARNED_ASKER,
+        BLIND,
         StudyRow("scripted listener asking at random", None, {"played": "listener, random", ROOMS: True}),
         StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher", ROOMS: True}),
-        compared=((LEARNED_ASKER, RANDOM_ASKER),),
+        compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND)),
     ),
     "interventions": _table(
         "Direct and indirect intervention",
