@@ -279,6 +279,14 @@ def test_it_learns_in_every_lighting_of_a_house(shown):
             learner.learn(update, Clock())
 
 
+def test_the_blind_see_nothing():
+    agent, training, split = lesson(dataclasses.replace(TINY, blind=True))
+    dark = FeatureBank({"grid": np.full_like(training.bank._table.numpy(), np.nan)}, "hand")
+    one, two = (play(split.make_env, agent.player(bank), split.tasks[:6], seed=0) for bank in (split.bank, dark))
+    assert [[s.action for s in e.steps] for e in one] == [[s.action for s in e.steps] for e in two]
+    VnlaLearner(agent, dataclasses.replace(training, bank=dark)).learn(0, Clock())  # or it would diverge
+
+
 def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):
     def run(folder, *iterations):
         for n in iterations:
