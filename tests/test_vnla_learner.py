@@ -281,6 +281,7 @@ def test_it_learns_in_every_lighting_of_a_house(shown):
 
 def test_the_blind_see_nothing():
     agent, training, split = lesson(dataclasses.replace(TINY, blind=True))
+    agent.network.eval()
     dark = FeatureBank({"grid": np.full_like(training.bank._table.numpy(), np.nan)}, "hand")
     one, two = (play(split.make_env, agent.player(bank), split.tasks[:6], seed=0) for bank in (split.bank, dark))
     assert [[s.action for s in e.steps] for e in one] == [[s.action for s in e.steps] for e in two]
