@@ -97,12 +97,12 @@ def all_classes(catalogue: Catalogue) -> tuple[str, ...]:
     return tuple(sorted({*catalogue.classes, *OPENING_KINDS, *SHELL}))
 
 
-def look(world: World, classes: Sequence[str], nodes: Iterable[int]) -> HouseStrips:
-    """Draw nodes of a world and label what is seen."""
+def look(world: World, classes: Sequence[str], nodes: Iterable[int] | None = None) -> HouseStrips:
+    """Draw nodes of a world, or all, and label what is seen."""
     object_class, room_of_id = ids_to_labels(world.house, classes)
     rgb, share, rooms, depths, room = [], [], [], [], []
     rows = margin()
-    for node in nodes:
+    for node in range(len(world.graph.positions)) if nodes is None else nodes:
         panorama = world.panorama(node)
         ids, depth = panorama.equirect_ids(EQUIRECT)[rows], panorama.equirect_depth(EQUIRECT)[rows]
         labels = cell_labels(ids, np.minimum(depth, FARTHEST), object_class, room_of_id, len(classes))
