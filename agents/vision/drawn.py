@@ -110,7 +110,6 @@ class StripSource:
             if not path.exists():
                 with drawn_world(data, name, self.cache, pictures, lit) as world:
                     count = len(world.graph.positions)
-                    look(world, classes, np.linspace(0, count - 1, math.ceil(self.share * count)).astype(int)).save(
-                        path
-                    )
+                    nodes = np.linspace(0, count - 1, math.ceil(self.share * count)).astype(int)
+                    look(world, classes, nodes).save(path)
         return name
