@@ -23,6 +23,8 @@ SIZE = 512
 """Side of a face, pixels."""
 VIEWS = 12
 """Headings of one timed call."""
+VIEWPOINTS = ("here", "there")
+"""Of which one fits into memory."""
 AIMS = (((480, 640), 1200.0, 700.0), ((224, 224), 5000.0, 3000.0))
 """Height and width, and how many views per second are promised: of rgb; of rgb, depth and ids."""
 SHOWN = {"rgb": ("rgb",), "depth": ("depth",), "ids": ("ids",), "rgb, depth and ids": ("rgb", "depth", "ids")}
@@ -45,13 +47,14 @@ def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
             for shown in ("rgb", "rgb, depth and ids"):
                 look = functools.partial(_look, panorama, SHOWN[shown], size, itertools.count(0.01, 1.01))
                 yield _rate(f"{name}, {shown}, new angles", look)
-        write_skybox(panorama, "viewpoint", skybox_folder(folder, "scan"))
-        kept = Skyboxes(folder, 1)
+        for viewpoint in VIEWPOINTS:
+            write_skybox(panorama, viewpoint, skybox_folder(folder, "scan"))
+        skyboxes = Skyboxes(folder, 1)
         for shown, depth in (("rgb", False), ("rgb and depth", True)):
             for (height, width), *_ in AIMS:
-                again = functools.partial(_open, lambda: kept, depth, (height, width))
+                again = functools.partial(_open, skyboxes, itertools.repeat(VIEWPOINTS[0]), depth, (height, width))
                 yield _rate(f"skyboxes of {SIZE} in memory, {width} x {height}, {shown}", again)
-            anew = functools.partial(_open, functools.partial(Skyboxes, folder, 1), depth, (480, 640))
+            anew = functools.partial(_open, skyboxes, itertools.cycle(VIEWPOINTS), depth, (480, 640))
             yield _rate(f"skyboxes of {SIZE} not in memory, {shown}", anew)
 
 
@@ -67,10 +70,9 @@ def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], 
             panorama.through(grid, channel)
 
 
-def _open(skyboxes: Callable[[], Skyboxes], depth: bool, size: tuple[int, int]) -> None:
+def _open(skyboxes: Skyboxes, viewpoints: Iterator[str], depth: bool, size: tuple[int, int]) -> None:
     """VIEWS times a picture of a skybox."""
-    for _ in range(VIEWS):
-        boxes = skyboxes()
-        boxes.rgb("scan", "viewpoint", 0.0, 0.0, VFOV36, size)
+    for viewpoint in itertools.islice(viewpoints, VIEWS):
+        skyboxes.rgb("scan", viewpoint, 0.0, 0.0, VFOV36, size)
         if depth:
-            boxes.metres("scan", "viewpoint", 0.0, 0.0, VFOV36, size)
+            skyboxes.metres("scan", viewpoint, 0.0, 0.0, VFOV36, size)
