@@ -8,6 +8,7 @@ import numpy as np
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
+from agents.vision.labels import HouseStrips
 from embodied.envs.base import HelpEnv
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import CameraSensor, PanoramaStore, ViewSettings
@@ -38,3 +39,15 @@ def pixels(cache: Path) -> HelpGymEnv:
     world = world_in(cache)
     sensor = CameraSensor(PanoramaStore({world.name: world}), ("rgb", "depth"), ViewSettings(height=16, width=16))
     return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), sensor, opened=[world])
+
+
+def coloured_strips(name: str, n: int, *, seed: int) -> HouseStrips:
+    """Strips of a world of red cells, each a 'rose', and green ones, a 'fern'; half a view or more is of one colour."""
+    rng = np.random.default_rng(seed)
+    what = rng.integers(0, 2, (n, 1, 4)).repeat(12, 1).repeat(9, 2)
+    rgb = np.zeros((n, 12, 36, 3), np.uint8)
+    rgb[..., 0], rgb[..., 1] = 200 * (what == 0) + 30, 200 * (what == 1) + 30
+    share = (np.eye(2)[what] * 255).astype(np.uint8)
+    depth = rng.normal(size=(n, 12, 36)).astype(np.float16)
+    rooms, room = np.zeros((n, 12, 36), np.int8), np.zeros(n, np.int8)
+    return HouseStrips(name, ("rose", "fern"), rgb.repeat(16, 1).repeat(16, 2), share, rooms, depth, room)

@@ -5,43 +5,21 @@ from __future__ import annotations
 import argparse
 import dataclasses
 
-import numpy as np
 import pytest
 from hand_data import build, small_house
-from hand_pixels import world_in
+from hand_pixels import coloured_strips, world_in
 
 from agents.common.weights import weights_digest
 from agents.studies.engine import run_study
 from agents.vision.config import RENDER_PRESETS, VisionConfig, drawing, lit_name
 from agents.vision.drawn import StripSource
 from agents.vision.encoder import random_encoder, save_encoder
-from agents.vision.labels import HouseStrips
 from agents.vision.resnet import ARCHITECTURES
 from agents.vision.study import EncoderStudy
 from embodied.cli.learning import by_name
 from embodied.cli.options import add_options, read_options
 from embodied.cli.study import VisionOptions
 from embodied.records import read_json
-
-
-def coloured(path, n: int, *, seed: int) -> None:
-    """Strips of a world in which a red cell is a 'rose' and a green one a 'fern'."""
-    rng = np.random.default_rng(seed)
-    what = rng.integers(0, 2, (n, 1, 4)).repeat(12, 1).repeat(9, 2)  # half a view or more is of one colour
-    rgb = np.zeros((n, 12, 36, 3), np.uint8)
-    rgb[..., 0], rgb[..., 1] = 200 * (what == 0) + 30, 200 * (what == 1) + 30
-    share = (np.eye(2)[what] * 255).astype(np.uint8)
-    strips = HouseStrips(
-        path.stem.partition("@")[0],
-        ("rose", "fern"),
-        rgb.repeat(16, 1).repeat(16, 2),
-        share,
-        np.zeros((n, 12, 36), np.int8),
-        rng.normal(size=(n, 12, 36)).astype(np.float16),
-        np.zeros(n, np.int8),
-    )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    strips.save(path)
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +34,11 @@ def setting(data, tmp_path, monkeypatch):
     for name in (*data.names("train"), *data.names("val_unseen")):
         nodes = len(data.place(name).graph.positions)
         for k in range(2):
-            coloured(tmp_path / "strips" / drawing(RENDER_PRESETS["fast"]) / f"{lit_name(name, k)}.npz", nodes, seed=k)
-        coloured(tmp_path / "strips" / drawing(RENDER_PRESETS["unlit"]) / f"{name}.npz", nodes, seed=5)
+            path = tmp_path / "strips" / drawing(RENDER_PRESETS["fast"]) / f"{lit_name(name, k)}.npz"
+            coloured_strips(name, nodes, seed=k).save(path)
+        coloured_strips(name, nodes, seed=5).save(
+            tmp_path / "strips" / drawing(RENDER_PRESETS["unlit"]) / f"{name}.npz"
+        )
     small = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     monkeypatch.setitem(ARCHITECTURES, "compact", small)
     files = [tmp_path / f"{k}.safetensors" for k in range(3)]

@@ -301,7 +301,7 @@ def test_training_the_encoder_lowers_its_loss(tmp_path):
     tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(ARCHITECTURES, "compact", tiny)
-        encoder, _, classes = train_encoder([strips_of_colours(8, seed=0)], config, note=lines.append)
+        encoder, classes = train_encoder([strips_of_colours(8, seed=0)], config, note=lines.append)
         assert classes == ["rose", "fern"]
         losses = [float(line.split("cell objects ")[1].split(",")[0]) for line in lines if "cell objects" in line]
         assert losses[-1] < 6.0, lines
@@ -318,7 +318,7 @@ def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatc
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
     config = VisionConfig(epochs=3, batch=2, least_views=1)
     houses, folder = [strips_of_colours(4, seed=0), strips_of_colours(4, seed=1)], tmp_path / "run"
-    whole, _, _ = train_encoder(houses, config, note=lambda line: None)
+    whole, _ = train_encoder(houses, config, note=lambda line: None)
 
     def stop(line: str) -> None:
         if line.startswith("epoch 3"):
@@ -327,7 +327,7 @@ def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatc
     with pytest.raises(KeyboardInterrupt):
         train_encoder(houses, config, folder, note=stop)
     lines: list[str] = []
-    again, _, _ = train_encoder(houses, config, folder, note=lines.append)
+    again, _ = train_encoder(houses, config, folder, note=lines.append)
     assert "continuing after update 2" in lines and again.digest == whole.digest
     with pytest.raises(CheckpointError, match="epochs 3 -> 5"):
         train_encoder(houses, dataclasses.replace(config, epochs=5), folder)

@@ -1,14 +1,15 @@
-"""agents.vision.recognise: what heads find in a panorama, and where."""
+"""agents.vision.recognise and agents.vision.detector: what is found in a panorama, and where."""
 
 import numpy as np
 import pytest
-import torch
+from hand_pixels import coloured_strips
 
-from agents.common.shipped import SHIPPED_HEADS
+from agents.common.shipped import SHIPPED_DETECTOR
 from agents.common.weights import origin_of
-from agents.vision.encoder import load_encoder, random_encoder, strip_map
-from agents.vision.features import strip_of
-from agents.vision.recognise import Heads, Recogniser, save_heads
+from agents.vision.config import StripTraining
+from agents.vision.detector import Detector, train_detector
+from agents.vision.encoder import load_encoder, random_encoder
+from agents.vision.recognise import Recogniser
 from agents.vision.strip import CELL, COLUMNS, ROWS, cell_direction, directions
 from embodied.render.panorama import Panorama
 
@@ -21,6 +22,14 @@ def panorama() -> Panorama:
     return Panorama(rgb, np.ones(FACES, np.float32), np.zeros(FACES, np.int32))
 
 
+@pytest.fixture(scope="module")
+def trained() -> Detector:
+    """Learned in strips in which a red cell is a 'rose' and a green one a 'fern'."""
+    config = StripTraining(epochs=6, batch=2, least_views=1, learning_rate=0.01)
+    encoder = random_encoder(seed=0)
+    return train_detector([coloured_strips("a", 12, seed=0)], encoder, config, note=lambda line: None)
+
+
 def test_cells_lie_where_the_strip_shows_them():
     rays = directions().reshape(ROWS, CELL, COLUMNS, CELL, 3)
     for row, column in [(0, 0), (6, 18), (11, 35), (3, 9)]:
@@ -30,32 +39,35 @@ def test_cells_lie_where_the_strip_shows_them():
         assert np.arctan2(z, np.hypot(x, y)) == pytest.approx(pitch, abs=0.02)
 
 
-def test_a_thing_is_found_in_the_cell_that_shows_it_best(panorama, tmp_path):
-    """Heads that look for what one cell shows find it there; those of a class that no cell shows find nothing."""
-    encoder = random_encoder(seed=0)
-    maps = strip_map(encoder.network, torch.from_numpy(strip_of(panorama)[None]))[0].detach()
-    spread = maps.flatten(1).std(1)[:, None, None] + 1e-6
-    unlike = (maps - maps.mean((1, 2), keepdim=True)) / spread
-    wanted = unlike[:, 4, 7] / spread[:, 0, 0]
-    heads = Heads(encoder.size, 2)
-    heads.load_state_dict({k: torch.zeros_like(v) for k, v in heads.state_dict().items()})
-    score = torch.einsum("d,drc->rc", wanted, maps)
-    heads.cell_objects.weight.data[0, :, 0, 0] = wanted * 10
-    heads.cell_objects.bias.data = torch.tensor([1.0 - 10 * float(score.max()), -5.0])
-    save_heads(heads, encoder, ["mug", "sofa"], tmp_path / "heads.safetensors", {"data": "a data set"})
-    assert origin_of(tmp_path / "heads.safetensors") == {"data": "a data set"}
-    (found,) = Recogniser.load(encoder, tmp_path / "heads.safetensors")(panorama)
-    assert found.name == "mug" and 0.5 < found.probability < 1
-    assert (found.yaw, found.pitch) == cell_direction(*divmod(int(score.argmax()), COLUMNS))
+def test_a_detector_learns_which_cells_and_views_show_a_class(trained):
+    other = coloured_strips("b", 6, seed=1)
+    assert min(trained.precision([other]).values()) > 0.95
+    cells, views = trained(other.rgb)
+    shown = other.share.transpose(0, 3, 1, 2) > 128
+    assert ((cells > 0.5) == shown).mean() > 0.95 and views.shape == (6, 36, 2)
 
 
-def test_heads_of_another_encoder_are_refused(tmp_path):
-    save_heads(Heads(random_encoder(seed=0).size, 1), random_encoder(seed=0), ["mug"], tmp_path / "heads.safetensors")
-    with pytest.raises(ValueError, match="name those that were trained with this encoder"):
-        Recogniser.load(random_encoder(seed=1), tmp_path / "heads.safetensors")
+def test_a_detector_is_saved_with_what_it_was_trained_with_and_belongs_to_its_encoder(trained, tmp_path):
+    path = tmp_path / "detector.safetensors"
+    trained.save(path, {"data": "a data set"})
+    assert origin_of(path) == {"data": "a data set"}
+    again, strips = Detector.load(trained.encoder, path), coloured_strips("b", 1, seed=1).rgb
+    assert again.classes == ("rose", "fern") and np.allclose(again(strips)[0], trained(strips)[0], atol=0.05)
+    with pytest.raises(ValueError, match="name the one that was trained with this encoder"):
+        Detector.load(random_encoder(seed=1), path)
 
 
-def test_the_shipped_heads_are_those_of_the_shipped_encoder(panorama):
-    found = Recogniser.load(load_encoder(), SHIPPED_HEADS)
-    assert "sofa" in found.classes and len(found.classes) > 250
+def test_a_thing_is_named_where_it_is_seen_best(panorama, monkeypatch):
+    cells = np.zeros((1, 3, ROWS, COLUMNS), np.float32)
+    cells[0, 0, 4, 7], cells[0, 1, 2, 2], cells[0, 2, 5, 5] = 0.8, 0.9, 0.2
+    detector = Detector(random_encoder(seed=0), None, ("mug", "wall", "sofa"))
+    monkeypatch.setattr(Detector, "__call__", lambda self, strips: (cells, None))
+    (found,) = Recogniser(detector)(panorama)
+    assert found.name == "mug" and found.probability == pytest.approx(0.8)
+    assert (found.yaw, found.pitch) == cell_direction(4, 7)
+
+
+def test_the_shipped_detector_is_that_of_the_shipped_encoder(panorama):
+    found = Recogniser.load(load_encoder(), SHIPPED_DETECTOR)
+    assert "sofa" in found.detector.classes and len(found.detector.classes) > 250
     assert all(0.3 <= thing.probability <= 1 for thing in found(panorama))

@@ -6,8 +6,8 @@ from pathlib import Path
 
 WEIGHTS = Path(__file__).resolve().parent.parent / "weights"
 SHIPPED_ENCODER, SHIPPED_AGENT = WEIGHTS / "encoder.safetensors", WEIGHTS / "hanna_mini.safetensors"
-SHIPPED_HEADS = WEIGHTS / "encoder_heads.safetensors"
-"""What the encoder was trained to tell."""
+SHIPPED_DETECTOR = WEIGHTS / "detector.safetensors"
+"""Of the shipped encoder."""
 SHIPPED_HARI = WEIGHTS / "hari_mini.safetensors"
 SHIPPED_VNLA, SHIPPED_VLN = WEIGHTS / "vnla_mini.safetensors", WEIGHTS / "vln_mini.safetensors"
 SHIPPED = {"hanna": SHIPPED_AGENT, "vnla": SHIPPED_VNLA, "hari": SHIPPED_HARI, "vln": SHIPPED_VLN}

@@ -51,6 +51,11 @@ def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[di
         raise ValueError(f"{path}: {e}; {remedy}") from e
 
 
+def kind_of(path: Path) -> str | None:
+    """What a file of weights holds, as `save_weights` was told."""
+    return load_tensors(Path(path), (FORMAT,), "train it again")[1].get("kind")
+
+
 def origin_of(path: Path) -> dict[str, Any] | None:
     """The identity of what a file of weights was trained with; None where that was not written down."""
     text = load_tensors(Path(path), (FORMAT,), "train it again")[1].get("identity")

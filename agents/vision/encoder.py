@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,11 +79,14 @@ class Encoder:
     @torch.no_grad()
     def encode_strips(self, strips: np.ndarray) -> np.ndarray:
         """(n, 192, 576, 3) uint8 -> (n, 36, D) float32 by one look at each strip."""
-        sent = self._send(strips)
-        # a processor keeps one strip in its cache, not several
-        parts = sent.split(1) if sent.device.type == "cpu" else [sent]
-        views = torch.cat([pool_views(strip_map(self._looking, part), self.network.peaks) for part in parts])
-        return self.finish(views).cpu().numpy()
+        views = [pool_views(strip_map(self._looking, part), self.network.peaks) for part in self._parts(strips)]
+        return self.finish(torch.cat(views)).cpu().numpy()
+
+    @torch.no_grad()
+    def pyramid(self, strips: np.ndarray) -> list[Tensor]:
+        """(n, 192, 576, 3) uint8 -> the maps of `strip_pyramid`."""
+        pyramids = [strip_pyramid(self._looking, part) for part in self._parts(strips)]
+        return [torch.cat(maps) for maps in zip(*pyramids, strict=True)]
 
     @torch.no_grad()
     def encode_views(self, views: np.ndarray) -> np.ndarray:
@@ -106,12 +110,22 @@ class Encoder:
             features = features - self.mean
         return features if self.mix is None else features @ self.mix
 
+    def _parts(self, strips: np.ndarray) -> Sequence[Tensor]:
+        """Strips as they are looked at together: a processor keeps one in its cache, not several."""
+        sent = self._send(strips)
+        return sent.split(1) if sent.device.type == "cpu" else [sent]
+
     def _send(self, images: np.ndarray) -> Tensor:
         return torch.from_numpy(np.ascontiguousarray(images)).to(next(self.network.parameters()).device)
 
 
 def strip_map(network: Network, strips: Tensor) -> Tensor:
     """(n, 192, 576, 3) uint8 -> (n, D, 12, 36) feature map of strips; left and right ends know each other."""
+    return strip_pyramid(network, strips)[-1]
+
+
+def strip_pyramid(network: Network, strips: Tensor) -> list[Tensor]:
+    """As `strip_map`, after the maps that it is made from, in cells of 8 and of 16 pixels."""
     if strips.shape[1:] != (HEIGHT, WIDTH, 3) or network.stride != CELL:
         raise ValueError(
             f"expected strips (n, {HEIGHT}, {WIDTH}, 3) and a network of stride {CELL}, got {tuple(strips.shape)} and "
@@ -119,8 +133,9 @@ def strip_map(network: Network, strips: Tensor) -> Tensor:
         )
     wide = network.normalise(torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2))
     # pixel by pixel is faster, but PyTorch 2.13 may corrupt memory on the way back (agents.vision.training)
-    maps = network.feature_map(wide.contiguous() if torch.is_grad_enabled() else wide)
-    return maps[..., MARGIN // CELL : -(MARGIN // CELL)]
+    maps = network.pyramid(wide.contiguous() if torch.is_grad_enabled() else wide)
+    ends = [MARGIN * m.shape[-1] // wide.shape[-1] for m in maps]
+    return [m[..., end:-end] for m, end in zip(maps, ends, strict=True)]
 
 
 def pool_views(maps: Tensor, peaks: int = 0) -> Tensor:

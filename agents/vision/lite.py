@@ -29,8 +29,8 @@ STAGES = (
     (1, 3, 1, 6, 320),
 )
 """Blocks, side of the kernel, stride of the first, expansion, channels: table 1 of the paper."""
-FINE = 11
-"""After so many blocks cells are 16 pixels wide, at the end 32."""
+FINEST, FINE = 5, 11
+"""After so many blocks cells are 8 and 16 pixels wide, at the end 32."""
 EPSILON, MOMENTUM = 1e-3, 0.01
 """Of batch normalisation, as the weights were learned."""
 
@@ -39,6 +39,8 @@ class Lite(nn.Module):
     """Images to a feature map; their sides are multiples of 32 pixels."""
 
     size, stride, peaks = SIZE, 16, PEAKS
+    channels = (STAGES[2][-1], STAGES[4][-1], SIZE)
+    """Of the maps of `pyramid`."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -55,12 +57,18 @@ class Lite(nn.Module):
 
     def feature_map(self, images: Tensor) -> Tensor:
         """(n, 3, H, W) normalised images -> (n, D, H / 16, W / 16)."""
-        x = fine = _convolve(self._conv_stem, self._bn0, images)
+        return self.pyramid(images)[-1]
+
+    def pyramid(self, images: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """(n, 3, H, W) normalised images -> (n, 40, H / 8, W / 8), (n, 112, H / 16, W / 16) and the feature map."""
+        x, kept = _convolve(self._conv_stem, self._bn0, images), []
         for i, block in enumerate(self._blocks, 1):
             x = block(x)
-            fine = x if i == FINE else fine
+            if i in (FINEST, FINE):
+                kept.append(x)
+        finest, fine = kept
         both = torch.cat([fine, F.interpolate(x, scale_factor=2.0, mode="bilinear")], 1)
-        return _convolve(self.neck, self.norm, both, clip=False).relu()
+        return finest, fine, _convolve(self.neck, self.norm, both, clip=False).relu()
 
     def normalise(self, images: Tensor) -> Tensor:
         """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as the weights expect, in memory pixel by pixel."""

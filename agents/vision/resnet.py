@@ -104,6 +104,8 @@ class ResNet(nn.Module):
     """D, channels of the map."""
     stride: int
     """Pixels per cell of the map."""
+    channels: tuple[int, int, int]
+    """Of the last three stages."""
     peaks = 0
     """So many of the last channels are the largest values of a view; the others are means."""
 
@@ -111,6 +113,8 @@ class ResNet(nn.Module):
         super().__init__()
         a = architecture
         self.size, self.stride = a.size, a.stride
+        second, third, fourth = (width * EXPANSION[a.block] for width in a.widths[1:])
+        self.channels = (second, third, fourth)
         block = {"basic": BasicBlock, "bottleneck": Bottleneck}[a.block]
         self.conv1 = nn.Conv2d(3, a.stem, 7, 2, 3, bias=False)
         self.bn1 = nn.BatchNorm2d(a.stem)
@@ -127,10 +131,15 @@ class ResNet(nn.Module):
 
     def feature_map(self, images: Tensor) -> Tensor:
         """(n, 3, H, W) normalised images -> (n, D, H / stride, W / stride)."""
-        x = F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)
+        return self.pyramid(images)[-1]
+
+    def pyramid(self, images: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """(n, 3, H, W) normalised images -> the maps of the last three stages."""
+        maps = [F.max_pool2d(F.relu(self.bn1(self.conv1(images))), 3, 2, 1)]
         for stage in (1, 2, 3, 4):
-            x = getattr(self, f"layer{stage}")(x)
-        return x
+            maps.append(getattr(self, f"layer{stage}")(maps[-1]))
+        _, _, second, third, last = maps
+        return second, third, last
 
     def normalise(self, images: Tensor) -> Tensor:
         """(n, H, W, 3) uint8 RGB -> (n, 3, H, W) float32, as the weights expect, in memory pixel by pixel."""

@@ -9,9 +9,12 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from agents.common.parallel import check_device, use_threads
 from agents.common.session import Note
-from agents.vision.config import VisionConfig, drawing, lit_name
+from agents.vision.config import StripTraining, VisionConfig, drawing, lit_name
+from agents.vision.detector import train_detector
 from agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
 from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
 from agents.vision.features import encode_panoramas, feature_path, has_features, save_features
@@ -56,6 +59,36 @@ def train_vision(
         write_json(out / "readings.json", numbers, indent=1)
 
 
+def detector_for(
+    encoder: Encoder,
+    source: StripSource,
+    config: StripTraining,
+    out: Path,
+    *,
+    device: str = "cpu",
+    workers: int = 1,
+    note: Note = print,
+) -> None:
+    """Train a detector on an encoder, in the training houses, and measure its precision in validation houses.
+
+    Raises:
+      LockedError: another process writes to `out`.
+    """
+    check_device(device)
+    data = Dataset(source.data)
+    with locked(out):
+        seen, unseen = (
+            source.strips(names, workers=workers, note=note)
+            for names in (training_houses(data, config), houses_of(data, ("val_unseen",)))
+        )
+        detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
+        learned = identity_of("agents.vision.run", settings=config, data=data.digest, encoder=encoder.digest)
+        detector.save(out / "detector.safetensors", learned)
+        found = detector.precision(unseen)
+        write_json(out / "readings.json", {"AP": float(np.mean(list(found.values()))), "AP by class": found}, indent=1)
+        note(f"average precision {np.mean(list(found.values())):.3f}, {len(found)} classes in validation houses")
+
+
 def trained_encoder(
     seen: Sequence[HouseStrips],
     config: VisionConfig,
@@ -73,14 +106,14 @@ def trained_encoder(
     classes = trained_classes(folder, config)
     if classes is None:
         home = folder / "training"
-        encoder, heads, classes = train_encoder(seen, config, home, device=device, note=note)
+        encoder, classes = train_encoder(seen, config, home, device=device, note=note)
         encoder = whitened(encoder, seen)
-        save_training(encoder, heads, classes, config, folder, identity)
+        save_training(encoder, classes, config, folder, identity)
         (home / "checkpoint.pt").unlink(missing_ok=True)
     return load_encoder(folder / "encoder.safetensors"), classes
 
 
-def training_houses(data: Dataset, config: VisionConfig) -> list[str]:
+def training_houses(data: Dataset, config: StripTraining) -> list[str]:
     """Names of the houses to learn from."""
     return houses_of(data, ("train",))[: config.training_houses or None]
 

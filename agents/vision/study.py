@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 
 from agents.common.session import Note
-from agents.common.weights import weights_digest
+from agents.common.weights import kind_of, weights_digest
 from agents.studies.engine import Measured, StudyLearner
 from agents.studies.tables import StudyRow, StudyTable
 from agents.vision.config import RENDER_PRESETS, VisionConfig
+from agents.vision.detector import Detector
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder
 from agents.vision.labels import HouseStrips
@@ -69,7 +70,8 @@ class EncoderStudy(StudyLearner):
     lit_houses: int = 12
     """So many houses are seen in light by one more encoder, and by readers."""
     ready: Mapping[str, Sequence[Path]] = field(default_factory=dict)
-    """Encoders that are there already, judged beside those that are trained: by row, one file per training seed."""
+    """Encoders, and detectors of the shipped encoder, that are there already, judged beside those that are trained: by
+    row, one file per training seed."""
 
     name = "vision"
     judges = ("agents.vision.study",)
@@ -158,20 +160,25 @@ class EncoderStudy(StudyLearner):
         return self._source(next((k for k in self.pictures if RENDER_PRESETS[k].lit_by), "fast"))
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
-        assert weights is not None, "every row is an encoder"
-        data, encoder = Dataset(self.source.data), load_encoder(weights)
+        assert weights is not None, "every row is an encoder or a detector"
+        data = Dataset(self.source.data)
         names = self._known(data)
         shown = self.source.strips(names, note=lambda line: None)
         classes = [shown[0].classes[i] for i in frequent_classes(shown, self.config.least_views)]
         drawn = self._source(split)
         read_in = drawn.strips(names[: self.lit_houses], note=lambda line: None)
-        unseen = drawn.strips(houses_of(data, (self.split,)))
-        known, other = (labelled(data, houses, encoder, classes) for houses in (read_in, unseen))
-        found = read(known, other, seed=self.config.seed)
-        ap = dict(zip(classes, found.ap, strict=True))
-        goals = float(np.nanmean([ap[c] for c in sought(data) or classes if c in ap]))
-        numbers = (found.mean_ap, goals, found.chance_ap, 100 * found.room_accuracy, found.depth_r2, found.place_auc)
-        return {name: Samples((float(v),)) for name, v in zip(COLUMNS, numbers, strict=True)}
+        unseen = drawn.strips(houses_of(data, (self.split,)), note=lambda line: None)
+        goals = sought(data) or classes
+        if kind_of(weights) == "detector":
+            found = Detector.load(load_encoder(), weights).precision(unseen)
+            seen = {read_in[0].classes[i] for i in frequent_classes(read_in, 1)}
+            known = [c for c in classes if c in seen]
+            return _measured(("AP", "goal_AP"), _mean_precision({c: found[c] for c in known if c in found}, goals))
+        first, other = (labelled(data, houses, load_encoder(weights), classes) for houses in (read_in, unseen))
+        reading = read(first, other, seed=self.config.seed)
+        ap, goal_ap = _mean_precision(dict(zip(classes, reading.ap, strict=True)), goals)
+        rest = (reading.chance_ap, 100 * reading.room_accuracy, reading.depth_r2, reading.place_auc)
+        return _measured(COLUMNS, (ap, goal_ap, *rest))
 
     def about(self) -> str:
         data = Dataset(self.source.data)
@@ -189,6 +196,15 @@ class EncoderStudy(StudyLearner):
     def _source(self, way: str) -> StripSource:
         """Pictures as they learned from, or drawn otherwise."""
         return dataclasses.replace(self.source, picture_kind=way, lights=1) if way else self.source
+
+
+def _mean_precision(ap: Mapping[str, float], goals: Sequence[str]) -> tuple[float, float]:
+    """Mean average precision over all classes that are known, and over those of `goals`."""
+    return float(np.nanmean(list(ap.values()))), float(np.nanmean([ap[c] for c in goals if c in ap]))
+
+
+def _measured(names: Iterable[str], numbers: Iterable[float]) -> Measured:
+    return {name: Samples((float(v),)) for name, v in zip(names, numbers, strict=True)}
 
 
 def sought(data: Dataset) -> list[str]:

@@ -11,7 +11,7 @@ import dataclasses
 import functools
 import operator
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,18 +19,18 @@ import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
-from torch import Tensor
+from torch import Tensor, nn
 
 from agents.common.checkpoint import Stateful
-from agents.common.session import Session, descend
+from agents.common.session import Note, Session, descend
 from agents.common.weights import seeded
-from agents.vision.config import VisionConfig
+from agents.vision.config import StripTraining, VisionConfig
 from agents.vision.encoder import Encoder, Network, build, pool_views, save_encoder, strip_map, whitening
 from agents.vision.labels import HouseStrips, visible_in_views
 from agents.vision.lite import Lite, load_imagenet
-from agents.vision.recognise import Heads, save_heads
 from agents.vision.strip import CELL, COLUMNS
 from assets.cache import digest, write_json
+from assets.records import ROOM_KINDS
 from embodied.identity import Identity, identity_of
 from embodied.records import load_json
 from embodied.render.photograph import camera_traits, photograph
@@ -64,6 +64,18 @@ class StripBatch:
 
     def to(self, device: str) -> StripBatch:
         return StripBatch(**{f.name: getattr(self, f.name).to(device) for f in dataclasses.fields(self)})
+
+
+class Heads(nn.Module):
+    """Linear readers of the feature map (cells) and of the pooled features (views), by which an encoder learns."""
+
+    def __init__(self, size: int, classes: int) -> None:
+        super().__init__()
+        self.cell_objects = nn.Conv2d(size, classes, 1)
+        self.cell_room = nn.Conv2d(size, len(ROOM_KINDS), 1)
+        self.cell_depth = nn.Conv2d(size, 1, 1)
+        self.view_objects = nn.Linear(size, classes)
+        self.view_room = nn.Linear(size, len(ROOM_KINDS))
 
 
 def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
@@ -178,90 +190,111 @@ def train_encoder(
     folder: Path | None = None,
     *,
     device: str = "cpu",
-    note: Callable[[str], None] = print,
-) -> tuple[Encoder, Heads, list[str]]:
-    """The encoder, its heads, and the names of the classes that the heads predict; both on the CPU in the end.
+    note: Note = print,
+) -> tuple[Encoder, list[str]]:
+    """The encoder, on the CPU in the end, and the names of the classes that it learned to tell.
 
-    Args:
-      device: where PyTorch computes.
-      folder: of the run, whose state is kept after each epoch; training goes on from it. None keeps nothing.
+    Args and errors: as `learn`.
+    """
+    classes = classes_of(houses, config)
+    with seeded(config.seed):
+        network = build(config.network)
+        heads = Heads(network.size, len(classes))
+    if isinstance(network, Lite):
+        load_imagenet(network)
+    modules = {"network": network, "heads": heads}
+    loss_of = functools.partial(vision_loss, network, heads)
+    identity = identity_of("agents.vision.training")
+    learn(houses, classes, config, modules, loss_of, folder, identity, device=device, note=note)
+    return Encoder(network.cpu().eval(), config.network), [houses[0].classes[i] for i in classes]
+
+
+def classes_of(houses: Sequence[HouseStrips], config: StripTraining) -> list[int]:
+    """Indices of the classes to learn.
 
     Raises:
       ValueError: no strips, or strips with different classes.
-      DivergedError: the loss is no longer a number.
-      CheckpointError: damaged, or of other settings.
     """
     if not houses or len({h.classes for h in houses}) != 1:
         raise ValueError("training needs strips of at least one house, all with the same list of classes")
-    classes = frequent_classes(houses, config.least_views)
-    strips = strip_count(houses)
-    training = _Training(config, len(classes), strips // config.batch, device)
-    note(f"{strips} strips an epoch, of {len(_by_name(houses))} houses, {len(classes)} classes")
+    return frequent_classes(houses, config.least_views)
+
+
+def learn(
+    houses: Sequence[HouseStrips],
+    classes: Sequence[int],
+    config: StripTraining,
+    modules: Mapping[str, nn.Module],
+    loss_of: Callable[[StripBatch], tuple[Tensor, dict[str, float]]],
+    folder: Path | None,
+    identity: Identity,
+    *,
+    device: str = "cpu",
+    note: Note = print,
+) -> None:
+    """Train modules on strips, epoch by epoch.
+
+    Args:
+      loss_of: a batch's loss, and its parts for the log.
+      folder: of the run, whose state is kept after each epoch; training goes on from it. None keeps nothing.
+      identity: what else decides the result.
+      device: where PyTorch computes.
+
+    Raises:
+      DivergedError: the loss is no longer a number.
+      CheckpointError: damaged, or of other settings.
+    """
+    updates = strip_count(houses) // config.batch
+    note(f"{strip_count(houses)} strips an epoch, of {len(_by_name(houses))} houses, {len(classes)} classes")
+    for module in modules.values():
+        module.to(device)
+    parameters = [p for module in modules.values() for p in module.parameters()]
+    optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
+    steps = max(config.epochs * updates, 1)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, config.learning_rate, total_steps=steps)
+
+    def update(batch: StripBatch, where: str) -> dict[str, float]:
+        loss, parts = loss_of(batch.to(device))
+        descend(loss, optimizer, where)
+        schedule.step()
+        return parts
+
+    def pass_over(epoch: int) -> dict[str, float]:
+        """Learn once from every strip; returns the losses, smoothed."""
+        # not in channels_last: its backward pass corrupts memory in PyTorch 2.13 on CPUs with few channels
+        for module in modules.values():
+            module.train()
+        rng = stream(config.seed, "vision", "epoch", epoch)
+        drawn = batches(houses, classes, config.batch, config.cameras, config.shade, rng=rng)
+        losses = (update(batch, f"epoch {epoch + 1}, update {done}") for done, batch in enumerate(drawn, 1))
+        return _watched(losses, f"epoch {epoch + 1}", updates, config.batch, note)
+
     if folder is None:
         for epoch in range(config.epochs):
-            training.pass_over(houses, classes, epoch, note)
-    else:
-        identity = identity_of("agents.vision.training", settings=config, strips=_digest_of(houses))
-        with Session(folder, identity, training.parts, config.epochs, checkpoint_minutes=0.0, note=note) as session:
-            for epoch in session:
-                session.add(training.pass_over(houses, classes, epoch, note))
-    network, heads = training.network.cpu().eval(), training.heads.cpu().eval()
-    names = [houses[0].classes[i] for i in classes]
-    return Encoder(network, config.network), heads, names
+            pass_over(epoch)
+        return
+    learned = {**identity, **identity_of(settings=config, strips=_digest_of(houses))}
+    parts: dict[str, Stateful] = {**modules, "optimizer": optimizer, "schedule": schedule}
+    with Session(folder, learned, parts, config.epochs, checkpoint_minutes=0.0, note=note) as session:
+        for epoch in session:
+            session.add(pass_over(epoch))
+
+
+def _watched(losses: Iterable[dict[str, float]], name: str, total: int, batch: int, note: Note) -> dict[str, float]:
+    """The parts of a pass's losses, smoothed, and told from time to time."""
+    began, smooth = time.monotonic(), dict[str, float]()
+    for done, parts in enumerate(losses, 1):
+        smooth = {k: 0.95 * smooth.get(k, v) + 0.05 * v for k, v in parts.items()}
+        if done % 25 == 0 or done == total:
+            rate = done * batch / (time.monotonic() - began)
+            terms = ", ".join(f"{k} {v:.3f}" for k, v in smooth.items())
+            note(f"{name}, update {done}/{total}, {rate:.1f} strips/s: {terms}")
+    return smooth
 
 
 def _digest_of(houses: Sequence[HouseStrips]) -> str:
     """Of the pictures and labels of some houses."""
     return digest(*(digest(h.name, h.classes, h.rgb.tobytes(), h.share.tobytes()) for h in houses))
-
-
-class _Training:
-    """Owns what changes while an encoder learns."""
-
-    def __init__(self, config: VisionConfig, classes: int, updates: int, device: str) -> None:
-        """Args:
-        updates: per epoch.
-        """
-        self.config, self._device = config, device
-        with seeded(config.seed):
-            self.network = build(config.network)
-            self.heads = Heads(self.network.size, classes)
-        if isinstance(self.network, Lite):
-            load_imagenet(self.network)
-        self.network.to(device)
-        self.heads.to(device)
-        parameters = [*self.network.parameters(), *self.heads.parameters()]
-        self._optimizer = torch.optim.AdamW(parameters, config.learning_rate, weight_decay=config.weight_decay)
-        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
-            self._optimizer, config.learning_rate, total_steps=max(config.epochs * updates, 1)
-        )
-        self._updates = updates
-
-    @property
-    def parts(self) -> dict[str, Stateful]:
-        """What is in its checkpoints."""
-        modules = {"network": self.network, "heads": self.heads}
-        return {**modules, "optimizer": self._optimizer, "schedule": self._schedule}
-
-    def pass_over(
-        self, houses: Sequence[HouseStrips], classes: Sequence[int], epoch: int, note: Callable[[str], None]
-    ) -> dict[str, float]:
-        """Learn once from every strip; returns the losses, smoothed."""
-        # not in channels_last: its backward pass corrupts memory in PyTorch 2.13 on CPUs with few channels
-        self.network.train()
-        began, smooth = time.monotonic(), dict[str, float]()
-        rng = stream(self.config.seed, "vision", "epoch", epoch)
-        drawn = batches(houses, classes, self.config.batch, self.config.cameras, self.config.shade, rng=rng)
-        for done, batch in enumerate(drawn, 1):
-            loss, parts = vision_loss(self.network, self.heads, batch.to(self._device))
-            descend(loss, self._optimizer, f"epoch {epoch + 1}, update {done}")
-            self._schedule.step()
-            smooth = {k: 0.95 * smooth.get(k, v) + 0.05 * v for k, v in parts.items()}
-            if done % 25 == 0 or done == self._updates:
-                rate = done * self.config.batch / (time.monotonic() - began)
-                terms = ", ".join(f"{k} {v:.3f}" for k, v in smooth.items())
-                note(f"epoch {epoch + 1}, update {done}/{self._updates}, {rate:.1f} strips/s: {terms}")
-        return smooth
 
 
 def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Encoder:
@@ -281,16 +314,10 @@ def _seen_by(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) ->
 
 
 def save_training(
-    encoder: Encoder,
-    heads: Heads,
-    classes: Sequence[str],
-    config: VisionConfig,
-    folder: Path,
-    identity: Identity | None = None,
+    encoder: Encoder, classes: Sequence[str], config: VisionConfig, folder: Path, identity: Identity | None = None
 ) -> None:
-    """encoder.safetensors (half precision), heads.safetensors and classes.json in `folder`."""
+    """encoder.safetensors (half precision) and classes.json in `folder`."""
     save_encoder(encoder, folder / "encoder.safetensors", identity)
-    save_heads(heads, encoder, classes, folder / "heads.safetensors", identity)
     write_json(folder / "classes.json", {"classes": list(classes), "config": dataclasses.asdict(config)})
 
 

@@ -1,4 +1,4 @@
-"""Train the encoder, an agent (hanna, vnla, vln, hari), or the ILIAD student.
+"""Train the encoder, its detector, an agent (hanna, vnla, vln, hari), or the ILIAD student.
 
 Rerun an interrupted command to resume; the result is the same. `tensorboard --logdir DIR` shows the curves. On several
 GPUs run `torchrun --nproc-per-node N --no-python embodied train hanna --device cuda ...`, and on several cores the same
@@ -17,7 +17,7 @@ from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConf
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.vision.config import VisionConfig
+from agents.vision.config import StripTraining, VisionConfig
 from agents.vln.config import FORCING, SPEAKER_SCALES, FollowerSettings, SpeakerSettings
 from agents.vln.config import SCALES as VLN_SCALES
 from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
@@ -28,6 +28,7 @@ from embodied.cli.learning import (
     SMALL_SCALE,
     Drawn,
     Encoded,
+    EncoderFile,
     Lit,
     Nav,
     Run,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 WATCHED = 2
 """Validation episodes that --rrd records each time."""
 TRAINING, EVALUATION = "settings of training", "settings of evaluation"
+DETECTOR = StripTraining(epochs=3, shade=0.3, weight_decay=0.02)
 VNLA_WORDS = {"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
 
 
@@ -69,6 +71,22 @@ class TrainVision(Strips, WithData):
     workers: Count = 1
     """Render N houses in parallel."""
     config: Annotated[VisionConfig, Settings(TRAINING, VisionConfig())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainDetector(Strips, WithData, EncoderFile):
+    """A detector of objects, on an encoder that stays as it is.
+
+    Renders the houses of a data set, trains a detector on the encoder's maps, and measures its average precision on
+    validation houses.
+    """
+
+    out: OutputFolder
+    """Folder for strips of views, weights and metrics."""
+    threads: Count = 2
+    workers: Count = 1
+    """Render N houses in parallel."""
+    config: Annotated[StripTraining, Settings(TRAINING, DETECTOR)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,6 +199,16 @@ def train_vision(args: TrainVision) -> None:
 
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
     train_vision(source, args.config, args.out, device=args.device, workers=args.workers, note=note)
+
+
+def train_detector(args: TrainDetector) -> None:
+    from agents.vision.drawn import StripSource
+    from agents.vision.encoder import load_encoder
+    from agents.vision.run import detector_for
+
+    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
+    encoder = load_encoder(args.encoder)
+    detector_for(encoder, source, args.config, args.out, device=args.device, workers=args.workers, note=note)
 
 
 def train_hanna(args: TrainHanna) -> None:
@@ -303,6 +331,7 @@ def _with_threads(train: Callable[[Any], None]) -> Callable[[Any], None]:
 
 COMMANDS: Mapping[str, Any] = {
     "vision": (TrainVision, _with_threads(train_vision)),
+    "detector": (TrainDetector, _with_threads(train_detector)),
     "hanna": (TrainHanna, _with_threads(train_hanna)),
     "vnla": (TrainVnla, _with_threads(train_vnla)),
     "vln": (

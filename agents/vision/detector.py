@@ -1,0 +1,162 @@
+"""A detector on a frozen encoder: which classes each part of a panorama shows, and each of its 36 views.
+
+It reads the encoder's maps in cells of 8 pixels (5 degrees), too, so that small things do not vanish in a mean. A view
+shows a class as surely as its surest cell, corrected by what the whole view looks like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import Tensor, nn
+
+from agents.common.session import Note
+from agents.common.shipped import SHIPPED_DETECTOR
+from agents.common.tensor_file import load_into
+from agents.common.weights import half_precision, load_weights, save_weights, seeded
+from agents.vision.config import StripTraining
+from agents.vision.encoder import Encoder, pool_views
+from agents.vision.labels import HouseStrips, visible_in_views
+from agents.vision.probe import average_precision
+from agents.vision.strip import inside_windows
+from agents.vision.training import StripBatch, classes_of, learn
+from embodied.identity import Identity, identity_of
+
+WIDTH = 128
+"""Channels of the detector's maps."""
+BLOCKS = 3
+
+
+class DetectorNetwork(nn.Module):
+    """Maps of an encoder's network to logits of cells and views."""
+
+    def __init__(self, channels: Sequence[int], classes: int) -> None:
+        """Args:
+        channels: of the maps in cells of 8, of 16, and of the last map.
+        """
+        super().__init__()
+        fine, middle, last = channels
+        self.fine = nn.Conv2d(fine, WIDTH, 1, bias=False)
+        self.coarse = nn.Conv2d(middle + last, WIDTH, 1, bias=False)
+        self.norm = nn.BatchNorm2d(WIDTH)
+        self.blocks = nn.ModuleList(_Block() for _ in range(BLOCKS))
+        self.cells = nn.Conv2d(WIDTH, classes, 1)
+        self.view_norm = nn.BatchNorm1d(2 * last, affine=False)
+        self.views = nn.Linear(2 * last, classes)
+
+    def forward(self, maps: Sequence[Tensor]) -> tuple[Tensor, Tensor]:
+        """(n, C, 12, 36) and (n, 36, C) logits from maps (n, channels, rows, columns) of `strip_pyramid`."""
+        fine, middle, last = maps
+        coarse = self.coarse(torch.cat([middle, last], 1))
+        x = F.relu(self.norm(self.fine(fine) + F.interpolate(coarse, scale_factor=2.0)))
+        for block in self.blocks:
+            x = block(x)
+        cells = F.max_pool2d(self.cells(x), 2)
+        inside = torch.from_numpy(inside_windows()).to(cells.device)
+        surest = cells.flatten(2)[:, :, inside].amax(-1).transpose(1, 2)
+        whole = torch.cat([pool_views(last), pool_views(last, last.shape[1])], -1)
+        return cells, surest + self.views(self.view_norm(whole.flatten(0, 1))).unflatten(0, whole.shape[:2])
+
+
+class _Block(nn.Module):
+    """A residual connection around a look at the neighbours of each cell, round the strip's ends."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.near = nn.Conv2d(WIDTH, WIDTH, 5, groups=WIDTH, bias=False)
+        self.norm = nn.BatchNorm2d(WIDTH)
+        self.mix = nn.Conv2d(WIDTH, WIDTH, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        around = F.pad(F.pad(x, (2, 2, 0, 0), mode="circular"), (0, 0, 2, 2))
+        return x + F.relu(self.mix(self.norm(self.near(around))))
+
+
+@dataclass(frozen=True)
+class DetectorAbout:
+    """What stands beside the weights of a detector."""
+
+    encoder: str
+    """Digest of its encoder."""
+    channels: tuple[int, int, int]
+    """Of the encoder's maps."""
+    classes: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Detector:
+    """A trained detector and the encoder whose maps it reads."""
+
+    encoder: Encoder
+    network: DetectorNetwork
+    classes: tuple[str, ...]
+
+    @classmethod
+    def load(cls, encoder: Encoder, path: Path = SHIPPED_DETECTOR) -> Detector:
+        """The detector in a file, for its encoder.
+
+        Raises:
+          FileNotFoundError, OSError.
+          ValueError: damaged, of another format, or of another encoder.
+        """
+        remedy = "train a detector with `embodied train detector`"
+        tensors, about = load_weights(path, "detector", DetectorAbout, remedy)
+        if about.encoder != encoder.digest:
+            raise ValueError(
+                f"{path}: a detector of encoder {about.encoder[:12]}, not of {encoder.digest[:12]}; name the one that "
+                "was trained with this encoder"
+            )
+        network = DetectorNetwork(about.channels, len(about.classes))
+        load_into(network, {k: v.float() for k, v in tensors.items()}, path)
+        return cls(encoder, network.eval(), about.classes)
+
+    def save(self, path: Path, identity: Identity | None = None) -> None:
+        """Write half-precision weights, the names of the classes and what they were trained with, atomically."""
+        about = DetectorAbout(self.encoder.digest, self.encoder.network.channels, self.classes)
+        save_weights(path, "detector", half_precision(self.network), about, identity)
+
+    @torch.no_grad()
+    def __call__(self, strips: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 192, 576, 3) uint8 -> probabilities of each class, (n, C, 12, 36) of cells and (n, 36, C) of views."""
+        cells, views = self.network(self.encoder.pyramid(strips))
+        return cells.sigmoid().cpu().numpy(), views.sigmoid().cpu().numpy()
+
+    def precision(self, houses: Sequence[HouseStrips]) -> dict[str, float]:
+        """Average precision of each class that some view of `houses` shows: is it visible in this view?"""
+        columns = [houses[0].classes.index(c) for c in self.classes]
+        scores = np.concatenate([self(h.rgb[i : i + 8])[1] for h in houses for i in range(0, len(h.rgb), 8)])
+        shown = np.concatenate([visible_in_views(h.share[..., columns]) for h in houses])
+        pairs = zip(self.classes, scores.reshape(-1, len(columns)).T, shown.reshape(-1, len(columns)).T, strict=True)
+        return {name: average_precision(score, there) for name, score, there in pairs if there.any()}
+
+
+def train_detector(
+    houses: Sequence[HouseStrips],
+    encoder: Encoder,
+    config: StripTraining,
+    folder: Path | None = None,
+    *,
+    device: str = "cpu",
+    note: Note = print,
+) -> Detector:
+    """A detector on an encoder that stays as it is; args and errors: as agents.vision.training.learn."""
+    classes = classes_of(houses, config)
+    looking = encoder.to(device)
+    with seeded(config.seed):
+        network = DetectorNetwork(encoder.network.channels, len(classes))
+
+    def loss_of(batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
+        cells, views = network(looking.pyramid(batch.rgb.cpu().numpy()))
+        shows = (batch.share.permute(0, 3, 1, 2) >= 8).float()  # covers 3 % of the cell
+        in_cells = F.binary_cross_entropy_with_logits(cells, shows) * 20
+        in_views = F.binary_cross_entropy_with_logits(views, batch.visible.float()) * 20
+        return in_cells + in_views, {"cell objects": float(in_cells.detach()), "view objects": float(in_views.detach())}
+
+    identity = identity_of("agents.vision.detector", encoder=encoder.digest)
+    learn(houses, classes, config, {"detector": network}, loss_of, folder, identity, device=device, note=note)
+    return Detector(encoder.to("cpu"), network.cpu().eval(), tuple(houses[0].classes[i] for i in classes))
