@@ -112,7 +112,7 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
     names = set(wheel.namelist())
     wanted = {f"{p}/py.typed" for p in PACKAGES} | {
         "agents/weights/encoder.safetensors",
-        "agents/weights/encoder_heads.safetensors",
+        "agents/weights/detector.safetensors",
         "embodied/serve/static/index.html",
         "embodied/serve/static/app.js",
         "embodied/serve/static/app.css",
