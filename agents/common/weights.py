@@ -78,8 +78,8 @@ def seeded(seed: int) -> Iterator[None]:
 
 
 def half_precision(network: nn.Module) -> dict[str, Tensor]:
-    """The weights of a network in half precision."""
-    return {k: v.detach().half() for k, v in network.state_dict().items()}
+    """The weights of a network in half precision; whole numbers, such as counters, as they are."""
+    return {k: v.half() if v.is_floating_point() else v for k, v in network.state_dict().items()}
 
 
 def check_features(found: str, learned_from: str) -> None:

@@ -112,7 +112,7 @@ class Detector:
                 "was trained with this encoder"
             )
         network = DetectorNetwork(about.channels, len(about.classes))
-        load_into(network, {k: v.float() for k, v in tensors.items()}, path)
+        load_into(network, tensors, path)
         return cls(encoder, network.eval(), about.classes)
 
     def save(self, path: Path, identity: Identity | None = None) -> None:

@@ -5,6 +5,7 @@ What belongs to viz, such as recordings, is passed in from the console command a
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -65,28 +66,42 @@ def detector_for(
     config: StripTraining,
     out: Path,
     *,
+    lit: int = 0,
+    also: StripSource | None = None,
     device: str = "cpu",
     workers: int = 1,
     note: Note = print,
 ) -> None:
     """Train a detector on an encoder, in the training houses, and measure its precision in validation houses.
 
+    Args:
+      lit: so many training houses are seen in light ('fast'), too.
+      also: of another data set, whose training houses of other names are seen, too.
+
     Raises:
       LockedError: another process writes to `out`.
     """
     check_device(device)
     data = Dataset(source.data)
+    names = training_houses(data, config)
+    pictures = [(source, names), (dataclasses.replace(source, picture_kind="fast", lights=1), names[:lit])]
+    if also:
+        pictures.append((also, [n for n in houses_of(Dataset(also.data), ("train",)) if n not in names]))
     with locked(out):
-        seen, unseen = (
-            source.strips(names, workers=workers, note=note)
-            for names in (training_houses(data, config), houses_of(data, ("val_unseen",)))
-        )
+        seen = [h for drawn, of in pictures for h in drawn.strips(of, workers=workers, note=note)]
+        unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
-        learned = identity_of("agents.vision.run", settings=config, data=data.digest, encoder=encoder.digest)
+        others = {
+            "lit": lit,
+            "also": Dataset(also.data).digest if also else None,
+            "share": also.share if also else None,
+        }
+        learned = identity_of("agents.vision.run", settings=config, data=data.digest, encoder=encoder.digest, **others)
         detector.save(out / "detector.safetensors", learned)
         found = detector.precision(unseen)
-        write_json(out / "readings.json", {"AP": float(np.mean(list(found.values()))), "AP by class": found}, indent=1)
-        note(f"average precision {np.mean(list(found.values())):.3f}, {len(found)} classes in validation houses")
+        whole = float(np.mean(list(found.values())))
+        write_json(out / "readings.json", {"AP": whole, "AP by class": found}, indent=1)
+        note(f"average precision {whole:.3f}, {len(found)} classes in validation houses")
 
 
 def trained_encoder(

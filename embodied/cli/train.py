@@ -38,7 +38,7 @@ from embodied.cli.learning import (
     WithData,
     WithDevice,
 )
-from embodied.cli.options import Count, InputFolder, InputPath, OutputFolder, Settings
+from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, Settings, positive
 
 if TYPE_CHECKING:
     from agents.vision.lessons import Lessons
@@ -86,6 +86,12 @@ class TrainDetector(Strips, WithData, EncoderFile):
     threads: Count = 2
     workers: Count = 1
     """Render N houses in parallel."""
+    lit_houses: Count = 0
+    """N of the training houses are seen in light, too."""
+    also: InputFolder | None = None
+    """Another data set: its training houses of other names are seen, too."""
+    share: Annotated[float, Option(positive, "X")] = 1.0
+    """Share of the viewpoints of --also that is drawn."""
     config: Annotated[StripTraining, Settings(TRAINING, DETECTOR)]
 
 
@@ -206,9 +212,21 @@ def train_detector(args: TrainDetector) -> None:
     from agents.vision.encoder import load_encoder
     from agents.vision.run import detector_for
 
-    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
+    strips = args.strips or args.out / "strips"
+    source = StripSource(args.data, strips, args.cache, args.pictures, args.lights)
+    also = StripSource(args.also, strips / "also", args.cache, args.pictures, share=args.share) if args.also else None
     encoder = load_encoder(args.encoder)
-    detector_for(encoder, source, args.config, args.out, device=args.device, workers=args.workers, note=note)
+    detector_for(
+        encoder,
+        source,
+        args.config,
+        args.out,
+        lit=args.lit_houses,
+        also=also,
+        device=args.device,
+        workers=args.workers,
+        note=note,
+    )
 
 
 def train_hanna(args: TrainHanna) -> None:
