@@ -12,8 +12,9 @@ from hand_pixels import coloured_strips, world_in
 from agents.common.weights import weights_digest
 from agents.studies.engine import run_study
 from agents.vision.config import RENDER_PRESETS, VisionConfig, drawing, lit_name
+from agents.vision.detector import Detector, DetectorNetwork
 from agents.vision.drawn import StripSource
-from agents.vision.encoder import random_encoder, save_encoder
+from agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from agents.vision.resnet import ARCHITECTURES
 from agents.vision.study import EncoderStudy
 from embodied.cli.learning import by_name
@@ -81,6 +82,18 @@ def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setti
     wider = dataclasses.replace(study, houses=(2, 8, 48), budget=8, config=dataclasses.replace(config, epochs=3))
     rows = [r.train for r in wider.tables()["houses"].rows[:4]]
     assert [r["epochs"] for r in rows] == [12, 3, 1, 3] and rows[2]["share"] == 0.5, "as many updates"
+
+
+@pytest.mark.slow
+def test_a_detector_is_judged_by_what_it_finds(setting, tmp_path):
+    path, encoder = tmp_path / "detector.safetensors", load_encoder()
+    Detector(encoder, DetectorNetwork(encoder.network.channels, 2), ("rose", "fern")).save(path)
+    study = dataclasses.replace(setting, pictures=("fast",), ready={"it": [path]})
+    body = read_json(
+        run_study(study, ["houses"], tmp_path / "study", note=lambda line: None)["houses"].with_suffix(".json")
+    )
+    (row,) = body["rows"]
+    assert set(row["values"]) <= {"AP_fast", "goal_AP_fast"} and 0 < row["values"]["AP_fast"]["mean"] < 1
 
 
 def test_of_more_houses_than_the_budget_some_viewpoints_are_drawn(data, tmp_path, monkeypatch):

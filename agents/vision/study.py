@@ -173,7 +173,7 @@ class EncoderStudy(StudyLearner):
             found = Detector.load(load_encoder(), weights).precision(unseen)
             seen = {read_in[0].classes[i] for i in frequent_classes(read_in, 1)}
             known = [c for c in classes if c in seen]
-            return _measured(("AP", "goal_AP"), _mean_precision({c: found[c] for c in known if c in found}, goals))
+            return _measured(COLUMNS[:2], _mean_precision({c: found[c] for c in known if c in found}, goals))
         first, other = (labelled(data, houses, load_encoder(weights), classes) for houses in (read_in, unseen))
         reading = read(first, other, seed=self.config.seed)
         ap, goal_ap = _mean_precision(dict(zip(classes, reading.ap, strict=True)), goals)
