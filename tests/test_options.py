@@ -54,7 +54,6 @@ LEARN = ("--data", "d", "--out", "o")
         (("evaluate", "hanna", "--data", "d", "--batch", "-3"), "--batch: should be"),
         (("evaluate", "hanna", "--data", "d", "--tasks", "-2"), "--tasks: should be"),
         (("evaluate", "hanna", "--data", "d", "--rrd", "2"), "--rrd wants --out DIR beside it"),
-        (("evaluate", "hari", "--data", "d", "--states", "some"), "--states: invalid choice: 'some'"),
         (("evaluate", "hanna", "--data", "d", "--tasks", "0"), "--tasks: should be"),
         (("features", "--data", "d", "--workers", "-5"), "--workers: should be"),
         (("features", "--data", "d", "--pictures", "nope"), "--pictures: invalid choice: 'nope'"),

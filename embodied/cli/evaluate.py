@@ -115,8 +115,7 @@ def _evaluate(
     changes = _Changes(args, client)
     rows, heard = _play(args, data, names, splits, changes, client, keep) if names else ([], {})
     about: dict[str, object] = {"data": data and data.digest, "seed": args.seed, "tasks": args.tasks, "agents": names}
-    about |= {"splits": splits, "rules": args.rules, "hari": dataclasses.asdict(args.hari_rules())}
-    about["assistant"] = args.assistant
+    about |= {"splits": splits, "rules": args.rules, "assistant": args.assistant}
     if files and data is not None:
         from embodied.cli.evaluate_trained import evaluate_trained
 
@@ -240,7 +239,7 @@ def _stages(
         yield _hidden_houses(args, args.seeds, limit or FEW_TASKS)
     elif data is None:
         seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
-        how = Asked(args.cache, sees=seen, rules=args.rules, hari=args.hari_rules(), assistant=assistant)
+        how = Asked(args.cache, sees=seen, rules=args.rules, assistant=assistant)
         flat = flat_playground(args.kind, args.seed, how)
         yield SplitData(f"flat_{args.seed}", flat.worlds, tuple(flat.tasks), flat.make_env)
     else:
@@ -249,7 +248,7 @@ def _stages(
             worlds = None
             if catalogue is not None:
                 worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
-            yield data.split(split, worlds=worlds, vnla=args.rules, hari=args.hari_rules(), assistant=assistant)
+            yield data.split(split, worlds=worlds, vnla=args.rules, assistant=assistant)
 
 
 def _hidden_houses(args: Options, file: Path, limit: int) -> SplitData:

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from embodied.cli.common import Furnished, Printed
 from embodied.cli.learning import SHOWN, Encoded, Threaded
 from embodied.cli.model import WithModel
-from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, not_negative
-
-if TYPE_CHECKING:
-    from embodied.envs.hari import HariRules
+from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
 VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
 """As in embodied.envs.vnla, which --help should not import."""
-STATES = ("none", "sparse", "dense")
-"""As in embodied.envs.hari, which --help should not import."""
 SEES = ("names", "strip", "panorama", "nothing")
 TEMPLATE = "template"
 
@@ -51,32 +46,6 @@ class TaskOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HariVariants:
-    """HARI's variants (defaults: Table E.2 of the dissertation)."""
-
-    stack: Count = 2
-    """Largest number of goals on the stack."""
-    longest: Count = 3
-    """Longest path to a sub-goal, in nodes."""
-    cost: Annotated[float, Option(not_negative, "X")] = 0.01
-    """Cost of each action."""
-    horizon: Count | None = None
-    """Longest episode in steps (default: its task's, 30)."""
-    uncooperative: bool = False
-    """The assistant answers a different question from the one asked."""
-    states: Annotated[str, Option(words=STATES)] = "sparse"
-    """How the agent's own place is described without a request."""
-    kept: Annotated[float, Option(metavar="SHARE")] = 0.1
-    """Share of the object classes, the most common first, that sparse descriptions keep."""
-
-    def hari_rules(self) -> HariRules:
-        from embodied.envs.hari import Costs, HariRules
-
-        costs, cooperative = Costs.alike(self.cost), not self.uncooperative
-        return HariRules(costs, self.stack, self.longest, cooperative, self.states, self.horizon, self.kept)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Results(Printed):
     """Results."""
 
@@ -100,7 +69,7 @@ class OfTrained:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(TaskOptions, Results, OfTrained, HariVariants, WithModel, Encoded, Threaded, Furnished):
+class Options(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
     kind: Annotated[str, Option(words=KINDS, name="kind")]
     """The kind of task."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()

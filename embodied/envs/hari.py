@@ -7,7 +7,7 @@ execution policy's choice) and DONE is `Stop`.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -45,16 +45,6 @@ class Costs:
         return getattr(self, action.intention.value) if isinstance(action, Ask) else 0.0
 
 
-STATES = ("none", "sparse", "dense")
-"""What an agent is told of where it is without asking."""
-
-
-def check_states(states: str) -> None:
-    """Raises ValueError for a word that is none of STATES."""
-    if states not in STATES:
-        raise ValueError(f"states must be one of {STATES}, got {states!r}")
-
-
 @dataclass(frozen=True)
 class HariRules:
     """What may be varied of HARI's environment; the defaults are Table E.2."""
@@ -66,9 +56,6 @@ class HariRules:
     """l_max, the most nodes to a sub-goal."""
     cooperative: bool = True
     """False: the assistant answers a question drawn from those that could be asked (Table 4.7)."""
-    states: str = "sparse"
-    """What d^s holds before anybody asks: one of STATES. 'none' is for agents that see for themselves, 'dense' is as
-    rich as the assistant's."""
     horizon: int | None = None
     """H, the most steps of an episode; None: what its task says (30 in Table E.2)."""
     kept: float = KEPT
@@ -81,7 +68,6 @@ class HariRules:
             )
         if not 0 < self.kept <= 1:
             raise ValueError(f"kept should be a share above 0 and at most 1, got {self.kept}")
-        check_states(self.states)
 
 
 AS_PRINTED = HariRules()
@@ -111,21 +97,9 @@ class HariEnv(HelpEnv):
         *,
         costs: Costs = Costs(),
         moves: Moves | None = None,
-        states: str = "sparse",
     ) -> None:
-        """
-        Args:
-          states: how where the agent is is described unasked, one of STATES.
-        """
         super().__init__(worlds, assistant, moves)
         self._describer, self._costs = describer, costs
-        check_states(states)
-        see: Mapping[str, Callable[[Place, int], Description]] = {
-            "none": lambda world, node: (),
-            "sparse": describer.sparse,
-            "dense": describer.dense,
-        }
-        self._see = see[states]
 
     def task_error(self, node: int, goal: int) -> float:
         """c(s, a_done): edges on the shortest path from node to goal (4.3.6; docs/sources.md, S61)."""
@@ -134,7 +108,7 @@ class HariEnv(HelpEnv):
     def _begin(self) -> None:
         goal = self.task.goal_nodes[0]
         self._goals = [StackedGoal(goal, self._describer.sparse(self.world, goal, goal=True), 0)]  # G_1
-        self._state = self._see(self.world, self.pose.node)
+        self._state = self._describer.sparse(self.world, self.pose.node)
 
     def _replied(self, reply: Reply) -> None:
         """T_G and p_desp of 4.3.4.2 and 4.3.4.3."""
@@ -153,7 +127,7 @@ class HariEnv(HelpEnv):
         self._on_top()
 
     def _moved(self) -> None:
-        self._state = self._see(self.world, self.pose.node)
+        self._state = self._describer.sparse(self.world, self.pose.node)
         self._tick()
         self._on_top()
 

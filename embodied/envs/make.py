@@ -76,7 +76,7 @@ def environment_maker(
         willing = HariAssistant(say, stack=hari.stack, longest=hari.longest)
         asked = assistant or (willing if hari.cooperative else Uncooperative(willing))
         moves = PanoramicMoves()
-        return lambda: HariEnv(worlds, asked, say, costs=hari.costs, moves=moves, states=hari.states)
+        return lambda: HariEnv(worlds, asked, say, costs=hari.costs, moves=moves)
     if kind == "ask":
         catalogues = (getattr(w, "catalogue", None) for w in worlds.values())
         return ask_environment_maker(worlds, look_of(next(catalogues, None)), assistant=assistant)
