@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from contact import contact
 from handmade_models import CUBE, write_own, write_pack
 
 from assets.attribution import attribution
@@ -18,8 +19,7 @@ from assets.importing.importer import finish_parts, read_obj
 from assets.importing.obj import MeshError, parse_obj
 from assets.importing.packs import find_packs
 from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
-from assets.importing.support_surfaces import contact, find_surfaces
-from assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, bounds
+from assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, SupportSurface, bounds
 from assets.rows import DATA, CatalogueError
 
 SOME = (
@@ -208,13 +208,12 @@ def test_front_and_up_follow_sweet_home_3d():
     np.testing.assert_allclose(high - low, [1, 1, 2], atol=1e-5)
 
 
-def test_surfaces_of_a_cube_are_its_top(tmp_path):
+def test_things_touch_the_top_of_a_cube_and_float_above_it(tmp_path):
     own = write_own(tmp_path / "own", {"box": {"file": "box.obj", "class": "cardboard box", "size": [0.4, 0.3, 0.2]}})
     (own / "box.obj").write_text(CUBE)
     parts = load_catalogue(tmp_path, own=[own]).mesh("mine/box")
-    (top,) = find_surfaces(parts)
-    assert top.name == "top" and top.z == pytest.approx(0.2, abs=1e-4) and top.headroom == 9.0
-    assert (top.x1 - top.x0) * (top.y1 - top.y0) == pytest.approx(0.12, rel=0.05)
+    at = lambda z: SupportSurface("top", z, -0.2, -0.15, 0.2, 0.15, 9.0)
+    assert [contact(parts, at(z)) for z in (0.2, 0.21)] == [1, 0]
 
 
 # hostile and broken packs

@@ -27,7 +27,7 @@ HANG = 0.30
 """Metres below its top over which what hangs falls into its full folds."""
 LIES = 0.9
 """Upward part of a normal from which on cloth lies. It stays smooth: things lie on it, and neither sink nor float (a
-surface is touched within 5 mm, assets.importing.support_surfaces)."""
+surface is touched within 5 mm)."""
 
 
 def rounded(
