@@ -9,7 +9,6 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
-from agents.common.session import Clock
 from agents.common.vocabulary import build_vocabulary
 from agents.find.config import FinderConfig
 from agents.find.network import AROUND, READ, Explorer, SeekNetwork
@@ -104,7 +103,7 @@ def test_who_sees_learns_to_find_things_and_who_is_blind_does_not(tmp_path):
     finder, blind = finder_for(split, iterations=70), finder_for(split, sees="nothing", iterations=62)
     for agent in (finder, blind):
         learner = FindLearner(agent, split, labels_for(split, agent))
-        numbers = [learner.learn(update, Clock()) for update in range(agent.about.config.iterations)]
+        numbers = [learner.learn(update) for update in range(agent.about.config.iterations)]
         assert numbers[-1]["reading"] < numbers[0]["reading"]
     assert success(finder, split) > success(blind, split) + 0.3
     finder.save(tmp_path / "agent.safetensors")

@@ -25,7 +25,7 @@ from agents.common.checkpoint import CheckpointError, restore
 from agents.common.choosing import choose_at, choose_greedily, choose_sampled
 from agents.common.imitation import REPORTED, SUMMED
 from agents.common.playing import play_with_memory
-from agents.common.session import Clock, DivergedError, Session, scheduled_rate, tasks_of_update, within_standard_error
+from agents.common.session import DivergedError, Session, scheduled_rate, tasks_of_update, within_standard_error
 from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
 from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
 from agents.hanna.asking import RULES, ask_above
@@ -116,7 +116,7 @@ def run(folder, config=TINY, split=None, **options):
 
 def collected(split, player, tasks):
     """Episodes that a player in training plays, and what the teacher says of them."""
-    episodes, memory, _ = play_with_memory(split.make_env, player, tasks, seed=0)
+    episodes, memory = play_with_memory(split.make_env, player, tasks, seed=0)
     return episodes, labelled(episodes, memory.moments, HannaTeacher(), split.worlds)
 
 
@@ -542,7 +542,7 @@ def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
     assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
     assert scheduled_rate(1e-3, 99, 100, 0.0) == 1e-3
     learner = HannaLearner(agent_for(setting(), config), setting(), HannaTeacher())
-    learner.learn(99, Clock())
+    learner.learn(99)
     assert learner.optimizer.param_groups[0]["lr"] == rates[-1]
 
 
@@ -599,7 +599,7 @@ def save_gradients(path: Path) -> None:
     torch.set_num_threads(1)
     split = setting()
     agent = agent_for(split, dataclasses.replace(TINY, dropout=0.0, environment_dropout=0.0, guided_asking=0.0))
-    numbers = HannaLearner(agent, split, HannaTeacher()).learn(0, Clock())
+    numbers = HannaLearner(agent, split, HannaTeacher()).learn(0)
     torch.save([p.grad for p in agent.network.parameters()], path)
     path.with_suffix(".json").write_text(json.dumps(numbers))
 

@@ -14,7 +14,8 @@ from hand_data import build, metrics_of
 from agents.common.shipped import SHIPPED_AGENT, WEIGHTS
 from agents.common.weights import origin_of, weights_digest
 from agents.hanna.agent import HannaAbout, HannaAgent
-from agents.hanna.evaluation import behaviour, hanna_policies
+from agents.hanna.evaluation import counted, hanna_policies
+from agents.hanna.policy import PerfectInterpretation
 from agents.hanna.run import train_agent, vocabulary_of
 from agents.hanna.study import HannaStudy
 from agents.studies.engine import run_study
@@ -28,8 +29,11 @@ from embodied.cli.train import TrainHanna
 from embodied.cli.view import looked_at
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
+from embodied.evaluation.tables import interval
+from embodied.interface import Mode, Stop
 from embodied.records import read_json
 from embodied.seeds import stream
+from embodied.teachers.hanna import segments
 
 pytestmark = pytest.mark.slow
 
@@ -109,8 +113,6 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     table = (out / "table.md").read_text()
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
         assert f"| {row} |" in table
-    behaviour = json.loads((out / "behaviour.json").read_text(), parse_constant=pytest.fail)
-    assert 0 <= behaviour["test_unseen"]["request share"] <= 1
     assert len(list(out.glob("episodes_*.jsonl"))) == table.count("| test_unseen |")
     looked, (name,) = looked_at(out), data.names("test_unseen")
     assert looked.by("learned", name) == looked.by("learned, no ask", name) == PLAIN, "recordings show what it saw"
@@ -130,17 +132,21 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     agent.network.eval()
     agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
     policies = hanna_policies(agent, bank)
-    episodes = []
+    rarely = PerfectInterpretation(policies["learned, ask every 5"])
+    episodes = {"always": [], "rarely": []}
     evaluate(
         data.split("test_unseen"),
-        {"p": policies["learned, perfect interpretation"]},
+        {"always": policies["learned, perfect interpretation"], "rarely": rarely},
         seed=0,
         batch=4,
-        keep=lambda name, played: episodes.extend(played),
+        keep=lambda name, played: episodes[name].extend(played),
     )
     worlds = data.places("test_unseen")
-    found = behaviour(episodes, worlds)
-    assert not found["departed wrong"] and found["request share"] > 0.2
+    pieces = [(worlds[e.task.world].graph, p) for e in sum(episodes.values(), []) for p in segments(e.steps)]
+    left = [(g, p) for g, p in pieces if p[0].mode is Mode.SUB and isinstance(p[-1].action, Stop)]
+    assert left and all(g.distance[p[-1].pose.node, p[0].targets[0]] <= 2.0 + 1e-9 for g, p in left)
+    found = counted(episodes["always"], worlds)
+    assert interval([found["request share"]]).mean > 0.2
     assert {f"{r} accuracy" for r in ("lost", "uncertain wrong", "never asked")} <= set(found)
 
 

@@ -12,7 +12,6 @@ from hand_data import built
 from hand_worlds import grid_world
 
 from agents.common.losses import IGNORE
-from agents.common.session import Clock
 from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
 from agents.common.vocabulary import build_vocabulary
 from agents.vision.bank import FeatureBank
@@ -98,7 +97,7 @@ def test_a_follower_learns_its_routes(split):
     agent = new(split, iterations=24, learning_rate=1e-2)
     learner, first = VlnLearner(agent, split), None
     for update in range(24):
-        numbers = learner.learn(update, Clock())
+        numbers = learner.learn(update)
         first = first or numbers["loss navigation"]
     assert numbers["loss navigation"] < first / 2
     agent.network.eval()

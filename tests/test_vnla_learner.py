@@ -15,7 +15,7 @@ from hand_vnla import TINY, lesson, split_under
 from agents.common import imitation
 from agents.common.checkpoint import CheckpointError
 from agents.common.playing import play_with_memory
-from agents.common.session import Clock, DivergedError
+from agents.common.session import DivergedError
 from agents.vision.bank import FeatureBank
 from agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
 from agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER
@@ -151,7 +151,7 @@ def moments(config=TINY):
     agent, training, _ = lesson(config)
     teacher = teacher_of(TRAINED_UNDER[config.rules], rules_of(config))
     player = for_training(agent.policy(training.bank), teacher)
-    return training, *play_with_memory(training.make_env, player, training.tasks[:8], seed=3)[:2]
+    return training, *play_with_memory(training.make_env, player, training.tasks[:8], seed=3)
 
 
 @pytest.mark.slow
@@ -249,7 +249,7 @@ def test_it_learns_one_batch_by_heart():
     config = dataclasses.replace(TINY, hidden_size=48, iterations=90, batch=4, learning_rate=5e-3, dropout=0.0)
     agent, training, _ = lesson(config)
     learner = VnlaLearner(agent, dataclasses.replace(training, tasks=training.tasks[:4]))
-    numbers = [learner.learn(u, Clock()) for u in range(config.iterations)]
+    numbers = [learner.learn(u) for u in range(config.iterations)]
     mean = lambda name, some: sum(n[name] for n in some) / len(some)
     assert mean("right moves", numbers[-10:]) > 0.75 > 0.5 > mean("right moves", numbers[:5])
     assert mean("loss navigation", numbers[-10:]) < 0.65 * mean("loss navigation", numbers[5:15])
@@ -276,7 +276,7 @@ def test_it_learns_in_every_lighting_of_a_house(shown):
     learner = VnlaLearner(agent, dataclasses.replace(training, bank=FeatureBank(own, "hand", dark)))
     with pytest.raises(DivergedError, match="loss") if shown else contextlib.nullcontext():
         for update in range(4):  # all of them in its own light: one seed in sixteen
-            learner.learn(update, Clock())
+            learner.learn(update)
 
 
 def test_the_blind_see_nothing():
@@ -285,7 +285,7 @@ def test_the_blind_see_nothing():
     dark = FeatureBank({"grid": np.full_like(training.bank._table.numpy(), np.nan)}, "hand")
     one, two = (play(split.make_env, agent.player(bank), split.tasks[:6], seed=0) for bank in (split.bank, dark))
     assert [[s.action for s in e.steps] for e in one] == [[s.action for s in e.steps] for e in two]
-    VnlaLearner(agent, dataclasses.replace(training, bank=dark)).learn(0, Clock())  # or it would diverge
+    VnlaLearner(agent, dataclasses.replace(training, bank=dark)).learn(0)  # or it would diverge
 
 
 def test_a_run_that_was_stopped_goes_on_as_if_it_had_not_been(tmp_path):

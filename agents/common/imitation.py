@@ -18,7 +18,6 @@ from torch import Tensor
 from agents.common import parallel
 from agents.common.playing import TaskSet, play_with_memory
 from agents.common.session import (
-    Clock,
     Options,
     Progress,
     Session,
@@ -91,7 +90,7 @@ class Learner:
         """The agent as it is evaluated, with the features of `split`."""
         return self.agent.policy(split.bank)
 
-    def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
+    def learn(self, update: int) -> Mapping[str, float]:
         """One update: play a batch, compute its loss, take a gradient step; the numbers to report, those of REPORTED.
 
         Raises:
@@ -105,15 +104,12 @@ class Learner:
         try:
             with seeded_dropout(config.seed + parallel.rank(), update):
                 self.network.train()
-                with clock.on("environment"):
-                    episodes, memory, thinking = play_with_memory(training.make_env, player, tasks, seed=seed)
-                    experience = self.experience(episodes, memory)
-                clock.move(thinking, "environment", "network")
-                with clock.on("backward"):
-                    batch_loss = self.loss_of(episodes, experience)
-                    rate = config.learning_rate
-                    set_learning_rate(self.optimizer, rate, update, config.iterations, config.cooldown)
-                    norm = descend(batch_loss.loss, self.optimizer, f"update {update}")
+                episodes, memory = play_with_memory(training.make_env, player, tasks, seed=seed)
+                experience = self.experience(episodes, memory)
+                batch_loss = self.loss_of(episodes, experience)
+                rate = config.learning_rate
+                set_learning_rate(self.optimizer, rate, update, config.iterations, config.cooldown)
+                norm = descend(batch_loss.loss, self.optimizer, f"update {update}")
         except torch.OutOfMemoryError as e:
             raise UnableError(f"out of memory at update {update}: use a smaller batch than {config.batch}") from e
         losses = [float(x.detach()) for x in batch_loss.losses]
@@ -183,7 +179,7 @@ def validate(learner: Learner, split: TaskSet, session: Session) -> Sequence[Epi
     config = learner.config
     tasks = [learner.evaluation_task(t) for t in split.tasks[: config.validation_tasks]]
     learner.network.eval()
-    with torch.inference_mode(), session.clock.on("validation"):
+    with torch.inference_mode():
         batch = learner.evaluation.evaluation_batch
         episodes = play(split.make_env, learner.evaluated_agent(split), tasks, seed=config.seed, batch=batch)
     values = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,19 +12,16 @@ from embodied.interface import Actions, Agent, Episode, Observations, Place, Rng
 
 
 class _MemoryKeeper:
-    """An agent that keeps the memory of its last call, because `rollout` does not hand it out, and its time."""
+    """An agent that keeps the memory of its last call, because `rollout` does not hand it out."""
 
     def __init__(self, agent: Agent) -> None:
         self._agent = agent
         self.memory: Any = None
-        self.seconds = 0.0
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
-        began = time.perf_counter()
         actions, self.memory = act(self._agent, observations, situations, memory, rngs=rngs)
-        self.seconds += time.perf_counter() - began
         return actions, self.memory
 
 
@@ -40,9 +36,9 @@ class TaskSet:
 
 def play_with_memory(
     make_env: Callable[[], HelpEnv], agent: Agent, tasks: Sequence[Task], *, seed: int
-) -> tuple[tuple[Episode, ...], Any, float]:
-    """Play `tasks` side by side; their episodes, the agent's last memory and the seconds that it took."""
+) -> tuple[tuple[Episode, ...], Any]:
+    """Play `tasks` side by side; their episodes and the agent's last memory."""
     remembering = _MemoryKeeper(agent)
     frames = rollout(make_env, remembering, tasks, seed=seed, batch=len(tasks))
     done = {f.index: f.episode for f in frames if f.episode is not None}
-    return tuple(done[i] for i in range(len(tasks))), remembering.memory, remembering.seconds
+    return tuple(done[i] for i in range(len(tasks))), remembering.memory

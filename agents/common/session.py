@@ -17,7 +17,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar, Unpack
 
@@ -65,26 +65,6 @@ class Progress:
     """Seconds of processor time spent so far, of all threads."""
 
 
-@dataclass
-class Clock:
-    """Seconds spent on each kind of work since the last report."""
-
-    spent: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def on(self, what: str) -> Iterator[None]:
-        began = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.spent[what] = self.spent.get(what, 0.0) + time.perf_counter() - began
-
-    def move(self, seconds: float, source: str, to: str) -> None:
-        """Count some of the seconds spent on one kind of work as another's."""
-        self.spent[source] -= seconds
-        self.spent[to] = self.spent.get(to, 0.0) + seconds
-
-
 class Session:
     """One session of a resumable run: owns its folder, counts updates and seconds, saves when due, ends when told.
 
@@ -123,7 +103,7 @@ class Session:
           every: updates per progress line.
         """
         self.folder, self.identity, self.parts, self.total = Path(folder), identity, parts, total
-        self.progress, self.clock = Progress(), Clock()
+        self.progress = Progress()
         self.sums: dict[str, float] = {}
         """Of what is being counted, such as a pass; the caller empties it."""
         self.history: list[dict[str, float]] = []
@@ -251,14 +231,11 @@ class Session:
         update, p = self.progress.update, self.progress
         means = {name: math.fsum(values) / len(values) for name, values in self._means.items()}
         done, passed = max(map(len, self._means.values())), time.monotonic() - self._since
-        spent = {what: seconds / passed for what, seconds in sorted(self.clock.spent.items())}
         self._log("train", means, self.progress.update)
-        self._log("share of time", spent, self.progress.update)
         said = "  ".join(f"{k} {v:.3g}" for k, v in means.items())
-        shares = f"  ({', '.join(f'{k} {100 * v:.0f} %' for k, v in spent.items())})" if spent else ""
         left = (self.total - update) * passed / done / 60
-        self._note(f"{update}/{self.total}  {said}{shares}  {p.seconds / 60:.1f} min, {left:.0f} to go")
-        self._means, self.clock.spent, self._since = {}, {}, time.monotonic()
+        self._note(f"{update}/{self.total}  {said}  {p.seconds / 60:.1f} min, {left:.0f} to go")
+        self._means, self._since = {}, time.monotonic()
 
     def _log(self, kind: str, numbers: Mapping[str, float], update: int | None = None) -> None:
         if parallel.rank() or not numbers:
@@ -295,7 +272,7 @@ def run(
     identity: Identity,
     parts: Mapping[str, Stateful],
     config: Any,
-    step: Callable[[int, Clock], Mapping[str, float]],
+    step: Callable[[int], Mapping[str, float]],
     validate: Callable[[Session], Sequence[Episode]],
     *,
     total: int | None = None,
@@ -324,7 +301,7 @@ def run(
     how |= {"may_change": may_change, "checkpoint_minutes": config.checkpoint_minutes}
     with Session(folder, identity, parts, total or config.iterations, **how) as session:
         for update in session:
-            session.add(step(update, session.clock))
+            session.add(step(update))
             if session.due(config.validate_every) and parallel.rank() == 0:
                 episodes, watch = validate(session), options.get("on_validation")
                 if watch is not None:

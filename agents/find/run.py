@@ -14,7 +14,7 @@ import torch.nn.functional as F
 from agents.common import imitation
 from agents.common.choosing import choose_sampled
 from agents.common.playing import play_with_memory
-from agents.common.session import Clock, Note, descend, episode_seed, seeded_dropout, set_learning_rate, tasks_of_update
+from agents.common.session import Note, descend, episode_seed, seeded_dropout, set_learning_rate, tasks_of_update
 from agents.common.settings import EvaluationSettings
 from agents.common.sighted import About, SightedAgent
 from agents.common.tensor_file import load_into
@@ -113,14 +113,13 @@ class FindLearner(imitation.Learner):
         super().__init__(finder, training)
         self._labels = labels
 
-    def learn(self, update: int, clock: Clock) -> Mapping[str, float]:
+    def learn(self, update: int) -> Mapping[str, float]:
         c, numbers, searches = self.config, dict[str, float](), list[Search]()
         if update >= c.glimpses:
             self.network.eval()
-            with clock.on("environment"):
-                searches, numbers = self._search(update)
+            searches, numbers = self._search(update)
         self.network.train()
-        with clock.on("backward"), seeded_dropout(c.seed, update):
+        with seeded_dropout(c.seed, update):
             set_learning_rate(self.optimizer, c.learning_rate, update, c.iterations, c.cooldown)
             loss = self._labels.loss(self.network, looks_of(self._labels, c.seed, update))
             numbers["reading"] = float(loss.detach())
@@ -135,7 +134,7 @@ class FindLearner(imitation.Learner):
         c, split = self.config, self.training
         policy = Watched(dataclasses.replace(self.agent.policy(split.bank), choose=choose_sampled))
         tasks = tasks_of_update(split.tasks, update, c.batch, c.seed)
-        episodes, searches, _ = play_with_memory(split.make_env, policy, tasks, seed=episode_seed(c.seed, update))
+        episodes, searches = play_with_memory(split.make_env, policy, tasks, seed=episode_seed(c.seed, update))
         return list(searches.values()), imitation.played(episodes, split.worlds)
 
 

@@ -6,7 +6,6 @@ The playing itself is embodied.evaluation, the same for everybody.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -21,10 +20,9 @@ from agents.hanna.percept import Percept
 from agents.hanna.policy import HannaPolicy, PerfectInterpretation
 from agents.vision.bank import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
-from embodied.evaluation.tables import Samples, interval, measured
-from embodied.interface import Agent, Ask, Episode, Mode, Place, Stop
-from embodied.navigation.graph import nearest
-from embodied.teachers.hanna import HannaTeacher, segments
+from embodied.evaluation.tables import Samples, measured
+from embodied.interface import Agent, Ask, Episode, Place
+from embodied.teachers.hanna import HannaTeacher
 
 REASONS = ("lost", "uncertain_wrong", "never_asked")
 WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
@@ -144,32 +142,12 @@ def players(agent: HannaAgent, bank: FeatureBank) -> tuple[dict[str, Agent], lis
 
 
 def counted(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
-    """The metrics of all tasks, how episodes failed, and how well conditions are predicted, per episode."""
+    """The metrics of all tasks, 'request share': of all steps (Figure D.1a), and how well conditions are predicted, per
+    episode."""
     graphs = {name: place.graph for name, place in places.items()}
-    return {**measured(episodes, graphs), **failures(episodes, places), **predictions(episodes, places)}
-
-
-def failures(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
-    """How episodes failed: 'ran out' of steps, 'stopped elsewhere', 'passed goal' without stopping there and 'never
-    asked' (parts of the two before); 'departed wrong': sub-tasks left more than 2 m from their target, of all that were
-    left; 'request share': of all steps (Figure D.1a)."""
-    found: dict[str, list[tuple[float, float]]] = {}
-    for e in episodes:
-        graph = places[e.task.world].graph
-        near = [graph.distance[v, nearest(graph, v, e.task.goal_nodes)] <= e.task.radius + 1e-9 for v in e.nodes]
-        pieces = [p for p in segments(e.steps) if p[0].mode is Mode.SUB and isinstance(p[-1].action, Stop)]
-        wrong = sum(graph.distance[p[-1].pose.node, p[0].targets[0]] > 2.0 + 1e-9 for p in pieces)
-        counts = {
-            "ran out": (not near[-1] and e.ended == "limit", 1),
-            "stopped elsewhere": (not near[-1] and e.ended != "limit", 1),
-            "passed goal": (not near[-1] and any(near), 1),
-            "never asked": (not near[-1] and e.requests == 0, 1),
-            "departed wrong": (wrong, len(pieces)),
-            "request share": (sum(isinstance(s.action, Ask) for s in e.steps), len(e.steps)),
-        }
-        for name, (some, all_) in counts.items():
-            found.setdefault(name, []).append((float(some), float(all_)))
-    return _ratios(found, [e.task.world for e in episodes])
+    asked = [(float(sum(isinstance(s.action, Ask) for s in e.steps)), float(len(e.steps))) for e in episodes]
+    share = _ratios({"request share": asked}, [e.task.world for e in episodes])
+    return {**measured(episodes, graphs), **share, **predictions(episodes, places)}
 
 
 def predictions(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
@@ -196,13 +174,6 @@ def predictions(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dic
             for name, (some, all_) in counts.items():
                 found.setdefault(f"{reason.replace('_', ' ')} {name}", []).append((float(some), float(all_)))
     return _ratios(found, [e.task.world for e in episodes])
-
-
-def behaviour(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, float | None]:
-    """The means of `failures` and `predictions`; None where there was nothing to count."""
-    found = {**failures(episodes, places), **predictions(episodes, places)}
-    means = {name: interval([samples]).mean for name, samples in found.items()}
-    return {name: None if math.isnan(mean) else mean for name, mean in means.items()}
 
 
 def _ratios(counts: Mapping[str, Sequence[tuple[float, float]]], houses: Iterable[str]) -> dict[str, Samples]:

@@ -61,7 +61,7 @@ def train(
             save_agent(agent, session.folder / "best.safetensors", identity)
         return episodes
 
-    step = lambda update, clock: train_step(learning, training, update)
+    step = lambda update: train_step(learning, training, update)
     how: dict[str, Any] = {"total": config.updates, "may_change": MAY_CHANGE}
     return run(folder, identity, learning.parts, config, step, validate, **how, **options)
 

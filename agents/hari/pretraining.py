@@ -88,7 +88,7 @@ def pretrain(
         return ()
 
     parts: dict[str, Stateful] = {"network": network, "optimizer": optimizer}
-    step = lambda update, clock: train_step(executor, optimizer, lessons, update)
+    step = lambda update: train_step(executor, optimizer, lessons, update)
     done = run(folder, identity, parts, config, step, validate, may_change=MAY_CHANGE, **options)
     network.eval()
     return done

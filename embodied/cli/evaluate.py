@@ -98,18 +98,13 @@ def _evaluate(
     args: Options, data: Dataset | None, names: Sequence[str], files: Sequence[Path], splits: Sequence[str]
 ) -> None:
     """Play, print the table, and write what goes into --out."""
-    from agents.hanna.evaluation import behaviour
     from assets.cache import write_json
     from embodied.evaluation import tables
     from embodied.records import episodes_file, fingerprint, save_lines
 
-    found: dict[str, object] = {}
-
     def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
         if args.out:
             save_lines(args.out / episodes_file(split, name), episodes)
-        if data is not None and files and args.kind == "hanna" and name == "learned":
-            found[split] = behaviour(episodes, data.places(split))
 
     client = functools.cache(lambda: client_of(args))
     changes = _Changes(args, client)
@@ -124,15 +119,11 @@ def _evaluate(
         rows, about = [*rows, *more], about | facts
     if args.out:
         tables.save(rows, args.out, "table")
-        if found:
-            write_json(args.out / "behaviour.json", found, indent=1)
         write_json(args.out / "run.json", fingerprint(**about), indent=1)
         note(f"table and episodes in {args.out}")
     text = tables.markdown(rows, [c for c in _columns(args.kind, files) if any(c in r.values for r in rows)])
-    if found:
-        text += f"\n{json.dumps(found, indent=1)}"
     result: dict[str, object] = {"data": data and data.digest, "rows": json.loads(tables.as_json(rows))}
-    result |= {"behaviour": found, "listener": heard}
+    result["listener"] = heard
     for name, (right, total) in heard.items():
         text += f"\n{name}: a scripted listener arrives with {right} of the {total} routes that it was told"
     if client.cache_info().currsize:
