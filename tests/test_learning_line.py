@@ -241,7 +241,7 @@ def test_agents_that_are_compared_differ_in_one_setting(study):
 
 def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tmp_path):
     learner, out = study
-    other = build(tmp_path / "other", tmp_path / "cache", people=False)
+    other = build(tmp_path / "other", tmp_path / "cache", routes="spanning")
     there = dataclasses.replace(learner, elsewhere=other.folder)
     splits = ("test_unseen", "test_unseen as shipped")
     assert there.tables()["4.5"].splits == splits, "nobody has seen its houses, none are out of distribution"

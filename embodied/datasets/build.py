@@ -17,7 +17,7 @@ from joblib.externals.loky import process_executor
 from assets.cache import digest, drafts, sweep, write_bytes, write_json
 from assets.catalogue import GROUPS, Catalogue, load_catalogue
 from assets.closure import code_digest
-from embodied.assistants.route_system import WORDINGS, route_paths, worded
+from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, SplitPlan, quota, scale
 from embodied.generate import HouseConfig, generate_house
@@ -67,7 +67,7 @@ class DatasetConfig:
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""
     routes: str = "sampled"
-    """'sampled', as in Room-to-Room; no other routes are made."""
+    """'sampled' as in Room-to-Room, or 'spanning' as in Lemma 2."""
     people: bool = True
     """Whether assistants stand in the house as figures (HANNA)."""
     language: str = "people"
@@ -81,8 +81,8 @@ class DatasetConfig:
     """Digest of the user's own groups.toml files that the houses are furnished by, too; `build_dataset` fills it in."""
 
     def __post_init__(self) -> None:
-        if self.routes != "sampled":
-            raise ValueError(f"routes should be 'sampled', got {self.routes!r}")
+        if self.routes not in ("sampled", "spanning"):
+            raise ValueError(f"routes should be 'sampled' or 'spanning', got {self.routes!r}")
         if self.language not in VOICES:
             raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
         if not self.rooms and self.kind != "vnla":
@@ -326,14 +326,18 @@ def _write_unit(
     language = VOICES[config.language](novelty)
     house, graph = make_house(config.seed, unit.name, HouseConfig(area=config.area, novelty=novelty), catalogue)
     house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
+    wording = WORDINGS[house_split]
     paths: list[tuple[int, ...]] = []
     if config.kind in ("hanna", "vln"):
         figures = furnishable(catalogue, novelty)
         met = meet(house, graph, figures, seed=config.seed) if config.kind == "hanna" and config.people else None
-        paths = route_paths(graph, unit.name, seed=config.seed, house_split=house_split, starts=met)
+        if config.routes == "spanning":
+            paths, wording = spanning_paths(graph), tuple(dict.fromkeys(wording))
+        else:
+            paths = route_paths(graph, unit.name, seed=config.seed, house_split=house_split, starts=met)
         house = house if met is None else add_people(house, met, (p[0] for p in paths))
     with open_world(house, catalogue, cache, graph=graph) as world:
-        routes = worded(world, paths, WORDINGS[house_split], seed=config.seed, language=language)
+        routes = worded(world, paths, wording, seed=config.seed, language=language)
         tasks = part_tasks(
             config.kind,
             world,
