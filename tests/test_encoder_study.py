@@ -9,13 +9,14 @@ import pytest
 from hand_data import build, small_house
 from hand_pixels import coloured_strips, world_in
 
-from agents.common.weights import weights_digest
+from agents.common.weights import origin_of, weights_digest
 from agents.studies.engine import run_study
-from agents.vision.config import RENDER_PRESETS, VisionConfig, drawing, lit_name
+from agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing, lit_name
 from agents.vision.detector import Detector, DetectorNetwork
 from agents.vision.drawn import StripSource
 from agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from agents.vision.resnet import ARCHITECTURES
+from agents.vision.run import detector_for
 from agents.vision.study import EncoderStudy
 from embodied.cli.learning import by_name
 from embodied.cli.options import add_options, read_options
@@ -82,6 +83,17 @@ def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setti
     wider = dataclasses.replace(study, houses=(2, 8, 48), budget=8, config=dataclasses.replace(config, epochs=3))
     rows = [r.train for r in wider.tables()["houses"].rows[:4]]
     assert [r["epochs"] for r in rows] == [12, 3, 1, 3] and rows[2]["share"] == 0.5, "as many updates"
+
+
+@pytest.mark.slow
+def test_a_detector_learns_from_lit_and_unlit_houses_and_is_measured_in_others(setting, tmp_path):
+    source = dataclasses.replace(setting.source, picture_kind="unlit", lights=1)
+    encoder, config, lines = random_encoder(seed=0), StripTraining(epochs=1, batch=2, least_views=1), list[str]()
+    detector_for(encoder, source, config, tmp_path / "run", lit=1, also=source, note=lines.append)
+    found = Detector.load(encoder, tmp_path / "run" / "detector.safetensors")
+    origin = origin_of(tmp_path / "run" / "detector.safetensors")
+    assert found.classes == ("rose", "fern") and origin["lit"] == 1 and origin["pictures"] == "unlit_192"
+    assert 0 < read_json(tmp_path / "run" / "readings.json")["AP"] <= 1 and lines[-1].startswith("average precision")
 
 
 @pytest.mark.slow

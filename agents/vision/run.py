@@ -91,12 +91,16 @@ def detector_for(
         seen = [h for drawn, of in pictures for h in drawn.strips(of, workers=workers, note=note)]
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
-        others = {
-            "lit": lit,
-            "also": Dataset(also.data).digest if also else None,
-            "share": also.share if also else None,
-        }
-        learned = identity_of("agents.vision.run", settings=config, data=data.digest, encoder=encoder.digest, **others)
+        learned = identity_of(
+            "agents.vision.run",
+            settings=config,
+            data=data.digest,
+            encoder=encoder.digest,
+            pictures=", ".join(sorted({drawing(pictures_of(data, n, source.picture_kind)) for n in names})),
+            lit=lit,
+            also=Dataset(also.data).digest if also else None,
+            share=also.share if also else None,
+        )
         detector.save(out / "detector.safetensors", learned)
         found = detector.precision(unseen)
         whole = float(np.mean(list(found.values())))
