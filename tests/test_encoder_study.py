@@ -89,7 +89,9 @@ def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setti
 def test_a_detector_learns_from_lit_and_unlit_houses_and_is_measured_in_others(setting, tmp_path):
     source = dataclasses.replace(setting.source, picture_kind="unlit", lights=1)
     encoder, config, lines = random_encoder(seed=0), StripTraining(epochs=1, batch=2, least_views=1), list[str]()
-    detector_for(encoder, source, config, tmp_path / "run", lit=1, also=source, note=lines.append)
+    with pytest.raises(ValueError, match="name a larger data set"):
+        detector_for(encoder, source, config, tmp_path / "run", also=source, note=lines.append)
+    detector_for(encoder, source, config, tmp_path / "run", lit=1, note=lines.append)
     found = Detector.load(encoder, tmp_path / "run" / "detector.safetensors")
     origin = origin_of(tmp_path / "run" / "detector.safetensors")
     assert found.classes == ("rose", "fern") and origin["lit"] == 1 and origin["pictures"] == "unlit_192"

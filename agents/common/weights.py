@@ -53,20 +53,25 @@ def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[di
 
 def kind_of(path: Path) -> str | None:
     """What a file of weights holds, as `save_weights` was told."""
-    return load_tensors(Path(path), (FORMAT,), "train it again")[1].get("kind")
+    return _read(path)[1].get("kind")
 
 
 def origin_of(path: Path) -> dict[str, Any] | None:
     """The identity of what a file of weights was trained with; None where that was not written down."""
-    text = load_tensors(Path(path), (FORMAT,), "train it again")[1].get("identity")
+    text = _read(path)[1].get("identity")
     found = None if text is None else parse(text, "an identity")
     return found if isinstance(found, dict) else None
 
 
 def weights_digest(path: Path) -> str:
     """Of the weights in a file and of what is needed to use them; not of what they were trained with."""
-    tensors, found = load_tensors(Path(path), (FORMAT,), "train it again")
+    tensors, found = _read(path)
     return checksum_of(tensors, {k: v for k, v in found.items() if k != "identity"})
+
+
+def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """The tensors of a file of weights, and what stands beside them."""
+    return load_tensors(Path(path), (FORMAT,), "train it again")
 
 
 @contextmanager

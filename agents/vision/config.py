@@ -1,4 +1,4 @@
-"""VisionConfig: how the encoder is trained. Free of torch, so that the command line answers at once."""
+"""How encoders and detectors are trained. Free of torch, so that the command line answers at once."""
 
 from __future__ import annotations
 

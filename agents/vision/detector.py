@@ -151,7 +151,7 @@ def train_detector(
         network = DetectorNetwork(encoder.network.channels, len(classes))
 
     def loss_of(batch: StripBatch) -> tuple[Tensor, dict[str, float]]:
-        cells, views = network(looking.pyramid(batch.rgb.cpu().numpy()))
+        cells, views = network(looking.pyramid(batch.rgb))
         shows = (batch.share.permute(0, 3, 1, 2) >= 8).float()  # covers 3 % of the cell
         in_cells = F.binary_cross_entropy_with_logits(cells, shows) * 20
         in_views = F.binary_cross_entropy_with_logits(views, batch.visible.float()) * 20

@@ -83,7 +83,7 @@ class Encoder:
         return self.finish(torch.cat(views)).cpu().numpy()
 
     @torch.no_grad()
-    def pyramid(self, strips: np.ndarray) -> list[Tensor]:
+    def pyramid(self, strips: np.ndarray | Tensor) -> list[Tensor]:
         """(n, 192, 576, 3) uint8 -> the maps of `strip_pyramid`."""
         pyramids = [strip_pyramid(self._looking, part) for part in self._parts(strips)]
         return [torch.cat(maps) for maps in zip(*pyramids, strict=True)]
@@ -110,9 +110,9 @@ class Encoder:
             features = features - self.mean
         return features if self.mix is None else features @ self.mix
 
-    def _parts(self, strips: np.ndarray) -> Sequence[Tensor]:
+    def _parts(self, strips: np.ndarray | Tensor) -> Sequence[Tensor]:
         """Strips as they are looked at together: a processor keeps one in its cache, not several."""
-        sent = self._send(strips)
+        sent = strips if isinstance(strips, Tensor) else self._send(strips)
         return sent.split(1) if sent.device.type == "cpu" else [sent]
 
     def _send(self, images: np.ndarray) -> Tensor:

@@ -1,4 +1,4 @@
-"""What the commands of the encoder do: train it, and make features with it.
+"""What the commands of the encoder do: train it, train a detector on it, and make features with it.
 
 What belongs to viz, such as recordings, is passed in from the console command as a function.
 """
@@ -76,19 +76,21 @@ def detector_for(
 
     Args:
       lit: so many training houses are seen in light ('fast'), too.
-      also: of another data set, whose training houses of other names are seen, too.
+      also: of another data set, whose training houses are seen, too, but for those that are in the first.
 
     Raises:
+      ValueError: `also` has no further houses.
       LockedError: another process writes to `out`.
     """
     check_device(device)
     data = Dataset(source.data)
     names = training_houses(data, config)
-    pictures = [(source, names), (dataclasses.replace(source, picture_kind="fast", lights=1), names[:lit])]
-    if also:
-        pictures.append((also, [n for n in houses_of(Dataset(also.data), ("train",)) if n not in names]))
     with locked(out):
-        seen = [h for drawn, of in pictures for h in drawn.strips(of, workers=workers, note=note)]
+        in_light = dataclasses.replace(source, picture_kind="fast", lights=1)
+        seen = source.strips(names, workers=workers, note=note)
+        seen += in_light.strips(names[:lit], workers=workers, note=note)
+        for strips in also.strips(_further(data, Dataset(also.data)), workers=workers, note=note) if also else ():
+            seen.append(dataclasses.replace(strips, name=f"also/{strips.name}"))
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
         learned = identity_of(
@@ -102,10 +104,20 @@ def detector_for(
             share=also.share if also else None,
         )
         detector.save(out / "detector.safetensors", learned)
+        (out / "training" / "checkpoint.pt").unlink(missing_ok=True)
         found = detector.precision(unseen)
         whole = float(np.mean(list(found.values())))
         write_json(out / "readings.json", {"AP": whole, "AP by class": found}, indent=1)
         note(f"average precision {whole:.3f}, {len(found)} classes in validation houses")
+
+
+def _further(data: Dataset, other: Dataset) -> list[str]:
+    """Names of the training houses of another data set that are in no split of the first."""
+    known = {data.place(name).house.digest for name in houses_of(data, data.splits)}
+    further = [n for n in houses_of(other, ("train",)) if other.place(n).house.digest not in known]
+    if not further:
+        raise ValueError(f"{other.folder}: all its training houses are in {data.folder}; name a larger data set")
+    return further
 
 
 def trained_encoder(
@@ -117,7 +129,7 @@ def trained_encoder(
     identity: Identity | None = None,
     device: str = "cpu",
 ) -> tuple[Encoder, list[str]]:
-    """The encoder that `config` makes of strips, from `folder` if it is there, and the classes of its heads.
+    """The encoder that `config` makes of strips, from `folder` if it is there, and the classes that it learned to tell.
 
     Args:
       identity: what it is trained with, for its file.

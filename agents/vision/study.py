@@ -4,7 +4,7 @@
     embodied study vision --data DATA --out STUDY --pictures unlit --houses 12 48 128 --test-pictures unlit fast
 
 Readers are fitted in the same few houses for all, in the kind of pictures that is judged; `--encoders` adds encoders
-that are there already.
+that are there already, and detectors of the shipped encoder.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from agents.vision.config import RENDER_PRESETS, VisionConfig
 from agents.vision.detector import Detector
 from agents.vision.drawn import StripSource, houses_of
 from agents.vision.encoder import load_encoder
-from agents.vision.labels import HouseStrips
+from agents.vision.labels import HouseStrips, visible_in_views
 from agents.vision.probe import labelled, read
 from agents.vision.run import trained_encoder, training_houses
 from agents.vision.training import frequent_classes
@@ -171,9 +171,8 @@ class EncoderStudy(StudyLearner):
         goals = sought(data) or classes
         if kind_of(weights) == "detector":
             found = Detector.load(load_encoder(), weights).precision(unseen)
-            seen = {read_in[0].classes[i] for i in frequent_classes(read_in, 1)}
-            known = [c for c in classes if c in seen]
-            return _measured(COLUMNS[:2], _mean_precision({c: found[c] for c in known if c in found}, goals))
+            known = [c for c in classes if _shown(c, read_in) and _shown(c, unseen)]
+            return _measured(COLUMNS[:2], _mean_precision({c: found.get(c, 0.0) for c in known}, goals))
         first, other = (labelled(data, houses, load_encoder(weights), classes) for houses in (read_in, unseen))
         reading = read(first, other, seed=self.config.seed)
         ap, goal_ap = _mean_precision(dict(zip(classes, reading.ap, strict=True)), goals)
@@ -196,6 +195,11 @@ class EncoderStudy(StudyLearner):
     def _source(self, way: str) -> StripSource:
         """Pictures as they learned from, or drawn otherwise."""
         return dataclasses.replace(self.source, picture_kind=way, lights=1) if way else self.source
+
+
+def _shown(name: str, houses: Sequence[HouseStrips]) -> bool:
+    """Whether some view of `houses` shows a class."""
+    return any(visible_in_views(h.share[..., [h.classes.index(name)]]).any() for h in houses)
 
 
 def _mean_precision(ap: Mapping[str, float], goals: Sequence[str]) -> tuple[float, float]:

@@ -24,9 +24,9 @@ SIZE = 512
 VIEWS = 12
 """Headings of one timed call."""
 VIEWPOINTS = ("here", "there")
-"""Of which one fits into memory."""
+"""Two, of which one fits into memory."""
 AIMS = (((480, 640), 1200.0, 700.0), ((224, 224), 5000.0, 3000.0))
-"""Height and width, and how many views per second are promised: of rgb; of rgb, depth and ids."""
+"""Height and width, and how many views per second are aimed at: of rgb; of rgb, depth and ids."""
 SHOWN = {"rgb": ("rgb",), "depth": ("depth",), "ids": ("ids",), "rgb, depth and ids": ("rgb", "depth", "ids")}
 
 

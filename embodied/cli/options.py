@@ -65,6 +65,7 @@ def _finite(words: str, holds: Callable[[float], bool]) -> Callable[[str], float
 
 
 positive = _finite("above 0", lambda x: x > 0)
+part = _finite("above 0 and at most 1", lambda x: 0 < x <= 1)
 not_negative = _finite("from 0 on", lambda x: x >= 0)
 face = whole(8, 4096)
 """Side of a cube face, pixels."""

@@ -159,7 +159,8 @@ class VisionOptions(Study, Trained, Strips, WithData):
     lit_houses: Count = 12
     """N houses are lit for one more encoder, and for linear readers."""
     encoders: NamedFiles = ()
-    """Evaluate these encoders, too; those of one name are training seeds of one kind."""
+    """Evaluate these encoders, or detectors of the shipped encoder, too; those of one name are training seeds of one
+    kind."""
     test_pictures: tuple[Annotated[str, PRESETS], ...] = ("unlit", "fast")
     """Kinds of pictures to evaluate on (default: unlit and fast)."""
     split: str = "val_unseen"

@@ -38,7 +38,7 @@ from embodied.cli.learning import (
     WithData,
     WithDevice,
 )
-from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, Settings, positive
+from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, Settings, part, whole
 
 if TYPE_CHECKING:
     from agents.vision.lessons import Lessons
@@ -86,12 +86,12 @@ class TrainDetector(Strips, WithData, EncoderFile):
     threads: Count = 2
     workers: Count = 1
     """Render N houses in parallel."""
-    lit_houses: Count = 0
+    lit_houses: Annotated[int, Option(whole(0), "N")] = 0
     """N of the training houses are seen in light, too."""
     also: InputFolder | None = None
-    """Another data set: its training houses of other names are seen, too."""
-    share: Annotated[float, Option(positive, "X")] = 1.0
-    """Share of the viewpoints of --also that is drawn."""
+    """Another data set: its training houses that are not in --data are seen, too."""
+    share: Annotated[float, Option(part, "X")] = 1.0
+    """Share of the viewpoints of --also that is drawn, in regular steps."""
     config: Annotated[StripTraining, Settings(TRAINING, DETECTOR)]
 
 
