@@ -96,6 +96,10 @@ def test_a_detector_learns_from_lit_and_unlit_houses_and_is_measured_in_others(s
     origin = origin_of(tmp_path / "run" / "detector.safetensors")
     assert found.classes == ("rose", "fern") and origin["lit"] == 1 and origin["pictures"] == "unlit_192"
     assert 0 < read_json(tmp_path / "run" / "readings.json")["AP"] <= 1 and lines[-1].startswith("average precision")
+    detector_for(encoder, source, config, tmp_path / "run", lit=1, note=lines.append)
+    again = Detector.load(encoder, tmp_path / "run" / "detector.safetensors")
+    weights = zip(found.network.parameters(), again.network.parameters(), strict=True)
+    assert "continuing after update 1" in lines and all((a == b).all() for a, b in weights)
 
 
 @pytest.mark.slow

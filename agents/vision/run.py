@@ -72,7 +72,8 @@ def detector_for(
     workers: int = 1,
     note: Note = print,
 ) -> None:
-    """Train a detector on an encoder, in the training houses, and measure its precision in validation houses.
+    """Train a detector on an encoder, in the training houses, and measure its precision in validation houses; training
+    goes on from the last epoch that was finished.
 
     Args:
       lit: so many training houses are seen in light ('fast'), too.
@@ -104,7 +105,6 @@ def detector_for(
             share=also.share if also else None,
         )
         detector.save(out / "detector.safetensors", learned)
-        (out / "training" / "checkpoint.pt").unlink(missing_ok=True)
         found = detector.precision(unseen)
         whole = float(np.mean(list(found.values())))
         write_json(out / "readings.json", {"AP": whole, "AP by class": found}, indent=1)
