@@ -211,10 +211,14 @@ def train_detector(args: TrainDetector) -> None:
     from agents.vision.drawn import StripSource
     from agents.vision.encoder import load_encoder
     from agents.vision.run import detector_for
+    from embodied.datasets.store import Dataset
 
     strips = args.strips or args.out / "strips"
     source = StripSource(args.data, strips, args.cache, args.pictures, args.lights)
-    also = StripSource(args.also, strips / "also", args.cache, args.pictures, share=args.share) if args.also else None
+    also = None
+    if args.also:
+        folder = strips / Dataset(args.also).digest[:12]  # houses of both have the same names
+        also = StripSource(args.also, folder, args.cache, args.pictures, share=args.share)
     encoder = load_encoder(args.encoder)
     detector_for(
         encoder,
