@@ -82,7 +82,7 @@ def read_weights(path: Path) -> dict[str, Tensor]:
         raise
     except Exception as e:  # torch and safetensors raise half a dozen kinds for a damaged file
         raise ValueError(
-            f"{path}: cannot be read as weights ({str(e).splitlines()[0]:.80}); download or train it again"
+            f"{path}: cannot be read as weights ({(str(e) or type(e).__name__).splitlines()[0]:.80}); download or train it again"
         ) from e
     if not isinstance(weights, Mapping) or not all(isinstance(v, Tensor) for v in weights.values()):
         raise ValueError(f"{path}: expected a state dict (name -> tensor), got {type(weights).__name__}")

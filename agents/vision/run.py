@@ -86,12 +86,14 @@ def detector_for(
     check_device(device)
     data = Dataset(source.data)
     names = training_houses(data, config)
+    further = _further(data, Dataset(also.data)) if also else []
     with locked(out):
         in_light = dataclasses.replace(source, picture_kind="fast", lights=1)
         seen = source.strips(names, workers=workers, note=note)
         seen += in_light.strips(names[:lit], workers=workers, note=note)
-        for strips in also.strips(_further(data, Dataset(also.data)), workers=workers, note=note) if also else ():
-            seen.append(dataclasses.replace(strips, name=f"also/{strips.name}"))
+        if also:
+            others = also.strips(further, workers=workers, note=note)
+            seen += [dataclasses.replace(h, name=f"also/{h.name}") for h in others]
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
         learned = identity_of(
