@@ -81,9 +81,8 @@ def read_weights(path: Path) -> dict[str, Tensor]:
     except OSError:
         raise
     except Exception as e:  # torch and safetensors raise half a dozen kinds for a damaged file
-        raise ValueError(
-            f"{path}: cannot be read as weights ({(str(e) or type(e).__name__).splitlines()[0]:.80}); download or train it again"
-        ) from e
+        why = (str(e) or type(e).__name__).splitlines()[0]
+        raise ValueError(f"{path}: cannot be read as weights ({why:.80}); download or train it again") from e
     if not isinstance(weights, Mapping) or not all(isinstance(v, Tensor) for v in weights.values()):
         raise ValueError(f"{path}: expected a state dict (name -> tensor), got {type(weights).__name__}")
     return dict(weights)
