@@ -27,13 +27,13 @@ from embodied.house.house import WEATHERS, House, Sky
 from embodied.light.backend import REMEDY, device, rest, warn
 from embodied.light.baking.compose import Composer, Solved, page_of
 from embodied.light.baking.solve import Problem, Radiosity, solve
-from embodied.light.baking.stages import facts_of, kept_light, same_atlas
+from embodied.light.baking.stages import facts_of, kept_light, mark_of, same_atlas
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
 from embodied.light.memory import Memory, once
 from embodied.light.pages import tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
 from embodied.light.pages.colours import ColourMaps
-from embodied.light.pages.files import Bake, StaleBake, open_bake, packed_meshes, page_files, reopened, write_page
+from embodied.light.pages.files import Bake, StaleBake, open_bake, packed_meshes, page_files, reopened, write_pages
 from embodied.light.pages.meshes import meshes_of
 from embodied.light.pages.tone import expose
 from embodied.light.pages.unwrap import openness
@@ -70,6 +70,8 @@ STAGES = {
     "done": (1.0, 1.0),
 }
 """Where each stage lies on the progress bar: its rough share of a bake's time."""
+TOGETHER = 8
+"""Pages that are composed before they are written."""
 
 
 def duration(house: House, quality: str) -> str:
@@ -297,7 +299,7 @@ def solve_house(
     clock = _Clock({} if took is None else took)
     atlas = shared.atlas
     if folder is not None:
-        same_atlas(folder, atlas)
+        same_atlas(folder, once(shared.memory, "mark", lambda: mark_of(atlas)))
     outdoors = outdoors_of(house, settings.rows)
     clock("outdoors")
     space = with_env(shared.space, outdoors.picture)
@@ -329,11 +331,11 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     error = check(s, settings.tolerance)
     clock("check")
     composer = Composer(s, settings, shared.maps, shared.memory)
-    for i in range(len(s.atlas.pages)):
-        progress("pages", i / len(s.atlas.pages))
-        if not all((folder / n).exists() for n in page_files(i)):
-            one = page_of(i, composer)
-            write_page(folder, i, one, settings.jpeg, shared.memory)
+    every = range(len(s.atlas.pages))
+    for start in every[::TOGETHER]:
+        progress("pages", start / len(every))
+        missing = [i for i in every[start : start + TOGETHER] if not all((folder / n).exists() for n in page_files(i))]
+        write_pages(folder, {i: page_of(i, composer) for i in missing}, settings.jpeg, shared.memory)
     clock("pages")
     first = len(s.atlas.pages)
     pictures = daylit(shared.outside, s.outdoors, s.exposure, settings.other_rays)

@@ -19,13 +19,19 @@ from embodied.scene.house_meshes import owners
 from embodied.scene.lit_pages import LitMesh
 
 
-def same_atlas(folder: Path, atlas: Atlas) -> None:
-    """Empty `folder` if what an interrupted run left there belongs to other meshes or textures."""
-    pages = [
-        digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes))
-        for p in atlas.pages
-    ]
-    mark, path = digest(pages), folder / "atlas.txt"
+def mark_of(atlas: Atlas) -> str:
+    """Hex digest of an atlas: its meshes and textures."""
+    return digest(
+        [
+            digest(p.corners.tobytes(), p.luxels.tobytes(), p.uv.tobytes(), p.fineness, repr(p.finishes))
+            for p in atlas.pages
+        ]
+    )
+
+
+def same_atlas(folder: Path, mark: str) -> None:
+    """Empty `folder` if what an interrupted run left there belongs to an atlas of another `mark_of`."""
+    path = folder / "atlas.txt"
     if not path.exists() or path.read_text() != mark:
         for old in sorted(p for p in folder.iterdir() if not p.name.startswith(".")):  # which holds a lock, too
             old.unlink()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -145,16 +145,16 @@ def page_files(i: int) -> tuple[str, ...]:
     return f"light_{i:03d}.npz", f"sun_{i:03d}.png", f"albedo_{i:03d}.jpg", f"page_{i:03d}.jpg"
 
 
-def write_page(folder: Path, i: int, page: Ingredients, quality: int, memory: Memory | None = None) -> None:
-    """Page i: light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of
+def write_pages(folder: Path, pages: Mapping[int, Ingredients], quality: int, memory: Memory | None = None) -> None:
+    """Pages by number: light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of
     `quality`."""
-    light, sun, shown, picture = page_files(i)
-    files = {
-        light: packed({"soft": page.soft, "glow": page.glow}),
-        sun: cv2.imencode(".png", page.sun)[1].tobytes(),
-        shown: once(memory, ("colours", i), lambda: jpeg(page.albedo, quality)),
-        picture: jpeg(page.picture, quality),
-    }
+    files = {}
+    for i, page in pages.items():
+        light, sun, shown, picture = page_files(i)
+        files[light] = packed({"soft": page.soft, "glow": page.glow})
+        files[sun] = cv2.imencode(".png", page.sun)[1].tobytes()
+        files[shown] = once(memory, ("colours", i), functools.partial(jpeg, page.albedo, quality))
+        files[picture] = jpeg(page.picture, quality)
     write_files(folder, files)
 
 
