@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, na
 from agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from agents.iliad.nav.student import LoopFree, NavStudent
 from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
-from agents.iliad.nav.world import NavMarginal, NavWorld
+from agents.iliad.nav.world import NavMarginal, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.training import IliadProblem, train
 from assets.catalogue import load_catalogue
@@ -81,7 +81,8 @@ def _teacher(config: NavConfig, data: NavData, cache: Path, folder: Path, note: 
     world = NavWorld(data.eyes.places)
     if config.teacher != "learned":
         wording = People().route if config.teacher == "people" else RouteDescriber().describe
-        return PeopleNavTeacher(world, seen_places(data.source, cache), wording)
+        say = varied(load_catalogue(cache)) if config.varied_words else str
+        return PeopleNavTeacher(world, seen_places(data.source, cache), lambda *walk, rng: say(wording(*walk, rng=rng)))
     executor = teach_executor(data, config, folder, note=note)
     describer = teach_describer(data, config, executor, folder, note=note)
     return LearnedNavTeacher(world, describer, executor, config.candidates, config.pragmatics)
@@ -114,9 +115,10 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     """A student of this seed with everything around it."""
     c, data = grounds.config, grounds.data
     eyes, splits = data.eyes.blind() if c.blind else data.eyes, data.splits
-    reword = varied(load_catalogue(grounds.cache)) if c.varied_words else None
-    words = build_vocabulary((request for trip in splits["train"] for request in trip.requests), reword=reword).words
-    eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors, reword))
+    if c.varied_words:
+        splits = {**splits, "train": _also(splits["train"], varied(load_catalogue(grounds.cache)))}
+    words = build_vocabulary(request for trip in splits["train"] for request in trip.requests).words
+    eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
     explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
@@ -125,6 +127,11 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
         NavWorld(eyes.places), grounds.teacher, NavMarginal(eyes.places), student, explorer,
         splits["train"], validation, identity,
     )  # fmt: skip
+
+
+def _also(trips: Sequence[Trip], say: Callable[[str], str]) -> list[Trip]:
+    """With each request as it is and in other words."""
+    return [dataclasses.replace(t, requests=(*t.requests, *map(say, t.requests))) for t in trips]
 
 
 def learn(
