@@ -17,7 +17,7 @@ from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, nav_data
 from agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from agents.iliad.nav.student import LoopFree, NavStudent
-from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher
+from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, Wording
 from agents.iliad.nav.world import NavMarginal, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.training import IliadProblem, train
@@ -80,12 +80,17 @@ def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = 
 def _teacher(config: NavConfig, data: NavData, cache: Path, folder: Path, note: Note) -> DescribingTeacher:
     world = NavWorld(data.eyes.places)
     if config.teacher != "learned":
-        wording = People().route if config.teacher == "people" else RouteDescriber().describe
-        say = varied(load_catalogue(cache)) if config.varied_words else str
-        return PeopleNavTeacher(world, seen_places(data.source, cache), lambda *walk, rng: say(wording(*walk, rng=rng)))
+        wording: Wording = People().route if config.teacher == "people" else RouteDescriber().describe
+        if config.varied_words:
+            wording = _in_other_words(wording, varied(load_catalogue(cache)))
+        return PeopleNavTeacher(world, seen_places(data.source, cache), wording)
     executor = teach_executor(data, config, folder, note=note)
     describer = teach_describer(data, config, executor, folder, note=note)
     return LearnedNavTeacher(world, describer, executor, config.candidates, config.pragmatics)
+
+
+def _in_other_words(wording: Wording, say: Callable[[str], str]) -> Wording:
+    return lambda world, path, yaw, *, rng: say(wording(world, path, yaw, rng=rng))
 
 
 def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
