@@ -29,7 +29,7 @@ from embodied.language.templates import WORDS
 from embodied.seeds import stream
 
 BACKWARD_SHARE = 0.15
-PARAPHRASED_SHARE, RENAMED_SHARE = 0.5, 0.5
+PARAPHRASED_SHARE, RENAMED_SHARE = 0.4, 0.3
 """Of the texts of training, in other frames and in synonyms (docs/sources.md, S184)."""
 FIND = "find "
 
@@ -62,23 +62,22 @@ def varied(catalogue: Catalogue) -> Callable[[str], str]:
 
 def _varied(text: str, lexicon: Lexicon) -> str:
     rng = stream(0, "varied", text)
-    if rng.random() < PARAPHRASED_SHARE:
-        text = paraphrase(text, lexicon, VARIED)
-    return some_in_synonyms(text, rng.random(), rng) if rng.random() < RENAMED_SHARE else text
+    drawn = rng.random()
+    if drawn < PARAPHRASED_SHARE:
+        return paraphrase(text, lexicon, VARIED)
+    if drawn < PARAPHRASED_SHARE + RENAMED_SHARE:
+        return some_in_synonyms(text, rng.random(), rng)
+    return text
 
 
 def some_in_synonyms(text: str, share: float, rng: np.random.Generator) -> str:
-    """The text with that share of its words and names of rooms in others of about the same meaning, those of
-    training."""
+    """The text with that share of its words in words of about the same meaning, those of training."""
 
-    def other(found: re.Match[str]) -> str:
-        like = VARIED.synonyms[found[0]]
-        return like[int(rng.integers(len(like)))] if rng.random() < share else found[0]
+    def other(word: re.Match[str]) -> str:
+        like = VARIED.synonyms.get(word[0], ())
+        return like[int(rng.integers(len(like)))] if like and rng.random() < share else word[0]
 
-    return _RENAMED.sub(other, text.lower())
-
-
-_RENAMED = re.compile(rf"\b(?:{'|'.join(sorted(VARIED.synonyms, key=len, reverse=True))})\b")
+    return re.sub("[a-z]+", other, text.lower())
 
 
 def paraphrase(text: str, lexicon: Lexicon, wordings: Wordings) -> str:
