@@ -43,6 +43,11 @@ def test_every_clause_has_frames_and_none_is_a_template():
 def test_no_frame_of_the_tests_and_none_of_its_words_in_their_places_are_heard_in_training():
     """Synonyms of the tests are chosen among the words that an agent does not know."""
     assert not frames_of(UNHEARD) & frames_of(VARIED)
+    words = [
+        {" ".join(tokenize(j)).strip(".,;- ") for j in x.joints} - {"", "then", "and", "and then"}
+        for x in (UNHEARD, VARIED)
+    ]
+    assert not words[0] & words[1]
     assert not set(UNHEARD.requests) & set(VARIED.requests) and not set(UNHEARD.where) & set(VARIED.where)
     pairs = [{(word, w) for word, like in x.synonyms.items() for w in like} for x in (UNHEARD, VARIED)]
     assert not pairs[0] & pairs[1]
