@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 from hand_data import built, noise_features, small_house
@@ -17,7 +19,7 @@ from agents.iliad.nav.run import NavSource, learn, prepare, problem_of
 from agents.iliad.nav.showing import episode_of, lines_of, tell
 from agents.iliad.nav.stages import config_of, load_follower, new_follower
 from agents.iliad.nav.student import NavStudent
-from agents.iliad.nav.teacher import PeopleNavTeacher
+from agents.iliad.nav.teacher import OtherWords, PeopleNavTeacher
 from agents.iliad.nav.world import NavWorld, walk_along
 from agents.iliad.study import IliadStudy, NavStudyWorld
 from agents.studies.engine import run_study
@@ -169,6 +171,14 @@ def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(sourc
     trips = grounds.data.splits["train"], problem_of(grounds, 0).training
     said, heard = ({r for trip in many for r in trip.requests} for many in trips)
     assert said < heard
+
+
+def test_descriptions_are_reworded_and_requests_stay():
+    told = ["Turn left.", None, "Go on."]
+    teacher = SimpleNamespace(describe=lambda tasks, executions, *, rng: told)
+    trips = [SimpleNamespace(requests=("Go on.",)) for _ in told]
+    found = OtherWords(teacher, str.upper).describe(trips, [None] * 3, rng=np.random.default_rng(0))
+    assert found == ["TURN LEFT.", None, "Go on."]
 
 
 def test_commands_train_and_show(source, tmp_path, capsys):

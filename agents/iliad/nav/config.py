@@ -66,7 +66,7 @@ class NavConfig:
     word_vectors: str = LEARNED_WORDS
     """What followers know of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
     varied_words: bool = False
-    """Most of what is said to students in training is said in words and sentences of other writers."""
+    """Students hear requests of training as they are and as other writers would say them (docs/sources.md, S184)."""
     data_seed: int = 0
     """Random seed of the further paths and of the teacher, which all students share."""
 

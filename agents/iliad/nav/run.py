@@ -17,7 +17,7 @@ from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, nav_data
 from agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from agents.iliad.nav.student import LoopFree, NavStudent
-from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, Wording
+from agents.iliad.nav.teacher import LearnedNavTeacher, OtherWords, PeopleNavTeacher
 from agents.iliad.nav.world import NavMarginal, NavWorld, Trip
 from agents.iliad.protocol import DescribingTeacher
 from agents.iliad.training import IliadProblem, train
@@ -80,17 +80,11 @@ def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = 
 def _teacher(config: NavConfig, data: NavData, cache: Path, folder: Path, note: Note) -> DescribingTeacher:
     world = NavWorld(data.eyes.places)
     if config.teacher != "learned":
-        wording: Wording = People().route if config.teacher == "people" else RouteDescriber().describe
-        if config.varied_words:
-            wording = _in_other_words(wording, varied(load_catalogue(cache)))
+        wording = People().route if config.teacher == "people" else RouteDescriber().describe
         return PeopleNavTeacher(world, seen_places(data.source, cache), wording)
     executor = teach_executor(data, config, folder, note=note)
     describer = teach_describer(data, config, executor, folder, note=note)
     return LearnedNavTeacher(world, describer, executor, config.candidates, config.pragmatics)
-
-
-def _in_other_words(wording: Wording, say: Callable[[str], str]) -> Wording:
-    return lambda world, path, yaw, *, rng: say(wording(world, path, yaw, rng=rng))
 
 
 def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
@@ -119,9 +113,10 @@ def spoken(grounds: NavGrounds, novelty: str, cache: Path) -> NavGrounds:
 def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     """A student of this seed with everything around it."""
     c, data = grounds.config, grounds.data
-    eyes, splits = data.eyes.blind() if c.blind else data.eyes, data.splits
+    eyes, splits, teacher = data.eyes.blind() if c.blind else data.eyes, data.splits, grounds.teacher
     if c.varied_words:
-        splits = {**splits, "train": _also(splits["train"], varied(load_catalogue(grounds.cache)))}
+        say = varied(load_catalogue(grounds.cache))
+        splits, teacher = {**splits, "train": _also(splits["train"], say)}, OtherWords(teacher, say)
     words = build_vocabulary(request for trip in splits["train"] for request in trip.requests).words
     eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
@@ -129,7 +124,7 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
     identity = identity_of("agents.iliad.nav.run", world="nav", data=data.digest, pictures=data.pictures, teacher=c)
     return IliadProblem(
-        NavWorld(eyes.places), grounds.teacher, NavMarginal(eyes.places), student, explorer,
+        NavWorld(eyes.places), teacher, NavMarginal(eyes.places), student, explorer,
         splits["train"], validation, identity,
     )  # fmt: skip
 

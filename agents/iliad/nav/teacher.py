@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -16,7 +17,7 @@ from agents.iliad.describing import DescribingNetworks, EachDescribed
 from agents.iliad.nav.network import WalkDescriber
 from agents.iliad.nav.student import NavEyes, NavStudent, Track
 from agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
-from agents.iliad.protocol import NOTHING
+from agents.iliad.protocol import NOTHING, DescribingTeacher
 from embodied.evaluation.metrics import sdtw
 from embodied.interface import SeenPlace
 
@@ -112,3 +113,17 @@ class PeopleNavTeacher(EachDescribed):
         if len(walk.nodes) < 2:
             return None
         return self.wording(self.places[trip.world], walk.nodes, trip.start.yaw, rng=rng)
+
+
+@dataclass(frozen=True)
+class OtherWords:
+    """A teacher whose descriptions are reworded; requests that it repeats stay."""
+
+    teacher: DescribingTeacher
+    say: Callable[[str], str]
+
+    def describe(
+        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
+    ) -> list[str | None]:
+        told = zip(tasks, self.teacher.describe(tasks, executions, rng=rng), strict=True)
+        return [d if d is None or d in trip.requests else self.say(d) for trip, d in told]

@@ -45,7 +45,7 @@ def smooth_pages(
     if variance is not None:
         noise, floor = _relative_noise(grid, out, variance)
     for step, like in zip(steps, likeness):
-        values = floats(np.concatenate([out, trust], axis=1))  # four at once are gathered faster
+        values = floats(np.concatenate([out, trust], axis=1))  # one gather of four is faster than two
         own, own_noise = mi.Color3f(vector(out)), floats(noise)
         least = floats(floor) + 1e-4
         shade = dr.log(_brightness(own) + least)

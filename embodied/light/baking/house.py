@@ -71,7 +71,7 @@ STAGES = {
 }
 """Where each stage lies on the progress bar: its rough share of a bake's time."""
 TOGETHER = 8
-"""Pages that are composed before they are written."""
+"""Pages that are composed before they are written, in one go; an interrupted bake loses no more."""
 
 
 def duration(house: House, quality: str) -> str:
@@ -332,10 +332,10 @@ def _make(house: House, shared: Shared, folder: Path, settings: Settings, progre
     clock("check")
     composer = Composer(s, settings, shared.maps, shared.memory)
     every = range(len(s.atlas.pages))
-    for start in every[::TOGETHER]:
-        progress("pages", start / len(every))
-        missing = [i for i in every[start : start + TOGETHER] if not all((folder / n).exists() for n in page_files(i))]
-        write_pages(folder, {i: page_of(i, composer) for i in missing}, settings.jpeg, shared.memory)
+    for i in every[::TOGETHER]:
+        progress("pages", i / len(every))
+        missing = [k for k in every[i : i + TOGETHER] if not all((folder / n).exists() for n in page_files(k))]
+        write_pages(folder, {k: page_of(k, composer) for k in missing}, settings.jpeg, shared.memory)
     clock("pages")
     first = len(s.atlas.pages)
     pictures = daylit(shared.outside, s.outdoors, s.exposure, settings.other_rays)
