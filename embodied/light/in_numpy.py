@@ -76,7 +76,7 @@ class Type:
 
 
 Float, UInt32, Int32, Bool = Type(np.float32), Type(np.uint32), Type(np.int32), Type(np.bool_)
-Point2f, Vector3f = Type(np.float32, 2), Type(np.float32, 3)
+Point2f, Vector3f, Vector4f = (Type(np.float32, size) for size in (2, 3, 4))
 Point3f = Normal3f = Color3f = Vector3f
 
 
