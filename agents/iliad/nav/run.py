@@ -116,7 +116,7 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     eyes, splits, teacher = data.eyes.blind() if c.blind else data.eyes, data.splits, grounds.teacher
     if c.varied_words:
         say = varied(load_catalogue(grounds.cache))
-        splits, teacher = {**splits, "train": _also(splits["train"], say)}, OtherWords(teacher, say)
+        splits, teacher = {**splits, "train": _heard_both_ways(splits["train"], say)}, OtherWords(teacher, say)
     words = build_vocabulary(request for trip in splits["train"] for request in trip.requests).words
     eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
@@ -129,8 +129,8 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     )  # fmt: skip
 
 
-def _also(trips: Sequence[Trip], say: Callable[[str], str]) -> list[Trip]:
-    """With each request as it is and in other words."""
+def _heard_both_ways(trips: Sequence[Trip], say: Callable[[str], str]) -> list[Trip]:
+    """The trips, with each of their requests as it is and as `say` rewords it."""
     return [dataclasses.replace(t, requests=(*t.requests, *map(say, t.requests))) for t in trips]
 
 
