@@ -11,8 +11,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cv2
+import deflate
 import numpy as np
 import pytest
+import simplejpeg
 
 from agents.common.checkpoint import CheckpointError, read_checkpoint
 from agents.common.session import Session
@@ -87,6 +89,16 @@ def test_a_checkpoint_is_not_compressed(tmp_path):
         read_checkpoint(tmp_path / "checkpoint.pt")
 
 
+def nothing_is_decoded(monkeypatch) -> None:
+    for library, name in (
+        (cv2, "imread"),
+        (cv2, "imdecode"),
+        (simplejpeg, "decode_jpeg"),
+        (deflate, "zlib_decompress"),
+    ):
+        monkeypatch.setattr(library, name, lambda *_, **__: pytest.fail("it is decoded"))
+
+
 @pytest.mark.parametrize("kind", [".png", ".jpg"])
 def test_a_picture_is_not_decoded_where_it_declares_another_size(kind, tmp_path, monkeypatch):
     small = cv2.imencode(kind, np.zeros((8, 48, 3), np.uint8))[1].tobytes()
@@ -98,7 +110,7 @@ def test_a_picture_is_not_decoded_where_it_declares_another_size(kind, tmp_path,
     assert wide != small
     monkeypatch.setattr(panorama_file, "encode", lambda *_: (wide, wide, wide))
     write_panoramas(tmp_path / "a.pano", [FACES], {})
-    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it is decoded"))
+    nothing_is_decoded(monkeypatch)
     with PanoramaFile(tmp_path / "a.pano") as file:
         for read in (file.rgb, file.depth, file.ids):
             with pytest.raises(PanoramaFileError, match="no picture of its size"):
@@ -108,9 +120,9 @@ def test_a_picture_is_not_decoded_where_it_declares_another_size(kind, tmp_path,
 @pytest.mark.parametrize("size", [(60000, 30000), (12000, 12000)])
 def test_no_picture_is_decoded_that_declares_to_be_huge(size, tmp_path, monkeypatch):
     (tmp_path / "a.png").write_bytes(wide_png(cv2.imencode(".png", np.zeros((8, 48, 3), np.uint8))[1].tobytes(), size))
-    monkeypatch.setattr(cv2, "imread", lambda *_: pytest.fail("it is decoded"))
+    nothing_is_decoded(monkeypatch)
     assert read_picture(tmp_path / "a.png") is None
-    for read in (colours.read_colours, model.load_texture, lambda path: pictures._read(Path(path), cv2.IMREAD_COLOR)):
+    for read in (colours.read_colours, model.load_texture, lambda path: pictures._read(Path(path), pictures._bgra)):
         with pytest.raises((ValueError, OSError), match=r"a\.png"):
             read(str(tmp_path / "a.png"))
 

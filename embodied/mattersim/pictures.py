@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import functools
 import math
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from assets.archives import read_picture
+from assets.archives import MOST_PIXELS
+from assets.decoding import colours, numbers, size_of
 from embodied.geometry import yaw_of_heading
 from embodied.render.panorama import (
     PixelGrid,
@@ -47,8 +50,8 @@ def tiles_of(faces: np.ndarray) -> np.ndarray:
     return np.stack([np.rot90(faces[face], turns) for face, turns in TILES])
 
 
-def face_of(strip: np.ndarray, face: int) -> np.ndarray:
-    """One of our faces, (s, s, ...), from the six tiles of a skybox beside each other.
+def face_of(strip: np.ndarray, face: int, to: np.ndarray | None = None) -> np.ndarray:
+    """One of our faces, (s, s, ...), from the six tiles of a skybox beside each other, written into `to` if given.
 
     Raises:
       ValueError: the tiles are not square.
@@ -58,7 +61,9 @@ def face_of(strip: np.ndarray, face: int) -> np.ndarray:
         raise ValueError(f"MatterSim: a skybox is six squares beside each other, got {width} x {height} pixels")
     tile, turns = WHERE[face]
     picture = strip[:, tile * height : (tile + 1) * height]
-    return cv2.rotate(picture, TURNED_BACK[turns]) if turns else picture
+    if turns:
+        return cv2.rotate(picture, TURNED_BACK[turns], dst=to)
+    return picture if to is None else cv2.copyTo(picture, None, to)
 
 
 class Skyboxes:
@@ -82,10 +87,11 @@ class Skyboxes:
         """
         folder = skybox_folder(self.dataset, scan)
         if self.apart:
-            strip = np.concatenate([_read(folder / FACES.format(viewpoint, k), cv2.IMREAD_COLOR) for k in range(6)], 1)
+            faces = [_read(folder / FACES.format(viewpoint, k), _bgra).copy() for k in range(6)]
+            strip = np.concatenate(faces, 1)
         else:
-            strip = _read(folder / RGB.format(viewpoint), cv2.IMREAD_COLOR)
-        return padded_rgba(len(strip), lambda k, to: cv2.cvtColor(face_of(strip, k), cv2.COLOR_RGB2RGBA, dst=to))
+            strip = _read(folder / RGB.format(viewpoint), _bgra)
+        return padded_rgba(len(strip), lambda k, to: face_of(strip, k, to))
 
     def _distances(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_plane` of a skybox's depth along the ray, uint16 DEPTH_UNITS.
@@ -93,8 +99,8 @@ class Skyboxes:
         Raises:
           ValueError: the picture is missing.
         """
-        units = _read(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), cv2.IMREAD_ANYDEPTH)
-        return padded_plane(len(units), lambda k, to: np.copyto(to, face_of(units, k)), kind=np.uint16)
+        units = _read(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), numbers)
+        return padded_plane(len(units), lambda k, to: face_of(units, k, to), kind=np.uint16)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
@@ -129,11 +135,25 @@ def _grid(padded: np.ndarray, heading: float, elevation: float, vfov: float, siz
     return perspective_grid(padded.shape[1] - 2, float(yaw_of_heading(heading)), elevation, vfov, *checked(vfov, size))
 
 
-def _read(path: Path, mode: int) -> np.ndarray:
-    picture = read_picture(path, mode)
+def _read(path: Path, decode: Callable[[bytes, np.ndarray], np.ndarray | None]) -> np.ndarray:
+    """The pixels of a file, in memory that the next picture of its size is read into."""
+    data = path.read_bytes() if path.is_file() else b""
+    width, height = size_of(data) or (0, 0)
+    size = width * height
+    picture = decode(data, _memory(size, threading.get_ident())) if 0 < size <= MOST_PIXELS else None
     if picture is None:
         raise ValueError(
             f"MatterSim: Could not open skybox files at: {path}; write them with `embodied export matterport`, "
             "or call setRenderingEnabled(False)"
         )
     return picture
+
+
+@functools.lru_cache(maxsize=2)
+def _memory(size: int, thread: int) -> np.ndarray:
+    """Room for so many pixels of four bytes, for one thread."""
+    return np.empty(4 * size, np.uint8)
+
+
+def _bgra(data: bytes, memory: np.ndarray) -> np.ndarray | None:
+    return colours(data, "BGRA", memory)

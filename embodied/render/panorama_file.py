@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import io
 import json
 import os
 import struct
@@ -29,9 +28,9 @@ from typing import BinaryIO, Self
 
 import cv2
 import numpy as np
-from PIL import Image
 
 from assets.cache import atomic_path
+from assets.decoding import colours, numbers, size_of
 from assets.json_file import RecordError, from_plain, parse
 from embodied.render.panorama import Panorama
 
@@ -147,9 +146,8 @@ class PanoramaFile:
           PanoramaFileError: it is none of this file's size.
         """
         picture = None
-        if _size_of(data) == (6 * self.size, self.size):
-            flag = cv2.IMREAD_COLOR_RGB if channel == "rgb" else cv2.IMREAD_UNCHANGED
-            picture = cv2.imdecode(np.frombuffer(data, np.uint8), flag)
+        if size_of(data) == (6 * self.size, self.size):
+            picture = colours(data) if channel == "rgb" else numbers(data)
         if picture is None:
             raise PanoramaFileError(
                 f"{self.path}: the {channel} of node {node} is no picture of its size; "
@@ -196,15 +194,6 @@ class _Stored(Panorama):
         return self._file.decoded(self._data["ids"], self._node, "ids")
 
 
-def _size_of(data: bytes) -> tuple[int, int] | None:
-    """Width and height that a JPEG or PNG says to have, without decoding it; None where it is neither."""
-    try:
-        with Image.open(io.BytesIO(data), formats=("JPEG", "PNG")) as opened:
-            return opened.size
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
-        return None
-
-
 def write_panoramas(
     path: Path, panoramas: Iterable[Panorama], meta: Mapping[str, object], lossless: bool = False
 ) -> None:
@@ -230,13 +219,13 @@ def write_panoramas(
 
 def encode(panorama: Panorama, lossless: bool = False) -> tuple[bytes, bytes, bytes]:
     """The three pictures of a node as files: rgb, depth, ids."""
-    colours = cv2.cvtColor(beside(panorama.rgb), cv2.COLOR_RGB2BGR)
+    bgr = cv2.cvtColor(beside(panorama.rgb), cv2.COLOR_RGB2BGR)
     if lossless:
-        rgb = _encoded(".png", colours, cv2.IMWRITE_PNG_COMPRESSION, 3)
+        rgb = _encoded(".png", bgr, cv2.IMWRITE_PNG_COMPRESSION, 3)
     else:
         rgb = _encoded(
             ".jpg",
-            colours,
+            bgr,
             cv2.IMWRITE_JPEG_QUALITY,
             JPEG_QUALITY,
             cv2.IMWRITE_JPEG_SAMPLING_FACTOR,

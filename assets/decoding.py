@@ -1,0 +1,86 @@
+"""Pixels of JPEG files and of 16-bit PNG files by decoders that take half as long as OpenCV's, and give the same.
+
+What they do not read, OpenCV reads: other kinds of files, photographs with an orientation, rows filtered otherwise.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+
+import cv2
+import deflate
+import numpy as np
+import simplejpeg
+from PIL import Image
+
+JFIF, EXIF = b"\xff\xd8\xff\xe0", b"Exif\0"
+PNG = b"\x89PNG\r\n\x1a\n"
+GREY_16 = struct.pack(">5B", 16, 0, 0, 0, 0)
+"""Of a PNG's header: 16 bits, grey, packed and filtered in the usual way, rows in order."""
+UP = 2
+"""The filter of rows that hold the difference to the row above."""
+CHUNK = struct.Struct(">I4s")
+
+
+def size_of(data: bytes) -> tuple[int, int] | None:
+    """Width and height that a JPEG or PNG says to have, without decoding it; None where it is neither."""
+    try:
+        with Image.open(io.BytesIO(data), formats=("JPEG", "PNG")) as opened:
+            return opened.size
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        return None
+
+
+def colours(data: bytes, order: str = "RGB", memory: np.ndarray | None = None) -> np.ndarray | None:
+    """(h, w, 3 or 4) uint8 pixels of a file; None where it is damaged.
+
+    Args:
+      order: of the channels, 'RGB', 'BGR' or 'BGRA'.
+      memory: as many bytes, in which the pixels may be returned; fresh memory costs half of what decoding does.
+    """
+    if data.startswith(JFIF) and EXIF not in data[:4096]:
+        try:
+            return simplejpeg.decode_jpeg(data, order, buffer=memory)
+        except ValueError:  # OpenCV reads more of them
+            pass
+    pixels = _by_opencv(data, cv2.IMREAD_COLOR_RGB if order == "RGB" else cv2.IMREAD_COLOR)
+    return cv2.cvtColor(pixels, cv2.COLOR_BGR2BGRA) if order == "BGRA" and pixels is not None else pixels
+
+
+def numbers(data: bytes, memory: np.ndarray | None = None) -> np.ndarray | None:
+    """(h, w) pixels of one channel of a file, uint16 where it has 16 bits; None where it is damaged. `memory` as of
+    `colours`."""
+    try:
+        pixels = _filtered_up(data, memory)
+    except (struct.error, deflate.DeflateError, ValueError):
+        pixels = None
+    return _by_opencv(data, cv2.IMREAD_ANYDEPTH) if pixels is None else pixels
+
+
+def _by_opencv(data: bytes, mode: int) -> np.ndarray | None:
+    return cv2.imdecode(np.frombuffer(data, np.uint8), mode) if data else None
+
+
+def _filtered_up(data: bytes, memory: np.ndarray | None) -> np.ndarray | None:
+    """The pixels of a PNG of 16-bit numbers, all rows of which are filtered UP; None where it is another."""
+    width, height = struct.unpack_from(">II", data, 16)
+    if not data.startswith(PNG) or data[24:29] != GREY_16:
+        return None
+    packed, at = [], len(PNG)
+    while at < len(data):
+        length, kind = CHUNK.unpack_from(data, at)
+        at += CHUNK.size
+        if kind == b"IDAT":
+            packed.append(data[at : at + length])
+        at += length + 4
+    unpacked = deflate.zlib_decompress(b"".join(packed), height * (2 * width + 1))
+    rows = np.frombuffer(unpacked, np.uint8).reshape(height, 2 * width + 1)
+    if not (rows[:, 0] == UP).all():
+        return None
+    size = 2 * width * height
+    pixels = (np.empty(size, np.uint8) if memory is None else memory[:size]).reshape(height, 2 * width)
+    pixels[0] = rows[0, 1:]
+    for k in range(1, height):
+        np.add(pixels[k - 1], rows[k, 1:], out=pixels[k])
+    return pixels.view(np.uint16).byteswap(inplace=True)
