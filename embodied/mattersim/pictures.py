@@ -18,11 +18,13 @@ import numpy as np
 from assets.archives import MOST_PIXELS
 from assets.decoding import colours, numbers, size_of
 from embodied.geometry import yaw_of_heading
+from embodied.mattersim.tiles import tiles_in
 from embodied.render.panorama import (
+    EVERY_FACE,
     PixelGrid,
+    bordered,
     checked,
     padded_plane,
-    padded_rgba,
     perspective_grid,
     read_maps,
     resampled_rgb,
@@ -50,8 +52,8 @@ def tiles_of(faces: np.ndarray) -> np.ndarray:
     return np.stack([np.rot90(faces[face], turns) for face, turns in TILES])
 
 
-def face_of(strip: np.ndarray, face: int, to: np.ndarray | None = None) -> np.ndarray:
-    """One of our faces, (s, s, ...), from the six tiles of a skybox beside each other, written into `to` if given.
+def tile_of(strip: np.ndarray, tile: int) -> np.ndarray:
+    """(s, s, ...): one of the six tiles of a skybox, which lie beside each other.
 
     Raises:
       ValueError: the tiles are not square.
@@ -59,11 +61,49 @@ def face_of(strip: np.ndarray, face: int, to: np.ndarray | None = None) -> np.nd
     height, width = strip.shape[:2]
     if width != 6 * height:
         raise ValueError(f"MatterSim: a skybox is six squares beside each other, got {width} x {height} pixels")
+    return strip[:, tile * height : (tile + 1) * height]
+
+
+def face_of(strip: np.ndarray, face: int, to: np.ndarray | None = None) -> np.ndarray:
+    """One of our faces, (s, s, ...), from a skybox, written into `to` if given; ValueError as of tile_of."""
     tile, turns = WHERE[face]
-    picture = strip[:, tile * height : (tile + 1) * height]
+    return _turned_back(tile_of(strip, tile), turns, to)
+
+
+def _turned_back(picture: np.ndarray, turns: int, to: np.ndarray | None) -> np.ndarray:
     if turns:
         return cv2.rotate(picture, TURNED_BACK[turns], dst=to)
     return picture if to is None else cv2.copyTo(picture, None, to)
+
+
+class Faces:
+    """The colours of a skybox, of which each face is decoded when it is first looked at."""
+
+    def __init__(self, s: int, tile: Callable[[int], np.ndarray]) -> None:
+        """Args:
+        s: side of a face, pixels.
+        tile: decodes a tile, (s, s, 4) uint8.
+        """
+        self.s, self._tile, self._missing = s, tile, EVERY_FACE
+        self._padded = np.empty((6, s + 2, s + 2, 4), np.uint8)
+
+    def showing(self, grid: PixelGrid | None = None) -> np.ndarray:
+        """`padded_rgba` with the faces that a grid shows, or all of them, and the borders between them.
+
+        Raises:
+          ValueError: a tile cannot be decoded, or has another size.
+        """
+        new = self._missing & (grid.faces if grid and self._missing else EVERY_FACE)
+        for face in new:
+            tile, turns = WHERE[face]
+            picture = self._tile(tile)
+            if picture.shape[:2] != (self.s, self.s):
+                raise ValueError(f"MatterSim: tiles of {self.s} and of {picture.shape[1]} x {picture.shape[0]} pixels")
+            _turned_back(picture, turns, self._padded[face, 1:-1, 1:-1])
+        if new:
+            bordered(self._padded)
+            self._missing -= new
+        return self._padded.reshape(6 * (self.s + 2), self.s + 2, 4)
 
 
 class Skyboxes:
@@ -79,19 +119,25 @@ class Skyboxes:
         self.colours = functools.lru_cache(maxsize=max(1, kept))(self._colours)
         self.distances = functools.lru_cache(maxsize=max(1, kept))(self._distances)
 
-    def _colours(self, scan: str, viewpoint: str) -> np.ndarray:
-        """`padded_rgba` of a skybox, but blue, green, red.
+    def _colours(self, scan: str, viewpoint: str) -> Faces:
+        """The colours of a skybox, blue, green, red.
 
         Raises:
           ValueError: a picture is missing, as there.
         """
         folder = skybox_folder(self.dataset, scan)
         if self.apart:
-            faces = [_read(folder / FACES.format(viewpoint, k), _bgra).copy() for k in range(6)]
-            strip = np.concatenate(faces, 1)
+            files = [folder / FACES.format(viewpoint, k) for k in range(6)]
+            tiles = [_contents(file) for file in files]
         else:
-            strip = _read(folder / RGB.format(viewpoint), _bgra)
-        return padded_rgba(len(strip), lambda k, to: face_of(strip, k, to))
+            files = [folder / RGB.format(viewpoint)] * 6
+            together = _contents(files[0])
+            alone = tiles_in(together, 6)
+            if alone is None:
+                return _whole(_pixels(files[0], together, _bgra))
+            tiles = alone
+        _, s = _size(files[0], tiles[0])
+        return Faces(s, lambda tile: _pixels(files[tile], tiles[tile], _bgra))
 
     def _distances(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_plane` of a skybox's depth along the ray, uint16 DEPTH_UNITS.
@@ -99,15 +145,17 @@ class Skyboxes:
         Raises:
           ValueError: the picture is missing.
         """
-        units = _read(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), numbers)
+        file = skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint)
+        units = _pixels(file, _contents(file), numbers)
         return padded_plane(len(units), lambda k, to: face_of(units, k, to), kind=np.uint16)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
     ) -> np.ndarray:
         """(h, w, 3) uint8, blue, green, red: the picture of a pose; size is (height, width)."""
-        padded = self.colours(scan, viewpoint)
-        return resampled_rgb(padded, _grid(padded, heading, elevation, vfov, size))
+        colours = self.colours(scan, viewpoint)
+        grid = _grid(colours.s, heading, elevation, vfov, size)
+        return resampled_rgb(colours.showing(grid), grid)
 
     def metres(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
@@ -118,7 +166,7 @@ class Skyboxes:
         (its src/lib/fragment.sh).
         """
         padded = self.distances(scan, viewpoint)
-        _, x, y = read_maps(padded, _grid(padded, heading, elevation, vfov, size))
+        _, x, y = read_maps(padded, _grid(padded.shape[1] - 2, heading, elevation, vfov, size))
         along_rays = cv2.remap(padded, x, y, cv2.INTER_LINEAR)
         return cv2.multiply(along_rays, _ray_shortening(vfov, *size), dtype=cv2.CV_16U)[..., None]
 
@@ -131,25 +179,56 @@ def _ray_shortening(vfov: float, height: int, width: int) -> np.ndarray:
     return (1 / np.sqrt(1 + right**2 + up[:, None] ** 2)).astype(np.float32)
 
 
-def _grid(padded: np.ndarray, heading: float, elevation: float, vfov: float, size: tuple[int, int]) -> PixelGrid:
-    return perspective_grid(padded.shape[1] - 2, float(yaw_of_heading(heading)), elevation, vfov, *checked(vfov, size))
+def _grid(s: int, heading: float, elevation: float, vfov: float, size: tuple[int, int]) -> PixelGrid:
+    return perspective_grid(s, float(yaw_of_heading(heading)), elevation, vfov, *checked(vfov, size))
 
 
-def _read(path: Path, decode: Callable[[bytes, np.ndarray], np.ndarray | None]) -> np.ndarray:
-    """The pixels of a file, in memory that the next picture of its size is read into."""
-    data = path.read_bytes() if path.is_file() else b""
+def _whole(strip: np.ndarray) -> Faces:
+    """The colours of a skybox of which all is decoded."""
+    faces = Faces(len(strip), functools.partial(tile_of, strip))
+    faces.showing()
+    return faces
+
+
+def _contents(path: Path) -> bytes:
+    if not path.is_file():
+        raise _unable(path)
+    return path.read_bytes()
+
+
+def _size(path: Path, data: bytes) -> tuple[int, int]:
+    """Width and height of a picture.
+
+    Raises:
+      ValueError: it is none, or too large.
+    """
     width, height = size_of(data) or (0, 0)
-    size = width * height
-    picture = decode(data, _memory(size, threading.get_ident())) if 0 < size <= MOST_PIXELS else None
+    if not 0 < width * height <= MOST_PIXELS:
+        raise _unable(path)
+    return width, height
+
+
+def _pixels(path: Path, data: bytes, decode: Callable[[bytes, np.ndarray], np.ndarray | None]) -> np.ndarray:
+    """The pixels of a picture, in memory that the next one of its size is read into.
+
+    Raises:
+      ValueError: it is none, or too large.
+    """
+    width, height = _size(path, data)
+    picture = decode(data, _memory(width * height, threading.get_ident()))
     if picture is None:
-        raise ValueError(
-            f"MatterSim: Could not open skybox files at: {path}; write them with `embodied export matterport`, "
-            "or call setRenderingEnabled(False)"
-        )
+        raise _unable(path)
     return picture
 
 
-@functools.lru_cache(maxsize=2)
+def _unable(path: Path) -> ValueError:
+    return ValueError(
+        f"MatterSim: Could not open skybox files at: {path}; write them with `embodied export matterport`, "
+        "or call setRenderingEnabled(False)"
+    )
+
+
+@functools.lru_cache(maxsize=8)
 def _memory(size: int, thread: int) -> np.ndarray:
     """Room for so many pixels of four bytes, for one thread."""
     return np.empty(4 * size, np.uint8)

@@ -30,12 +30,13 @@ FACES = (
 """Forward and up direction of every face, world."""
 AXES = np.array([(forward, np.cross(forward, up), up) for forward, up in FACES])
 """(6, 3, 3): forward, right and up of every face, world."""
-INSIDE = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]) @ AXES
-"""(6, 4, 3): the products of a ray with these are not negative where it meets the face."""
+INSIDE = (np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]) @ AXES).reshape(24, 3)
+"""(24, 3): the products of a ray with four of these are not negative where it meets a face; those of each face."""
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
 MOST_TURNS = 4 * math.pi
 """Largest angle that is taken for radians; larger ones are most often degrees."""
+EVERY_FACE = frozenset(range(6))
 NEXT = 16
 """From one pixel to the next of those that tell about which part of the faces a picture shows."""
 CREASE = 0.05
@@ -164,10 +165,16 @@ def padded_rgba(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarra
       s: side of a face, pixels.
       write: writes face k into (s, s, 4).
     """
-    padded, pad = np.empty((6, s + 2, s + 2, 4), np.uint8), pad_grid(s)
+    padded = np.empty((6, s + 2, s + 2, 4), np.uint8)
     for k, whole in enumerate(padded):
         write(k, whole[1:-1, 1:-1])
-    flat = padded.reshape(6 * (s + 2), s + 2, 4)
+    return bordered(padded)
+
+
+def bordered(padded: np.ndarray) -> np.ndarray:
+    """(6 (s + 2), s + 2, 4): the faces of a `padded_rgba`, (6, s + 2, s + 2, 4), with borders from their neighbours."""
+    side = padded.shape[1]
+    flat, pad = padded.reshape(6 * side, side, 4), pad_grid(side - 2)
     padded[pad.face, pad.row, pad.column] = cv2.remap(flat, pad.x, pad.y, cv2.INTER_LINEAR)[:, 0]
     return flat
 
@@ -252,15 +259,22 @@ class PixelGrid:
     """Where the pixels of a picture lie on the padded faces."""
 
     def __init__(
-        self, s: int, shape: tuple[int, int], draw: Callable[[np.ndarray], None], *, keep: bool = False
+        self,
+        s: int,
+        shape: tuple[int, int],
+        draw: Callable[[np.ndarray], None],
+        *,
+        keep: bool = False,
+        near: Callable[[], frozenset[int]] = lambda: EVERY_FACE,
     ) -> None:
         """Args:
         s: side of a face, pixels.
         shape: height and width of the picture.
         draw: writes the maps.
         keep: keep them from the first time on.
+        near: tells what `faces` is.
         """
-        self.s, self.shape, self.draw = s, shape, draw
+        self.s, self.shape, self.draw, self._near = s, shape, draw, near
         self._keep = keep
         self._kept: np.ndarray | None = None
 
@@ -284,6 +298,11 @@ class PixelGrid:
         self.draw(work.maps)
         work.grid = self
         return work.maps
+
+    @functools.cached_property
+    def faces(self) -> frozenset[int]:
+        """The faces that the picture shows, or comes within a pixel of; perhaps one more."""
+        return self._near()
 
     @functools.cached_property
     def shown(self) -> list[tuple[slice, slice]]:
@@ -317,10 +336,11 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
     tall = math.tan(vfov / 2)
     right = tall / height * np.arange(1 - width, width, 2)
-    rows = np.stack([np.ones(height), tall / height * np.arange(height - 1, -height, -2)], axis=1)
+    rows = np.stack([np.ones(height), tall / height * np.arange(height - 1, -height, -2)])
     columns = np.stack([cp * cy + sy * right, cp * sy - cy * right, np.full(width, sp)])
     up = np.array([-sp * cy, -sp * sy, cp])
-    return PixelGrid(s, (height, width), functools.partial(_draw, s, rows, columns, up))
+    looks = s, rows, columns, up
+    return PixelGrid(s, (height, width), functools.partial(_draw, *looks), near=functools.partial(_faces, *looks))
 
 
 @functools.lru_cache(maxsize=4)
@@ -340,47 +360,63 @@ def equirect_grid(s: int, height: int) -> PixelGrid:
     """The grid of an equirectangular picture of (height, 2 height) pixels."""
     yaw = np.pi - (np.arange(2 * height) + 0.5) * np.pi / height
     pitch = np.pi / 2 - (np.arange(height) + 0.5) * np.pi / height
-    rows = np.stack([np.cos(pitch), np.sin(pitch)], axis=1)
+    rows = np.stack([np.cos(pitch), np.sin(pitch)])
     columns = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(2 * height)])
     draw = functools.partial(_draw, s, rows, columns, np.array([0.0, 0.0, 1.0]))
     return PixelGrid(s, (height, 2 * height), draw, keep=True)
 
 
 def _draw(s: int, rows: np.ndarray, columns: np.ndarray, up: np.ndarray, maps: np.ndarray) -> None:
-    """Write the maps of a picture whose pixel (i, j) looks along rows[i, 0] columns[:, j] + rows[i, 1] up.
+    """Write the maps of a picture whose pixel (i, j) looks along rows[0, i] columns[:, j] + rows[1, i] up.
 
     On one face the maps are fractions of linear functions of the ray, and those are products of a (h, 2) and a (2, w)
     matrix. Every face is written where it may be seen; where two may, the one that the ray goes along more is.
 
     Args:
-      rows: (h, 2), the first column not negative.
+      rows: (2, h), the first not negative.
       columns: (3, w) world.
       up: (3,) world.
       maps: (3, h, w) float32; depth in the picture is in units of the rays.
     """
-    across, rising = INSIDE @ columns, (INSIDE @ up)[..., None]
-    (least, lowest), (most, highest) = rows.min(0), rows.max(0)
-    reach = np.maximum(least * across, most * across) + np.maximum(lowest * rising, highest * rising)
-    wide = (reach >= 0).all(1)
-    high = (rows[:, 0] * across.max(2, keepdims=True) + rows[:, 1] * rising >= 0).all(1)
-    seen = [(k, _span(high[k]), _span(wide[k])) for k in np.flatnonzero(high.any(1) & wide.any(1))]
-    apart = sum(maps[0, i, j].size for _, i, j in seen) == maps[0].size
+    across, rising, reach = _reach(rows, columns, up)
+    wide = np.all(reach >= 0, axis=1)
+    met = np.flatnonzero(wide.any(1))
+    high = np.all(rows[0] * across[met].max(2, keepdims=True) + rows[1] * rising[met] >= 0, axis=1)
+    seen = [(k, _span(up_down), _span(wide[k])) for k, up_down in zip(met, high, strict=True) if up_down.any()]
+    apart = sum((i.stop - i.start) * (j.stop - j.start) for _, i, j in seen) == maps[0].size
     if not apart:
         maps[0] = 0
-    rows, linear = rows.astype(np.float32), linear_maps(s)
-    factors = np.empty((3, 2, columns.shape[1]), np.float32)
+    lines, linear = rows.T.astype(np.float32), linear_maps(s)
+    factors = np.empty((6, 3, 2, columns.shape[1]), np.float32)
+    factors[:, :, 0] = (linear @ columns).reshape(6, 3, -1)
+    factors[:, :, 1] = (linear @ up).reshape(6, 3, 1)
     spare = _scratch(maps.shape[1:], threading.get_ident()).face
     for n, (face, i, j) in enumerate(seen):
-        factors[:, 0], factors[:, 1] = linear[face] @ columns, (linear[face] @ up)[:, None]
         here = maps[:, i, j]
         if apart or n == 0:
-            np.matmul(rows[i], factors[..., j], out=here)
+            np.matmul(lines[i], factors[face, ..., j], out=here)
             continue
-        found = np.matmul(rows[i], factors[..., j], out=spare[: here.size].reshape(here.shape))
+        found = np.matmul(lines[i], factors[face, ..., j], out=spare[: here.size].reshape(here.shape))
         nearer = cv2.compare(found[0], here[0], cv2.CMP_GT)
         for values, to in zip(found, here, strict=True):
             cv2.copyTo(values, nearer, to)
     np.divide(maps[1:], maps[0], out=maps[1:])
+
+
+def _reach(rows: np.ndarray, columns: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(6, 4, w) and (6, 4, 1): INSIDE times columns and up; and (6, 4, w): the most of INSIDE times a ray that a column
+    has."""
+    across, rising = (INSIDE @ columns).reshape(6, 4, -1), (INSIDE @ up).reshape(6, 4, 1)
+    least, most, lowest, highest = rows[0].min(), rows[0].max(), rows[1].min(), rows[1].max()
+    reach = most * across if least == most else np.maximum(least * across, most * across)
+    return across, rising, reach + np.maximum(lowest * rising, highest * rising)
+
+
+def _faces(s: int, rows: np.ndarray, columns: np.ndarray, up: np.ndarray) -> frozenset[int]:
+    """`PixelGrid.faces` of a perspective picture."""
+    pixel = 2 / s * math.hypot(1, *np.abs(columns).max(1), np.abs(rows[1]).max())
+    met = np.all(_reach(rows, columns, up)[2] >= -pixel, axis=1)
+    return frozenset(np.flatnonzero(met.any(1)).tolist())
 
 
 def _span(where: np.ndarray) -> slice:
@@ -391,9 +427,11 @@ def _span(where: np.ndarray) -> slice:
 
 @functools.lru_cache(maxsize=8)
 def linear_maps(s: int) -> np.ndarray:
-    """(6, 3, 3): multiplied with a ray: how far it goes along a face's axis, and that times x and y of its pixel."""
+    """(18, 3): of each face, multiplied with a ray: how far it goes along its axis, and that times x and y of its
+    pixel."""
     middle = (s + 1) / 2
-    return np.array([[[1, 0, 0], [middle, s / 2, 0], [middle + k * (s + 2), 0, -s / 2]] for k in range(6)]) @ AXES
+    of_face = [[[1, 0, 0], [middle, s / 2, 0], [middle + k * (s + 2), 0, -s / 2]] for k in range(6)]
+    return (np.array(of_face) @ AXES).reshape(18, 3)
 
 
 @functools.lru_cache(maxsize=8)

@@ -1,0 +1,109 @@
+"""Tiles of a skybox are decoded alone where its file has marks for it, to the same pixels."""
+
+import math
+
+import cv2
+import numpy as np
+import pytest
+
+from embodied.mattersim import pictures
+from embodied.mattersim.pictures import RGB, Skyboxes, skybox_folder
+from embodied.mattersim.tiles import tiles_in
+
+FULL = [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
+MARKED = [*FULL, cv2.IMWRITE_JPEG_RST_INTERVAL, 8]
+"""Of tiles of 64 pixels: eight blocks."""
+
+
+def strip(side: int = 64) -> np.ndarray:
+    """(side, 6 side, 3) noise about a slope."""
+    noise = np.random.default_rng(0).integers(0, 60, (side, 6 * side, 3))
+    return (noise + np.linspace(0, 190, 6 * side)[None, :, None]).astype(np.uint8)
+
+
+def jpeg(options: list[int], side: int = 64) -> bytes:
+    return cv2.imencode(".jpg", strip(side), options)[1].tobytes()
+
+
+def decoded(data: bytes) -> np.ndarray:
+    return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+
+
+@pytest.mark.parametrize("more", [[], [cv2.IMWRITE_JPEG_OPTIMIZE, 1]])
+def test_each_tile_is_a_picture_of_its_own(more):
+    data = jpeg([*MARKED, *more])
+    tiles = tiles_in(data, 6)
+    np.testing.assert_array_equal(np.concatenate([decoded(t) for t in tiles], axis=1), decoded(data))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        jpeg(FULL),
+        jpeg([cv2.IMWRITE_JPEG_RST_INTERVAL, 8]),
+        jpeg([*FULL, cv2.IMWRITE_JPEG_RST_INTERVAL, 4]),
+        jpeg([*FULL, cv2.IMWRITE_JPEG_RST_INTERVAL, 7], 60),
+        jpeg([*MARKED, cv2.IMWRITE_JPEG_PROGRESSIVE, 1]),
+        jpeg(MARKED)[:900],
+        jpeg(MARKED)[:3000],
+        b"\xff\xd8",
+        b"",
+        cv2.imencode(".png", strip())[1].tobytes(),
+    ],
+    ids=["no marks", "half chroma", "other marks", "cut blocks", "progressive", "head", "cut", "start", "empty", "png"],
+)
+def test_other_files_have_no_tiles_of_their_own(data):
+    assert tiles_in(data, 6) is None
+
+
+def written(folder, options: list[int]) -> Skyboxes:
+    home = skybox_folder(str(folder), "scan")
+    home.mkdir(parents=True)
+    (home / RGB.format("here")).write_bytes(jpeg(options))
+    return Skyboxes(str(folder), 1)
+
+
+def test_views_are_the_same_whatever_is_decoded_before(tmp_path):
+    rng = np.random.default_rng(1)
+    poses = [(h, e, v) for h in (0, math.pi / 4, 2.0) for e in (0, 0.6, -1.5) for v in (0.3, math.pi / 3, 2.0)]
+    poses += [(*rng.uniform((0, -1.5), (7, 1.5)), math.pi / 3) for _ in range(30)]
+    whole = written(tmp_path / "whole", FULL)
+    for n, (heading, elevation, vfov) in enumerate(poses):
+        alone = written(tmp_path / str(n), MARKED)
+        for turn in (0, 1.3):
+            pose = "scan", "here", heading + turn, elevation, vfov, (60, 80)
+            np.testing.assert_array_equal(alone.rgb(*pose), whole.rgb(*pose), err_msg=str(pose))
+
+
+def test_a_view_decodes_only_what_it_shows(tmp_path, monkeypatch):
+    seen = []
+    decode = pictures.colours
+    monkeypatch.setattr(pictures, "colours", lambda *how: seen.append(0) or decode(*how))
+    boxes = written(tmp_path, MARKED)
+    straight = lambda heading: boxes.rgb("scan", "here", heading, 0, math.radians(50), (40, 40))
+    straight(0)
+    assert len(seen) == 1
+    straight(0)
+    straight(math.pi / 4)
+    assert len(seen) == 2, "it lies between two"
+    for heading in (2.0, 3.0, 4.0, 5.0):
+        straight(heading)
+    assert len(seen) == 4, "neither above nor below"
+
+
+def test_a_damaged_tile_is_named_when_it_is_looked_at(tmp_path):
+    boxes = written(tmp_path, MARKED)
+    file = skybox_folder(str(tmp_path), "scan") / RGB.format("here")
+    file.write_bytes(file.read_bytes()[:-400])
+    with pytest.raises(ValueError, match="here_skybox_small.jpg"):
+        boxes.rgb("scan", "here", 0, 0, 2.0, (40, 40))
+
+
+def test_tiles_of_two_sizes_are_refused(tmp_path):
+    home = skybox_folder(str(tmp_path), "scan")
+    home.mkdir(parents=True)
+    for k in range(6):
+        side = 64 if k < 3 else 48
+        cv2.imwrite(str(home / f"here_skybox{k}_sami.jpg"), np.zeros((side, side, 3), np.uint8))
+    with pytest.raises(ValueError, match=r"tiles of 64 and of 48 x 48 pixels"):
+        Skyboxes(str(tmp_path), 1, apart=True).rgb("scan", "here", 0, 0, 3.0, (40, 40))
