@@ -169,9 +169,9 @@ def vocabulary_with(words: tuple[str, ...], vectors: str, reword: Callable[[str]
 
 
 class WordEmbedding(nn.Embedding):
-    """Word numbers (...) to (..., h): learned alone; or, with `use_vectors`, the sum of what is learned of a word and
-    linear maps of its pre-trained vector and, in a ContextualLexicon, of that of its text. Of a word never heard it is
-    these maps alone."""
+    """Word numbers (...) to (..., h): learned alone; or, with `use_vectors`, the sum of what is learned of a word and a
+    linear map of its pre-trained vector, which is all of a word never heard. In a ContextualLexicon it is the sum of
+    linear maps of both vectors, and nothing is learned of single words."""
 
     def __init__(self, words: int, width: int) -> None:
         super().__init__(words, width, padding_idx=0)
@@ -202,18 +202,18 @@ class WordEmbedding(nn.Embedding):
     def forward(self, numbers: Tensor) -> Tensor:
         if self.lexicon is None:
             return super().forward(numbers)
-        around = None
         if isinstance(self.lexicon, ContextualLexicon):
-            numbers, around = (part.to(numbers.device) for part in self.lexicon.occurrences.find(numbers))
+            words, around = (part.to(self.weight.device) for part in self.lexicon.occurrences.find(numbers))
+            return self._meant(words) + self.context(nn.functional.dropout(around, VECTOR_DROPOUT, self.training))
         heard = numbers < self.num_embeddings
         if self.training:
             heard = heard & (torch.rand(numbers.shape, device=numbers.device) >= OWN_DROPOUT)
-        own = super().forward(torch.where(heard, numbers, 0))
-        rows = torch.stack(self.lexicon.rows).to(own)
-        meant = own + self.meaning(nn.functional.dropout(rows[numbers], VECTOR_DROPOUT, self.training))
-        if around is None:
-            return meant
-        return meant + self.context(nn.functional.dropout(around.to(own), VECTOR_DROPOUT, self.training))
+        return super().forward(torch.where(heard, numbers, 0)) + self._meant(numbers)
+
+    def _meant(self, numbers: Tensor) -> Tensor:
+        assert self.lexicon is not None, "an embedding with vectors"
+        rows = torch.stack(self.lexicon.rows).to(self.weight)
+        return self.meaning(nn.functional.dropout(rows[numbers], VECTOR_DROPOUT, self.training))
 
 
 def use_vectors(network: nn.Module, vocabulary: Vocabulary) -> None:
