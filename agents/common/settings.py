@@ -27,8 +27,7 @@ POSITIVE = Limit(lambda x: 0 < x < math.inf, "positive and finite")
 SHARE = Limit(lambda x: 0 <= x <= 1, "in [0, 1]")
 NOT_ALL = Limit(lambda x: 0 <= x < 1, "in [0, 1)")
 LEARNED_WORDS = "learned"
-CONTEXTUAL = "contextual"
-WORD_VECTORS = (LEARNED_WORDS, "minilm", CONTEXTUAL)
+WORD_VECTORS = (LEARNED_WORDS, "minilm")
 EVERYBODY = "everybody"
 SPEAKERS = (EVERYBODY, FAMILIAR)
 """Whose descriptions of routes are learned from: everybody's, or those of people who are not kept from training."""
@@ -110,8 +109,7 @@ class ImitationSettings(ValidatedRunSettings):
     instruction_length: int = 50
     """Longest instruction, words."""
     word_vectors: str = LEARNED_WORDS
-    """What is known of words: 'learned' alone; 'minilm', pre-trained vectors besides; or 'contextual', pre-trained
-    vectors of words and of the texts around them (docs/sources.md, S181)."""
+    """What is known of words: 'learned' alone, or 'minilm', pre-trained vectors besides (docs/sources.md, S181)."""
     varied_words: bool = False
     """Most of what is said in training is said in words and sentences of other writers (docs/sources.md, S184)."""
     validation_tasks: int = 200

@@ -60,19 +60,15 @@ class Vocabulary:
         if found is None:
             if len(self._encoded) >= REMEMBERED:
                 self._encoded.clear()
-            numbers = self.numbers(tokenize(self.reword(text) if self.reword else text))
-            numbers = [*(numbers[: length - 1][::-1] if backwards else numbers), END_NUMBER][:length]
+            words = tokenize(self.reword(text) if self.reword else text)
+            numbers = self.sentence(words[: length - 1][::-1] if backwards else words)[:length]
             padding = [PAD_NUMBER] * (length - len(numbers))
             found = self._encoded[key] = np.array(numbers + padding, dtype=np.int64)
         return found
 
-    def numbers(self, words: Iterable[str]) -> list[int]:
-        """Numbers of the words of a text."""
-        return list(map(self.number, words))
-
     def sentence(self, words: Iterable[str]) -> list[int]:
         """Numbers of words, END last."""
-        return [*self.numbers(words), END_NUMBER]
+        return [*map(self.number, words), END_NUMBER]
 
     def batch(self, texts: Sequence[str], length: int) -> np.ndarray:
         """(B, L) int64 of several texts as `encode` gives them, no longer than the longest of them."""

@@ -78,7 +78,7 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
     mine, its = _kind(agent.about), _kind(other.about)
     vectors = agent.config.word_vectors, other.config.word_vectors
     differ = [f"{k} {its[k]} -> {v}" for k, v in mine.items() if v != its[k]]
-    if differ or vectors not in ((vectors[0], vectors[0]), ("minilm", LEARNED_WORDS)):
+    if differ or vectors[1] not in (LEARNED_WORDS, vectors[0]):
         changed = ", ".join(differ or [f"word_vectors {vectors[1]} -> {vectors[0]}"])
         raise ValueError(f"{source} cannot be begun with: {changed}; give this run its settings")
     take_into(agent.network, other.network.state_dict())

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.common.paraphrases import UNHEARD, in_synonyms, paraphraser, reworded
-from agents.common.settings import CONTEXTUAL, EVERYBODY
+from agents.common.settings import EVERYBODY
 from agents.studies.tables import StudyRow, StudyTable
 from assets.catalogue import load_catalogue
 from assets.closure import code_digest
@@ -58,16 +58,9 @@ def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits:
 
 
 def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
-    """Agents that learn words from instructions alone, with pre-trained vectors, from varied words, too, and these with
-    vectors of whole texts."""
+    """Agents that learn words from instructions alone, with pre-trained vectors, and from varied words, too."""
     vectors = row("pre-trained vectors", word_vectors="minilm")
-    varied = row("varied words", word_vectors="minilm", varied_words=True)
-    return (
-        row("learned words"),
-        vectors,
-        varied,
-        row("varied words in context", word_vectors=CONTEXTUAL, varied_words=True),
-    )
+    return row("learned words"), vectors, row("varied words", word_vectors="minilm", varied_words=True)
 
 
 def _changes(readers: Sequence[StudyRow]) -> list[tuple[StudyRow, StudyRow]]:

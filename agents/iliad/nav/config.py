@@ -64,8 +64,7 @@ class NavConfig:
     speakers: str = EVERYBODY
     """Whose requests are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
     word_vectors: str = LEARNED_WORDS
-    """What followers know of words: 'learned' alone; 'minilm', pre-trained vectors besides; or 'contextual',
-    pre-trained vectors of words and of the texts around them."""
+    """What followers know of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
     varied_words: bool = False
     """Students hear requests of training as they are and as other writers would say them (docs/sources.md, S184)."""
     data_seed: int = 0
