@@ -25,11 +25,17 @@ def saved(image: np.ndarray, kind: str, **options: object) -> bytes:
     return buffer.getvalue()
 
 
-def turned() -> bytes:
+def turned(**options: object) -> bytes:
     """A photograph that says to be shown upside down."""
     exif = Image.Exif()
     exif[0x0112] = 3
-    return saved(picture(), "JPEG", exif=exif)
+    return saved(picture(), "JPEG", exif=exif, **options)
+
+
+def late() -> bytes:
+    """The same behind a long comment."""
+    data = turned()
+    return data[:20] + b"\xff\xfe\x13\x8a" + b"x" * 5000 + data[20:]
 
 
 COLOURS = {
@@ -38,6 +44,7 @@ COLOURS = {
     "progressive": saved(picture(), "JPEG", progressive=True),
     "grey": saved(picture(1), "JPEG"),
     "turned": turned(),
+    "turned behind a comment": late(),
     "png": saved(picture(), "PNG"),
 }
 
@@ -83,6 +90,13 @@ def test_the_files_that_are_written_here_are_read_without_opencv(monkeypatch):
 def test_what_is_no_picture_is_none(broken):
     assert colours(broken) is None
     assert numbers(broken) is None
+
+
+def test_a_second_header_does_not_count():
+    image = np.arange(37 * 61, dtype=np.uint16).reshape(37, 61)
+    data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP])[1].tobytes()
+    flat = data[:20] + bytes(4) + data[24:33] + data[8:]
+    assert numbers(flat) is None
 
 
 def test_damaged_numbers_are_what_opencv_makes_of_them():

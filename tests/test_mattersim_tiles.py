@@ -1,13 +1,16 @@
 """Tiles of a skybox are decoded alone where its file has marks for it, to the same pixels."""
 
 import math
+import struct
+import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 import numpy as np
 import pytest
 
 from embodied.mattersim import pictures
-from embodied.mattersim.pictures import RGB, Skyboxes, skybox_folder
+from embodied.mattersim.pictures import DEPTH, RGB, Skyboxes, skybox_folder
 from embodied.mattersim.tiles import tiles_in
 
 FULL = [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
@@ -45,12 +48,27 @@ def test_each_tile_is_a_picture_of_its_own(more):
         jpeg([*FULL, cv2.IMWRITE_JPEG_RST_INTERVAL, 7], 60),
         jpeg([*MARKED, cv2.IMWRITE_JPEG_PROGRESSIVE, 1]),
         jpeg(MARKED)[:900],
+        bytes.fromhex("ffd8ffdd00040008ffc00002ffda0002"),
+        jpeg(MARKED)[:2] + b"\xff\xe1\x00\x0cExif\0\0MM\0\0"[:14] + jpeg(MARKED)[2:],
         jpeg(MARKED)[:3000],
         b"\xff\xd8",
         b"",
         cv2.imencode(".png", strip())[1].tobytes(),
     ],
-    ids=["no marks", "half chroma", "other marks", "cut blocks", "progressive", "head", "cut", "start", "empty", "png"],
+    ids=[
+        "no marks",
+        "half chroma",
+        "other marks",
+        "cut blocks",
+        "progressive",
+        "head",
+        "short frame",
+        "exif",
+        "cut",
+        "start",
+        "empty",
+        "png",
+    ],
 )
 def test_other_files_have_no_tiles_of_their_own(data):
     assert tiles_in(data, 6) is None
@@ -91,12 +109,47 @@ def test_a_view_decodes_only_what_it_shows(tmp_path, monkeypatch):
     assert len(seen) == 4, "neither above nor below"
 
 
-def test_a_damaged_tile_is_named_when_it_is_looked_at(tmp_path):
+def test_a_file_that_is_cut_short_is_named(tmp_path):
     boxes = written(tmp_path, MARKED)
     file = skybox_folder(str(tmp_path), "scan") / RGB.format("here")
     file.write_bytes(file.read_bytes()[:-400])
     with pytest.raises(ValueError, match="here_skybox_small.jpg"):
         boxes.rgb("scan", "here", 0, 0, 2.0, (40, 40))
+
+
+def test_a_strip_that_declares_to_be_huge_is_not_decoded(tmp_path, monkeypatch):
+    boxes = written(tmp_path, MARKED)
+    file = skybox_folder(str(tmp_path), "scan") / RGB.format("here")
+    huge = struct.pack(">HH", 9984, 59904)
+    file.write_bytes(file.read_bytes().replace(struct.pack(">HH", 64, 384), huge, 1))
+    monkeypatch.setattr(pictures, "tiles_in", lambda *_: pytest.fail("it is taken apart"))
+    with pytest.raises(ValueError, match="here_skybox_small.jpg"):
+        boxes.rgb("scan", "here", 0, 0, 1.0, (40, 40))
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_depth_of_8_and_of_16_bits_is_read(kind, tmp_path):
+    home = skybox_folder(str(tmp_path), "scan")
+    home.mkdir(parents=True)
+    cv2.imwrite(str(home / DEPTH.format("here")), np.full((64, 384), 200, kind))
+    metres = Skyboxes(str(tmp_path), 1).metres("scan", "here", 0.4, 0, 0.2, (9, 9))
+    assert set(np.unique(metres)) <= {198, 199, 200}
+
+
+def test_threads_share_a_skybox(tmp_path):
+    whole, before = written(tmp_path / "whole", FULL), sys.getswitchinterval()
+    poses = [("scan", "here", h, e, 1.0, (30, 30)) for h in (0.4, 1.9, 3.6, 5.2) for e in (-0.7, 0.6)]
+    wanted = [whole.rgb(*pose) for pose in poses]
+    sys.setswitchinterval(1e-5)
+    try:
+        for n in range(60):
+            shared = written(tmp_path / str(n), MARKED)
+            shared.colours("scan", "here")
+            with ThreadPoolExecutor(4) as threads:
+                got = list(threads.map(lambda pose, box=shared: box.rgb(*pose), poses))
+            np.testing.assert_array_equal(got, wanted)
+    finally:
+        sys.setswitchinterval(before)
 
 
 def test_tiles_of_two_sizes_are_refused(tmp_path):

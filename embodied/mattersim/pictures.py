@@ -64,16 +64,13 @@ def tile_of(strip: np.ndarray, tile: int) -> np.ndarray:
     return strip[:, tile * height : (tile + 1) * height]
 
 
-def face_of(strip: np.ndarray, face: int, to: np.ndarray | None = None) -> np.ndarray:
-    """One of our faces, (s, s, ...), from a skybox, written into `to` if given; ValueError as of tile_of."""
-    tile, turns = WHERE[face]
-    return _turned_back(tile_of(strip, tile), turns, to)
-
-
-def _turned_back(picture: np.ndarray, turns: int, to: np.ndarray | None) -> np.ndarray:
+def write_face(face: int, tile: np.ndarray, to: np.ndarray) -> None:
+    """Write one of our faces, (s, s, ...), from its tile."""
+    turns, tile = WHERE[face][1], tile.astype(to.dtype, copy=False)
     if turns:
-        return cv2.rotate(picture, TURNED_BACK[turns], dst=to)
-    return picture if to is None else cv2.copyTo(picture, None, to)
+        cv2.rotate(tile, TURNED_BACK[turns], dst=to)
+    else:
+        cv2.copyTo(tile, None, to)
 
 
 class Faces:
@@ -84,7 +81,8 @@ class Faces:
         s: side of a face, pixels.
         tile: decodes a tile, (s, s, 4) uint8.
         """
-        self.s, self._tile, self._missing = s, tile, EVERY_FACE
+        self.s, self._missing, self._lock = s, EVERY_FACE, threading.Lock()
+        self._tile: Callable[[int], np.ndarray] | None = tile
         self._padded = np.empty((6, s + 2, s + 2, 4), np.uint8)
 
     def showing(self, grid: PixelGrid | None = None) -> np.ndarray:
@@ -93,17 +91,22 @@ class Faces:
         Raises:
           ValueError: a tile cannot be decoded, or has another size.
         """
-        new = self._missing & (grid.faces if grid and self._missing else EVERY_FACE)
-        for face in new:
-            tile, turns = WHERE[face]
-            picture = self._tile(tile)
+        with self._lock:
+            if self._tile is not None:
+                self._decode(self._tile, self._missing & (grid.faces if grid else EVERY_FACE))
+        return self._padded.reshape(6 * (self.s + 2), self.s + 2, 4)
+
+    def _decode(self, tile: Callable[[int], np.ndarray], faces: frozenset[int]) -> None:
+        for face in faces:
+            picture = tile(WHERE[face][0])
             if picture.shape[:2] != (self.s, self.s):
                 raise ValueError(f"MatterSim: tiles of {self.s} and of {picture.shape[1]} x {picture.shape[0]} pixels")
-            _turned_back(picture, turns, self._padded[face, 1:-1, 1:-1])
-        if new:
+            write_face(face, picture, self._padded[face, 1:-1, 1:-1])
+        if faces:
             bordered(self._padded)
-            self._missing -= new
-        return self._padded.reshape(6 * (self.s + 2), self.s + 2, 4)
+        self._missing -= faces
+        if not self._missing:
+            self._tile = None  # and the file with it
 
 
 class Skyboxes:
@@ -123,7 +126,7 @@ class Skyboxes:
         """The colours of a skybox, blue, green, red.
 
         Raises:
-          ValueError: a picture is missing, as there.
+          ValueError: a picture is missing, or cannot be read.
         """
         folder = skybox_folder(self.dataset, scan)
         if self.apart:
@@ -132,6 +135,7 @@ class Skyboxes:
         else:
             files = [folder / RGB.format(viewpoint)] * 6
             together = _contents(files[0])
+            _size(files[0], together)
             alone = tiles_in(together, 6)
             if alone is None:
                 return _whole(_pixels(files[0], together, _bgra))
@@ -147,15 +151,15 @@ class Skyboxes:
         """
         file = skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint)
         units = _pixels(file, _contents(file), numbers)
-        return padded_plane(len(units), lambda k, to: face_of(units, k, to), kind=np.uint16)
+        return padded_plane(len(units), lambda k, to: write_face(k, tile_of(units, WHERE[k][0]), to), kind=np.uint16)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
     ) -> np.ndarray:
         """(h, w, 3) uint8, blue, green, red: the picture of a pose; size is (height, width)."""
-        colours = self.colours(scan, viewpoint)
-        grid = _grid(colours.s, heading, elevation, vfov, size)
-        return resampled_rgb(colours.showing(grid), grid)
+        faces = self.colours(scan, viewpoint)
+        grid = _grid(faces.s, heading, elevation, vfov, size)
+        return resampled_rgb(faces.showing(grid), grid)
 
     def metres(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]

@@ -6,6 +6,8 @@ from __future__ import annotations
 import re
 import struct
 
+from assets.decoding import EXIF
+
 START_OF_FRAME, RESTART_INTERVAL, START_OF_SCAN = 0xC0, 0xDD, 0xDA
 WHOLE = bytes([3, 1, 0x11, 0, 2, 0x11, 1, 3, 0x11, 1])
 """Of a frame: three components, none of them subsampled. Numbers of quantization tables are those of OpenCV."""
@@ -16,7 +18,7 @@ RESTARTS, END = re.compile(rb"\xff[\xd0-\xd7]"), b"\xff\xd9"
 
 
 def tiles_in(data: bytes, count: int) -> list[bytes] | None:
-    """A JPEG for each of `count` square tiles that lie beside each other in a JPEG; None where it has no such marks."""
+    """A JPEG for each of `count` square tiles that lie beside each other in a JPEG; None without such markers."""
     segments, at = {}, 2
     while START_OF_SCAN not in segments:
         if data[at : at + 1] != b"\xff" or len(data) < at + 4:
@@ -27,9 +29,11 @@ def tiles_in(data: bytes, count: int) -> list[bytes] | None:
     frame, interval = segments.get(START_OF_FRAME), segments.get(RESTART_INTERVAL)
     if frame is None or interval is None:
         return None
+    if data[frame][5:] != WHOLE or EXIF in data[:at]:
+        return None
     _, side, width = struct.unpack_from(">BHH", data, frame.start)
     blocks, rest = divmod(side, BLOCK)
-    if rest or width != count * side or data[interval] != struct.pack(">H", blocks) or data[frame][5:] != WHOLE:
+    if rest or width != count * side or data[interval] != struct.pack(">H", blocks):
         return None
     parts = RESTARTS.split(data[at:].removesuffix(END))
     if not data.endswith(END) or len(parts) != count * blocks:

@@ -31,7 +31,7 @@ FACES = (
 AXES = np.array([(forward, np.cross(forward, up), up) for forward, up in FACES])
 """(6, 3, 3): forward, right and up of every face, world."""
 INSIDE = (np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]) @ AXES).reshape(24, 3)
-"""(24, 3): the products of a ray with four of these are not negative where it meets a face; those of each face."""
+"""(24, 3), four to a face: a ray meets the face where its products with all four are not negative."""
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
 MOST_TURNS = 4 * math.pi
@@ -272,7 +272,7 @@ class PixelGrid:
         shape: height and width of the picture.
         draw: writes the maps.
         keep: keep them from the first time on.
-        near: tells what `faces` is.
+        near: finds `faces`.
         """
         self.s, self.shape, self.draw, self._near = s, shape, draw, near
         self._keep = keep
@@ -301,7 +301,7 @@ class PixelGrid:
 
     @functools.cached_property
     def faces(self) -> frozenset[int]:
-        """The faces that the picture shows, or comes within a pixel of; perhaps one more."""
+        """The faces that the picture shows or comes within a pixel of, and perhaps others."""
         return self._near()
 
     @functools.cached_property
