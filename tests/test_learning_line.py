@@ -128,6 +128,7 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     config = parsed(TrainHanna, "--data", ".", "--out", ".", *SMALL).config
     bank = Lessons(data, random_encoder(seed=0)).split("test_unseen").bank
     words = vocabulary_of(data).words
+    torch.manual_seed(0)
     agent = HannaAgent.new(HannaAbout(config=config, encoder=bank.digest, feature_size=bank.size, words=words))
     agent.network.eval()
     agent.network.ask_out.bias.data = torch.tensor([-1.0, 1.0])  # it asks whenever it can
