@@ -31,7 +31,7 @@ def make_data(folder: Path, kind: str = "hanna"):
     """A data set with small painted panoramas in folder/data."""
     data = built(folder / "data", kind, make_house=small_house)
     pictures = PictureSettings(size=64)
-    for name in {n for s in data.splits for n in data.names(s)}:
+    for name in sorted({n for s in data.splits for n in data.names(s)}):
         place = data.place(name)
         meta = {"house": place.house.digest, **pictures.stored()}
         nodes = [gradient(k) for k in range(len(place.graph.ids))]

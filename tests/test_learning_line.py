@@ -79,7 +79,7 @@ def data(tmp_path_factory):
     data = build(folder / "data", folder / "cache", ood=1)
     encoder = random_encoder(seed=0)
     rng = np.random.default_rng(0)
-    for name in {n for s in data.splits for n in data.names(s)}:
+    for name in sorted({n for s in data.splits for n in data.names(s)}):
         place = data.place(name)
         features = rng.normal(size=(len(place.graph.positions), 36, encoder.size))
         save_features(
