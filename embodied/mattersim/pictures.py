@@ -73,7 +73,7 @@ def write_face(face: int, tile: np.ndarray, to: np.ndarray) -> None:
         cv2.copyTo(tile, None, to)
 
 
-class Faces:
+class SkyboxColours:
     """The colours of a skybox, of which each face is decoded when it is first looked at."""
 
     def __init__(self, s: int, tile: Callable[[int], np.ndarray]) -> None:
@@ -122,7 +122,7 @@ class Skyboxes:
         self.colours = functools.lru_cache(maxsize=max(1, kept))(self._colours)
         self.distances = functools.lru_cache(maxsize=max(1, kept))(self._distances)
 
-    def _colours(self, scan: str, viewpoint: str) -> Faces:
+    def _colours(self, scan: str, viewpoint: str) -> SkyboxColours:
         """The colours of a skybox, blue, green, red.
 
         Raises:
@@ -141,7 +141,7 @@ class Skyboxes:
                 return _whole(_pixels(files[0], together, _bgra))
             tiles = alone
         _, s = _size(files[0], tiles[0])
-        return Faces(s, lambda tile: _pixels(files[tile], tiles[tile], _bgra))
+        return SkyboxColours(s, lambda tile: _pixels(files[tile], tiles[tile], _bgra))
 
     def _distances(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_plane` of a skybox's depth along the ray, uint16 DEPTH_UNITS.
@@ -157,9 +157,9 @@ class Skyboxes:
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
     ) -> np.ndarray:
         """(h, w, 3) uint8, blue, green, red: the picture of a pose; size is (height, width)."""
-        faces = self.colours(scan, viewpoint)
-        grid = _grid(faces.s, heading, elevation, vfov, size)
-        return resampled_rgb(faces.showing(grid), grid)
+        skybox = self.colours(scan, viewpoint)
+        grid = _grid(skybox.s, heading, elevation, vfov, size)
+        return resampled_rgb(skybox.showing(grid), grid)
 
     def metres(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
@@ -187,11 +187,11 @@ def _grid(s: int, heading: float, elevation: float, vfov: float, size: tuple[int
     return perspective_grid(s, float(yaw_of_heading(heading)), elevation, vfov, *checked(vfov, size))
 
 
-def _whole(strip: np.ndarray) -> Faces:
+def _whole(strip: np.ndarray) -> SkyboxColours:
     """The colours of a skybox of which all is decoded."""
-    faces = Faces(len(strip), functools.partial(tile_of, strip))
-    faces.showing()
-    return faces
+    whole = SkyboxColours(len(strip), functools.partial(tile_of, strip))
+    whole.showing()
+    return whole
 
 
 def _contents(path: Path) -> bytes:
