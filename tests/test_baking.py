@@ -265,7 +265,7 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
 
 def test_faces_of_a_traced_panorama_are_pictures_of_their_directions(lit):
     from embodied.light.tracing.reference import Tracer
-    from embodied.render.panorama import FACES
+    from embodied.render.sampling import FACES
 
     house, _, _, baked = lit
     tracer = Tracer(baked, house, quality="reference", size=16, rays=16)

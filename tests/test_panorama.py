@@ -12,8 +12,10 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.datasets import matterport
 from embodied.interface import Pose
 from embodied.navigation.graph import graph_of
-from embodied.render.panorama import FACES, Panorama, face_rays, perspective_grid, ray_stretch
+from embodied.render import sampling
+from embodied.render.panorama import Panorama, equirect_grid, face_rays, perspective_grid, ray_stretch
 from embodied.render.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
+from embodied.render.sampling import FACES
 
 S = 64
 
@@ -69,14 +71,40 @@ def test_a_resampled_view_equals_the_closed_form(yaw, pitch, vfov):
     assert agree.mean() > 0.97
 
 
-@pytest.mark.parametrize("seed", range(30))
-def test_every_pixel_is_looked_up_where_its_ray_meets_the_cube(seed):
+def some_view(seed: int) -> tuple[float, float, float, int, int]:
     """Also where opposite faces are seen at once, straight up and down, and on seams (yaws of whole 15 degrees)."""
     rng = np.random.default_rng(seed)
     yaw = rng.uniform(-math.pi, math.pi) if seed % 3 else math.radians(15 * rng.integers(24))
     pitch = (rng.uniform(-math.pi / 2, math.pi / 2), 0.0, math.radians(30), math.pi / 2)[seed % 4]
     vfov, (h, w) = rng.uniform(0.2, 2.8), rng.integers(1, 60, 2).tolist()
-    along, x, y = perspective_grid(S, float(yaw), float(pitch), float(vfov), h, w).maps()
+    return float(yaw), float(pitch), float(vfov), h, w
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_compiled_code_finds_the_same_pixels(seed, monkeypatch):
+    pytest.importorskip("numba")
+    h, w = some_view(seed)[-2:]
+    grids = {(h, w): perspective_grid(S, *some_view(seed)), (h, 2 * h): equirect_grid(S, h)}
+    for shape, grid in grids.items():
+        maps, faces = np.empty((2, 3, *shape), np.float32), []
+        for way, found in zip((sampling.compiled(), None), maps, strict=True):
+            monkeypatch.setattr(sampling, "compiled", lambda way=way: way)
+            grid.draw(found)
+            faces.append(sampling.shown(S, found[1], found[2]))
+        assert np.array_equal(*maps), "in every bit"
+        assert faces[0] == faces[1]
+        monkeypatch.undo()
+
+
+@pytest.mark.parametrize("way", ["numba", "numpy"])
+@pytest.mark.parametrize("seed", range(30))
+def test_every_pixel_is_looked_up_where_its_ray_meets_the_cube(seed, way, monkeypatch):
+    if way == "numba":
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(sampling, "compiled", lambda: None)
+    yaw, pitch, vfov, h, w = some_view(seed)
+    along, x, y = perspective_grid.__wrapped__(S, yaw, pitch, vfov, h, w).maps()
     rays = pinhole(yaw, pitch, vfov, h, w)
     face = np.floor(y / (S + 2)).astype(int)
     forward, up = (np.array([f[i] for f in FACES])[face] for i in (0, 1))

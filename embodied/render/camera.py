@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.render.panorama import FACES
+from embodied.render.sampling import FACES
 
 NEAR, FAR = 0.03, 200.0
 """Nothing nearer or farther is drawn, metres."""

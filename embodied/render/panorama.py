@@ -18,27 +18,12 @@ import cv2
 import numpy as np
 
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
+from embodied.render.sampling import AXES, EVERY_FACE, Rays, locate, near, shown
 
-FACES = (
-    ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
-    ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)),
-    ((0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
-)
-"""Forward and up direction of every face, world."""
-AXES = np.array([(forward, np.cross(forward, up), up) for forward, up in FACES])
-"""(6, 3, 3): forward, right and up of every face, world."""
-INSIDE = (np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]) @ AXES).reshape(24, 3)
-"""(24, 3), four to a face: a ray meets the face where its products with all four are not negative."""
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
 MOST_TURNS = 4 * math.pi
 """Largest angle that is taken for radians; larger ones are most often degrees."""
-EVERY_FACE = frozenset(range(6))
-NEXT = 16
-"""From one pixel to the next of those that tell about which part of the faces a picture shows."""
 CREASE = 0.05
 """Depths that differ by more than this share belong to different things and are not mixed."""
 
@@ -236,8 +221,6 @@ class _Scratch:
     mask: np.ndarray
     maps: np.ndarray
     """(3, h, w)."""
-    face: np.ndarray
-    """(3 h w,), for the maps of one face."""
     grid: PixelGrid | None = None
     """Whose maps they are."""
 
@@ -251,7 +234,6 @@ def _scratch(shape: tuple[int, int], thread: int) -> _Scratch:
         np.empty(shape, np.float32),
         np.empty(shape, np.uint8),
         np.empty((3, *shape), np.float32),
-        np.empty(3 * shape[0] * shape[1], np.float32),
     )
 
 
@@ -307,12 +289,8 @@ class PixelGrid:
     @functools.cached_property
     def shown(self) -> list[tuple[slice, slice]]:
         """About which rows and columns of the padded faces the picture shows."""
-        x, y = self.maps()[1:, ::NEXT, ::NEXT].astype(int)
-        faces, found = y // (self.s + 2), []
-        for face in np.unique(faces):
-            across, down = x[faces == face], y[faces == face]
-            found.append((slice(down.min(), down.max() + NEXT), slice(across.min(), across.max() + NEXT)))
-        return found
+        _, x, y = self.maps()
+        return shown(self.s, x, y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,13 +312,19 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
     if not (abs(yaw) <= MOST_TURNS and abs(pitch) <= math.pi):
         raise ValueError(f"yaw and pitch are in radians, got {yaw:g} and {pitch:g}; math.radians(90) is 90 degrees")
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
-    tall = math.tan(vfov / 2)
-    right = tall / height * np.arange(1 - width, width, 2)
-    rows = np.stack([np.ones(height), tall / height * np.arange(height - 1, -height, -2)])
-    columns = np.stack([cp * cy + sy * right, cp * sy - cy * right, np.full(width, sp)])
-    up = np.array([-sp * cy, -sp * sy, cp])
-    looks = s, rows, columns, up
-    return PixelGrid(s, (height, width), functools.partial(_draw, *looks), near=functools.partial(_faces, *looks))
+    right, rows = _lens(vfov, height, width)
+    columns = np.array([[cp * cy], [cp * sy], [sp]]) + np.array([[sy], [-cy], [0.0]]) * right
+    rays = Rays(rows, columns.astype(np.float32), np.array([-sp * cy, -sp * sy, cp], np.float32))
+    draw, faces = functools.partial(locate, s, rays), functools.partial(near, s, rays)
+    return PixelGrid(s, (height, width), draw, near=faces)
+
+
+@functools.lru_cache(maxsize=8)
+def _lens(vfov: float, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """(w,): how far to the right pixels look per metre forward; (2, h) float32: one, and how far up."""
+    step = math.tan(vfov / 2) / height
+    up = step * np.arange(height - 1, -height, -2)
+    return step * np.arange(1 - width, width, 2), np.stack([np.ones(height), up]).astype(np.float32)
 
 
 @functools.lru_cache(maxsize=4)
@@ -360,78 +344,10 @@ def equirect_grid(s: int, height: int) -> PixelGrid:
     """The grid of an equirectangular picture of (height, 2 height) pixels."""
     yaw = np.pi - (np.arange(2 * height) + 0.5) * np.pi / height
     pitch = np.pi / 2 - (np.arange(height) + 0.5) * np.pi / height
-    rows = np.stack([np.cos(pitch), np.sin(pitch)])
-    columns = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(2 * height)])
-    draw = functools.partial(_draw, s, rows, columns, np.array([0.0, 0.0, 1.0]))
-    return PixelGrid(s, (height, 2 * height), draw, keep=True)
-
-
-def _draw(s: int, rows: np.ndarray, columns: np.ndarray, up: np.ndarray, maps: np.ndarray) -> None:
-    """Write the maps of a picture whose pixel (i, j) looks along rows[0, i] columns[:, j] + rows[1, i] up.
-
-    On one face the maps are fractions of linear functions of the ray, and those are products of a (h, 2) and a (2, w)
-    matrix. Every face is written where it may be seen; where two may, the one that the ray goes along more is.
-
-    Args:
-      rows: (2, h), the first not negative.
-      columns: (3, w) world.
-      up: (3,) world.
-      maps: (3, h, w) float32; depth in the picture is in units of the rays.
-    """
-    across, rising, reach = _reach(rows, columns, up)
-    wide = np.all(reach >= 0, axis=1)
-    met = np.flatnonzero(wide.any(1))
-    high = np.all(rows[0] * across[met].max(2, keepdims=True) + rows[1] * rising[met] >= 0, axis=1)
-    seen = [(k, _span(up_down), _span(wide[k])) for k, up_down in zip(met, high, strict=True) if up_down.any()]
-    apart = sum((i.stop - i.start) * (j.stop - j.start) for _, i, j in seen) == maps[0].size
-    if not apart:
-        maps[0] = 0
-    lines, linear = rows.T.astype(np.float32), linear_maps(s)
-    factors = np.empty((6, 3, 2, columns.shape[1]), np.float32)
-    factors[:, :, 0] = (linear @ columns).reshape(6, 3, -1)
-    factors[:, :, 1] = (linear @ up).reshape(6, 3, 1)
-    spare = _scratch(maps.shape[1:], threading.get_ident()).face
-    for n, (face, i, j) in enumerate(seen):
-        here = maps[:, i, j]
-        if apart or n == 0:
-            np.matmul(lines[i], factors[face, ..., j], out=here)
-            continue
-        found = np.matmul(lines[i], factors[face, ..., j], out=spare[: here.size].reshape(here.shape))
-        nearer = cv2.compare(found[0], here[0], cv2.CMP_GT)
-        for values, to in zip(found, here, strict=True):
-            cv2.copyTo(values, nearer, to)
-    np.divide(maps[1:], maps[0], out=maps[1:])
-
-
-def _reach(rows: np.ndarray, columns: np.ndarray, up: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(6, 4, w) and (6, 4, 1): INSIDE times columns and up; and (6, 4, w): the most of INSIDE times a ray that a column
-    has."""
-    across, rising = (INSIDE @ columns).reshape(6, 4, -1), (INSIDE @ up).reshape(6, 4, 1)
-    least, most, lowest, highest = rows[0].min(), rows[0].max(), rows[1].min(), rows[1].max()
-    reach = most * across if least == most else np.maximum(least * across, most * across)
-    return across, rising, reach + np.maximum(lowest * rising, highest * rising)
-
-
-def _faces(s: int, rows: np.ndarray, columns: np.ndarray, up: np.ndarray) -> frozenset[int]:
-    """`PixelGrid.faces` of a perspective picture."""
-    pixel = 2 / s * math.hypot(1, *np.abs(columns).max(1), np.abs(rows[1]).max())
-    met = np.all(_reach(rows, columns, up)[2] >= -pixel, axis=1)
-    return frozenset(np.flatnonzero(met.any(1)).tolist())
-
-
-def _span(where: np.ndarray) -> slice:
-    """From the first to the last that is true."""
-    found = np.flatnonzero(where)
-    return slice(int(found[0]), int(found[-1]) + 1)
-
-
-@functools.lru_cache(maxsize=8)
-def linear_maps(s: int) -> np.ndarray:
-    """(18, 3): of each face, multiplied with a ray: how far it goes along its axis, and that times x and y of its
-    pixel."""
-    middle = (s + 1) / 2
-    of_face = [[[1, 0, 0], [middle, s / 2, 0], [middle + k * (s + 2), 0, -s / 2]] for k in range(6)]
-    return (np.array(of_face) @ AXES).reshape(18, 3)
+    rows = np.stack([np.cos(pitch), np.sin(pitch)]).astype(np.float32)
+    columns = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(2 * height)]).astype(np.float32)
+    rays = Rays(rows, columns, np.array([0, 0, 1], np.float32))
+    return PixelGrid(s, (height, 2 * height), functools.partial(locate, s, rays), keep=True)
 
 
 @functools.lru_cache(maxsize=8)

@@ -26,8 +26,9 @@ import numpy as np
 from embodied.errors import UnableError
 from embodied.house.house import House
 from embodied.render.camera import FAR, NEAR, View
-from embodied.render.panorama import FACES, Panorama
+from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
+from embodied.render.sampling import FACES
 from embodied.scene.house_meshes import owners
 from embodied.scene.lit_pages import LitPages, glass_surfaces
 from embodied.scene.model import VISUAL, build_spec, compile_spec, owner_of_name

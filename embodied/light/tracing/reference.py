@@ -20,7 +20,8 @@ from embodied.light.tracing import paths, radiosity
 from embodied.light.tracing.radiosity import Points
 from embodied.light.tracing.scene import Hit, Panes, backdrop_at, look, picture_at, through, world_of
 from embodied.render.film import light_of, shown_of
-from embodied.render.panorama import FACES, Panorama
+from embodied.render.panorama import Panorama
+from embodied.render.sampling import FACES
 from embodied.seeds import stream
 
 BRIGHTEST = 12.0

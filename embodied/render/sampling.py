@@ -1,0 +1,136 @@
+"""Where the rays of a picture meet the faces of a panorama.
+
+Faces have side s and borders of a pixel, and lie below each other. Numbers are rounded to float32 after each operation,
+in the order in which they are written here and in embodied.render.kernels: with Numba or without, and on every
+processor, pictures are the same.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import math
+import threading
+from types import ModuleType
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+FACES = (
+    ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)),
+    ((0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
+)
+"""Forward and up direction of every face, world."""
+AXES = np.array([(forward, np.cross(forward, up), up) for forward, up in FACES])
+"""(6, 3, 3): forward, right and up of every face, world."""
+INSIDE = (np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]) @ AXES).reshape(24, 3)
+"""(24, 3), four to a face: a ray meets the face where its products with all four are not negative."""
+DOWN = (AXES * [[1], [1], [-1]]).astype(np.float32)
+"""(6, 3, 3): forward, right and down of every face."""
+BY_AXIS = (0, 2, 1, 3, 4, 5)
+"""Of faces that a ray meets at their edge, the first here has it."""
+EVERY_FACE = frozenset(range(6))
+NEXT = 16
+"""From one pixel to the next of those that tell about which part of the faces a picture shows."""
+
+
+class Rays(NamedTuple):
+    """Pixel (i, j) looks along rows[0, i] columns[:, j] + rows[1, i] up. All are float32."""
+
+    rows: np.ndarray
+    """(2, h), the first not negative."""
+    columns: np.ndarray
+    """(3, w) world."""
+    up: np.ndarray
+    """(3,) world."""
+
+
+def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
+    """Write where rays meet faces.
+
+    Args:
+      s: side of a face, pixels.
+      rays: of a picture of (h, w) pixels.
+      maps: (3, h, w) float32: how far the ray goes along the axis of the face, and x and y on the faces.
+    """
+    if (kernels := compiled()) is not None:
+        kernels.locate(*rays, s, *maps)
+        return
+    half, middle, side = np.float32(s / 2), np.float32((s + 1) / 2), np.float32(s + 2)
+    maps[0] = 0
+    spare = _spare(maps.size, threading.get_ident())
+    for face, i, j in _seen(rays):
+        here = maps[:, i, j]
+        found, scale = spare[0, : here.size].reshape(here.shape), spare[1, : here[0].size].reshape(here.shape[1:])
+        np.multiply(rays.rows[0, i, None], (DOWN[face] @ rays.columns[:, j])[:, None], out=found)
+        found += rays.rows[1, i, None] * (DOWN[face] @ rays.up)[:, None, None]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            np.divide(half, found[0], out=scale)
+            found[1:] *= scale
+        found[1:] += middle
+        found[2] += np.float32(face) * side
+        nearer = cv2.compare(found[0], here[0], cv2.CMP_GT)
+        for values, to in zip(found, here, strict=True):
+            cv2.copyTo(values, nearer, to)
+
+
+def shown(s: int, x: np.ndarray, y: np.ndarray) -> list[tuple[slice, slice]]:
+    """About which rows and columns of the faces a picture shows, of which two maps of `locate` are given."""
+    if (kernels := compiled()) is not None:
+        found = kernels.shown(x, y, s + 2, NEXT).tolist()
+    else:
+        across, down = x[::NEXT, ::NEXT].astype(int), y[::NEXT, ::NEXT].astype(int)
+        of = [(down[on], across[on]) for on in (down // (s + 2) == face for face in EVERY_FACE) if on.any()]
+        found = [(rows.min(), rows.max(), columns.min(), columns.max()) for rows, columns in of]
+    return [(slice(top, bottom + NEXT), slice(left, right + NEXT)) for top, bottom, left, right in found if top >= 0]
+
+
+def near(s: int, rays: Rays) -> frozenset[int]:
+    """The faces that rays meet or come within a pixel of, and perhaps others."""
+    rows, columns, _ = rays
+    pixel = 2 / s * math.hypot(1, *np.abs(columns).max(1), np.abs(rows[1]).max())
+    met = np.all(_reach(rays)[2] >= -pixel, axis=1)
+    return frozenset(np.flatnonzero(met.any(1)).tolist())
+
+
+@functools.cache
+def compiled() -> ModuleType | None:
+    """The same in compiled code, if Numba is installed and goes with this NumPy."""
+    try:
+        return importlib.import_module("embodied.render.kernels")
+    except ImportError:
+        return None
+
+
+def _seen(rays: Rays) -> list[tuple[int, slice, slice]]:
+    """The faces that rays meet, and between which rows and columns, and a pixel beyond."""
+    across, rising, reach = _reach(rays)
+    wide = np.all(reach >= 0, axis=1)
+    high = np.all(rays.rows[0] * across.max(2, keepdims=True) + rays.rows[1] * rising >= 0, axis=1)
+    return [(face, _span(high[face]), _span(wide[face])) for face in BY_AXIS if high[face].any() and wide[face].any()]
+
+
+def _reach(rays: Rays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(6, 4, w) and (6, 4, 1): INSIDE times columns and up; and (6, 4, w): the most of INSIDE times a ray that a column
+    has."""
+    across, rising = (INSIDE @ rays.columns).reshape(6, 4, -1), (INSIDE @ rays.up).reshape(6, 4, 1)
+    least, most, lowest, highest = rays.rows[0].min(), rays.rows[0].max(), rays.rows[1].min(), rays.rows[1].max()
+    reach = most * across if least == most else np.maximum(least * across, most * across)
+    return across, rising, reach + np.maximum(lowest * rising, highest * rising)
+
+
+@functools.lru_cache(maxsize=8)
+def _spare(size: int, thread: int) -> np.ndarray:
+    """(2, size) float32 of one thread to work in: fresh memory costs more than what is done with it."""
+    return np.empty((2, size), np.float32)
+
+
+def _span(where: np.ndarray) -> slice:
+    """From before the first to after the last that is true."""
+    found = np.flatnonzero(where)
+    return slice(max(0, int(found[0]) - 1), int(found[-1]) + 2)
