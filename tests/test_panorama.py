@@ -13,7 +13,15 @@ from embodied.datasets import matterport
 from embodied.interface import Pose
 from embodied.navigation.graph import graph_of
 from embodied.render import sampling
-from embodied.render.panorama import Panorama, equirect_grid, face_rays, perspective_grid, ray_stretch
+from embodied.render.panorama import (
+    Panorama,
+    PixelGrid,
+    equirect_grid,
+    face_rays,
+    grid36,
+    perspective_grid,
+    ray_stretch,
+)
 from embodied.render.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.sampling import FACES
 
@@ -80,29 +88,66 @@ def some_view(seed: int) -> tuple[float, float, float, int, int]:
     return float(yaw), float(pitch), float(vfov), h, w
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_compiled_code_finds_the_same_pixels(seed, monkeypatch):
+@pytest.fixture(scope="module")
+def kernels():
     pytest.importorskip("numba")
-    h, w = some_view(seed)[-2:]
-    grids = {(h, w): perspective_grid(S, *some_view(seed)), (h, 2 * h): equirect_grid(S, h)}
-    for shape, grid in grids.items():
-        maps, faces = np.empty((2, 3, *shape), np.float32), []
-        for way, found in zip((sampling.compiled(), None), maps, strict=True):
-            monkeypatch.setattr(sampling, "compiled", lambda way=way: way)
-            grid.draw(found)
-            faces.append(sampling.shown(S, found[1], found[2]))
-        assert np.array_equal(*maps), "in every bit"
-        assert faces[0] == faces[1]
-        monkeypatch.undo()
+    assert sampling.compiled() is not None, "Numba is installed, so that it is used"
+    return sampling.compiled()
+
+
+def drawn_both_ways(grid: PixelGrid, kernels, monkeypatch) -> np.ndarray:
+    """(3, h, w): maps that are the same in every bit, compiled and not, as is what they say is shown."""
+    maps, seen = np.empty((2, 3, *grid.shape), np.float32), []
+    for way, found in zip((kernels, None), maps, strict=True):
+        monkeypatch.setattr(sampling, "compiled", lambda way=way: way)
+        grid.draw(found)
+        seen.append(sampling.shown(grid.s, found[1], found[2]))
+    assert np.array_equal(*maps)
+    assert seen[0] == seen[1]
+    for x, y in maps[0, 1:, :: sampling.NEXT, :: sampling.NEXT].reshape(2, -1).astype(int).T:
+        assert any(rows.start <= y < rows.stop and columns.start <= x < columns.stop for rows, columns in seen[0])
+    return maps[0]
+
+
+@pytest.mark.parametrize("s", [1, S, 2048])
+@pytest.mark.parametrize("seed", range(20))
+def test_compiled_code_finds_the_same_pixels(seed, s, kernels, monkeypatch):
+    drawn_both_ways(perspective_grid(s, *some_view(seed)), kernels, monkeypatch)
+    drawn_both_ways(equirect_grid(s, 1 + seed), kernels, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("s", "view"),
+    [
+        (2048, (3.9269908356186347, -0.2617993464202806, 0.2545668238541856, 56, 1)),
+        (3, (0.785398140016583, 1.865891128019589e-05, 2.483824476005943, 100, 1)),
+        (64, (math.radians(45), math.atan(math.sqrt(0.5)), 1e-9, 33, 40)),
+        (64, (math.radians(45), 0.0, 1.0, 1, 1)),
+    ],
+)
+def test_compiled_code_finds_the_same_pixels_on_seams(s, view, kernels, monkeypatch):
+    """Where rounding alone decides which of two faces a ray meets."""
+    drawn_both_ways(perspective_grid(s, *view), kernels, monkeypatch)
+
+
+def test_compiled_code_finds_the_same_pixels_of_36_views(kernels, monkeypatch):
+    drawn_both_ways(grid36(S, 20), kernels, monkeypatch)
+
+
+def test_a_broken_numba_is_told_of_and_done_without(monkeypatch):
+    def broken(name):
+        raise OSError("llvmlite does not load")
+
+    monkeypatch.setattr(sampling.importlib, "import_module", broken)
+    with pytest.warns(UserWarning, match="llvmlite"):
+        assert sampling.compiled.__wrapped__() is None
 
 
 @pytest.mark.parametrize("way", ["numba", "numpy"])
 @pytest.mark.parametrize("seed", range(30))
-def test_every_pixel_is_looked_up_where_its_ray_meets_the_cube(seed, way, monkeypatch):
-    if way == "numba":
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(sampling, "compiled", lambda: None)
+def test_every_pixel_is_looked_up_where_its_ray_meets_the_cube(seed, way, request, monkeypatch):
+    kernels = request.getfixturevalue("kernels") if way == "numba" else None
+    monkeypatch.setattr(sampling, "compiled", lambda: kernels)
     yaw, pitch, vfov, h, w = some_view(seed)
     along, x, y = perspective_grid.__wrapped__(S, yaw, pitch, vfov, h, w).maps()
     rays = pinhole(yaw, pitch, vfov, h, w)

@@ -26,7 +26,12 @@ LIBRARIES = (
     DISTRIBUTION, "mujoco-core", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",
 )  # fmt: skip
 """What houses, light and pictures need."""
-EXTRAS = {"agents": ("torch", "safetensors"), "viz": ("rerun-sdk", "av", "matplotlib"), "data": ("pyarrow",)}
+EXTRAS = {
+    "agents": ("torch", "safetensors"),
+    "viz": ("rerun-sdk", "av", "matplotlib"),
+    "data": ("pyarrow",),
+    "numba": ("numba",),
+}
 """What else there is, by the extra of the distribution that brings it."""
 FREE_DISK = 2.0
 """GiB below which rendering houses will soon fail."""
@@ -125,7 +130,7 @@ def extras(_: Options) -> Finding:
         found, missing = _installed(names)
         parts += found
         lacking += [extra] * bool(missing)
-    remedy = f"pip install '{DISTRIBUTION}[{','.join(lacking)}]' (agents that learn, recordings, exports)"
+    remedy = f"pip install '{DISTRIBUTION}[{','.join(lacking)}]' (agents that learn, recordings, exports, speed)"
     return Finding("extras", not lacking, ", ".join(parts) or "none installed", remedy, False)
 
 

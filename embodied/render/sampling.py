@@ -1,8 +1,7 @@
 """Where the rays of a picture meet the faces of a panorama.
 
 Faces have side s and borders of a pixel, and lie below each other. Numbers are rounded to float32 after each operation,
-in the order in which they are written here and in embodied.render.kernels: with Numba or without, and on every
-processor, pictures are the same.
+in the same order here and in embodied.render.kernels, so that pictures are the same with Numba and without.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import functools
 import importlib
 import math
 import threading
+import warnings
 from types import ModuleType
 from typing import NamedTuple
 
@@ -56,19 +56,22 @@ def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
     Args:
       s: side of a face, pixels.
       rays: of a picture of (h, w) pixels.
-      maps: (3, h, w) float32: how far the ray goes along the axis of the face, and x and y on the faces.
+      maps: (3, h, w) float32, each contiguous: how far the ray goes along the axis of the face, and x and y on the
+        faces.
     """
     if (kernels := compiled()) is not None:
         kernels.locate(*rays, s, *maps)
         return
     half, middle, side = np.float32(s / 2), np.float32((s + 1) / 2), np.float32(s + 2)
-    maps[0] = 0
-    spare = _spare(maps.size, threading.get_ident())
+    maps[0], straight = 0, np.all(rays.rows[0] == 1)
+    spare = _spare(maps[0].size, threading.get_ident())
     for face, i, j in _seen(rays):
         here = maps[:, i, j]
-        found, scale = spare[0, : here.size].reshape(here.shape), spare[1, : here[0].size].reshape(here.shape[1:])
-        np.multiply(rays.rows[0, i, None], (DOWN[face] @ rays.columns[:, j])[:, None], out=found)
-        found += rays.rows[1, i, None] * (DOWN[face] @ rays.up)[:, None, None]
+        found, scale = spare[: here.size].reshape(here.shape), spare[-here[0].size :].reshape(here.shape[1:])
+        across, up = (DOWN[face] @ rays.columns[:, j])[:, None], (DOWN[face] @ rays.up)[:, None, None]
+        if not straight:
+            across = np.multiply(rays.rows[0, i, None], across, out=found)
+        np.add(across, rays.rows[1, i, None] * up, out=found)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             np.divide(half, found[0], out=scale)
             found[1:] *= scale
@@ -100,18 +103,23 @@ def near(s: int, rays: Rays) -> frozenset[int]:
 
 @functools.cache
 def compiled() -> ModuleType | None:
-    """The same in compiled code, if Numba is installed and goes with this NumPy."""
+    """The same in compiled code, if Numba is installed and works."""
     try:
         return importlib.import_module("embodied.render.kernels")
     except ImportError:
         return None
+    except Exception as e:
+        warnings.warn(f"pictures at new angles take longer, since Numba does not work here: {e!r}", stacklevel=2)
+        return None
 
 
 def _seen(rays: Rays) -> list[tuple[int, slice, slice]]:
-    """The faces that rays meet, and between which rows and columns, and a pixel beyond."""
+    """The faces that rays meet, and between which rows and columns; on seams also those that rounded rays may meet."""
+    rows, columns, _ = rays
     across, rising, reach = _reach(rays)
-    wide = np.all(reach >= 0, axis=1)
-    high = np.all(rays.rows[0] * across.max(2, keepdims=True) + rays.rows[1] * rising >= 0, axis=1)
+    rounding = -1e-6 * math.hypot(np.abs(rows[0]).max() * math.hypot(*np.abs(columns).max(1)), np.abs(rows[1]).max())
+    wide = np.all(reach >= rounding, axis=1)
+    high = np.all(rows[0] * across.max(2, keepdims=True) + rows[1] * rising >= rounding, axis=1)
     return [(face, _span(high[face]), _span(wide[face])) for face in BY_AXIS if high[face].any() and wide[face].any()]
 
 
@@ -124,13 +132,13 @@ def _reach(rays: Rays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return across, rising, reach + np.maximum(lowest * rising, highest * rising)
 
 
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=4)
 def _spare(size: int, thread: int) -> np.ndarray:
-    """(2, size) float32 of one thread to work in: fresh memory costs more than what is done with it."""
-    return np.empty((2, size), np.float32)
+    """(4 size,) float32 of one thread to work in: fresh memory costs more than what is done with it."""
+    return np.empty(4 * size, np.float32)
 
 
 def _span(where: np.ndarray) -> slice:
-    """From before the first to after the last that is true."""
+    """From the first to the last that is true."""
     found = np.flatnonzero(where)
-    return slice(max(0, int(found[0]) - 1), int(found[-1]) + 2)
+    return slice(int(found[0]), int(found[-1]) + 1)
