@@ -20,8 +20,8 @@ from assets.cache import digest
 ROOT = Path(__file__).resolve().parent.parent
 OURS = ("assets", "embodied", "agents", "viz")
 """Packages whose modules are followed; all others are libraries."""
-INDIFFERENT = frozenset({"tqdm", "joblib", "ray", "OpenGL", "gymnasium", "rerun", "psutil"})
-"""Libraries that decide no byte of any product: they show, spread or hand on what others make."""
+INDIFFERENT = frozenset({"tqdm", "joblib", "ray", "numba", "OpenGL", "gymnasium", "rerun", "psutil"})
+"""Libraries that decide no byte of any product: they show, spread, hasten or hand on what others make."""
 
 
 @dataclass(frozen=True)
