@@ -30,8 +30,8 @@ AXES = np.array([(forward, np.cross(forward, up), up) for forward, up in FACES])
 """(6, 3, 3): forward, right and up of every face, world."""
 INSIDE = (np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]]) @ AXES).reshape(24, 3)
 """(24, 3), four to a face: a ray meets the face where its products with all four are not negative."""
-DOWN = (AXES * [[1], [1], [-1]]).astype(np.float32)
-"""(6, 3, 3): forward, right and down of every face."""
+PICTURE_AXES = (AXES * [[1], [1], [-1]]).astype(np.float32)
+"""(6, 3, 3): forward, right and down of every face as a picture shows it."""
 BY_AXIS = (0, 2, 1, 3, 4, 5)
 """Of faces that a ray meets at their edge, the first here has it."""
 EVERY_FACE = frozenset(range(6))
@@ -68,7 +68,7 @@ def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
     for face, i, j in _seen(rays):
         here = maps[:, i, j]
         found, scale = spare[: here.size].reshape(here.shape), spare[-here[0].size :].reshape(here.shape[1:])
-        across, up = (DOWN[face] @ rays.columns[:, j])[:, None], (DOWN[face] @ rays.up)[:, None, None]
+        across, up = (PICTURE_AXES[face] @ rays.columns[:, j])[:, None], (PICTURE_AXES[face] @ rays.up)[:, None, None]
         if not straight:
             across = np.multiply(rays.rows[0, i, None], across, out=found)
         np.add(across, rays.rows[1, i, None] * up, out=found)
