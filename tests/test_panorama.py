@@ -91,15 +91,15 @@ def some_view(seed: int) -> tuple[float, float, float, int, int]:
 @pytest.fixture(scope="module")
 def kernels():
     pytest.importorskip("numba")
-    assert sampling.compiled() is not None, "Numba is installed, so that it is used"
-    return sampling.compiled()
+    assert sampling.numba_kernels() is not None, "Numba is installed, so that it is used"
+    return sampling.numba_kernels()
 
 
 def drawn_both_ways(grid: PixelGrid, kernels, monkeypatch) -> np.ndarray:
     """(3, h, w): maps that are the same in every bit, compiled and not, as is what they say is shown."""
     maps, seen = np.empty((2, 3, *grid.shape), np.float32), []
     for way, found in zip((kernels, None), maps, strict=True):
-        monkeypatch.setattr(sampling, "compiled", lambda way=way: way)
+        monkeypatch.setattr(sampling, "numba_kernels", lambda way=way: way)
         grid.draw(found)
         seen.append(sampling.shown(grid.s, found[1], found[2]))
     assert np.array_equal(*maps)
@@ -140,14 +140,14 @@ def test_a_broken_numba_is_told_of_and_done_without(monkeypatch):
 
     monkeypatch.setattr(sampling.importlib, "import_module", broken)
     with pytest.warns(UserWarning, match="llvmlite"):
-        assert sampling.compiled.__wrapped__() is None
+        assert sampling.numba_kernels.__wrapped__() is None
 
 
 @pytest.mark.parametrize("way", ["numba", "numpy"])
 @pytest.mark.parametrize("seed", range(30))
 def test_every_pixel_is_looked_up_where_its_ray_meets_the_cube(seed, way, request, monkeypatch):
     kernels = request.getfixturevalue("kernels") if way == "numba" else None
-    monkeypatch.setattr(sampling, "compiled", lambda: kernels)
+    monkeypatch.setattr(sampling, "numba_kernels", lambda: kernels)
     yaw, pitch, vfov, h, w = some_view(seed)
     along, x, y = perspective_grid.__wrapped__(S, yaw, pitch, vfov, h, w).maps()
     rays = pinhole(yaw, pitch, vfov, h, w)

@@ -14,8 +14,8 @@ RAYS = "float32[:, ::1], float32[:, ::1], float32[::1]"
 MAP = "float32[:, ::1]"
 
 
-def compiled(signature: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Compiles a function, and keeps what comes out beside this file or in Numba's cache folder if it can."""
+def compiled_for(signature: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Compiles a function for arguments of these types, and keeps what comes out beside this file or in Numba's cache folder if it can."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         options = {"error_model": "numpy", "nogil": True}
@@ -27,7 +27,7 @@ def compiled(signature: str) -> Callable[[Callable[..., Any]], Callable[..., Any
     return decorate
 
 
-@compiled(f"void({RAYS}, int64, {MAP}, {MAP}, {MAP})")
+@compiled_for(f"void({RAYS}, int64, {MAP}, {MAP}, {MAP})")
 def locate(
     rows: np.ndarray, columns: np.ndarray, up: np.ndarray, s: int, along: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> None:
@@ -49,7 +49,7 @@ def locate(
             y[i, j] = middle + down * scale + face * side
 
 
-@compiled(f"int64[:, ::1]({MAP}, {MAP}, int64, int64)")
+@compiled_for(f"int64[:, ::1]({MAP}, {MAP}, int64, int64)")
 def shown(x: np.ndarray, y: np.ndarray, side: int, step: int) -> np.ndarray:
     """(6, 4): first and last row and column of what `sampling.shown` finds of each face; -1 where it shows none."""
     found = np.full((6, 4), -1)

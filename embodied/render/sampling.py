@@ -59,7 +59,7 @@ def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
       maps: (3, h, w) float32, each contiguous: how far the ray goes along the axis of the face, and x and y on the
         faces.
     """
-    if (kernels := compiled()) is not None:
+    if (kernels := numba_kernels()) is not None:
         kernels.locate(*rays, s, *maps)
         return
     half, middle, side = np.float32(s / 2), np.float32((s + 1) / 2), np.float32(s + 2)
@@ -84,7 +84,7 @@ def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
 
 def shown(s: int, x: np.ndarray, y: np.ndarray) -> list[tuple[slice, slice]]:
     """About which rows and columns of the faces a picture shows, of which two maps of `locate` are given."""
-    if (kernels := compiled()) is not None:
+    if (kernels := numba_kernels()) is not None:
         found = kernels.shown(x, y, s + 2, NEXT).tolist()
     else:
         across, down = x[::NEXT, ::NEXT].astype(int), y[::NEXT, ::NEXT].astype(int)
@@ -102,8 +102,8 @@ def near(s: int, rays: Rays) -> frozenset[int]:
 
 
 @functools.cache
-def compiled() -> ModuleType | None:
-    """The same in compiled code, if Numba is installed and works."""
+def numba_kernels() -> ModuleType | None:
+    """embodied.render.kernels, which has `locate` and `shown` in compiled code, if Numba is installed and works."""
     try:
         return importlib.import_module("embodied.render.kernels")
     except ImportError:
