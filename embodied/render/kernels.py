@@ -15,7 +15,7 @@ MAP = "float32[:, ::1]"
 
 
 def compiled_for(signature: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Compiles a function for arguments of these types, and keeps what comes out beside this file or in Numba's cache folder if it can."""
+    """Compiles a function for such arguments; what comes out is kept beside this file or in Numba's cache folder."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         options = {"error_model": "numpy", "nogil": True}
