@@ -4,6 +4,10 @@ PYTHON ?=
 OUT ?= out/demo
 SEED ?=
 
+# one package in one folder, as a wheel installs it, for tools that read sources
+LINKED = rm -rf build/linked; mkdir -p build/linked/embodied; ln -s $(CURDIR)/embodied/* $(CURDIR)/agents $(CURDIR)/assets \
+  $(CURDIR)/viz build/linked/embodied/
+
 help:
 	@echo 'make demo    seed -> furnished house -> panoramas -> an agent finds something -> Rerun recording, in $(OUT)'
 	@echo 'make test    the whole test suite'
@@ -27,13 +31,16 @@ test: setup
 lint: setup
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
-	@mkdir -p build; .venv/bin/lint-imports --no-cache > build/imports.log 2>&1 || { cat build/imports.log; false; }
+	@$(LINKED)
+	@(cd build/linked && ../../.venv/bin/lint-imports --config ../../pyproject.toml --no-cache) > build/imports.log 2>&1 \
+	  || { cat build/imports.log; false; }
 	@.venv/bin/mypy
 
 quick: setup
 	@OMP_NUM_THREADS=1 .venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist worksteal
 
 docs: setup
+	@$(LINKED)
 	@.venv/bin/python docs/build_results.py
 	@.venv/bin/python docs/build_reference.py
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict -q

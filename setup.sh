@@ -61,7 +61,7 @@ if ! [ -x .venv/bin/python ]; then
     else die "cannot create a virtual environment; install the package python3-venv"; fi; }
 fi
 
-wanted=$(cat pyproject.toml constraints.txt | sha256sum | cut -c 1-64)
+wanted=$(cat pyproject.toml setup.py constraints.txt | sha256sum | cut -c 1-64)
 if [ "$(cat .venv/.ready 2>/dev/null)" != "$wanted" ]; then
   say "installing Python packages (a few minutes the first time)"
   index=()

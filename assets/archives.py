@@ -24,7 +24,7 @@ def open_arrays(file: Path | BinaryIO, most: int = MOST) -> Iterator[NpzFile]:
 
     Raises:
       ValueError: its directory says that it unpacks to over `most` bytes, or it is no such archive.
-      OSError, or another of assets.cache.DAMAGED: it cannot be read.
+      OSError, or another of embodied.assets.cache.DAMAGED: it cannot be read.
     """
     archive = np.load(file, allow_pickle=False)
     if not isinstance(archive, NpzFile):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from assets.cache import write_bytes
-from assets.catalogue import Catalogue
-from assets.records import Asset
-from assets.rows import DATA, read_json
+from embodied.assets.cache import write_bytes
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.records import Asset
+from embodied.assets.rows import DATA, read_json
 
 LICENCES = {
     "CC0-1.0": "https://creativecommons.org/publicdomain/zero/1.0/",

@@ -16,17 +16,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
+from embodied.assets import materials
+from embodied.assets.built import BASICS, MAKERS
+from embodied.assets.cache import default_cache
+from embodied.assets.importing.importer import import_model, scaled
+from embodied.assets.importing.own import OwnModel, import_own, read_own, source_digest
+from embodied.assets.importing.packs import find_packs, pack_of
+from embodied.assets.importing.sh3f import open_pack
+from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
+from embodied.assets.rows import DATA, CatalogueError, check_classes, read_json, read_models
 from tqdm import tqdm
-
-from assets import materials
-from assets.built import BASICS, MAKERS
-from assets.cache import default_cache
-from assets.importing.importer import import_model, scaled
-from assets.importing.own import OwnModel, import_own, read_own, source_digest
-from assets.importing.packs import find_packs, pack_of
-from assets.importing.sh3f import open_pack
-from assets.records import Asset, Finish, ImportRecipe, MeshPart
-from assets.rows import DATA, CatalogueError, check_classes, read_json, read_models
 
 __all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
 

@@ -15,11 +15,13 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from assets.cache import digest
+from embodied.assets.cache import digest
 
-ROOT = Path(__file__).resolve().parent.parent
-OURS = ("assets", "embodied", "agents", "viz")
-"""Packages whose modules are followed; all others are libraries."""
+OURS = "embodied"
+"""The package whose modules are followed; all others are libraries."""
+ROOT = Path(str(sys.modules[OURS].__file__)).resolve().parent.parent
+BESIDE = ("agents", "assets", "viz")
+"""Parts of it that lie beside its folder in a clone, and inside it where a wheel installed them."""
 INDIFFERENT = frozenset({"tqdm", "joblib", "ray", "numba", "OpenGL", "gymnasium", "rerun", "psutil"})
 """Libraries that decide no byte of any product: they show, spread, hasten or hand on what others make."""
 
@@ -39,7 +41,7 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
 
     Args:
       makers: dotted names of modules.
-      root: the folder that holds our packages.
+      root: the folder that holds our package.
       without: modules and libraries that are left out with all that they alone import: those that decide nothing about
         the product, and those of which the product's key holds what they made.
 
@@ -48,7 +50,7 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
     """
     found: dict[str, Path] = {}
     libraries: set[str] = set()
-    known = {*OURS, *sys.stdlib_module_names, *without, *INDIFFERENT}
+    known = {OURS, *sys.stdlib_module_names, *without, *INDIFFERENT}
     waiting = list(makers)
     for name in makers:
         if _file_of(name, root) is None:
@@ -60,8 +62,8 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
             continue
         found[name] = path
         names = _read(path.read_bytes(), name, path.name == "__init__.py").imports
-        ours = [n for n in names if n.split(".")[0] in OURS]
-        waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if "." in n]  # packages run before their modules
+        ours = [n for n in names if n.split(".")[0] == OURS]
+        waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if n.count(".") > 1]  # run before their modules
         libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in known)
     return Closure(dict(sorted(found.items())), tuple(sorted(libraries)))
 
@@ -92,17 +94,18 @@ def code_digest(*makers: str, root: Path = ROOT, without: tuple[str, ...] = ()) 
     Data files are those in a folder `data` beside a module, and tables (.toml) beside a module that names them.
 
     Args:
-      without: as for `closure`; 'assets.data' leaves out the data files beside the modules of `assets`.
+      without: as for `closure`; 'embodied.assets.data' leaves out the data files beside the modules of that package.
     """
     whole = closure(*makers, root=root, without=without)
     read = {name: _read(path.read_bytes(), name, path.name == "__init__.py") for name, path in whole.modules.items()}
-    folders = {path.parent / "data" for path in whole.modules.values()}
-    named = [f for f in folders if ".".join(f.relative_to(root).parts) not in without]
-    data = {f for folder in named for f in folder.glob("*") if f.is_file()}
-    data |= {f for name, path in whole.modules.items() for t in read[name].tables if (f := path.with_name(t)).is_file()}
+    packages = {_package_of(name, path): path.parent for name, path in whole.modules.items()}
+    folders = {f"{package}.data": folder / "data" for package, folder in packages.items()}
+    data = {f"{n}/{f.name}": f for n, folder in folders.items() if n not in without for f in folder.glob("*")}
+    for name, path in whole.modules.items():
+        data |= {f"{_package_of(name, path)}/{table}": path.with_name(table) for table in read[name].tables}
     return digest(
         {name: module.digest for name, module in read.items()},
-        {f.relative_to(root).as_posix(): digest(f) for f in sorted(data)},
+        {name: digest(f) for name, f in sorted(data.items()) if f.is_file()},
         {name: _version(name) for name in whole.libraries},
     )[:16]
 
@@ -132,11 +135,20 @@ def _last_name(node: ast.expr) -> str:
 
 
 def _file_of(module: str, root: Path) -> Path | None:
-    path = root.joinpath(*module.split("."))
-    for file in (path / "__init__.py", path.with_suffix(".py")):
-        if module.split(".")[0] in OURS and file.is_file():
-            return file
+    top, *parts = module.split(".")
+    if top != OURS:
+        return None
+    homes = (root / OURS, root) if parts and parts[0] in BESIDE else (root / OURS,)
+    for path in (home.joinpath(*parts) for home in homes):
+        for file in (path / "__init__.py", path.with_suffix(".py")):
+            if file.is_file():
+                return file
     return None
+
+
+def _package_of(module: str, path: Path) -> str:
+    """The dotted name of the package that a module with this file is in, or is."""
+    return module if path.name == "__init__.py" else module.rpartition(".")[0]
 
 
 def _absolute(node: ast.ImportFrom, module: str, package: bool) -> str:

@@ -8,9 +8,9 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
-from assets import json_file
-from assets.json_file import RecordError
-from assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, SupportSurface
+from embodied.assets import json_file
+from embodied.assets.json_file import RecordError
+from embodied.assets.records import ROOM_KINDS, SUPPORTS, Asset, ImportRecipe, SupportSurface
 
 Row = dict[str, Any]
 """One JSON object of a table."""

@@ -41,8 +41,8 @@ from typing import TYPE_CHECKING
 from embodied.gym.registration import register_with_gymnasium
 
 if TYPE_CHECKING:
-    from assets.cache import default_cache
-    from assets.catalogue import Catalogue, load_catalogue
+    from embodied.assets.cache import default_cache
+    from embodied.assets.catalogue import Catalogue, load_catalogue
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
     from embodied.datasets.store import Dataset
     from embodied.evaluation.evaluate import agent as baseline
@@ -67,8 +67,8 @@ __version__: str
 """The version of the installed distribution."""
 
 _HOMES = {
-    "assets.cache": ("default_cache",),
-    "assets.catalogue": ("Catalogue", "load_catalogue"),
+    "embodied.assets.cache": ("default_cache",),
+    "embodied.assets.catalogue": ("Catalogue", "load_catalogue"),
     "embodied.datasets.build": ("DatasetConfig", "build_dataset", "draw_panoramas"),
     "embodied.datasets.store": ("Dataset",),
     "embodied.evaluation.evaluate": ("evaluate",),

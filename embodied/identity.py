@@ -11,8 +11,8 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from assets.cache import digest, write_json
-from assets.closure import code_digest
+from embodied.assets.cache import digest, write_json
+from embodied.assets.closure import code_digest
 from embodied.records import RecordError, read_json, to_json
 
 Identity = Mapping[str, Any]

@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from assets.cache import sweep
+from embodied.assets.cache import sweep
 from embodied.errors import UnableError
 
 LOCK = ".embodied.lock"

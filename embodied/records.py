@@ -1,4 +1,4 @@
-"""Records as JSON: tasks, routes, steps, episodes, settings; they are read by assets.json_file.
+"""Records as JSON: tasks, routes, steps, episodes, settings; they are read by embodied.assets.json_file.
 
 Any frozen dataclass, enum, tuple, mapping or small array can be written; where a field may hold
 several records, the object carries its class name under 'is'.
@@ -18,8 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.cache import write_bytes
-from assets.json_file import (
+from embodied import interface
+from embodied.assets.cache import write_bytes
+from embodied.assets.json_file import (
     RULES,
     RecordError,
     T,
@@ -31,7 +32,6 @@ from assets.json_file import (
     read_json,
     shown,
 )
-from embodied import interface
 from embodied.distribution import DISTRIBUTION
 
 WIDEST = 100.0

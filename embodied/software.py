@@ -20,7 +20,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from assets.cache import atomic_path
+from embodied.assets.cache import atomic_path
 
 ATOMIC = "libatomic.so.1"
 FOLDER = "lavavu_osmesa.libs"

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from tqdm import tqdm
 
-from assets.cache import default_cache, digest
-from assets.catalogue import Catalogue, load_catalogue
-from assets.closure import code_digest
 from embodied import gl
+from embodied.assets.cache import default_cache, digest
+from embodied.assets.catalogue import Catalogue, load_catalogue
+from embodied.assets.closure import code_digest
 from embodied.house.house import House
 from embodied.house.validation import load_house
 from embodied.interface import Sighting
@@ -393,7 +393,7 @@ def gloss_of(bake: Bake, *, detail: bool = True) -> Gloss:
 
 def makers(pictures: PictureSettings) -> tuple[str, ...]:
     """Modules that draw and keep such pictures; cached pictures made by other code than theirs are not used."""
-    modules = ["assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
+    modules = ["embodied.assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
     if pictures.lit:
         modules.append("embodied.light.baking.house")
     if pictures.gloss:

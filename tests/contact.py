@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from assets.records import MeshPart, SupportSurface
+from embodied.assets.records import MeshPart, SupportSurface
 
 
 def columns(parts: Sequence[MeshPart], xs: np.ndarray, ys: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -85,9 +85,9 @@ def paint(data, pictures, names=None):
 
 def noise_features(data):
     """Features of nothing for all houses of a data set, as made by an untrained encoder, which is returned."""
-    from agents.vision.drawn import pictures_of
-    from agents.vision.encoder import random_encoder
-    from agents.vision.features import feature_path, save_features
+    from embodied.agents.vision.drawn import pictures_of
+    from embodied.agents.vision.encoder import random_encoder
+    from embodied.agents.vision.features import feature_path, save_features
 
     encoder = random_encoder(seed=0)
     for name in dict.fromkeys(n for split in data.splits for n in data.names(split)):

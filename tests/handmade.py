@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from embodied.assets.records import Asset, Finish, MeshPart, SupportSurface
 
-from assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
 from embodied.scene.house_meshes import house_parts
@@ -47,7 +47,7 @@ def _asset(key: str, object_class: str, size, support: str = "floor", surfaces=(
 
 @dataclass(frozen=True, eq=False)
 class HandCatalogue:
-    """Quacks like assets.catalogue.Catalogue as far as a scene needs it."""
+    """Quacks like embodied.assets.catalogue.Catalogue as far as a scene needs it."""
 
     assets: Mapping[str, Asset] = field(
         default_factory=lambda: {

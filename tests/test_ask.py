@@ -11,14 +11,14 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
+from embodied.agents.ask.config import AskerConfig, AskEvaluation
+from embodied.agents.ask.foresight import CHOICES, Foresight
+from embodied.agents.ask.learned import LearnedAsker, facts, fit
+from embodied.agents.ask.study import AskStudy
+from embodied.agents.studies.engine import run_study
 from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
-from agents.ask.config import AskerConfig, AskEvaluation
-from agents.ask.foresight import CHOICES, Foresight
-from agents.ask.learned import LearnedAsker, facts, fit
-from agents.ask.study import AskStudy
-from agents.studies.engine import run_study
 from embodied.assistants.ask import in_view, understood
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
@@ -326,7 +326,7 @@ def test_what_it_knows_tells_a_yes_from_a_no(world, tasks, make_env):
 
 
 def test_a_study_trains_by_dagger_judges_and_draws(world, tasks, make_env, tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.ask.study.houses", lambda *_: ({"grid": world}, make_env, look))
+    monkeypatch.setattr("embodied.agents.ask.study.houses", lambda *_: ({"grid": world}, make_env, look))
     config = dataclasses.replace(LITTLE, houses=1, tasks=2, rounds=1, round_tasks=2)
     sizes = AskEvaluation(test_houses=1, test_tasks=3, oracle_tasks=2, model_tasks=2)
     model = lambda places: Asker(RULES["always route"])

@@ -10,17 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact import contact
+from embodied.assets.attribution import attribution
+from embodied.assets.built import MAKERS
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.importing.importer import finish_parts, read_obj
+from embodied.assets.importing.obj import MeshError, parse_obj
+from embodied.assets.importing.packs import find_packs
+from embodied.assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
+from embodied.assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, SupportSurface, bounds
+from embodied.assets.rows import DATA, CatalogueError
 from handmade_models import CUBE, write_own, write_pack
-
-from assets.attribution import attribution
-from assets.built import MAKERS
-from assets.catalogue import load_catalogue
-from assets.importing.importer import finish_parts, read_obj
-from assets.importing.obj import MeshError, parse_obj
-from assets.importing.packs import find_packs
-from assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
-from assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, SupportSurface, bounds
-from assets.rows import DATA, CatalogueError
 
 SOME = (
     "scopia/bed1",

@@ -16,17 +16,17 @@ import zipfile
 import numpy as np
 import pytest
 from conftest import two_rooms
+from embodied.agents.bandit.config import BanditConfig
+from embodied.agents.hanna.training_config import TrainingConfig
+from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.vision.config import VisionConfig
+from embodied.assets.cache import atomic_path
+from embodied.assets.catalogue import CatalogueError, load_catalogue
+from embodied.assets.importing.sh3f import CATALOGUE, PackError, open_pack
+from embodied.assets.materials import finish
 from tqdm import tqdm
 
 import embodied
-from agents.bandit.config import BanditConfig
-from agents.hanna.training_config import TrainingConfig
-from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.vision.config import VisionConfig
-from assets.cache import atomic_path
-from assets.catalogue import CatalogueError, load_catalogue
-from assets.importing.sh3f import CATALOGUE, PackError, open_pack
-from assets.materials import finish
 from embodied import cli
 from embodied.cli.options import field_docs
 from embodied.datasets.build import for_each_unit
@@ -312,7 +312,7 @@ def test_viewers_that_are_not_there_are_named_before_any_work(capsys, tmp_path, 
     monkeypatch.chdir(tmp_path)
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("viz.sinks.PORT", 1)  # nobody listens there
+    monkeypatch.setattr("embodied.viz.sinks.PORT", 1)  # nobody listens there
     assert "no viewer listens at" in said(capsys, "demo", "--connect", "rerun+http://127.0.0.1:1/proxy")
     assert "URL of a running viewer" in said(capsys, "demo", "--connect", "http://127.0.0.1:1")
     assert "use --serve and a browser" in said(capsys, "rollout", "--spawn")

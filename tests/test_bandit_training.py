@@ -10,21 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from embodied.agents.bandit import corpus, libreoffice
+from embodied.agents.bandit.config import BanditConfig
+from embodied.agents.bandit.corpus import CorpusError, Pair, Sizes
+from embodied.agents.bandit.network import REMEDY, BanditAbout, Critic, EncoderDecoder, Translator, begin, load_network
+from embodied.agents.bandit.ratings import Rater
+from embodied.agents.bandit.study import BanditStudy
+from embodied.agents.bandit.training import bandit, material, pretrain, teach_critic
+from embodied.agents.bandit.translate import batches, decode, greedy, padded, perplexity
+from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint
+from embodied.agents.common.choosing import sampled_choice
+from embodied.agents.common.session import Session
+from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
+from embodied.agents.common.weights import load_weights
+from embodied.agents.studies.engine import run_study
 
-from agents.bandit import corpus, libreoffice
-from agents.bandit.config import BanditConfig
-from agents.bandit.corpus import CorpusError, Pair, Sizes
-from agents.bandit.network import REMEDY, BanditAbout, Critic, EncoderDecoder, Translator, begin, load_network
-from agents.bandit.ratings import Rater
-from agents.bandit.study import BanditStudy
-from agents.bandit.training import bandit, material, pretrain, teach_critic
-from agents.bandit.translate import batches, decode, greedy, padded, perplexity
-from agents.common.checkpoint import CheckpointError, read_checkpoint
-from agents.common.choosing import sampled_choice
-from agents.common.session import Session
-from agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
-from agents.common.weights import load_weights
-from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.identity import read_finished

@@ -12,14 +12,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-
-from assets.built import MAKERS, soft, storage, tableware
-from assets.built.primitives import ball, bar, box, cylinder, extruded, fitted, flat, lathe, part, pillow, sheet, tube
-from assets.built.table import BUILDS, read_makers, remade
-from assets.materials import MATERIALS
-from assets.materials.registry import read_materials
-from assets.records import ROOM_KINDS, SUPPORTS, Finish
-from assets.rows import CatalogueError, read_models
+from embodied.assets.built import MAKERS, soft, storage, tableware
+from embodied.assets.built.primitives import (
+    ball,
+    bar,
+    box,
+    cylinder,
+    extruded,
+    fitted,
+    flat,
+    lathe,
+    part,
+    pillow,
+    sheet,
+    tube,
+)
+from embodied.assets.built.table import BUILDS, read_makers, remade
+from embodied.assets.materials import MATERIALS
+from embodied.assets.materials.registry import read_materials
+from embodied.assets.records import ROOM_KINDS, SUPPORTS, Finish
+from embodied.assets.rows import CatalogueError, read_models
 
 
 @functools.cache
@@ -179,8 +191,8 @@ def test_params_override_the_look_and_the_seed_changes_only_the_details():
 
 DIGEST = """
 import hashlib, numpy as np
-from assets.built import MAKERS, soft, storage, tableware
-from assets.records import Finish
+from embodied.assets.built import MAKERS, soft, storage, tableware
+from embodied.assets.records import Finish
 h = hashlib.sha256()
 for key in ("built/curtain_linen_0", "built/book_row_2", "built/coat_hooks_0", "built/potted_plant_broad_grey"):
     for p in MAKERS[key].make(MAKERS[key].asset.size, (), lambda k: Finish(tile=0.5)):

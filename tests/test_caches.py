@@ -9,8 +9,8 @@ import sys
 import time
 
 import pytest
+from embodied.assets import cache as caches
 
-import assets.cache
 from embodied.cli import main
 
 
@@ -19,11 +19,11 @@ def test_a_shared_cache_is_read_and_never_written(tmp_path, monkeypatch):
     (shared / "light" / "house").mkdir(parents=True)
     (shared / "light" / "house" / "page.png").write_bytes(b"shared")
     monkeypatch.setenv("EMBODIED_CACHE", f"{mine}{os.pathsep}{shared}")
-    assert assets.cache.default_cache() == mine
+    assert caches.default_cache() == mine
     page = mine / "light" / "house" / "page.png"
     assert page.read_bytes() == b"shared"
-    assets.cache.write_bytes(page, b"mine")
-    assets.cache.default_cache()
+    caches.write_bytes(page, b"mine")
+    caches.default_cache()
     assert page.read_bytes() == b"mine" and (shared / "light" / "house" / "page.png").read_bytes() == b"shared"
 
 
@@ -53,7 +53,7 @@ def test_shared_caches_that_lead_back_or_are_not_there_do_no_harm(tmp_path, monk
     (shared / "light" / "back").symlink_to(shared)
     monkeypatch.setenv("EMBODIED_CACHE", os.pathsep.join(map(str, (mine, tmp_path / "nowhere", shared))))
     for _ in range(2):
-        assert assets.cache.default_cache() == mine
+        assert caches.default_cache() == mine
         assert [p.relative_to(mine).as_posix() for p in sorted(mine.rglob("*"))] == ["light", "light/a.npz"]
     assert f"EMBODIED_CACHE names {tmp_path / 'nowhere'}, which is left out: " in caplog.text
 
@@ -68,7 +68,7 @@ def filled(tmp_path, shared_cache):
     folder = tmp_path / "cache"
     for name in ("assets", "collision", "landscapes", "materials"):
         (shared_cache / name).mkdir(parents=True, exist_ok=True)
-        assets.cache.link(shared_cache / name, folder / name)
+        caches.link(shared_cache / name, folder / name)
     assert main([*ORDER, "--out", str(tmp_path / "first"), "--cache", str(folder)]) == 0
     (tmp_path / "empty").mkdir()
     folders = [tmp_path / "empty", folder, *(p for p in folder.rglob("*") if p.is_dir())]

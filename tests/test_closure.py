@@ -6,11 +6,11 @@ import re
 import shutil
 from pathlib import Path
 
+import embodied.assets.closure as closure_module
 import pytest
+from embodied.assets.closure import ROOT, closure, code_digest
+from embodied.assets.importing import importer
 
-import assets.closure
-from assets.closure import ROOT, closure, code_digest
-from assets.importing import importer
 from embodied.datasets.build import program
 from embodied.light import settings
 from embodied.light.pages import colours, unwrap
@@ -98,7 +98,7 @@ def test_a_table_that_a_docstring_mentions_is_in_no_key(tmp_path):
     ],
 )
 def test_what_a_picture_shows_is_in_its_key(tree, file, old, new):
-    """The house's record, and what is built by name inside a function (assets.built), count."""
+    """The house's record, and what is built by name inside a function (embodied.assets.built), count."""
     unlit = makers(PictureSettings())
     before = key(tree, *unlit)
     edit(tree / file, old, new)
@@ -171,16 +171,16 @@ def test_versions_of_libraries_that_decide_bakes_are_in_their_key(monkeypatch):
     libraries = closure("embodied.light.baking.house", without=settings.APART).libraries
     assert {"drjit", "mitsuba", "numpy", "xatlas", "cv2"} <= set(libraries) and "tqdm" not in libraries
     before = key(ROOT, "embodied.light.baking.house", without=settings.APART)
-    monkeypatch.setattr(assets.closure, "_version", lambda name: "another" if name == "mitsuba" else "")
+    monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == "mitsuba" else "")
     assert key(ROOT, "embodied.light.baking.house", without=settings.APART) != before
     code_digest.cache_clear()
 
 
 def test_data_beside_the_code_is_in_the_key(tree):
-    before = key(tree, "assets.catalogue")
+    before = key(tree, "embodied.assets.catalogue")
     data = next(p for p in sorted((tree / "assets/data").iterdir()) if p.suffix == ".json")
     data.write_text(data.read_text() + "\n")
-    assert key(tree, "assets.catalogue") != before
+    assert key(tree, "embodied.assets.catalogue") != before
 
 
 def test_pictures_depend_on_what_draws_them():
@@ -212,7 +212,7 @@ def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):
 def test_versions_of_libraries_are_in_the_key(monkeypatch):
     assert "mujoco" in closure(*makers(PictureSettings())).libraries
     before = key(ROOT, *makers(PictureSettings()))
-    monkeypatch.setattr(assets.closure, "_version", lambda name: "another" if name == "mujoco" else "")
+    monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == "mujoco" else "")
     assert key(ROOT, *makers(PictureSettings())) != before
     code_digest.cache_clear()
 
@@ -221,13 +221,13 @@ def test_an_optional_package_that_comes_or_goes_leaves_data_sets_as_they_are(mon
     """What the project needs decides; what is installed besides does not."""
     needed = re.findall(r'^ +"([\w-]+)', re.search(r"\ndependencies = \[(.*?)\n\]", PROJECT, re.S)[1], re.M)
     code_digest.cache_clear()
-    before, version = program(), assets.closure._version
-    names = {d.lower().replace("_", "-"): tops for tops, ds in assets.closure._distributions().items() for d in ds}
+    before, version = program(), closure_module._version
+    names = {d.lower().replace("_", "-"): tops for tops, ds in closure_module._distributions().items() for d in ds}
     kept = {names.get(n.lower(), n) for n in needed}
-    monkeypatch.setattr(assets.closure, "_version", lambda n: version(n) if n in kept else "another")
+    monkeypatch.setattr(closure_module, "_version", lambda n: version(n) if n in kept else "another")
     code_digest.cache_clear()
     assert program() == before
-    monkeypatch.setattr(assets.closure, "_version", lambda n: "another" if n == "shapely" else version(n))
+    monkeypatch.setattr(closure_module, "_version", lambda n: "another" if n == "shapely" else version(n))
     code_digest.cache_clear()
     assert program() != before
     code_digest.cache_clear()

@@ -11,10 +11,10 @@ import gymnasium
 import numpy as np
 import pytest
 from conftest import two_rooms
+from embodied.assets.json_file import RecordError
 from gymnasium.utils.env_checker import check_env
 from handmade import HandCatalogue, furnished
 
-from assets.json_file import RecordError
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.habitat import (
     from_habitat,
@@ -150,7 +150,7 @@ def test_running_out_of_actions_truncates_and_stop_terminates(course):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 4])
 def test_an_expert_arrives_in_generated_houses_whatever_its_turns(seed, shared_cache):
-    from assets.catalogue import load_catalogue
+    from embodied.assets.catalogue import load_catalogue
 
     house, graph = make_dataset_house(seed, f"flat_{seed}", HouseConfig(area=(70.0, 110.0)), load_catalogue())
     place = type("Place", (), {"house": house, "graph": graph, "name": house.name})()

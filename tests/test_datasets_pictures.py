@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from embodied.agents.vision import drawn, occasions
+from embodied.agents.vision import run as vision
+from embodied.agents.vision.config import PLAIN, RENDER_PRESETS
+from embodied.agents.vision.encoder import random_encoder
+from embodied.agents.vision.features import encode_panoramas, feature_path, load_features
+from embodied.agents.vision.occasions import OCCASIONS, shown_path
+from embodied.agents.vision.resnet import ARCHITECTURES
 from hand_data import build, small_house
 from handmade import HandCatalogue
 from test_cluster import FakeRay
 
-from agents.vision import drawn, occasions
-from agents.vision import run as vision
-from agents.vision.config import PLAIN, RENDER_PRESETS
-from agents.vision.encoder import random_encoder
-from agents.vision.features import encode_panoramas, feature_path, load_features
-from agents.vision.occasions import OCCASIONS, shown_path
-from agents.vision.resnet import ARCHITECTURES
 from embodied.cli.dataset import chosen_pictures
 from embodied.datasets import build as building
 from embodied.datasets.store import Dataset

@@ -1,13 +1,13 @@
-"""viz.described: what HARI's assistant spoke of, where it is."""
+"""embodied.viz.described: what HARI's assistant spoke of, where it is."""
 
 import numpy as np
 import pytest
+from embodied.viz.described import label, middle, panorama_pixels
 from hand_worlds import HandWorld, hand_graph, room, thing
 
 from embodied.assistants.descriptions import Describer, spoken_of
 from embodied.house.house import House, Opening, Storey
 from embodied.interface import Feature, Pose
-from viz.described import label, middle, panorama_pixels
 
 
 @pytest.fixture

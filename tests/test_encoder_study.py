@@ -6,18 +6,18 @@ import argparse
 import dataclasses
 
 import pytest
+from embodied.agents.common.weights import origin_of, weights_digest
+from embodied.agents.studies.engine import run_study
+from embodied.agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing, lit_name
+from embodied.agents.vision.detector import Detector, DetectorNetwork
+from embodied.agents.vision.drawn import StripSource
+from embodied.agents.vision.encoder import load_encoder, random_encoder, save_encoder
+from embodied.agents.vision.resnet import ARCHITECTURES
+from embodied.agents.vision.run import detector_for
+from embodied.agents.vision.study import EncoderStudy
 from hand_data import build, small_house
 from hand_pixels import coloured_strips, world_in
 
-from agents.common.weights import origin_of, weights_digest
-from agents.studies.engine import run_study
-from agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing, lit_name
-from agents.vision.detector import Detector, DetectorNetwork
-from agents.vision.drawn import StripSource
-from agents.vision.encoder import load_encoder, random_encoder, save_encoder
-from agents.vision.resnet import ARCHITECTURES
-from agents.vision.run import detector_for
-from agents.vision.study import EncoderStudy
 from embodied.cli.learning import by_name
 from embodied.cli.options import add_options, read_options
 from embodied.cli.study import VisionOptions
@@ -115,7 +115,7 @@ def test_a_detector_is_judged_by_what_it_finds(setting, tmp_path):
 
 
 def test_of_more_houses_than_the_budget_some_viewpoints_are_drawn(data, tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.vision.drawn.drawn_world", lambda *_: world_in(tmp_path))
+    monkeypatch.setattr("embodied.agents.vision.drawn.drawn_world", lambda *_: world_in(tmp_path))
     source = StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "unlit", share=0.5)
     name = data.names("train")[0]
     (half,) = source.strips([name], note=lambda line: None)

@@ -17,16 +17,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint, restore, write_checkpoint
+from embodied.agents.common.session import Session
+from embodied.agents.common.tensor_file import save_tensors
+from embodied.assets.cache import DRAFTS
+from embodied.assets.catalogue import CatalogueError, load_catalogue
+from embodied.assets.closure import ROOT
+from embodied.viz import sinks
 from hand_data import build, content, paint, small_house
 from hand_worlds import grid_world
 from test_locks import own_files
 
-from agents.common.checkpoint import CheckpointError, read_checkpoint, restore, write_checkpoint
-from agents.common.session import Session
-from agents.common.tensor_file import save_tensors
-from assets.cache import DRAFTS
-from assets.catalogue import CatalogueError, load_catalogue
-from assets.closure import ROOT
 from embodied import cli
 from embodied.bench.timing import Measure, Report
 from embodied.cli import doctor
@@ -44,7 +45,6 @@ from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
-from viz import sinks
 
 
 @pytest.fixture(scope="module")

@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.find.config import FinderConfig
+from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
+from embodied.agents.find.policy import STOP, WORDS, Search, Watched, costs_of
+from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
+from embodied.agents.find.way_map import WayMap
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.lessons import Split
 from hand_worlds import grid_world, line_world
 
-from agents.common.vocabulary import build_vocabulary
-from agents.find.config import FinderConfig
-from agents.find.network import AROUND, READ, Explorer, SeekNetwork
-from agents.find.policy import STOP, WORDS, Search, Watched, costs_of
-from agents.find.run import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
-from agents.find.way_map import WayMap
-from agents.vision.bank import FeatureBank
-from agents.vision.lessons import Split
 from embodied.envs.make import environment_maker
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import shapely
 from conftest import FINISHES, two_rooms
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.records import ROOM_KINDS
 
-from assets.catalogue import load_catalogue
-from assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.config import RETRIES
 from embodied.generate.furnish import furnish
@@ -418,7 +418,7 @@ def test_rooms_of_one_kind_are_furnished_differently():
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_house_in_another_process():
     code = (
-        "from conftest import two_rooms; from assets.catalogue import load_catalogue;"
+        "from conftest import two_rooms; from embodied.assets.catalogue import load_catalogue;"
         "from embodied.generate.furnish import furnish;"
         "print(furnish(two_rooms(), load_catalogue(), seed=3).digest)"
     )

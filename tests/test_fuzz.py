@@ -23,27 +23,29 @@ import rerun as rr
 import rerun.blueprint as rrb
 import torch
 from conftest import two_rooms
+from embodied.agents.bandit.config import BanditConfig
+from embodied.agents.bandit.network import REMEDY, BanditAbout, Translator, load_network, save_network
+from embodied.agents.bandit.training import NumberedCorpus
+from embodied.agents.common.checkpoint import restore
+from embodied.agents.common.session import Session
+from embodied.agents.common.tensor_file import save_tensors
+from embodied.agents.common.vocabulary import END, PAD, UNKNOWN, Vocabulary, build_vocabulary
+from embodied.agents.common.weights import FORMAT, load_weights
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent
+from embodied.agents.hanna.training_config import SCALES
+from embodied.agents.hari import agent as hari
+from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.hari.words import FeatureWords
+from embodied.agents.iliad.nav.stages import config_of
+from embodied.agents.iliad.regex.run import load_student
+from embodied.agents.vision.encoder import random_encoder
+from embodied.agents.vision.features import load_features, save_features
+from embodied.agents.vision.labels import HouseStrips
+from embodied.assets.catalogue import load_catalogue
+from embodied.viz.report import judged
+from embodied.viz.sinks import Sinks, check_recording, open_recording
 from hand_data import built
 
-from agents.bandit.config import BanditConfig
-from agents.bandit.network import REMEDY, BanditAbout, Translator, load_network, save_network
-from agents.bandit.training import NumberedCorpus
-from agents.common.checkpoint import restore
-from agents.common.session import Session
-from agents.common.tensor_file import save_tensors
-from agents.common.vocabulary import END, PAD, UNKNOWN, Vocabulary, build_vocabulary
-from agents.common.weights import FORMAT, load_weights
-from agents.hanna.agent import HannaAbout, HannaAgent
-from agents.hanna.training_config import SCALES
-from agents.hari import agent as hari
-from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.words import FeatureWords
-from agents.iliad.nav.stages import config_of
-from agents.iliad.regex.run import load_student
-from agents.vision.encoder import random_encoder
-from agents.vision.features import load_features, save_features
-from agents.vision.labels import HouseStrips
-from assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.errors import UnableError
 from embodied.evaluation import tables
@@ -58,8 +60,6 @@ from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import MAGIC, TAIL, PanoramaFile, write_panoramas
 from embodied.render.sightings import load_table, save_table, sightings_table
 from embodied.seeds import stream
-from viz.report import judged
-from viz.sinks import Sinks, check_recording, open_recording
 
 pytestmark = pytest.mark.slow
 

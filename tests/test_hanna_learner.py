@@ -17,25 +17,38 @@ import numpy as np
 import pytest
 import torch
 import torch.distributed as dist
+from embodied.agents.common import imitation
+from embodied.agents.common.checkpoint import CheckpointError, restore
+from embodied.agents.common.choosing import choose_at, choose_greedily, choose_sampled
+from embodied.agents.common.imitation import REPORTED, SUMMED
+from embodied.agents.common.playing import play_with_memory
+from embodied.agents.common.session import (
+    DivergedError,
+    Session,
+    scheduled_rate,
+    tasks_of_update,
+    within_standard_error,
+)
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent, take_weights
+from embodied.agents.hanna.asking import RULES, ask_above
+from embodied.agents.hanna.collect import imitation_loss, labelled
+from embodied.agents.hanna.losses import (
+    IGNORE,
+    curiosity,
+    help_loss,
+    navigation_loss,
+    negative_log_likelihood,
+    reason_loss,
+)
+from embodied.agents.hanna.policy import for_training
+from embodied.agents.hanna.run import HannaLearner
+from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.lessons import Split
 from hand_data import metrics_of
 from hand_worlds import grid_world
 
-from agents.common import imitation
-from agents.common.checkpoint import CheckpointError, restore
-from agents.common.choosing import choose_at, choose_greedily, choose_sampled
-from agents.common.imitation import REPORTED, SUMMED
-from agents.common.playing import play_with_memory
-from agents.common.session import DivergedError, Session, scheduled_rate, tasks_of_update, within_standard_error
-from agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
-from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
-from agents.hanna.asking import RULES, ask_above
-from agents.hanna.collect import imitation_loss, labelled
-from agents.hanna.losses import IGNORE, curiosity, help_loss, navigation_loss, negative_log_likelihood, reason_loss
-from agents.hanna.policy import for_training
-from agents.hanna.run import HannaLearner
-from agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
-from agents.vision.bank import FeatureBank
-from agents.vision.lessons import Split
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes

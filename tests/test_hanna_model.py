@@ -8,11 +8,18 @@ import math
 import numpy as np
 import pytest
 import torch
-
-from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, sim_attend, sinusoid
-from agents.hanna.lstm import LstmNetwork
-from agents.hanna.network import HannaNetwork
-from agents.hanna.percept import (
+from embodied.agents.hanna.attention import (
+    DotAttend,
+    FeedForward,
+    IncTime,
+    MultiAttend,
+    SelfAttend,
+    sim_attend,
+    sinusoid,
+)
+from embodied.agents.hanna.lstm import LstmNetwork
+from embodied.agents.hanna.network import HannaNetwork
+from embodied.agents.hanna.percept import (
     DO_NOTHING,
     REQUEST,
     SLOTS,
@@ -23,7 +30,7 @@ from agents.hanna.percept import (
     slot_distribution,
     target_similarity,
 )
-from agents.hanna.training_config import TrainingConfig
+from embodied.agents.hanna.training_config import TrainingConfig
 
 WORDS, FEATURES = 12, 6
 SMALL = TrainingConfig(hidden_size=16, navigation_embedding=8, ask_embedding=4, self_heads=2, text_heads=2, dropout=0.0)

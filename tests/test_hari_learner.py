@@ -9,20 +9,36 @@ import itertools
 import numpy as np
 import pytest
 import torch
-from hand_data import built
-from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
-
-from agents.common.checkpoint import CheckpointError
-from agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
-from agents.common.playing import TaskSet
-from agents.hari import pretraining
-from agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save_agent, save_executor
-from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import IntentionRun, counts_of, train, train_step, values
-from agents.hari.judging import TEST
-from agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
-from agents.hari.policy import DO, DONE, Belief, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
-from agents.hari.pretraining import (
+from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
+from embodied.agents.common.playing import TaskSet
+from embodied.agents.hari import pretraining
+from embodied.agents.hari.agent import (
+    HariAgent,
+    load_agent,
+    load_executor,
+    new_executor,
+    new_heads,
+    save_agent,
+    save_executor,
+)
+from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.hari.intention import IntentionRun, counts_of, train, train_step, values
+from embodied.agents.hari.judging import TEST
+from embodied.agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
+from embodied.agents.hari.policy import (
+    DO,
+    DONE,
+    Belief,
+    Choice,
+    Considered,
+    HariPolicy,
+    Reader,
+    carry,
+    consider,
+    policy_of,
+)
+from embodied.agents.hari.pretraining import (
     PretrainingData,
     _begin,
     _play,
@@ -31,11 +47,14 @@ from agents.hari.pretraining import (
     pretrain,
     pretraining_success,
 )
-from agents.hari.pretraining import train_step as lesson
-from agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
-from agents.hari.study import HariStudy
-from agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
-from agents.studies.engine import run_study
+from embodied.agents.hari.pretraining import train_step as lesson
+from embodied.agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
+from embodied.agents.hari.study import HariStudy
+from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
+from embodied.agents.studies.engine import run_study
+from hand_data import built
+from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
+
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant

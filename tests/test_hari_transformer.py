@@ -1,10 +1,9 @@
-"""agents.hari.transformer: the same network as torch's, over packed rows."""
+"""embodied.agents.hari.transformer: the same network as torch's, over packed rows."""
 
 import pytest
 import torch
+from embodied.agents.hari.transformer import Packing, Transformer, fast_dropout
 from torch import nn
-
-from agents.hari.transformer import Packing, Transformer, fast_dropout
 
 
 @pytest.fixture

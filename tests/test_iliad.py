@@ -8,15 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.session import Session, descend
+from embodied.agents.iliad.config import LearnerConfig, mixing_at
+from embodied.agents.iliad.describing import by_the_program, by_the_text, kept
+from embodied.agents.iliad.learners import (
+    Asked,
+    RunningMean,
+    adel,
+    adel_loss,
+    dagger,
+    mixture,
+    reinforce,
+    reinforce_loss,
+)
+from embodied.agents.iliad.protocol import NOTHING, ExecutionScores
+from embodied.agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from torch import Tensor, nn
 
-from agents.common.checkpoint import CheckpointError
-from agents.common.session import Session, descend
-from agents.iliad.config import LearnerConfig, mixing_at
-from agents.iliad.describing import by_the_program, by_the_text, kept
-from agents.iliad.learners import Asked, RunningMean, adel, adel_loss, dagger, mixture, reinforce, reinforce_loss
-from agents.iliad.protocol import NOTHING, ExecutionScores
-from agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from embodied.seeds import stream
 
 silent = lambda line: None

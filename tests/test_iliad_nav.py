@@ -5,18 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from hand_worlds import grid_world, line_world
-
-from agents.common.choosing import greedy_choice
-from agents.common.vocabulary import build_vocabulary
-from agents.hanna.percept import orientation
-from agents.iliad.config import LearnerConfig
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.network import WalkDescriber
-from agents.iliad.nav.stages import new_follower
-from agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track
-from agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, performance, said, walked
-from agents.iliad.nav.world import (
+from embodied.agents.common.choosing import greedy_choice
+from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.hanna.percept import orientation
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.network import WalkDescriber
+from embodied.agents.iliad.nav.stages import new_follower
+from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track
+from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, performance, said, walked
+from embodied.agents.iliad.nav.world import (
     HORIZON,
     NavMarginal,
     NavWalk,
@@ -27,10 +25,12 @@ from agents.iliad.nav.world import (
     walk_along,
     without_loops,
 )
-from agents.iliad.training import IliadProblem, success_rate, train
-from agents.vision.bank import FeatureBank
-from agents.vln.network import COPIES
-from assets.records import ROOM_KINDS
+from embodied.agents.iliad.training import IliadProblem, success_rate, train
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vln.network import COPIES
+from embodied.assets.records import ROOM_KINDS
+from hand_worlds import grid_world, line_world
+
 from embodied.interface import FindObject, Pose, Route, Task
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task

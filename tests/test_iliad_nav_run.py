@@ -9,20 +9,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.word_vectors import Lexicon
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.run import NavSource, learn, prepare, problem_of
+from embodied.agents.iliad.nav.showing import episode_of, lines_of, tell
+from embodied.agents.iliad.nav.stages import config_of, load_follower, new_follower
+from embodied.agents.iliad.nav.student import NavStudent
+from embodied.agents.iliad.nav.teacher import OtherWords, PeopleNavTeacher
+from embodied.agents.iliad.nav.world import NavWorld, walk_along
+from embodied.agents.iliad.study import IliadStudy, NavStudyWorld
+from embodied.agents.studies.engine import run_study
 from hand_data import built, noise_features, small_house
 
-from agents.common.checkpoint import CheckpointError
-from agents.common.word_vectors import Lexicon
-from agents.iliad.config import LearnerConfig
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.run import NavSource, learn, prepare, problem_of
-from agents.iliad.nav.showing import episode_of, lines_of, tell
-from agents.iliad.nav.stages import config_of, load_follower, new_follower
-from agents.iliad.nav.student import NavStudent
-from agents.iliad.nav.teacher import OtherWords, PeopleNavTeacher
-from agents.iliad.nav.world import NavWorld, walk_along
-from agents.iliad.study import IliadStudy, NavStudyWorld
-from agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.datasets.store import Dataset
 from embodied.interface import Sight, Stop
@@ -64,8 +64,8 @@ def test_houses_to_validate_and_to_test_in_are_nobodys_to_learn_from(grounds):
 
 def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch):
     """Said plainly here: houses made by hand hold nothing that people have words for."""
-    monkeypatch.setattr("agents.common.more_paths.load_catalogue", lambda cache: None)
-    monkeypatch.setattr("agents.common.more_paths.People", lambda novelty: PlainLanguage())
+    monkeypatch.setattr("embodied.agents.common.more_paths.load_catalogue", lambda cache: None)
+    monkeypatch.setattr("embodied.agents.common.more_paths.People", lambda novelty: PlainLanguage())
     monkeypatch.setattr(Dataset, "open_world", lambda self, name, catalogue, cache: self.place(name))
     more = dataclasses.replace(SMALL, more_paths=7)
     found, few = source.data(more).splits, grounds.data.splits
@@ -107,7 +107,7 @@ def test_a_teacher_is_trained_once(source, tmp_path):
 
 @pytest.mark.parametrize(("teacher", "voice"), [("grammar", RouteDescriber), ("people", People)])
 def test_the_grammar_or_people_teach_without_training(source, tmp_path, monkeypatch, teacher, voice):
-    monkeypatch.setattr("agents.iliad.nav.run.seen_places", lambda data, cache: {})
+    monkeypatch.setattr("embodied.agents.iliad.nav.run.seen_places", lambda data, cache: {})
     found = prepare(dataclasses.replace(SMALL, teacher=teacher), source, tmp_path, note=silent).teacher
     assert isinstance(found, PeopleNavTeacher) and isinstance(found.wording.__self__, voice)
     assert not any(tmp_path.iterdir())

@@ -9,18 +9,22 @@ import time
 
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from agents.common.checkpoint import CheckpointError
-from agents.common.choosing import greedy_choice
-from agents.iliad.config import LearnerConfig
-from agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
-from agents.iliad.regex.config import MARGINALS, RegexConfig
-from agents.iliad.regex.data import LEAST_CHANGED, WordTask, known, make_data, read_templates, rules_without_requests
-from agents.iliad.regex.language import PARTS, templates
-from agents.iliad.regex.networks import ChangeDescriber, Speller
-from agents.iliad.regex.rules import (
+from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.choosing import greedy_choice
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.regex.coding import GAP, PAD, changes, characters, request_words, texts
+from embodied.agents.iliad.regex.config import MARGINALS, RegexConfig
+from embodied.agents.iliad.regex.data import (
+    LEAST_CHANGED,
+    WordTask,
+    known,
+    make_data,
+    read_templates,
+    rules_without_requests,
+)
+from embodied.agents.iliad.regex.language import PARTS, templates
+from embodied.agents.iliad.regex.networks import ChangeDescriber, Speller
+from embodied.agents.iliad.regex.rules import (
     ALPHABET,
     LETTERS,
     LONGEST,
@@ -32,15 +36,18 @@ from agents.iliad.regex.rules import (
     outputs,
     random_rule,
 )
-from agents.iliad.regex.run import learn, load_student, prepare
-from agents.iliad.regex.showing import lines_of, tell
-from agents.iliad.regex.stages import new_network
-from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, parse
-from agents.iliad.regex.words import made_up, read_words
-from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written, carried_out, nearness
-from agents.iliad.study import IliadStudy, RegexStudyWorld
-from agents.iliad.training import IliadProblem, train
-from agents.studies.engine import run_study
+from embodied.agents.iliad.regex.run import learn, load_student, prepare
+from embodied.agents.iliad.regex.showing import lines_of, tell
+from embodied.agents.iliad.regex.stages import new_network
+from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher, parse
+from embodied.agents.iliad.regex.words import made_up, read_words
+from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld, Written, carried_out, nearness
+from embodied.agents.iliad.study import IliadStudy, RegexStudyWorld
+from embodied.agents.iliad.training import IliadProblem, train
+from embodied.agents.studies.engine import run_study
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from embodied.cli import main
 from embodied.seeds import stream
 

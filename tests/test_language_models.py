@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from embodied.assets.catalogue import load_catalogue
 from hand_chat import ChatServer, Parrot, first_allowed, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
-from assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import ask_environment_maker, environment_maker, look_of
@@ -38,17 +38,17 @@ from embodied.tasks.find import find_pool, find_task
 
 pytest.importorskip("openai", reason="the optional extra [llm] is not installed")
 
-from agents.language_models.agent import LanguageModelAgent
-from agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
-from agents.language_models.cache import AnswerCache
-from agents.language_models.checking import arrives, understood
-from agents.language_models.client import MOST_BYTES, Client, ServerSettings, misfit, object_schema
-from agents.language_models.judge import ModelJudge
-from agents.language_models.messages import Messages
-from agents.language_models.paraphrase import paraphrased
-from agents.language_models.prompts import read_prompt
-from agents.language_models.telling import Teller
-from agents.language_models.words import SeenNames
+from embodied.agents.language_models.agent import LanguageModelAgent
+from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
+from embodied.agents.language_models.cache import AnswerCache
+from embodied.agents.language_models.checking import arrives, understood
+from embodied.agents.language_models.client import MOST_BYTES, Client, ServerSettings, misfit, object_schema
+from embodied.agents.language_models.judge import ModelJudge
+from embodied.agents.language_models.messages import Messages
+from embodied.agents.language_models.paraphrase import paraphrased
+from embodied.agents.language_models.prompts import read_prompt
+from embodied.agents.language_models.telling import Teller
+from embodied.agents.language_models.words import SeenNames
 
 ONE = object_schema(word={"type": "string", "enum": ["yes", "no"]})
 ASKED = [{"role": "user", "content": "say it"}]

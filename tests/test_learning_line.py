@@ -9,21 +9,21 @@ import json
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
+from embodied.agents.common.weights import origin_of, weights_digest
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent
+from embodied.agents.hanna.evaluation import counted, hanna_policies
+from embodied.agents.hanna.policy import PerfectInterpretation
+from embodied.agents.hanna.run import train_agent, vocabulary_of
+from embodied.agents.hanna.study import HannaStudy
+from embodied.agents.studies.engine import run_study
+from embodied.agents.vision.config import PLAIN
+from embodied.agents.vision.encoder import load_encoder, random_encoder, save_encoder
+from embodied.agents.vision.features import feature_path, save_features
+from embodied.agents.vision.lessons import Lessons
+from embodied.agents.vision.run import encoder_of
 from hand_data import build, metrics_of
 
-from agents.common.shipped import SHIPPED_AGENT, WEIGHTS
-from agents.common.weights import origin_of, weights_digest
-from agents.hanna.agent import HannaAbout, HannaAgent
-from agents.hanna.evaluation import counted, hanna_policies
-from agents.hanna.policy import PerfectInterpretation
-from agents.hanna.run import train_agent, vocabulary_of
-from agents.hanna.study import HannaStudy
-from agents.studies.engine import run_study
-from agents.vision.config import PLAIN
-from agents.vision.encoder import load_encoder, random_encoder, save_encoder
-from agents.vision.features import feature_path, save_features
-from agents.vision.lessons import Lessons
-from agents.vision.run import encoder_of
 from embodied.cli import features, main, options
 from embodied.cli.train import TrainHanna
 from embodied.cli.view import looked_at

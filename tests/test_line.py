@@ -14,11 +14,16 @@ import numpy as np
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
+from embodied.agents.vision import features, recognise
+from embodied.agents.vision.config import PLAIN
+from embodied.assets.cache import digest
+from embodied.assets.catalogue import load_catalogue
+from embodied.viz import recording
+from embodied.viz.blueprint import blueprint_of, sees_title
+from embodied.viz.recording import Pictures, camera_axes, record
+from embodied.viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
+from embodied.viz.video import camera_track, write_video
 
-from agents.vision import features, recognise
-from agents.vision.config import PLAIN
-from assets.cache import digest
-from assets.catalogue import load_catalogue
 from embodied import generate
 from embodied.cli import demo, main
 from embodied.envs.base import HelpEnv
@@ -33,11 +38,6 @@ from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import open_world
-from viz import recording
-from viz.blueprint import blueprint_of, sees_title
-from viz.recording import Pictures, camera_axes, record
-from viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
-from viz.video import camera_track, write_video
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 

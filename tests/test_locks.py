@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 from conftest import two_rooms
+from embodied.assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes, write_files
 from hand_data import built, content
 
-from assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes, write_files
 from embodied import cli
 from embodied.errors import UnableError
 from embodied.locks import LOCK, LockedError, locked
@@ -67,7 +67,7 @@ def killed_draft(folder) -> None:
     code = """
 import os, signal, sys
 from pathlib import Path
-from assets.cache import atomic_path
+from embodied.assets.cache import atomic_path
 with atomic_path(Path(sys.argv[1]) / "weights.safetensors") as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)
@@ -191,7 +191,7 @@ APART = ["unshare", "--user", "--map-root-user", "--pid", "--fork"]
 DRAW = """
 import os, sys, time
 from pathlib import Path
-from assets.cache import atomic_path
+from embodied.assets.cache import atomic_path
 with atomic_path(Path(sys.argv[1]) / "first.json") as temporary:
     temporary.write_text("first")
     print(os.getpid(), flush=True)
@@ -202,7 +202,7 @@ with atomic_path(Path(sys.argv[1]) / "first.json") as temporary:
 WRITE = """
 import sys
 from pathlib import Path
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 write_bytes(Path(sys.argv[1]), b"second")
 """
 

@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from assets.closure import code_digest
-from assets.materials import MATERIALS, fingerprint, finish, make_maps, normal_map, of_role
-from assets.materials.maps import fbm, herringbone, hexagons, noise, planks
-from assets.materials.registry import PAINTERS, painters_of, read_materials
-from assets.materials.wood import SPECIES, boards
-from assets.rows import CatalogueError
+from embodied.assets.closure import code_digest
+from embodied.assets.materials import MATERIALS, fingerprint, finish, make_maps, normal_map, of_role
+from embodied.assets.materials.maps import fbm, herringbone, hexagons, noise, planks
+from embodied.assets.materials.registry import PAINTERS, painters_of, read_materials
+from embodied.assets.materials.wood import SPECIES, boards
+from embodied.assets.rows import CatalogueError
 
 PICTURES = ("art", "rug", "label")
 """Families that are shown once, not repeated."""
@@ -113,7 +112,7 @@ def test_the_maps_on_disk_are_whole_or_made_again(tmp_path):
 @pytest.mark.slow
 def test_another_process_makes_the_same_maps():
     code = (
-        "import hashlib; from assets.materials import make_maps, fingerprint; m = make_maps('linen/3');"
+        "import hashlib; from embodied.assets.materials import make_maps, fingerprint; m = make_maps('linen/3');"
         "print(hashlib.sha256((m.color * 255).round().astype('uint8').tobytes()).hexdigest(), fingerprint('linen/3'))"
     )
     other = subprocess.run(
@@ -237,4 +236,5 @@ def test_painters_run_no_code_that_fingerprints_do_not_know():
     for module in {p.__module__ for p in PAINTERS.values()}:
         tree = ast.parse(Path(sys.modules[module].__file__).read_text())
         names = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and n.module}
-        assert {n for n in names if n.startswith("assets")} <= {"assets.materials.maps", "assets.records"}, module
+        allowed = {"embodied.assets.materials.maps", "embodied.assets.records"}
+        assert {n for n in names if n.startswith("embodied")} <= allowed, module

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import warnings
 
-import assets.importing.packs as packs
-from assets.built import BASICS
-from assets.catalogue import _tell_once, load_catalogue
+import embodied.assets.importing.packs as packs
+from embodied.assets.built import BASICS
+from embodied.assets.catalogue import _tell_once, load_catalogue
+
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.lacking import lacking
 

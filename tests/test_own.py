@@ -16,17 +16,17 @@ import numpy as np
 import pytest
 import trimesh
 from conftest import two_rooms
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.importing import importer
+from embodied.assets.importing.meshing import crease_normals
+from embodied.assets.importing.obj import MAX_CORNERS, MeshError, parse_obj
+from embodied.assets.importing.own import import_own, read_own
+from embodied.assets.importing.sh3f import PackError
+from embodied.assets.records import bounds
+from embodied.assets.rows import DATA, CatalogueError, read_json
 from handmade_models import CUBE, write_own, write_pack
 from PIL import Image
 
-from assets.catalogue import load_catalogue
-from assets.importing import importer
-from assets.importing.meshing import crease_normals
-from assets.importing.obj import MAX_CORNERS, MeshError, parse_obj
-from assets.importing.own import import_own, read_own
-from assets.importing.sh3f import PackError
-from assets.records import bounds
-from assets.rows import DATA, CatalogueError, read_json
 from embodied.house.house import Placement
 from embodied.navigation.graph import graph_of
 from embodied.world import open_world

@@ -7,17 +7,17 @@ import re
 import shutil
 
 import pytest
+from embodied.agents.common.paraphrases import UNHEARD, VARIED, Wordings, paraphrase, varied
+from embodied.agents.common.vocabulary import tokenize
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.data import NavData
+from embodied.agents.iliad.nav.run import NavGrounds, reworded
+from embodied.agents.iliad.nav.world import Trip
+from embodied.agents.studies import wordings as studied
+from embodied.agents.studies.wordings import PARAPHRASED, SPEAKERS, SYNONYMS, WORDING, code_of
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.closure import ROOT, code_digest
 
-from agents.common.paraphrases import UNHEARD, VARIED, Wordings, paraphrase, varied
-from agents.common.vocabulary import tokenize
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.data import NavData
-from agents.iliad.nav.run import NavGrounds, reworded
-from agents.iliad.nav.world import Trip
-from agents.studies import wordings as studied
-from agents.studies.wordings import PARAPHRASED, SPEAKERS, SYNONYMS, WORDING, code_of
-from assets.catalogue import load_catalogue
-from assets.closure import ROOT, code_digest
 from embodied.interface import Pose
 from embodied.language import parse
 from embodied.language.clauses import Enter, Exit, Past, StopIn, Turn

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from assets.importing.importer import FOLDS, RawPart, finish_parts
-from assets.importing.meshing import CREASE, face_normals
-from assets.importing.rounding import COARSE, DEEP, FINE, folded, is_coarse, refined, rounded
-from assets.records import Finish, ImportRecipe
+from embodied.assets.importing.importer import FOLDS, RawPart, finish_parts
+from embodied.assets.importing.meshing import CREASE, face_normals
+from embodied.assets.importing.rounding import COARSE, DEEP, FINE, folded, is_coarse, refined, rounded
+from embodied.assets.records import Finish, ImportRecipe
 
 SIDES, RADIUS, HEIGHT = 12, 0.05, 0.1
 

@@ -6,13 +6,12 @@ import dataclasses
 import math
 
 import pytest
-
-from agents.bandit.config import BanditConfig
-from agents.common.settings import RunSettings, ValidatedRunSettings
-from agents.hanna.training_config import TrainingConfig
-from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.vision.config import VisionConfig
-from agents.vnla.config import VnlaSettings
+from embodied.agents.bandit.config import BanditConfig
+from embodied.agents.common.settings import RunSettings, ValidatedRunSettings
+from embodied.agents.hanna.training_config import TrainingConfig
+from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.vision.config import VisionConfig
+from embodied.agents.vnla.config import VnlaSettings
 
 VALIDATED = (TrainingConfig(), ExecutionConfig(), IntentionConfig(), VnlaSettings())
 RUNS = (*VALIDATED, BanditConfig())

@@ -9,8 +9,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from embodied.assets.importing import packs
 
-from assets.importing import packs
 from embodied import gl, software
 from embodied.cli import doctor
 

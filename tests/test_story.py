@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from embodied.viz.story import Story
 from hand_worlds import line_world
 
 from embodied.assistants.words import described
@@ -20,7 +21,6 @@ from embodied.interface import (
     Task,
     Viewpoint,
 )
-from viz.story import Story
 
 GOAL = FindObject("mug", "hall", ("mug_1",))
 

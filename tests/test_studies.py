@@ -18,11 +18,11 @@ from typing import Any
 
 import pytest
 import torch
+from embodied.agents.common.weights import load_weights, save_weights
+from embodied.agents.studies.engine import check, run_study
+from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from hand_data import built, small_house
 
-from agents.common.weights import load_weights, save_weights
-from agents.studies.engine import check, run_study
-from agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.cli import main
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
@@ -136,7 +136,7 @@ def test_each_run_is_trained_and_judged_once_and_its_numbers_are_right(tmp_path)
 
 
 def test_processor_time_counts_each_run_once(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.studies.engine._processor", lambda home: 3600.0)
+    monkeypatch.setattr("embodied.agents.studies.engine._processor", lambda home: 3600.0)
     found = table(Archer(tmp_path / "log"), tmp_path / "out")  # six runs; two rows show those of 'far'
     assert "Processor time of training: 6.00 hours." in found["notes"]
 
@@ -211,7 +211,7 @@ def test_two_studies_never_write_into_one_folder(tmp_path):
 KILLED = """
 import dataclasses, os, signal, sys
 from pathlib import Path
-import agents.studies.engine as engine
+import embodied.agents.studies.engine as engine
 from test_studies import Archer, table
 
 class Mortal(Archer):

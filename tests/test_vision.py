@@ -13,19 +13,27 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.tensor_file import read_weights, save_tensors
+from embodied.agents.vision import labels, strip
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing, lit_name
+from embodied.agents.vision.encoder import (
+    Encoder,
+    load_encoder,
+    pool_views,
+    random_encoder,
+    save_encoder,
+    strip_map,
+    whitening,
+)
+from embodied.agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
+from embodied.agents.vision.lite import Lite, folded, load_imagenet
+from embodied.agents.vision.probe import LabelledFeatures, ProbeScores, as_numbers, average_precision, place_auc, read
+from embodied.agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
+from embodied.agents.vision.training import batches, photograph_strip, strip_count, train_encoder, turn_strip
+from embodied.assets.cache import write_json
 
-from agents.common.checkpoint import CheckpointError
-from agents.common.tensor_file import read_weights, save_tensors
-from agents.vision import labels, strip
-from agents.vision.bank import FeatureBank
-from agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing, lit_name
-from agents.vision.encoder import Encoder, load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
-from agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
-from agents.vision.lite import Lite, folded, load_imagenet
-from agents.vision.probe import LabelledFeatures, ProbeScores, as_numbers, average_precision, place_auc, read
-from agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
-from agents.vision.training import batches, photograph_strip, strip_count, train_encoder, turn_strip
-from assets.cache import write_json
 from embodied.errors import UnableError
 from embodied.interface import Sight
 from embodied.light import lightings_of
@@ -455,8 +463,8 @@ def test_settings_that_nothing_can_be_learned_with_are_refused():
 FULL = """
 import resource, signal, sys, torch
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
-from agents.common.checkpoint import write_checkpoint
-from agents.vision.encoder import random_encoder, save_encoder
+from embodied.agents.common.checkpoint import write_checkpoint
+from embodied.agents.vision.encoder import random_encoder, save_encoder
 from embodied import cli
 from embodied.cli import doctor
 encoder = random_encoder(seed=0)

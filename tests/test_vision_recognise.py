@@ -1,16 +1,16 @@
-"""agents.vision.recognise and agents.vision.detector: what is found in a panorama, and where."""
+"""embodied.agents.vision.recognise and embodied.agents.vision.detector: what is found in a panorama, and where."""
 
 import numpy as np
 import pytest
+from embodied.agents.common.shipped import SHIPPED_DETECTOR
+from embodied.agents.common.weights import origin_of
+from embodied.agents.vision.config import StripTraining
+from embodied.agents.vision.detector import Detector, train_detector
+from embodied.agents.vision.encoder import load_encoder, random_encoder
+from embodied.agents.vision.recognise import Recogniser
+from embodied.agents.vision.strip import CELL, COLUMNS, ROWS, cell_direction, directions
 from hand_pixels import coloured_strips
 
-from agents.common.shipped import SHIPPED_DETECTOR
-from agents.common.weights import origin_of
-from agents.vision.config import StripTraining
-from agents.vision.detector import Detector, train_detector
-from agents.vision.encoder import load_encoder, random_encoder
-from agents.vision.recognise import Recogniser
-from agents.vision.strip import CELL, COLUMNS, ROWS, cell_direction, directions
 from embodied.render.panorama import Panorama
 
 FACES = (6, 32, 32)

@@ -8,21 +8,21 @@ import math
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common.losses import IGNORE
+from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
+from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.lessons import Split
+from embodied.agents.vln.agent import VlnAbout, VlnAgent
+from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
+from embodied.agents.vln.network import Said
+from embodied.agents.vln.policy import VlnMoment, channels_of
+from embodied.agents.vln.run import VlnLearner, losses_of, mixed, teacher_share
+from embodied.agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
 from hand_data import built
 from hand_worlds import grid_world
 
-from agents.common.losses import IGNORE
-from agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
-from agents.common.vocabulary import build_vocabulary
-from agents.vision.bank import FeatureBank
-from agents.vision.encoder import load_encoder
-from agents.vision.lessons import Split
-from agents.vln.agent import VlnAbout, VlnAgent
-from agents.vln.config import FollowerSettings, SpeakerSettings
-from agents.vln.network import Said
-from agents.vln.policy import VlnMoment, channels_of
-from agents.vln.run import VlnLearner, losses_of, mixed, teacher_share
-from agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import SplitData, dataset_of
 from embodied.envs.make import environment_maker

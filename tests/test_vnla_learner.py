@@ -10,16 +10,14 @@ import math
 import numpy as np
 import pytest
 import torch
-from hand_vnla import TINY, lesson, split_under
-
-from agents.common import imitation
-from agents.common.checkpoint import CheckpointError
-from agents.common.playing import play_with_memory
-from agents.common.session import DivergedError
-from agents.vision.bank import FeatureBank
-from agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
-from agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER
-from agents.vnla.network import (
+from embodied.agents.common import imitation
+from embodied.agents.common.checkpoint import CheckpointError
+from embodied.agents.common.playing import play_with_memory
+from embodied.agents.common.session import DivergedError
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
+from embodied.agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER
+from embodied.agents.vnla.network import (
     ASK,
     DONT,
     MOST_LEFT,
@@ -31,8 +29,10 @@ from agents.vnla.network import (
     ReadText,
     VnlaPercept,
 )
-from agents.vnla.policy import SupervisedVnla, VnlaMoment, carried_out, for_training
-from agents.vnla.run import VnlaLearner, losses_of
+from embodied.agents.vnla.policy import SupervisedVnla, VnlaMoment, carried_out, for_training
+from embodied.agents.vnla.run import VnlaLearner, losses_of
+from hand_vnla import TINY, lesson, split_under
+
 from embodied.action_spaces import WORDS
 from embodied.envs.vnla import RULES, teacher_of
 from embodied.evaluation.rollout import play

@@ -7,15 +7,15 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
+from embodied.agents.common import word_vectors
+from embodied.agents.common.paraphrases import UNHEARD, in_synonyms, reworded
+from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.common.word_vectors import Lexicon, WordEmbedding, take_weights, use_vectors, vocabulary_with
+from embodied.agents.hanna.attention import TextEncoder
+from embodied.agents.vln.agent import VlnAbout, VlnAgent
+from embodied.agents.vln.config import FollowerSettings
 from torch import nn
 
-from agents.common import word_vectors
-from agents.common.paraphrases import UNHEARD, in_synonyms, reworded
-from agents.common.vocabulary import build_vocabulary
-from agents.common.word_vectors import Lexicon, WordEmbedding, take_weights, use_vectors, vocabulary_with
-from agents.hanna.attention import TextEncoder
-from agents.vln.agent import VlnAbout, VlnAgent
-from agents.vln.config import FollowerSettings
 from embodied.errors import UnableError
 from embodied.interface import Candidates, Mode, Observation, Sight, Stop, act
 

@@ -80,7 +80,7 @@ def middle(placement: Placement) -> np.ndarray:
 def panorama_pixels(world: Place, pose: Pose, placements: list[Placement], height: int) -> np.ndarray:
     """(n, 2) pixels, column and row, of the middles of some things in a panorama of (height, 2 height).
 
-    Its middle column is the agent's gaze, as viz.recording.log_sight turns it.
+    Its middle column is the agent's gaze, as embodied.viz.recording.log_sight turns it.
     """
     offset = np.array([middle(p) for p in placements]).reshape(-1, 3) - world.graph.positions[pose.node]
     yaw = np.arctan2(offset[:, 1], offset[:, 0])

@@ -18,6 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
+from embodied.viz.blueprint import blueprint_of
+from embodied.viz.described import boxes, log_described, log_recognised
+from embodied.viz.house3d import light_meshes, lit_meshes, log_house
+from embodied.viz.sinks import Sinks, open_recording
+from embodied.viz.story import Story
 from scipy.spatial.transform import Rotation
 
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Step, Stop, Task
@@ -28,11 +33,6 @@ from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
 from embodied.world import World
-from viz.blueprint import blueprint_of
-from viz.described import boxes, log_described, log_recognised
-from viz.house3d import light_meshes, lit_meshes, log_house
-from viz.sinks import Sinks, open_recording
-from viz.story import Story
 
 PALETTE = {
     "graph": (120, 130, 150),
@@ -48,7 +48,7 @@ HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20
 VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)
 """How high the picture along the gaze reaches: for people, and for an agent that sees this one view only (VNLA)."""
 Recognise = Callable[[Panorama], Sequence[Recognised]]
-"""Names what is in a panorama (agents.vision.recognise.Recogniser)."""
+"""Names what is in a panorama (embodied.agents.vision.recognise.Recogniser)."""
 SHORT = 60
 """Letters of a request that is shown as a heading."""
 

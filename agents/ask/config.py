@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, require
+from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, require
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.ask.config import AskerConfig, AskEvaluation
-from agents.ask.foresight import Foresight
-from agents.ask.learned import Decisions, LearnedAsker, load_asker, shown, train
-from agents.common.session import Note
-from agents.common.weights import save_weights
-from agents.studies.engine import Measured, StudyLearner
-from agents.studies.tables import Figure, StudyRow, StudyTable
-from assets.catalogue import load_catalogue
+from embodied.agents.ask.config import AskerConfig, AskEvaluation
+from embodied.agents.ask.foresight import Foresight
+from embodied.agents.ask.learned import Decisions, LearnedAsker, load_asker, shown, train
+from embodied.agents.common.session import Note
+from embodied.agents.common.weights import save_weights
+from embodied.agents.studies.engine import Measured, StudyLearner
+from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.assets.catalogue import load_catalogue
+
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
@@ -97,7 +98,7 @@ class AskStudy(StudyLearner):
     """All that its answers depend on."""
 
     name = "ask"
-    judges = ("agents.ask.foresight", "agents.ask.study", "embodied.evaluation.ask")
+    judges = ("embodied.agents.ask.foresight", "embodied.agents.ask.study", "embodied.evaluation.ask")
 
     def tables(self) -> Mapping[str, StudyTable]:
         model, columns = (_rule(MODEL),) if self.model else (), (*COLUMNS, *KINDS, *metrics.USAGE)
@@ -118,7 +119,7 @@ class AskStudy(StudyLearner):
         }
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Identity:
-        return identity_of("agents.ask.learned", settings=dataclasses.replace(self.config, seed=seed))
+        return identity_of("embodied.agents.ask.learned", settings=dataclasses.replace(self.config, seed=seed))
 
     def train(self, train_: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         config = dataclasses.replace(self.config, seed=seed)

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-from agents.bandit.bleu import corpus_parts, sentence_bleu
-from agents.bandit.network import Translator
-from agents.bandit.training import NumberedCorpus, sampled
-from agents.bandit.translate import greedy, in_order, padded, perplexity
-from agents.common.checkpoint import read_checkpoint
+from embodied.agents.bandit.bleu import corpus_parts, sentence_bleu
+from embodied.agents.bandit.network import Translator
+from embodied.agents.bandit.training import NumberedCorpus, sampled
+from embodied.agents.bandit.translate import greedy, in_order, padded, perplexity
+from embodied.agents.common.checkpoint import read_checkpoint
 
 COLUMNS = (
     "BLEU",

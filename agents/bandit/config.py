@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, POSITIVE, Limit, RunSettings, require
+from embodied.agents.common.settings import AT_LEAST_ONE, POSITIVE, Limit, RunSettings, require
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,8 +12,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.bandit.config import Sizes
-from assets.cache import digest, write_bytes, write_json
+from embodied.agents.bandit.config import Sizes
+from embodied.assets.cache import digest, write_bytes, write_json
+
 from embodied.locks import locked
 from embodied.records import RecordError, from_plain, read_json
 from embodied.seeds import stream

@@ -13,15 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.bandit.behaviour import COLUMNS, behaviour, translator_of_run
-from agents.bandit.config import BanditConfig
-from agents.bandit.corpus import corpus_digest
-from agents.bandit.ratings import CLEAN, Rater, rater_of
-from agents.bandit.training import NumberedCorpus, bandit, material, pretrain, teach_critic
-from agents.common.checkpoint import read_checkpoint
-from agents.common.session import Note
-from agents.studies.engine import Measured, StudyLearner
-from agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.agents.bandit.behaviour import COLUMNS, behaviour, translator_of_run
+from embodied.agents.bandit.config import BanditConfig
+from embodied.agents.bandit.corpus import corpus_digest
+from embodied.agents.bandit.ratings import CLEAN, Rater, rater_of
+from embodied.agents.bandit.training import NumberedCorpus, bandit, material, pretrain, teach_critic
+from embodied.agents.common.checkpoint import read_checkpoint
+from embodied.agents.common.session import Note
+from embodied.agents.studies.engine import Measured, StudyLearner
+from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 
@@ -121,7 +122,7 @@ class BanditStudy(StudyLearner):
     """Who rates in the table 'people': the rater that people were found to resemble."""
 
     name = "bandit"
-    judges = ("agents.bandit.behaviour",)
+    judges = ("embodied.agents.bandit.behaviour",)
 
     def tables(self) -> Mapping[str, StudyTable]:
         if self.rater is None:
@@ -142,7 +143,7 @@ class BanditStudy(StudyLearner):
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         config, run = self._settings(train, seed), {k: v for k, v in train.items() if k != RATE}
-        return identity_of("agents.bandit.training", settings=config, corpus=self._corpus(), run=run)
+        return identity_of("embodied.agents.bandit.training", settings=config, corpus=self._corpus(), run=run)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         begun, m = self._begun(seed, folder), _material(self.data, self._settings(train, seed))

@@ -18,20 +18,20 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from embodied.agents.bandit.bleu import corpus_bleu, sentence_bleu
+from embodied.agents.bandit.config import BanditConfig
+from embodied.agents.bandit.corpus import corpus_digest, load
+from embodied.agents.bandit.network import Critic, Translator, begin, load_network, save_network
+from embodied.agents.bandit.ratings import CLEAN, Rater
+from embodied.agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
+from embodied.agents.common.checkpoint import Stateful
+from embodied.agents.common.choosing import sampled_choice
+from embodied.agents.common.losses import Decisions, actor_loss, critic_loss
+from embodied.agents.common.session import Note, Session, descend
+from embodied.agents.common.vocabulary import Vocabulary, most_frequent
+from embodied.agents.common.weights import weights_digest
 from torch import Tensor
 
-from agents.bandit.bleu import corpus_bleu, sentence_bleu
-from agents.bandit.config import BanditConfig
-from agents.bandit.corpus import corpus_digest, load
-from agents.bandit.network import Critic, Translator, begin, load_network, save_network
-from agents.bandit.ratings import CLEAN, Rater
-from agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
-from agents.common.checkpoint import Stateful
-from agents.common.choosing import sampled_choice
-from agents.common.losses import Decisions, actor_loss, critic_loss
-from agents.common.session import Note, Session, descend
-from agents.common.vocabulary import Vocabulary, most_frequent
-from agents.common.weights import weights_digest
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
@@ -82,7 +82,9 @@ class NumberedCorpus:
     def identity(self, stage: str, *fields: str, **more: object) -> dict[str, object]:
         """What a stage depends on: settings by name, and the corpus."""
         settings = {name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)}
-        return identity_of("agents.bandit.training", stage=stage, settings=settings, corpus=self.digest, **more)
+        return identity_of(
+            "embodied.agents.bandit.training", stage=stage, settings=settings, corpus=self.digest, **more
+        )
 
     def _generator(self, name: str) -> torch.Generator:
         return torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
@@ -92,7 +94,7 @@ def material(folder: Path, config: BanditConfig) -> NumberedCorpus:
     """Read a corpus folder; words are those of its supervised set.
 
     Raises:
-      CorpusError: see agents.bandit.corpus.load.
+      CorpusError: see embodied.agents.bandit.corpus.load.
     """
     names = ("supervised", "dev", "test")
     corpus = load(folder, (*names, config.bandit_set), longest=config.longest)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from embodied.agents.bandit.network import Translator
+from embodied.agents.common.choosing import Choice, greedy_choice
+from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 from torch import Tensor
-
-from agents.bandit.network import Translator
-from agents.common.choosing import Choice, greedy_choice
-from agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 
 POOL = 20
 """Batches that are sorted by length together."""

@@ -13,11 +13,9 @@ from pathlib import Path
 from typing import Any, ClassVar, Unpack
 
 import torch
-from torch import Tensor
-
-from agents.common import parallel
-from agents.common.playing import TaskSet, play_with_memory
-from agents.common.session import (
+from embodied.agents.common import parallel
+from embodied.agents.common.playing import TaskSet, play_with_memory
+from embodied.agents.common.session import (
     Options,
     Progress,
     Session,
@@ -28,7 +26,9 @@ from agents.common.session import (
     set_learning_rate,
     tasks_of_update,
 )
-from agents.common.settings import MAY_CHANGE
+from embodied.agents.common.settings import MAY_CHANGE
+from torch import Tensor
+
 from embodied.errors import UnableError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -122,7 +122,7 @@ def train(
 ) -> Progress:
     """Train in place, from `folder`'s checkpoint if there is one (agents.common.session.run); one process at a time.
 
-    Writes best.safetensors (see `validate`) and what agents.common.session writes into `folder`.
+    Writes best.safetensors (see `validate`) and what embodied.agents.common.session writes into `folder`.
     """
     tasks, about = learner.training.tasks, learner.agent.about
     size = sum(p.numel() for p in learner.network.parameters())

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, NOT_ALL, NOT_NEGATIVE, ImitationSettings, require, require_word
+from embodied.agents.common.settings import (
+    AT_LEAST_ONE,
+    NOT_ALL,
+    NOT_NEGATIVE,
+    ImitationSettings,
+    require,
+    require_word,
+)
 
 SEES_WHAT = ("all", "map", "nothing")
 THINGS = (

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from embodied.interface import TURNS, VIEWS
 
 FACTS = 5
-"""Of an option; see agents.find.policy.facts."""
+"""Of an option; see embodied.agents.find.policy.facts."""
 
 
 def _around() -> Tensor:

@@ -10,22 +10,29 @@ from pathlib import Path
 import numpy as np
 import torch
 import torch.nn.functional as F
+from embodied.agents.common import imitation
+from embodied.agents.common.choosing import choose_sampled
+from embodied.agents.common.playing import play_with_memory
+from embodied.agents.common.session import (
+    Note,
+    descend,
+    episode_seed,
+    seeded_dropout,
+    set_learning_rate,
+    tasks_of_update,
+)
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.sighted import About, SightedAgent
+from embodied.agents.common.tensor_file import load_into
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
+from embodied.agents.common.weights import check_features, load_weights, save_weights, seeded
+from embodied.agents.find.config import THINGS, FinderConfig
+from embodied.agents.find.network import READ, Explorer, SeekNetwork
+from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.lessons import Lessons, Split
+from embodied.assets.catalogue import load_catalogue
 
-from agents.common import imitation
-from agents.common.choosing import choose_sampled
-from agents.common.playing import play_with_memory
-from agents.common.session import Note, descend, episode_seed, seeded_dropout, set_learning_rate, tasks_of_update
-from agents.common.settings import EvaluationSettings
-from agents.common.sighted import About, SightedAgent
-from agents.common.tensor_file import load_into
-from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.weights import check_features, load_weights, save_weights, seeded
-from agents.find.config import THINGS, FinderConfig
-from agents.find.network import READ, Explorer, SeekNetwork
-from agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
-from agents.vision.bank import FeatureBank
-from agents.vision.lessons import Lessons, Split
-from assets.catalogue import load_catalogue
 from embodied.action_spaces import PanoramicMoves
 from embodied.datasets.store import Dataset
 from embodied.envs.make import environment_maker
@@ -139,7 +146,7 @@ class FindLearner(imitation.Learner):
 
 
 def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:
-    """Train, or go on training, an agent; writes best.safetensors and what agents.common.session writes."""
+    """Train, or go on training, an agent; writes best.safetensors and what embodied.agents.common.session writes."""
     training = find_split(lessons, "train", config.house_tasks, config.training_houses or None)
     validation = find_split(lessons, "val_unseen", -(-config.validation_tasks // len(lessons.data.names("val_unseen"))))
     vocabulary = build_vocabulary(t.request for t in training.tasks)
@@ -148,7 +155,7 @@ def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Pa
     say = lambda c: PlainLanguage().request(FindObject(c), rng=stream(config.seed, "unused"))
     requests = torch.stack([torch.from_numpy(vocabulary.encode(say(c), WORDS)) for c in classes])
     finder = new_finder(about, requests)
-    identity = identity_of("agents.find.run", settings=config, **lessons.identity())
+    identity = identity_of("embodied.agents.find.run", settings=config, **lessons.identity())
     looks = dataclasses.replace(training, bank=finder.policy(training.bank).bank)
     labels = labels_of(lessons.data, looks, classes, cache)
     if config.agent == "detector":

@@ -1,4 +1,4 @@
-"""Finding things with and without sight, as a learner of agents.studies.engine."""
+"""Finding things with and without sight, as a learner of embodied.agents.studies.engine."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.common.session import Note
-from agents.find.config import FinderConfig
-from agents.find.run import Finder, tasks_in, train_finder
-from agents.studies.episodes import JUDGES
-from agents.studies.tables import StudyRow, StudyTable
-from agents.vision.lessons import Lessons
-from agents.vision.run import encoder_of
-from agents.vision.sighted_study import SightedStudy
+from embodied.agents.common.session import Note
+from embodied.agents.find.config import FinderConfig
+from embodied.agents.find.run import Finder, tasks_in, train_finder
+from embodied.agents.studies.episodes import JUDGES
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.vision.lessons import Lessons
+from embodied.agents.vision.run import encoder_of
+from embodied.agents.vision.sighted_study import SightedStudy
+
 from embodied.datasets.store import Dataset, SplitData
 from embodied.envs.make import environment_maker
 
@@ -51,8 +52,8 @@ class FindStudy(SightedStudy):
     """Tasks of each house that agents are judged on."""
 
     name, agent_kind = "find", Finder
-    makers = ("agents.find.run",)
-    judges = (*JUDGES, "agents.find.run")
+    makers = ("embodied.agents.find.run",)
+    judges = (*JUDGES, "embodied.agents.find.run")
 
     def tables(self) -> Mapping[str, StudyTable]:
         return TABLES

@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.common.choosing import choose_at
-from agents.common.settings import LEARNED_WORDS
-from agents.common.sighted import About, SightedAgent
-from agents.common.weights import check_features
-from agents.common.word_vectors import take_weights as take_into
-from agents.hanna.asking import RULES, ask_patiently
-from agents.hanna.lstm import LstmNetwork
-from agents.hanna.network import AgentNetwork, HannaNetwork
-from agents.hanna.policy import HannaPolicy
-from agents.hanna.recognition import Likeness
-from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.vision.bank import FeatureBank
+from embodied.agents.common.choosing import choose_at
+from embodied.agents.common.settings import LEARNED_WORDS
+from embodied.agents.common.sighted import About, SightedAgent
+from embodied.agents.common.weights import check_features
+from embodied.agents.common.word_vectors import take_weights as take_into
+from embodied.agents.hanna.asking import RULES, ask_patiently
+from embodied.agents.hanna.lstm import LstmNetwork
+from embodied.agents.hanna.network import AgentNetwork, HannaNetwork
+from embodied.agents.hanna.policy import HannaPolicy
+from embodied.agents.hanna.recognition import Likeness
+from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
+from embodied.agents.vision.bank import FeatureBank
 
 SIZES = (
     *("model", "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads", "dropout"),

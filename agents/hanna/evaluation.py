@@ -10,15 +10,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import torch
+from embodied.agents.common.choosing import choose_at
+from embodied.agents.hanna.agent import HannaAgent
+from embodied.agents.hanna.asking import RULES, ask_every
+from embodied.agents.hanna.network import Scores
+from embodied.agents.hanna.percept import Percept
+from embodied.agents.hanna.policy import HannaPolicy, PerfectInterpretation
+from embodied.agents.vision.bank import FeatureBank
 from torch import nn
 
-from agents.common.choosing import choose_at
-from agents.hanna.agent import HannaAgent
-from agents.hanna.asking import RULES, ask_every
-from agents.hanna.network import Scores
-from agents.hanna.percept import Percept
-from agents.hanna.policy import HannaPolicy, PerfectInterpretation
-from agents.vision.bank import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.tables import Samples, measured
 from embodied.interface import Agent, Ask, Episode, Place

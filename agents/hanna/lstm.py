@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from embodied.agents.common.rows import Rows
+from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.hanna.attention import DotAttend
+from embodied.agents.hanna.network import AgentNetwork
+from embodied.agents.hanna.percept import SLOTS, VIEWS, Percept, action_size
+from embodied.agents.hanna.training_config import TrainingConfig
 from torch import Tensor, nn
-
-from agents.common.rows import Rows
-from agents.common.word_vectors import WordEmbedding
-from agents.hanna.attention import DotAttend
-from agents.hanna.network import AgentNetwork
-from agents.hanna.percept import SLOTS, VIEWS, Percept, action_size
-from agents.hanna.training_config import TrainingConfig
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,27 @@ from typing import Any
 
 import torch
 import torch.nn.functional as F
+from embodied.agents.common.rows import Rows
+from embodied.agents.hanna.attention import (
+    DotAttend,
+    FeedForward,
+    IncTime,
+    MultiAttend,
+    SelfAttend,
+    TextEncoder,
+    sim_attend,
+)
+from embodied.agents.hanna.percept import (
+    REQUEST,
+    SLOTS,
+    VIEWS,
+    Percept,
+    action_size,
+    slot_distribution,
+    target_similarity,
+)
+from embodied.agents.hanna.training_config import TrainingConfig
 from torch import Tensor, nn
-
-from agents.common.rows import Rows
-from agents.hanna.attention import DotAttend, FeedForward, IncTime, MultiAttend, SelfAttend, TextEncoder, sim_attend
-from agents.hanna.percept import REQUEST, SLOTS, VIEWS, Percept, action_size, slot_distribution, target_similarity
-from agents.hanna.training_config import TrainingConfig
 
 SHORT = 12
 """Words up to which an instruction is encoded with the short ones."""

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
-
-from agents.common.choosing import Chooser, choose_greedily, choose_sampled
-from agents.common.rows import RunningRows, hidden_channels
-from agents.common.vocabulary import Vocabulary
-from agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
-from agents.hanna.network import AgentNetwork, Scores
-from agents.hanna.percept import (
+from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
+from embodied.agents.common.rows import RunningRows, hidden_channels
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
+from embodied.agents.hanna.network import AgentNetwork, Scores
+from embodied.agents.hanna.percept import (
     COPIES,
     DO_NOTHING,
     HEADINGS,
@@ -29,9 +27,11 @@ from agents.hanna.percept import (
     candidate_rows,
     orientation,
 )
-from agents.hanna.recognition import Likeness, PlaceMap
-from agents.hanna.trail import Trail, weigh, weigh_by_image
-from agents.vision.bank import FeatureBank
+from embodied.agents.hanna.recognition import Likeness, PlaceMap
+from embodied.agents.hanna.trail import Trail, weigh, weigh_by_image
+from embodied.agents.vision.bank import FeatureBank
+from torch import Tensor
+
 from embodied.interface import (
     Actions,
     Ask,

@@ -11,8 +11,7 @@ import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from agents.hanna.percept import HEADINGS, VIEWS
+from embodied.agents.hanna.percept import HEADINGS, VIEWS
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Unpack
 
-from agents.common import imitation
-from agents.common.losses import IGNORE
-from agents.common.session import Progress
-from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.weights import weights_digest
-from agents.common.word_vectors import LEARNED_WORDS
-from agents.hanna.agent import HannaAbout, HannaAgent, take_weights
-from agents.hanna.asking import RULES
-from agents.hanna.collect import Experience, imitation_loss, labelled
-from agents.hanna.policy import HannaMemory, for_training
-from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.vision.bank import FeatureBank
-from agents.vision.lessons import Lessons, Split
+from embodied.agents.common import imitation
+from embodied.agents.common.losses import IGNORE
+from embodied.agents.common.session import Progress
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
+from embodied.agents.common.weights import weights_digest
+from embodied.agents.common.word_vectors import LEARNED_WORDS
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent, take_weights
+from embodied.agents.hanna.asking import RULES
+from embodied.agents.hanna.collect import Experience, imitation_loss, labelled
+from embodied.agents.hanna.policy import HannaMemory, for_training
+from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.lessons import Lessons, Split
+
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task, Teacher
@@ -106,5 +107,5 @@ def train_agent(
         take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
         begun["begin"] = weights_digest(begin)
     agent.network.to(lessons.device)
-    identity = identity_of("agents.hanna.run", settings=config, **lessons.identity(), **begun)
+    identity = identity_of("embodied.agents.hanna.run", settings=config, **lessons.identity(), **begun)
     return imitation.train(HannaLearner(agent, training, HannaTeacher()), validation, folder, identity, **options)

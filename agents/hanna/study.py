@@ -1,4 +1,4 @@
-"""The tables of 4.2 as data, and HANNA as a learner of agents.studies.engine."""
+"""The tables of 4.2 as data, and HANNA as a learner of embodied.agents.studies.engine."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.common.session import Note
-from agents.common.weights import weights_digest
-from agents.hanna.agent import HannaAgent
-from agents.hanna.evaluation import all_policies, by_the_text, counted
-from agents.hanna.places import AGAIN, COLUMNS, recognised
-from agents.hanna.run import train_agent
-from agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from agents.studies.engine import Measured
-from agents.studies.episodes import JUDGES
-from agents.studies.tables import StudyRow, StudyTable
-from agents.studies.wordings import speakers_table, words_table
-from agents.vision.lessons import Lessons
-from agents.vision.occasions import OCCASIONS
-from agents.vision.sighted_study import SPLITS as TEST
-from agents.vision.sighted_study import SightedStudy, spoken
+from embodied.agents.common.session import Note
+from embodied.agents.common.weights import weights_digest
+from embodied.agents.hanna.agent import HannaAgent
+from embodied.agents.hanna.evaluation import all_policies, by_the_text, counted
+from embodied.agents.hanna.places import AGAIN, COLUMNS, recognised
+from embodied.agents.hanna.run import train_agent
+from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
+from embodied.agents.studies.engine import Measured
+from embodied.agents.studies.episodes import JUDGES
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.wordings import speakers_table, words_table
+from embodied.agents.vision.lessons import Lessons
+from embodied.agents.vision.occasions import OCCASIONS
+from embodied.agents.vision.sighted_study import SPLITS as TEST
+from embodied.agents.vision.sighted_study import SightedStudy, spoken
+
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 
@@ -166,8 +167,8 @@ class HannaStudy(SightedStudy):
     """When the pictures that helpers show were taken (agents.vision.occasions.OCCASIONS), in training and judging."""
 
     name, agent_kind = "hanna", HannaAgent
-    makers = ("agents.hanna.run",)
-    judges = (*JUDGES, "agents.hanna.evaluation", "agents.hanna.places")
+    makers = ("embodied.agents.hanna.run",)
+    judges = (*JUDGES, "embodied.agents.hanna.evaluation", "embodied.agents.hanna.places")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""

@@ -4,7 +4,7 @@ The likeliest move of an agent that misread its words leads to and fro between t
 knows which of its moves lead towards where it has been, under the words that it still follows, and how often it was
 there; never more than it has walked itself. A place is known again by its panorama; the way back lies opposite the way
 there. Who is shown the panorama of where to go knows in the same manner when it is there, and, if it has been there
-before, which way leads there. Places are known again by what they look like (agents.hanna.recognition).
+before, which way leads there. Places are known again by what they look like (embodied.agents.hanna.recognition).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from embodied.agents.hanna.percept import HEADINGS, VIEWS
+from embodied.agents.hanna.recognition import PlaceMap
 
-from agents.hanna.percept import HEADINGS, VIEWS
-from agents.hanna.recognition import PlaceMap
 from embodied.interface import Action, Mode, Move, Observation
 
 UNLIKELY = 1e-6

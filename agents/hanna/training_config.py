@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import (
+from embodied.agents.common.settings import (
     AT_LEAST_ONE,
     EVERYBODY,
     NOT_ALL,
@@ -22,7 +22,7 @@ from agents.common.settings import (
     require,
     require_word,
 )
-from agents.hanna.asking import RULES
+from embodied.agents.hanna.asking import RULES
 
 MODELS = ("hanna", "lstm")
 

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, NOT_ALL, NOT_NEGATIVE, POSITIVE, SHARE, ValidatedRunSettings, require
+from embodied.agents.common.settings import (
+    AT_LEAST_ONE,
+    NOT_ALL,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    ValidatedRunSettings,
+    require,
+)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,15 +16,15 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import torch
+from embodied.agents.common.checkpoint import Stateful
+from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
+from embodied.agents.common.playing import TaskSet
+from embodied.agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
+from embodied.agents.hari.agent import HariAgent, save_agent
+from embodied.agents.hari.networks import INTENTIONS, RecurrentHead
+from embodied.agents.hari.policy import Choice, policy_of
 from torch import Tensor
 
-from agents.common.checkpoint import Stateful
-from agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
-from agents.common.playing import TaskSet
-from agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
-from agents.hari.agent import HariAgent, save_agent
-from agents.hari.networks import INTENTIONS, RecurrentHead
-from agents.hari.policy import Choice, policy_of
 from embodied.envs.hari import shaped_costs
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
@@ -43,9 +43,9 @@ def train(
     identity: Identity,
     **options: Unpack[Options],
 ) -> Progress:
-    """Train `agent.actor` and `critic` in place (see agents.common.session.run).
+    """Train `agent.actor` and `critic` in place (see embodied.agents.common.session.run).
 
-    Writes best.safetensors (least validation cost) and what agents.common.session writes.
+    Writes best.safetensors (least validation cost) and what embodied.agents.common.session writes.
     """
     config = agent.config
     agent.executor.network.eval()

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
+from embodied.agents.hari.config import ExecutionConfig
+from embodied.agents.hari.transformer import Packing, Transformer
+from embodied.agents.hari.words import SIZES, Inputs
 from torch import Tensor, nn
-
-from agents.hari.config import ExecutionConfig
-from agents.hari.transformer import Packing, Transformer
-from agents.hari.words import SIZES, Inputs
 
 INTENTIONS = ("cur", "goal", "sub", "do", "done")
 """A-bar of 4.3.3.2, in the order of the intention policy's outputs."""

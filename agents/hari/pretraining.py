@@ -18,10 +18,8 @@ from typing import Unpack
 
 import numpy as np
 import torch
-from torch import Tensor
-
-from agents.common.checkpoint import Stateful
-from agents.common.session import (
+from embodied.agents.common.checkpoint import Stateful
+from embodied.agents.common.session import (
     Options,
     Progress,
     Session,
@@ -31,9 +29,11 @@ from agents.common.session import (
     set_learning_rate,
     tasks_of_update,
 )
-from agents.hari.agent import Executor, save_executor
-from agents.hari.config import ExecutionConfig
-from agents.hari.words import Inputs, collate, padded, percept
+from embodied.agents.hari.agent import Executor, save_executor
+from embodied.agents.hari.config import ExecutionConfig
+from embodied.agents.hari.words import Inputs, collate, padded, percept
+from torch import Tensor
+
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.assistants.hari import LONGEST, described_subgoal
@@ -72,9 +72,9 @@ class Walk:
 def pretrain(
     executor: Executor, lessons: PretrainingData, folder: Path, identity: Identity, **options: Unpack[Options]
 ) -> Progress:
-    """Train `executor` in place (see agents.common.session.run).
+    """Train `executor` in place (see embodied.agents.common.session.run).
 
-    Writes best.safetensors (by validation success) and what agents.common.session writes.
+    Writes best.safetensors (by validation success) and what embodied.agents.common.session writes.
     """
     config, network = executor.config, executor.network
     optimizer = torch.optim.Adam(network.parameters(), config.learning_rate)

@@ -6,15 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
-from agents.common.playing import TaskSet
-from agents.common.session import Options, Progress
-from agents.common.tensor_file import checksum_of
-from agents.common.weights import weights_digest
-from agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
-from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.intention import train
-from agents.hari.pretraining import PretrainingData, pretrain
-from agents.hari.words import feature_words
+from embodied.agents.common.playing import TaskSet
+from embodied.agents.common.session import Options, Progress
+from embodied.agents.common.tensor_file import checksum_of
+from embodied.agents.common.weights import weights_digest
+from embodied.agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
+from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.hari.intention import train
+from embodied.agents.hari.pretraining import PretrainingData, pretrain
+from embodied.agents.hari.words import feature_words
+
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
@@ -72,7 +73,7 @@ def train_execution(
     note = options.get("note", print)
     note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(executor.words)} names, {size:,} parameters")
     more = {} if begin is None else {"begin": weights_digest(begin)}
-    identity = identity_of("agents.hari.run", settings=config, data=data.digest, **more)
+    identity = identity_of("embodied.agents.hari.run", settings=config, data=data.digest, **more)
     return pretrain(executor, lessons, folder, identity, **options)
 
 
@@ -87,5 +88,5 @@ def train_intention(
     note = options.get("note", print)
     note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {size:,} parameters of each head")
     begin = checksum_of(executor.network.state_dict(), {})
-    identity = identity_of("agents.hari.run", settings=config, data=data.digest, begin=begin)
+    identity = identity_of("embodied.agents.hari.run", settings=config, data=data.digest, begin=begin)
     return train(HariAgent(executor, actor, config), critic, training, validation, folder, identity, **options)

@@ -8,16 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.common.session import Note
-from agents.common.weights import weights_digest
-from agents.hari.agent import HariAgent, load_agent, load_executor
-from agents.hari.config import ExecutionConfig, IntentionConfig
-from agents.hari.judging import GREEDY, RANDOM, TEST, policies, validation_means
-from agents.hari.networks import INTENTIONS
-from agents.hari.run import CONDITIONS, rules_of, train_execution, train_intention
-from agents.studies.engine import Measured
-from agents.studies.episodes import JUDGES, EpisodeStudy
-from agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.agents.common.session import Note
+from embodied.agents.common.weights import weights_digest
+from embodied.agents.hari.agent import HariAgent, load_agent, load_executor
+from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
+from embodied.agents.hari.judging import GREEDY, RANDOM, TEST, policies, validation_means
+from embodied.agents.hari.networks import INTENTIONS
+from embodied.agents.hari.run import CONDITIONS, rules_of, train_execution, train_intention
+from embodied.agents.studies.engine import Measured
+from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
+from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
@@ -100,8 +101,8 @@ class HariStudy(EpisodeStudy):
     to learn from; None: in `data`."""
 
     name = "hari"
-    makers = ("agents.hari.run",)
-    judges = (*JUDGES, "agents.hari.judging")
+    makers = ("embodied.agents.hari.run",)
+    judges = (*JUDGES, "embodied.agents.hari.judging")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution come beside those of the tests; elsewhere, houses may all be unknown."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, SHARE, require, require_word
+from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, SHARE, require, require_word
 
 LEARNERS = ("adel", "mixture", "dagger", "binary", "continuous")
 """ADEL (Algorithm 9), the mixture of Algorithm 5, DAgger, and REINFORCE with a reward of success or of nearness."""

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-
-from agents.iliad.protocol import NOTHING, Executions, Tasks, one_request
+from embodied.agents.iliad.protocol import NOTHING, Executions, Tasks, one_request
 
 
 def kept(candidates: Sequence[str], performances: Sequence[float], threshold: float) -> list[str]:

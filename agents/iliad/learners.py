@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
-
-from agents.common.losses import Decisions, actor_loss
-from agents.iliad.protocol import (
+from embodied.agents.common.losses import Decisions, actor_loss
+from embodied.agents.iliad.protocol import (
     NOTHING,
     DescribingTeacher,
     Executions,
@@ -25,6 +23,7 @@ from agents.iliad.protocol import (
     Student,
     Tasks,
 )
+from torch import Tensor
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,8 @@ import copy
 from typing import Any
 
 import torch
-
-from agents.common.session import descend
-from agents.common.weights import seeded
+from embodied.agents.common.session import descend
+from embodied.agents.common.weights import seeded
 
 RATE, CLIP = 1e-3, 5.0
 """Of the one update that shows what is learned from a description."""

@@ -12,12 +12,12 @@ from typing import TypeVar
 
 import numpy as np
 import torch
+from embodied.agents.common.checkpoint import Stateful
+from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate
+from embodied.agents.common.tensor_file import load_into, read_weights
+from embodied.agents.common.weights import origin_of, save_weights
 from torch import Tensor, nn
 
-from agents.common.checkpoint import Stateful
-from agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate
-from agents.common.tensor_file import load_into, read_weights
-from agents.common.weights import origin_of, save_weights
 from embodied.identity import Identity, differences
 from embodied.seeds import stream
 
@@ -44,7 +44,7 @@ class TeachingStage:
     identity: Identity
     """All that the network depends on."""
     about: object
-    """Stands beside its weights (agents.common.weights)."""
+    """Stands beside its weights (embodied.agents.common.weights)."""
 
     def train(
         self,

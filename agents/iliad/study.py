@@ -10,21 +10,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.common.checkpoint import read_checkpoint
-from agents.common.session import Note
-from agents.iliad.config import LearnerConfig
-from agents.iliad.nav import run as nav
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.stages import load_follower
-from agents.iliad.nav.world import NavMarginal, NavWorld
-from agents.iliad.regex import run as regex
-from agents.iliad.regex.config import RegexConfig
-from agents.iliad.regex.world import RegexWorld
-from agents.iliad.training import episodes_to, successes
-from agents.studies.engine import Measured, StudyLearner
-from agents.studies.tables import Figure, StudyRow, StudyTable
-from agents.studies.wordings import SPEAKERS, WORDING, code_of, saying, speakers_table, words_table
-from assets.cache import digest
+from embodied.agents.common.checkpoint import read_checkpoint
+from embodied.agents.common.session import Note
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.nav import run as nav
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.stages import load_follower
+from embodied.agents.iliad.nav.world import NavMarginal, NavWorld
+from embodied.agents.iliad.regex import run as regex
+from embodied.agents.iliad.regex.config import RegexConfig
+from embodied.agents.iliad.regex.world import RegexWorld
+from embodied.agents.iliad.training import episodes_to, successes
+from embodied.agents.studies.engine import Measured, StudyLearner
+from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.agents.studies.wordings import SPEAKERS, WORDING, code_of, saying, speakers_table, words_table
+from embodied.assets.cache import digest
+
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
@@ -188,7 +189,7 @@ class IliadStudy(StudyLearner):
     repeats: tuple[int, ...]
     threads: int = 1
 
-    judges = ("agents.iliad.training", "agents.iliad.regex.run", "agents.iliad.nav.run")
+    judges = ("embodied.agents.iliad.training", "embodied.agents.iliad.regex.run", "embodied.agents.iliad.nav.run")
 
     @property
     def name(self) -> str:
@@ -223,7 +224,7 @@ class IliadStudy(StudyLearner):
         return dataclasses.replace(self.config, seed=seed, anneal_every=every, **changes)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
-        makers, settings = f"agents.iliad.{self.world.name}.run", self.settings(train, seed)
+        makers, settings = f"embodied.agents.iliad.{self.world.name}.run", self.settings(train, seed)
         return identity_of(makers, settings=settings, **{**self._world(train).source(), **_of(train, OWN)})
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:

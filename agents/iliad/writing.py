@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from embodied.agents.common.choosing import Choice
+from embodied.agents.common.rows import Rows
 from torch import Tensor, nn
-
-from agents.common.choosing import Choice
-from agents.common.rows import Rows
 
 PAD = 0
 

@@ -18,8 +18,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from agents.language_models.cache import AnswerCache
-from assets.cache import digest
+from embodied.agents.language_models.cache import AnswerCache
+from embodied.assets.cache import digest
+
 from embodied.errors import UnableError
 from embodied.interface import Usage
 from embodied.records import RecordError, from_json, parse, to_json

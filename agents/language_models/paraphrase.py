@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.language_models.checking import arrives
-from agents.language_models.client import Client, object_schema
-from agents.language_models.prompts import read_prompt
+from embodied.agents.language_models.checking import arrives
+from embodied.agents.language_models.client import Client, object_schema
+from embodied.agents.language_models.prompts import read_prompt
+
 from embodied.interface import STEP, Route, SeenPlace, Usage
 
 STYLES = (

@@ -6,8 +6,8 @@ import string
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.language_models.client import Message
-from assets.json_file import read_text
+from embodied.agents.language_models.client import Message
+from embodied.assets.json_file import read_text
 
 FOLDER = Path(__file__).parent / "prompts"
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.language_models.client import Message, object_schema
-from agents.language_models.pictures import Panoramas, shown
-from agents.language_models.prompts import Prompt, read_prompt
-from agents.language_models.words import Namer, actions_of, sees, side, ways
+from embodied.agents.language_models.client import Message, object_schema
+from embodied.agents.language_models.pictures import Panoramas, shown
+from embodied.agents.language_models.prompts import Prompt, read_prompt
+from embodied.agents.language_models.words import Namer, actions_of, sees, side, ways
+
 from embodied.interface import Action, Ask, Intention, Observation, Stop
 
 REMEMBERED = 8
@@ -29,7 +30,7 @@ class Teller:
     panoramas: Panoramas | None = None
     """What is shown to a model that sees; None for one that reads only."""
     pictures: str = "strip"
-    """One of agents.language_models.pictures.PICTURES."""
+    """One of embodied.agents.language_models.pictures.PICTURES."""
     prompt: Prompt = dataclasses.field(default_factory=lambda: agent_prompt())
 
     def text(self, o: Observation, said: Sequence[str] = ()) -> str:

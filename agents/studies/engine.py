@@ -20,14 +20,14 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import joblib
+from embodied.agents.common.checkpoint import read_checkpoint
+from embodied.agents.common.parallel import use_threads
+from embodied.agents.common.session import Note
+from embodied.agents.common.weights import weights_digest
+from embodied.agents.studies.pages import draw, page
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.assets.cache import digest, write_bytes, write_json
 
-from agents.common.checkpoint import read_checkpoint
-from agents.common.parallel import use_threads
-from agents.common.session import Note
-from agents.common.weights import weights_digest
-from agents.studies.pages import draw, page
-from agents.studies.tables import StudyRow, StudyTable
-from assets.cache import digest, write_bytes, write_json
 from embodied.evaluation.tables import PERCENT, Samples, interval, less
 from embodied.identity import (
     CODE,

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from embodied.agents.studies.tables import StudyTable
+from embodied.assets.cache import atomic_path
 from matplotlib.figure import Figure as Picture
-
-from agents.studies.tables import StudyTable
-from assets.cache import atomic_path
 
 
 def page(body: Mapping[str, Any], picture: str | None = None) -> str:

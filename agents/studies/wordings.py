@@ -10,11 +10,12 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.common.paraphrases import UNHEARD, in_synonyms, paraphraser, reworded
-from agents.common.settings import EVERYBODY
-from agents.studies.tables import StudyRow, StudyTable
-from assets.catalogue import load_catalogue
-from assets.closure import code_digest
+from embodied.agents.common.paraphrases import UNHEARD, in_synonyms, paraphraser, reworded
+from embodied.agents.common.settings import EVERYBODY
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.closure import code_digest
+
 from embodied.interface import Agent
 from embodied.novelty import FAMILIAR, NOVEL
 

@@ -13,18 +13,18 @@ from pathlib import Path
 import numpy as np
 import torch
 import torch.nn.functional as F
+from embodied.agents.common.session import Note
+from embodied.agents.common.shipped import SHIPPED_DETECTOR
+from embodied.agents.common.tensor_file import load_into
+from embodied.agents.common.weights import half_precision, load_weights, save_weights, seeded
+from embodied.agents.vision.config import StripTraining
+from embodied.agents.vision.encoder import Encoder, pool_views
+from embodied.agents.vision.labels import HouseStrips, visible_in_views
+from embodied.agents.vision.probe import average_precision
+from embodied.agents.vision.strip import inside_windows
+from embodied.agents.vision.training import StripBatch, classes_of, learn
 from torch import Tensor, nn
 
-from agents.common.session import Note
-from agents.common.shipped import SHIPPED_DETECTOR
-from agents.common.tensor_file import load_into
-from agents.common.weights import half_precision, load_weights, save_weights, seeded
-from agents.vision.config import StripTraining
-from agents.vision.encoder import Encoder, pool_views
-from agents.vision.labels import HouseStrips, visible_in_views
-from agents.vision.probe import average_precision
-from agents.vision.strip import inside_windows
-from agents.vision.training import StripBatch, classes_of, learn
 from embodied.identity import Identity, identity_of
 
 WIDTH = 128
@@ -144,7 +144,7 @@ def train_detector(
     device: str = "cpu",
     note: Note = print,
 ) -> Detector:
-    """A detector on an encoder that stays as it is; args and errors: as agents.vision.training.learn."""
+    """A detector on an encoder that stays as it is; args and errors: as embodied.agents.vision.training.learn."""
     classes = classes_of(houses, config)
     looking = encoder.to(device)
     with seeded(config.seed):
@@ -157,6 +157,6 @@ def train_detector(
         in_views = F.binary_cross_entropy_with_logits(views, batch.visible.float()) * 20
         return in_cells + in_views, {"cell objects": float(in_cells.detach()), "view objects": float(in_views.detach())}
 
-    identity = identity_of("agents.vision.detector", encoder=encoder.digest)
+    identity = identity_of("embodied.agents.vision.detector", encoder=encoder.digest)
     learn(houses, classes, config, {"detector": network}, loss_of, folder, identity, device=device, note=note)
     return Detector(encoder.to("cpu"), network.cpu().eval(), tuple(houses[0].classes[i] for i in classes))

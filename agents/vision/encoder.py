@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.common.tensor_file import load_into, read_weights
+from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.vision.lite import LITE, Lite, folded
+from embodied.agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
+from embodied.agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
 from torch import Tensor
 
-from agents.common.shipped import SHIPPED_ENCODER
-from agents.common.tensor_file import load_into, read_weights
-from agents.common.weights import load_weights, save_weights, seeded
-from agents.vision.lite import LITE, Lite, folded
-from agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
-from agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
 from embodied.identity import Identity
 
 DIGESTED = "embodied-encoder-1"
@@ -132,7 +132,7 @@ def strip_pyramid(network: Network, strips: Tensor) -> list[Tensor]:
             f"stride {network.stride}; use sharing 'views' for other networks"
         )
     wide = network.normalise(torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2))
-    # pixel by pixel is faster, but PyTorch 2.13 may corrupt memory on the way back (agents.vision.training)
+    # pixel by pixel is faster, but PyTorch 2.13 may corrupt memory on the way back (embodied.agents.vision.training)
     maps = network.pyramid(wide.contiguous() if torch.is_grad_enabled() else wide)
     ends = [MARGIN * m.shape[-1] // wide.shape[-1] for m in maps]
     return [m[..., end:-end] for m, end in zip(maps, ends, strict=True)]

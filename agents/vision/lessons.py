@@ -8,20 +8,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from agents.common.more_paths import SaidBy
-from agents.common.paraphrases import varied
-from agents.common.playing import TaskSet
-from agents.common.settings import EvaluationSettings, ImitationSettings
-from agents.common.sighted import About
-from agents.common.vocabulary import Vocabulary
-from agents.vision.bank import FeatureBank
-from agents.vision.config import drawing
-from agents.vision.drawn import pictures_of
-from agents.vision.encoder import Encoder
-from agents.vision.features import feature_path, load_bank
-from agents.vision.occasions import OCCASIONS, showing
-from assets.cache import default_cache
-from assets.catalogue import load_catalogue
+from embodied.agents.common.more_paths import SaidBy
+from embodied.agents.common.paraphrases import varied
+from embodied.agents.common.playing import TaskSet
+from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
+from embodied.agents.common.sighted import About
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.config import drawing
+from embodied.agents.vision.drawn import pictures_of
+from embodied.agents.vision.encoder import Encoder
+from embodied.agents.vision.features import feature_path, load_bank
+from embodied.agents.vision.occasions import OCCASIONS, showing
+from embodied.assets.cache import default_cache
+from embodied.assets.catalogue import load_catalogue
+
 from embodied.datasets.store import Dataset
 from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.evaluate import spread
@@ -43,10 +44,10 @@ class Lessons:
     data: Dataset
     encoder: Encoder
     picture_kind: str | None = None
-    """Of the pictures that the features come from, as in agents.vision.run.pictures_of."""
+    """Of the pictures that the features come from, as in embodied.agents.vision.run.pictures_of."""
     device: str = "cpu"
     shown: str = "same"
-    """When the pictures that helpers show were taken, one of agents.vision.occasions.OCCASIONS."""
+    """When the pictures that helpers show were taken, one of embodied.agents.vision.occasions.OCCASIONS."""
     cache: Path = field(default_factory=default_cache)
     """Where the furniture is, for other pictures than the agent sees."""
 

@@ -13,11 +13,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from agents.vision.bank import FeatureBank
-from agents.vision.drawn import pictures_of
-from agents.vision.encoder import Encoder
-from agents.vision.features import (
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.drawn import pictures_of
+from embodied.agents.vision.encoder import Encoder
+from embodied.agents.vision.features import (
     EQUIRECT,
     VIEW_SIZE,
     encode_panoramas,
@@ -27,11 +26,12 @@ from agents.vision.features import (
     margin,
     save_features,
 )
-from agents.vision.strip import HEIGHT, VFOV, WIDTH
-from assets.cache import digest, write_json
-from assets.catalogue import load_catalogue
-from assets.closure import code_digest
-from assets.json_file import read_json
+from embodied.agents.vision.strip import HEIGHT, VFOV, WIDTH
+from embodied.assets.cache import digest, write_json
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.closure import code_digest
+from embodied.assets.json_file import read_json
+
 from embodied.datasets.store import Dataset
 from embodied.generate.another_day import another_day
 from embodied.house.house import House
@@ -91,7 +91,7 @@ def house_at(data: Dataset, name: str, occasion: Occasion, cache: Path) -> House
 
 def digest_at(data: Dataset, name: str, occasion: Occasion, cache: Path) -> str:
     """The digest of that house, kept in the cache: another day takes a second to make."""
-    code = code_digest("agents.vision.occasions")
+    code = code_digest("embodied.agents.vision.occasions")
     key = digest([data.digest, name, occasion.lighting, occasion.day, code])
     path = cache / "days" / f"{key[:32]}.json"
     if not path.exists():

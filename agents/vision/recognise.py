@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.common.shipped import SHIPPED_DETECTOR
-from agents.vision.detector import Detector
-from agents.vision.encoder import Encoder
-from agents.vision.features import strip_of
-from agents.vision.labels import SHELL
-from agents.vision.strip import COLUMNS, cell_direction
+from embodied.agents.common.shipped import SHIPPED_DETECTOR
+from embodied.agents.vision.detector import Detector
+from embodied.agents.vision.encoder import Encoder
+from embodied.agents.vision.features import strip_of
+from embodied.agents.vision.labels import SHELL
+from embodied.agents.vision.strip import COLUMNS, cell_direction
+
 from embodied.render.panorama import Panorama, Recognised
 
 

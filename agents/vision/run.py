@@ -11,19 +11,19 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from embodied.agents.common.parallel import check_device, use_threads
+from embodied.agents.common.session import Note
+from embodied.agents.vision.config import StripTraining, VisionConfig, drawing, lit_name
+from embodied.agents.vision.detector import train_detector
+from embodied.agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
+from embodied.agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
+from embodied.agents.vision.features import encode_panoramas, feature_path, has_features, save_features
+from embodied.agents.vision.labels import HouseStrips
+from embodied.agents.vision.occasions import Occasion, make_shown
+from embodied.agents.vision.probe import as_numbers, labelled, read
+from embodied.agents.vision.training import save_training, train_encoder, trained_classes, whitened
+from embodied.assets.cache import write_json
 
-from agents.common.parallel import check_device, use_threads
-from agents.common.session import Note
-from agents.vision.config import StripTraining, VisionConfig, drawing, lit_name
-from agents.vision.detector import train_detector
-from agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
-from agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
-from agents.vision.features import encode_panoramas, feature_path, has_features, save_features
-from agents.vision.labels import HouseStrips
-from agents.vision.occasions import Occasion, make_shown
-from agents.vision.probe import as_numbers, labelled, read
-from agents.vision.training import save_training, train_encoder, trained_classes, whitened
-from assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
 from embodied.identity import Identity, identity_of
@@ -49,7 +49,9 @@ def train_vision(
         seen = source.strips(training_houses(data, config), workers=workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         drawn = sorted({drawing(pictures_of(data, h.name, source.picture_kind)) for h in seen})
-        identity = identity_of("agents.vision.run", settings=config, data=data.digest, pictures=", ".join(drawn))
+        identity = identity_of(
+            "embodied.agents.vision.run", settings=config, data=data.digest, pictures=", ".join(drawn)
+        )
         encoder, classes = trained_encoder(seen, config, out, note, identity=identity, device=device)
         untrained = whitened(random_encoder(seed=config.seed), seen)
         numbers = {}
@@ -97,7 +99,7 @@ def detector_for(
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
         learned = identity_of(
-            "agents.vision.run",
+            "embodied.agents.vision.run",
             settings=config,
             data=data.digest,
             encoder=encoder.digest,
@@ -180,7 +182,7 @@ def make_features(
     skipped.
 
     Args:
-      picture_kind: as agents.vision.drawn.pictures_of takes it.
+      picture_kind: as embodied.agents.vision.drawn.pictures_of takes it.
       splits: of whose houses; none for all.
       first: so many houses of each split.
       ray: address of a Ray cluster to use instead of `workers`.

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from agents.common.settings import EvaluationSettings, ImitationSettings
-from agents.common.sighted import SightedAgent
-from agents.studies.episodes import EpisodeStudy
-from agents.studies.tables import StudyRow, StudyTable
-from agents.studies.wordings import SPEAKERS, code_of, hearing
-from agents.vision.lessons import Lessons
-from agents.vision.run import encoder_of
-from assets.cache import default_cache
+from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
+from embodied.agents.common.sighted import SightedAgent
+from embodied.agents.studies.episodes import EpisodeStudy
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.wordings import SPEAKERS, code_of, hearing
+from embodied.agents.vision.lessons import Lessons
+from embodied.agents.vision.run import encoder_of
+from embodied.assets.cache import default_cache
+
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent

@@ -7,11 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
-
-from agents.common.session import descend
-from agents.vision.encoder import Network, load_encoder
-from agents.vision.strip import COLUMNS
-from agents.vision.training import Heads, StripBatch, vision_loss
+from embodied.agents.common.session import descend
+from embodied.agents.vision.encoder import Network, load_encoder
+from embodied.agents.vision.strip import COLUMNS
+from embodied.agents.vision.training import Heads, StripBatch, vision_loss
 
 BATCH = {"cpu": 2, "cuda": 64}
 """Strips of one call."""

@@ -17,19 +17,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from embodied.agents.common.session import Note
+from embodied.agents.common.weights import kind_of, weights_digest
+from embodied.agents.studies.engine import Measured, StudyLearner
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.vision.config import RENDER_PRESETS, VisionConfig
+from embodied.agents.vision.detector import Detector
+from embodied.agents.vision.drawn import StripSource, houses_of
+from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.labels import HouseStrips, visible_in_views
+from embodied.agents.vision.probe import labelled, read
+from embodied.agents.vision.run import trained_encoder, training_houses
+from embodied.agents.vision.training import frequent_classes
 
-from agents.common.session import Note
-from agents.common.weights import kind_of, weights_digest
-from agents.studies.engine import Measured, StudyLearner
-from agents.studies.tables import StudyRow, StudyTable
-from agents.vision.config import RENDER_PRESETS, VisionConfig
-from agents.vision.detector import Detector
-from agents.vision.drawn import StripSource, houses_of
-from agents.vision.encoder import load_encoder
-from agents.vision.labels import HouseStrips, visible_in_views
-from agents.vision.probe import labelled, read
-from agents.vision.run import trained_encoder, training_houses
-from agents.vision.training import frequent_classes
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
@@ -74,7 +74,7 @@ class EncoderStudy(StudyLearner):
     row, one file per training seed."""
 
     name = "vision"
-    judges = ("agents.vision.study",)
+    judges = ("embodied.agents.vision.study",)
 
     def __post_init__(self) -> None:
         labels = [row.label for row in self.tables()["houses"].rows]
@@ -128,7 +128,7 @@ class EncoderStudy(StudyLearner):
         other: dict[str, object] = {k: train[k] for k in (LIT, SHARE) if k in train}
         if LIT in train:
             other["lit pictures"] = self._lit().picture_kind
-        return identity_of("agents.vision.run", settings=self._settings(train, seed), **other, **self._drawn())
+        return identity_of("embodied.agents.vision.run", settings=self._settings(train, seed), **other, **self._drawn())
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         if READY in train:

@@ -19,18 +19,18 @@ import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
+from embodied.agents.common.checkpoint import Stateful
+from embodied.agents.common.session import Note, Session, descend
+from embodied.agents.common.weights import seeded
+from embodied.agents.vision.config import StripTraining, VisionConfig
+from embodied.agents.vision.encoder import Encoder, Network, build, pool_views, save_encoder, strip_map, whitening
+from embodied.agents.vision.labels import HouseStrips, visible_in_views
+from embodied.agents.vision.lite import Lite, load_imagenet
+from embodied.agents.vision.strip import CELL, COLUMNS
+from embodied.assets.cache import digest, write_json
+from embodied.assets.records import ROOM_KINDS
 from torch import Tensor, nn
 
-from agents.common.checkpoint import Stateful
-from agents.common.session import Note, Session, descend
-from agents.common.weights import seeded
-from agents.vision.config import StripTraining, VisionConfig
-from agents.vision.encoder import Encoder, Network, build, pool_views, save_encoder, strip_map, whitening
-from agents.vision.labels import HouseStrips, visible_in_views
-from agents.vision.lite import Lite, load_imagenet
-from agents.vision.strip import CELL, COLUMNS
-from assets.cache import digest, write_json
-from assets.records import ROOM_KINDS
 from embodied.identity import Identity, identity_of
 from embodied.records import load_json
 from embodied.render.photograph import camera_traits, photograph
@@ -204,7 +204,7 @@ def train_encoder(
         load_imagenet(network)
     modules = {"network": network, "heads": heads}
     loss_of = functools.partial(vision_loss, network, heads)
-    identity = identity_of("agents.vision.training")
+    identity = identity_of("embodied.agents.vision.training")
     learn(houses, classes, config, modules, loss_of, folder, identity, device=device, note=note)
     return Encoder(network.cpu().eval(), config.network), [houses[0].classes[i] for i in classes]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.choosing import choose_at
-from agents.common.sighted import About, SightedAgent
-from agents.common.weights import check_features
-from agents.vision.bank import FeatureBank
-from agents.vln.config import FollowerSettings
-from agents.vln.network import FollowerNetwork
-from agents.vln.policy import VlnPolicy
+from embodied.agents.common.choosing import choose_at
+from embodied.agents.common.sighted import About, SightedAgent
+from embodied.agents.common.weights import check_features
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vln.config import FollowerSettings
+from embodied.agents.vln.network import FollowerNetwork
+from embodied.agents.vln.policy import VlnPolicy
 
 
 @dataclass(frozen=True, kw_only=True)

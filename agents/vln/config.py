@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import (
+from embodied.agents.common.settings import (
     AT_LEAST_ONE,
     EVERYBODY,
     NOT_ALL,

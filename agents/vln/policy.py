@@ -8,16 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from embodied.agents.common.choosing import Chooser, choose_greedily
+from embodied.agents.common.losses import IGNORE
+from embodied.agents.common.rows import RunningRows, hidden_channels
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.hanna.percept import action_index, candidate_rows, orientation
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vln.network import COPIES, FollowerNetwork, Heard, Said, Seen
+from embodied.assets.records import ROOM_KINDS
 from torch import Tensor
 
-from agents.common.choosing import Chooser, choose_greedily
-from agents.common.losses import IGNORE
-from agents.common.rows import RunningRows, hidden_channels
-from agents.common.vocabulary import Vocabulary
-from agents.hanna.percept import action_index, candidate_rows, orientation
-from agents.vision.bank import FeatureBank
-from agents.vln.network import COPIES, FollowerNetwork, Heard, Said, Seen
-from assets.records import ROOM_KINDS
 from embodied.geometry import wrap
 from embodied.interface import (
     VIEW_PITCHES,

@@ -14,22 +14,22 @@ from typing import Unpack
 
 import torch
 import torch.nn.functional as F
+from embodied.agents.common import imitation
+from embodied.agents.common.choosing import choose_sampled
+from embodied.agents.common.losses import IGNORE, negative_log_likelihood
+from embodied.agents.common.more_paths import more_routes
+from embodied.agents.common.session import Progress
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.common.weights import weights_digest
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vln.agent import VlnAbout, VlnAgent
+from embodied.agents.vln.config import FollowerSettings
+from embodied.agents.vln.policy import SupervisedVln, VlnMoment
+from embodied.agents.vln.speaker import load_speaker, spoken_tasks
 from torch import Tensor
 
-from agents.common import imitation
-from agents.common.choosing import choose_sampled
-from agents.common.losses import IGNORE, negative_log_likelihood
-from agents.common.more_paths import more_routes
-from agents.common.session import Progress
-from agents.common.settings import EvaluationSettings
-from agents.common.vocabulary import build_vocabulary
-from agents.common.weights import weights_digest
-from agents.vision.bank import FeatureBank
-from agents.vision.lessons import Lessons, Split
-from agents.vln.agent import VlnAbout, VlnAgent
-from agents.vln.config import FollowerSettings
-from agents.vln.policy import SupervisedVln, VlnMoment
-from agents.vln.speaker import load_speaker, spoken_tasks
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task
 from embodied.novelty import FAMILIAR
@@ -116,7 +116,7 @@ def train_follower(
     agent = VlnAgent.new(lessons.about(VlnAbout, config, evaluation, words), words.reword)
     agent.network.to(lessons.device)
     spoken = {"speaker": weights_digest(speaker)} if speaker and config.spoken_share else {}
-    identity = identity_of("agents.vln.run", settings=config, **lessons.identity(), **spoken)
+    identity = identity_of("embodied.agents.vln.run", settings=config, **lessons.identity(), **spoken)
     return imitation.train(VlnLearner(agent, training), validation, folder, identity, **options)
 
 

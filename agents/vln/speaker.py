@@ -13,25 +13,25 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from embodied.agents.common.choosing import choose_sampled, sampled_choice
+from embodied.agents.common.session import Note
+from embodied.agents.common.tensor_file import load_into
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
+from embodied.agents.common.weights import check_features, load_weights, seeded
+from embodied.agents.iliad.nav.network import WalkDescriber
+from embodied.agents.iliad.nav.student import NavEyes
+from embodied.agents.iliad.nav.teacher import said, walked
+from embodied.agents.iliad.nav.world import HORIZON, Trip, walk_along
+from embodied.agents.iliad.stages import TeachingStage
+from embodied.agents.iliad.writing import log_likelihood
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vln.agent import VlnAgent
+from embodied.agents.vln.config import SpeakerSettings
+from embodied.agents.vln.network import COPIES
+from embodied.agents.vln.policy import SPOKEN, channels_of
 from torch import Tensor
 
-from agents.common.choosing import choose_sampled, sampled_choice
-from agents.common.session import Note
-from agents.common.tensor_file import load_into
-from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.common.weights import check_features, load_weights, seeded
-from agents.iliad.nav.network import WalkDescriber
-from agents.iliad.nav.student import NavEyes
-from agents.iliad.nav.teacher import said, walked
-from agents.iliad.nav.world import HORIZON, Trip, walk_along
-from agents.iliad.stages import TeachingStage
-from agents.iliad.writing import log_likelihood
-from agents.vision.bank import FeatureBank
-from agents.vision.lessons import Lessons, Split
-from agents.vln.agent import VlnAgent
-from agents.vln.config import SpeakerSettings
-from agents.vln.network import COPIES
-from agents.vln.policy import SPOKEN, channels_of
 from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.store import SplitData
 from embodied.evaluation.metrics import without_repeats
@@ -124,7 +124,7 @@ def train_speaker(lessons: Lessons, config: SpeakerSettings, folder: Path, *, no
 
 def speaker_identity(lessons: Lessons, config: SpeakerSettings) -> Identity:
     """All that a trained speaker depends on."""
-    return identity_of("agents.vln.speaker", settings=config, **lessons.identity())
+    return identity_of("embodied.agents.vln.speaker", settings=config, **lessons.identity())
 
 
 def _path(task: Task) -> tuple[int, ...]:

@@ -8,17 +8,17 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from embodied.agents.common.session import Note
+from embodied.agents.studies.engine import Measured
+from embodied.agents.studies.episodes import JUDGES
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.wordings import speakers_table, words_table
+from embodied.agents.vision.sighted_study import SPLITS, SightedStudy
+from embodied.agents.vln.agent import VlnAgent
+from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
+from embodied.agents.vln.run import train_follower
+from embodied.agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
 
-from agents.common.session import Note
-from agents.studies.engine import Measured
-from agents.studies.episodes import JUDGES
-from agents.studies.tables import StudyRow, StudyTable
-from agents.studies.wordings import speakers_table, words_table
-from agents.vision.sighted_study import SPLITS, SightedStudy
-from agents.vln.agent import VlnAgent
-from agents.vln.config import FollowerSettings, SpeakerSettings
-from agents.vln.run import train_follower
-from agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
 from embodied.evaluation.evaluate import spread
 from embodied.identity import Identity, key_of
 from embodied.records import save_lines
@@ -75,8 +75,8 @@ class VlnStudy(SightedStudy):
     speaker: SpeakerSettings
 
     name, agent_kind, all_tables = "vln", VlnAgent, TABLES
-    makers = ("agents.vln.run",)
-    judges = (*JUDGES, "agents.vln.speaker", "agents.common.more_paths")
+    makers = ("embodied.agents.vln.run",)
+    judges = (*JUDGES, "embodied.agents.vln.speaker", "embodied.agents.common.more_paths")
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         spoken = train.get("spoken_share", self.config.spoken_share)

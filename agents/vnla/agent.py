@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.choosing import choose_at
-from agents.common.sighted import About, SightedAgent
-from agents.common.weights import check_features
-from agents.vision.bank import FeatureBank
-from agents.vnla.config import ASK_RULES, VnlaSettings
-from agents.vnla.network import VnlaNetwork
-from agents.vnla.policy import SupervisedVnla, VnlaPolicy
+from embodied.agents.common.choosing import choose_at
+from embodied.agents.common.sighted import About, SightedAgent
+from embodied.agents.common.weights import check_features
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vnla.config import ASK_RULES, VnlaSettings
+from embodied.agents.vnla.network import VnlaNetwork
+from embodied.agents.vnla.policy import SupervisedVnla, VnlaPolicy
+
 from embodied.interface import Agent
 from embodied.teachers.vnla import AskRules
 

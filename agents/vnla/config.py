@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
+from embodied.agents.common.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
 
 ASKERS = ("none", "first", "random", "teacher", "learned")
 """Who decides when to ask (docs/sources.md, S51)."""

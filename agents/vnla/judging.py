@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from agents.vision.bank import FeatureBank
-from agents.vnla.agent import VnlaAgent
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vnla.agent import VnlaAgent
+
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
 

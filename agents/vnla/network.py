@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
+from embodied.agents.common.rows import Rows
+from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.vnla.config import VnlaSettings
 from torch import Tensor, nn
 
-from agents.common.rows import Rows
-from agents.common.word_vectors import WordEmbedding
-from agents.vnla.config import VnlaSettings
 from embodied.action_spaces import WORDS
 
 ACTIONS = len(WORDS) + 1

@@ -14,13 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 import torch.nn.functional as F
-from torch import Tensor
-
-from agents.common.choosing import Chooser, choose_greedily, choose_sampled
-from agents.common.rows import RunningRows, hidden_channels
-from agents.common.vocabulary import Vocabulary
-from agents.vision.bank import FeatureBank
-from agents.vnla.network import (
+from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
+from embodied.agents.common.rows import RunningRows, hidden_channels
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vnla.network import (
     ASK,
     DONT,
     MOST_LEFT,
@@ -32,6 +30,8 @@ from agents.vnla.network import (
     VnlaNetwork,
     VnlaPercept,
 )
+from torch import Tensor
+
 from embodied.action_spaces import WORDS
 from embodied.interface import (
     TURNS,

@@ -15,18 +15,18 @@ from pathlib import Path
 from typing import Unpack
 
 import torch
+from embodied.agents.common import imitation
+from embodied.agents.common.losses import negative_log_likelihood
+from embodied.agents.common.session import Progress
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
+from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.policy import VnlaMoment, for_training
 from torch import Tensor
 
-from agents.common import imitation
-from agents.common.losses import negative_log_likelihood
-from agents.common.session import Progress
-from agents.common.settings import EvaluationSettings
-from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.vision.bank import FeatureBank
-from agents.vision.lessons import Lessons, Split
-from agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
-from agents.vnla.config import TRAINED_UNDER, VnlaSettings
-from agents.vnla.policy import VnlaMoment, for_training
 from embodied.action_spaces import WORDS
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset
@@ -98,5 +98,5 @@ def train_agent(
     words = vocabulary_of(lessons.data, houses, lessons.rewording(config))
     agent = VnlaAgent.new(lessons.about(VnlaAbout, config, evaluation, words), words.reword)
     agent.network.to(lessons.device)
-    identity = identity_of("agents.vnla.run", settings=config, **lessons.identity())
+    identity = identity_of("embodied.agents.vnla.run", settings=config, **lessons.identity())
     return imitation.train(VnlaLearner(agent, training), validation, folder, identity, **options)

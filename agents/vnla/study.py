@@ -11,16 +11,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.common.session import Note
-from agents.studies.episodes import JUDGES
-from agents.studies.tables import StudyRow, StudyTable
-from agents.studies.wordings import words_table
-from agents.vision.lessons import Lessons
-from agents.vision.sighted_study import NOTHING, SPLITS, SightedStudy
-from agents.vnla.agent import VnlaAgent
-from agents.vnla.config import VnlaSettings
-from agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
-from agents.vnla.run import train_agent
+from embodied.agents.common.session import Note
+from embodied.agents.studies.episodes import JUDGES
+from embodied.agents.studies.tables import StudyRow, StudyTable
+from embodied.agents.studies.wordings import words_table
+from embodied.agents.vision.lessons import Lessons
+from embodied.agents.vision.sighted_study import NOTHING, SPLITS, SightedStudy
+from embodied.agents.vnla.agent import VnlaAgent
+from embodied.agents.vnla.config import VnlaSettings
+from embodied.agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
+from embodied.agents.vnla.run import train_agent
+
 from embodied.datasets.store import SplitData
 from embodied.interface import Agent
 
@@ -106,8 +107,8 @@ class VnlaStudy(SightedStudy):
     judging: tuple[int, ...] = EVALUATION_SEEDS
 
     name, agent_kind, all_tables = "vnla", VnlaAgent, TABLES
-    makers = ("agents.vnla.run",)
-    judges = (*JUDGES, "agents.vnla.judging")
+    makers = ("embodied.agents.vnla.run",)
+    judges = (*JUDGES, "embodied.agents.vnla.judging")
 
     def settings(self, train: Mapping[str, Any], seed: int) -> VnlaSettings:
         return super().settings({k: v for k, v in train.items() if k != ROOMS}, seed)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from assets.built.maker import Maker
-from assets.built.table import read_makers, remade
-from assets.rows import DATA, check_classes, read_json, read_models
+from embodied.assets.built.maker import Maker
+from embodied.assets.built.table import read_makers, remade
+from embodied.assets.rows import DATA, check_classes, read_json, read_models
 
 __all__ = ["BASICS", "MAKERS", "Maker"]
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from assets.built.maker import BLACK, CHROME, GAP, STEEL, Order, parts_of, plain
-from assets.built.primitives import box, cylinder, lathe
-from assets.records import Finish, MeshPart
+from embodied.assets.built.maker import BLACK, CHROME, GAP, STEEL, Order, parts_of, plain
+from embodied.assets.built.primitives import box, cylinder, lathe
+from embodied.assets.records import Finish, MeshPart
 
 ENAMEL = plain((0.90, 0.90, 0.89), 0.25)
 DOOR = Finish(color=(0.16, 0.19, 0.21, 0.45), roughness=0.04)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from assets.built.maker import BLACK, PORCELAIN, Order, handle, parts_of, plain
-from assets.built.primitives import Shape, bar, box, cylinder, lathe, pillow
-from assets.records import MeshPart
+from embodied.assets.built.maker import BLACK, PORCELAIN, Order, handle, parts_of, plain
+from embodied.assets.built.primitives import Shape, bar, box, cylinder, lathe, pillow
+from embodied.assets.records import MeshPart
 
 
 def bed(order: Order) -> list[MeshPart]:

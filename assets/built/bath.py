@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-
-from assets.built.maker import CHROME, GLASS, PAPER, PORCELAIN, Order, carcass, front, handle, parts_of, plain
-from assets.built.primitives import (
+from embodied.assets.built.maker import CHROME, GLASS, PAPER, PORCELAIN, Order, carcass, front, handle, parts_of, plain
+from embodied.assets.built.primitives import (
     Shape,
     ball,
     between,
@@ -20,8 +19,8 @@ from assets.built.primitives import (
     tube,
     unrolled_uv,
 )
-from assets.built.soft import layers
-from assets.records import Finish, MeshPart
+from embodied.assets.built.soft import layers
+from embodied.assets.records import Finish, MeshPart
 
 
 def vanity(order: Order) -> list[MeshPart]:

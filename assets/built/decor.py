@@ -6,11 +6,22 @@ import itertools
 
 import numpy as np
 import shapely
+from embodied.assets.built.maker import BLACK, BRASS, MIRROR, PAPER, WHITE, Order, parts_of, plain, whole_image
+from embodied.assets.built.primitives import (
+    Shape,
+    ball,
+    between,
+    box,
+    cylinder,
+    flat,
+    frame,
+    lathe,
+    sheet,
+    tube,
+    upright,
+)
+from embodied.assets.records import MeshPart
 from scipy.interpolate import PchipInterpolator
-
-from assets.built.maker import BLACK, BRASS, MIRROR, PAPER, WHITE, Order, parts_of, plain, whole_image
-from assets.built.primitives import Shape, ball, between, box, cylinder, flat, frame, lathe, sheet, tube, upright
-from assets.records import MeshPart
 
 GLAZES = {
     "white": plain((0.85, 0.83, 0.78), 0.55),

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-
-from assets.built.maker import Order, parts_of, plain
-from assets.built.primitives import Shape, bar, box, extruded, joined, lathe, sheet, tube
-from assets.records import MeshPart
+from embodied.assets.built.maker import Order, parts_of, plain
+from embodied.assets.built.primitives import Shape, bar, box, extruded, joined, lathe, sheet, tube
+from embodied.assets.records import MeshPart
 
 
 def shoes(order: Order) -> list[MeshPart]:

@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-
-from assets.built.maker import BLACK, GLASS, PAPER, STEEL, Order, parts_of, plain
-from assets.built.primitives import Shape, ball, between, box, cylinder, frame, joined, lathe, quads, rim, sheet, tube
-from assets.records import Finish, MeshPart, Size
+from embodied.assets.built.maker import BLACK, GLASS, PAPER, STEEL, Order, parts_of, plain
+from embodied.assets.built.primitives import (
+    Shape,
+    ball,
+    between,
+    box,
+    cylinder,
+    frame,
+    joined,
+    lathe,
+    quads,
+    rim,
+    sheet,
+    tube,
+)
+from embodied.assets.records import Finish, MeshPart, Size
 
 TINTS = {
     "white": (0.90, 0.89, 0.86),

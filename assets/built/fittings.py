@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from assets.built.maker import BLACK, CHROME, WHITE, Order, parts_of, plain
-from assets.built.primitives import Shape, box, cylinder, lathe, quads, tube
-from assets.records import MeshPart
+from embodied.assets.built.maker import BLACK, CHROME, WHITE, Order, parts_of, plain
+from embodied.assets.built.primitives import Shape, box, cylinder, lathe, quads, tube
+from embodied.assets.records import MeshPart
 
 
 def switch(order: Order) -> list[MeshPart]:

@@ -6,8 +6,7 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-
-from assets.built.maker import (
+from embodied.assets.built.maker import (
     BLACK,
     CHROME,
     GLASS,
@@ -21,8 +20,8 @@ from assets.built.maker import (
     parts_of,
     plain,
 )
-from assets.built.primitives import Shape, between, box, cylinder, joined, lathe, quads, tube, upright
-from assets.records import Finish, MeshPart
+from embodied.assets.built.primitives import Shape, between, box, cylinder, joined, lathe, quads, tube, upright
+from embodied.assets.records import Finish, MeshPart
 
 TOP = 0.038
 """Thickness of the worktop, metres."""

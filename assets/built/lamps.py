@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-
-from assets.built.maker import BULB, LIGHTS, SHADE, WHITE, Order, parts_of, plain, tinted
-from assets.built.primitives import Shape, ball, box, cylinder, joined, lathe, quads, sheet, tube
-from assets.records import Finish, MeshPart
+from embodied.assets.built.maker import BULB, LIGHTS, SHADE, WHITE, Order, parts_of, plain, tinted
+from embodied.assets.built.primitives import Shape, ball, box, cylinder, joined, lathe, quads, sheet, tube
+from embodied.assets.records import Finish, MeshPart
 
 OPAL = plain((0.96, 0.94, 0.89), 0.3, emission=(7.0, 5.9, 4.5))
 GLOW = plain((1.0, 0.96, 0.88), 0.3, emission=BULB)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-
-from assets.built.maker import BLACK, CHROME, STEEL, Order, parts_of, plain
-from assets.built.primitives import Shape, box, flat, joined, sheet, tube
-from assets.records import MeshPart
+from embodied.assets.built.maker import BLACK, CHROME, STEEL, Order, parts_of, plain
+from embodied.assets.built.primitives import Shape, box, flat, joined, sheet, tube
+from embodied.assets.records import MeshPart
 
 SEAM = plain((0.06, 0.055, 0.05), 0.8, specular=0.1)
 """Zips and edgings."""

@@ -8,9 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, outline, part, tube
-from assets.records import Asset, Color, Finish, MeshPart, Size, SupportSurface
+from embodied.assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, outline, part, tube
+from embodied.assets.records import Asset, Color, Finish, MeshPart, Size, SupportSurface
 
 FinishOf = Callable[[str], Finish]
 Look = Mapping[str, str | float]

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-
-from assets.built.maker import BLACK, BRASS, CHROME, PAPER, PORCELAIN, STEEL, Order, parts_of, plain, whole_image
-from assets.built.primitives import (
+from embodied.assets.built.maker import (
+    BLACK,
+    BRASS,
+    CHROME,
+    PAPER,
+    PORCELAIN,
+    STEEL,
+    Order,
+    parts_of,
+    plain,
+    whole_image,
+)
+from embodied.assets.built.primitives import (
     Shape,
     ball,
     bar,
@@ -21,7 +31,7 @@ from assets.built.primitives import (
     tube,
     upright,
 )
-from assets.records import Finish, MeshPart
+from embodied.assets.records import Finish, MeshPart
 
 CLOTH = (
     (0.55, 0.16, 0.14),

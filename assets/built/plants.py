@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from assets.built.maker import SOIL, Order, parts_of, plain
-from assets.built.primitives import Shape, lathe, sheet, tube
-from assets.records import MeshPart, Size
+from embodied.assets.built.maker import SOIL, Order, parts_of, plain
+from embodied.assets.built.primitives import Shape, lathe, sheet, tube
+from embodied.assets.records import MeshPart, Size
 
 GREENS = {
     "broad": ((0.16, 0.30, 0.12), (0.26, 0.42, 0.16)),

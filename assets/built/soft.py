@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-
-from assets.built.maker import WHITE, Order, parts_of, plain, whole_image
-from assets.built.primitives import Shape, ball, box, cylinder, folds, joined, lathe, pillow, quads, sheet, tube
-from assets.records import MeshPart, Size
+from embodied.assets.built.maker import WHITE, Order, parts_of, plain, whole_image
+from embodied.assets.built.primitives import (
+    Shape,
+    ball,
+    box,
+    cylinder,
+    folds,
+    joined,
+    lathe,
+    pillow,
+    quads,
+    sheet,
+    tube,
+)
+from embodied.assets.records import MeshPart, Size
 
 PLEAT = 0.095
 """Width of a fold of a drawn curtain, metres."""

@@ -5,10 +5,21 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-
-from assets.built.maker import BLACK, MIRROR, STEEL, Look, Order, carcass, front, handle, joints, parts_of, surface
-from assets.built.primitives import bar, box, pillow
-from assets.records import MeshPart, Size, SupportSurface
+from embodied.assets.built.maker import (
+    BLACK,
+    MIRROR,
+    STEEL,
+    Look,
+    Order,
+    carcass,
+    front,
+    handle,
+    joints,
+    parts_of,
+    surface,
+)
+from embodied.assets.built.primitives import bar, box, pillow
+from embodied.assets.records import MeshPart, Size, SupportSurface
 
 BOARD = 0.022
 

@@ -7,8 +7,8 @@ import functools
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from assets import rows
-from assets.built import (
+from embodied.assets import rows
+from embodied.assets.built import (
     appliances,
     basics,
     bath,
@@ -25,10 +25,10 @@ from assets.built import (
     storage,
     tableware,
 )
-from assets.built.maker import LIGHTS, Build, Look, Maker, made, surface
-from assets.materials import MATERIALS
-from assets.records import Asset, SupportSurface
-from assets.rows import CatalogueError, Field, Row
+from embodied.assets.built.maker import LIGHTS, Build, Look, Maker, made, surface
+from embodied.assets.materials import MATERIALS
+from embodied.assets.records import Asset, SupportSurface
+from embodied.assets.rows import CatalogueError, Field, Row
 
 BUILDS: Mapping[str, Build] = rows.made_in(
     *(appliances, basics, bath, decor, entry, everyday, fittings, kitchen),

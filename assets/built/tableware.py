@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-
-from assets.built.maker import BLACK, BRASS, GLASS, STEEL, Order, parts_of, plain
-from assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, tube
-from assets.records import MeshPart
+from embodied.assets.built.maker import BLACK, BRASS, GLASS, STEEL, Order, parts_of, plain
+from embodied.assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, tube
+from embodied.assets.records import MeshPart
 
 MUGS = {
     "white": plain((0.91, 0.90, 0.88), 0.18),

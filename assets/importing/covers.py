@@ -12,15 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from embodied.assets.importing.meshing import face_normals
+from embodied.assets.importing.mtl_finish import CLOTH
+from embodied.assets.materials.maps import Canvas, blurred
+from embodied.assets.materials.textile import folds, leather
+from embodied.assets.materials.wood import furniture
 from PIL import Image
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-
-from assets.importing.meshing import face_normals
-from assets.importing.mtl_finish import CLOTH
-from assets.materials.maps import Canvas, blurred
-from assets.materials.textile import folds, leather
-from assets.materials.wood import furniture
 
 LEATHER = re.compile(r"leather|cuero|cuir|leder|\bskai\b", re.IGNORECASE)
 WOOD = re.compile(
@@ -53,7 +52,7 @@ class Covering:
     draw: Callable[[Canvas], np.ndarray]
     """(n, n, 3) or (n, n, 1) factors, mean about 1."""
     detail: str
-    """What it shows from nearby (assets.materials.detail)."""
+    """What it shows from nearby (embodied.assets.materials.detail)."""
     grained: bool = False
     """Runs along the longest side of every board."""
 

@@ -17,16 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from embodied.assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart, Tell
+from embodied.assets.importing.meshing import face_normals
+from embodied.assets.importing.obj import FARTHEST, MAX_FACES, MeshError
+from embodied.assets.importing.sh3f import MAX_ENTRY
+from embodied.assets.importing.textures import mirrored, palette, sampled, shrunk, tinted, to_linear, to_srgb
+from embodied.assets.json_file import parse
+from embodied.assets.json_file import shown as short
+from embodied.assets.records import Finish
 from PIL import Image
-
-from assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart, Tell
-from assets.importing.meshing import face_normals
-from assets.importing.obj import FARTHEST, MAX_FACES, MeshError
-from assets.importing.sh3f import MAX_ENTRY
-from assets.importing.textures import mirrored, palette, sampled, shrunk, tinted, to_linear, to_srgb
-from assets.json_file import parse
-from assets.json_file import shown as short
-from assets.records import Finish
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 PICTURES = ("PNG", "JPEG")

@@ -2,7 +2,7 @@
 
 The models of Sweet Home 3D are y up with their front towards +z, of any unit: `modelRotation`
 turns them, then the bounding box is stretched to the catalogue's width, height and depth, as
-Sweet Home 3D does itself. The asset frame (assets.records.MeshPart) is (x, -z, y) of that.
+Sweet Home 3D does itself. The asset frame (embodied.assets.records.MeshPart) is (x, -z, y) of that.
 """
 
 from __future__ import annotations
@@ -18,28 +18,27 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
+from embodied.assets.archives import open_arrays
+from embodied.assets.cache import atomic_path, digest, write_bytes, write_json
+from embodied.assets.closure import code_digest
+from embodied.assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
+from embodied.assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
+from embodied.assets.importing.mtl_finish import corrected, finish_of
+from embodied.assets.importing.obj import Group, MeshError, MtlMaterial, Obj, decoded, libraries, parse_mtl, parse_obj
+from embodied.assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
+from embodied.assets.importing.sh3f import Pack, PackError
+from embodied.assets.importing.textures import cut, filled, palette, shrunk, tinted
+from embodied.assets.json_file import read_json
+from embodied.assets.records import Finish, ImportRecipe, MeshPart, bounds
 from PIL import Image, UnidentifiedImageError
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from assets.archives import open_arrays
-from assets.cache import atomic_path, digest, write_bytes, write_json
-from assets.closure import code_digest
-from assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
-from assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
-from assets.importing.mtl_finish import corrected, finish_of
-from assets.importing.obj import Group, MeshError, MtlMaterial, Obj, decoded, libraries, parse_mtl, parse_obj
-from assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
-from assets.importing.sh3f import Pack, PackError
-from assets.importing.textures import cut, filled, palette, shrunk, tinted
-from assets.json_file import read_json
-from assets.records import Finish, ImportRecipe, MeshPart, bounds
-
 log = logging.getLogger(__name__)
 
-READER = "assets.importing.own"
+READER = "embodied.assets.importing.own"
 """The module that imports models of all formats: its code is part of every cache key."""
-APART = ("assets", "assets.data", "assets.importing")
+APART = ("embodied.assets", "embodied.assets.data", "embodied.assets.importing")
 """What the code of imported models does not count: packages' names, and the catalogue's rows, whose recipes are in the
 keys."""
 FORMATS = ("PNG", "JPEG", "BMP", "TGA")
@@ -81,7 +80,7 @@ class RawPart:
     finish: Finish
     image: Image.Image | None = None
     cover: str | None = None
-    """What it wears, folds alone where it has an image (assets.importing.covers)."""
+    """What it wears, folds alone where it has an image (embodied.assets.importing.covers)."""
     two_sided: bool = False
     """Seen from behind, too, where it is open."""
     least: float | None = 0.5

@@ -7,9 +7,8 @@ import re
 from typing import Any
 
 import numpy as np
-
-from assets.importing.obj import MtlMaterial
-from assets.records import Finish
+from embodied.assets.importing.obj import MtlMaterial
+from embodied.assets.records import Finish
 
 MIRROR = re.compile(r"mirror|espejo|miroir|spiegel|reflejo", re.IGNORECASE)
 METAL = re.compile(

@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
-from assets import rows
-from assets.cache import digest
-from assets.importing.glb import read_glb
-from assets.importing.importer import Reader, cached, import_model, obj_files, read_obj
-from assets.importing.mtl_finish import corrected
-from assets.importing.obj import MeshError
-from assets.importing.sh3f import MAX_ENTRY, open_pack
-from assets.records import Asset, Finish, ImportRecipe, MeshPart
-from assets.rows import CatalogueError, Field, Row
+from embodied.assets import rows
+from embodied.assets.cache import digest
+from embodied.assets.importing.glb import read_glb
+from embodied.assets.importing.importer import Reader, cached, import_model, obj_files, read_obj
+from embodied.assets.importing.mtl_finish import corrected
+from embodied.assets.importing.obj import MeshError
+from embodied.assets.importing.sh3f import MAX_ENTRY, open_pack
+from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
+from embodied.assets.rows import CatalogueError, Field, Row
 
 KINDS = (".glb", ".obj", ".sh3f")
 OWN_FIELDS = {

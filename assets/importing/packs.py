@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from assets.importing.sh3f import Pack, PackError, open_pack
+from embodied.assets.importing.sh3f import Pack, PackError, open_pack
 
 SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
 """Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""

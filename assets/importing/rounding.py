@@ -8,8 +8,7 @@ of sofas, cushions and tubes have round outlines and not only round shading.
 from __future__ import annotations
 
 import numpy as np
-
-from assets.importing.meshing import corner_angles, crease_normals, face_normals
+from embodied.assets.importing.meshing import corner_angles, crease_normals, face_normals
 
 SAG = 0.0012
 """Metres between an edge and the curve over it, from which on the edge is split."""

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
-from assets.cache import digest
-from assets.records import IDENTITY
+from embodied.assets.cache import digest
+from embodied.assets.records import IDENTITY
 
 CATALOGUE = "PluginFurnitureCatalog.properties"
 MAX_ENTRY = 64 * 2**20

@@ -7,14 +7,13 @@ import functools
 import cv2
 import numpy as np
 import shapely
+from embodied.assets.importing.meshing import weld
 from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
-from assets.importing.meshing import weld
-
 PALETTE = 2304
 """Most colours of vertices that are told apart: texels of a square of 48 are far enough apart for decimation, which
-takes a step of 0.02 for a seam (assets.importing.meshing.project_uv)."""
+takes a step of 0.02 for a seam (embodied.assets.importing.meshing.project_uv)."""
 FINER = 4
 """Times that a mask is enlarged before its outline is drawn."""
 OUTLINE = 0.75

@@ -8,15 +8,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-
-from assets.cache import atomic_path, digest, write_json
-from assets.closure import code_digest
-from assets.json_file import read_json
-from assets.materials import maps
-from assets.materials.maps import Maps, normal_map
-from assets.materials.material import ROLES, Material, detail_of
-from assets.materials.registry import MATERIALS, PAINTERS, painters_of
-from assets.records import Finish
+from embodied.assets.cache import atomic_path, digest, write_json
+from embodied.assets.closure import code_digest
+from embodied.assets.json_file import read_json
+from embodied.assets.materials import maps
+from embodied.assets.materials.maps import Maps, normal_map
+from embodied.assets.materials.material import ROLES, Material, detail_of
+from embodied.assets.materials.registry import MATERIALS, PAINTERS, painters_of
+from embodied.assets.records import Finish
 
 __all__ = ["MATERIALS", "ROLES", "Maps", "Material", "finish", "make_maps", "of_role"]
 IMAGES = ("color.png", "normal.png", "roughness.png")
@@ -85,7 +84,7 @@ def fingerprint(key: str) -> str:
     """
     material = _material(key)
     modules = {maps.__name__, *(PAINTERS[name].__module__ for name in painters_of(material.told))}
-    code = code_digest(*sorted(modules), without=(__name__, "assets.data"))
+    code = code_digest(*sorted(modules), without=(__name__, "embodied.assets.data"))
     return digest(key, material.pixels, material.tile, dict(material.told), code)
 
 

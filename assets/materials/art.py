@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-
-from assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, rgb, smooth_step
-from assets.records import Color
+from embodied.assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, rgb, smooth_step
+from embodied.assets.records import Color
 
 
 def _canvas(on: Canvas, color: Color, grain: float = 0.015) -> np.ndarray:

@@ -9,10 +9,9 @@ import functools
 
 import cv2
 import numpy as np
-
-from assets.materials.maps import Canvas, blurred
-from assets.materials.textile import Weave, leather
-from assets.records import DETAILS
+from embodied.assets.materials.maps import Canvas, blurred
+from embodied.assets.materials.textile import Weave, leather
+from embodied.assets.records import DETAILS
 
 PIXELS, TILE = 512, 0.512
 """Side of a tile, pixels and metres."""

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import scipy.fft
-
-from assets.records import Color
+from embodied.assets.records import Color
 
 Colors = tuple[Color, ...]
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-
-from assets.materials.maps import Maps
+from embodied.assets.materials.maps import Maps
 
 ROLES = (
     "floor_wood",
@@ -95,5 +94,5 @@ class Material:
 
 
 def detail_of(material: Material) -> str | None:
-    """What a material shows from nearby, one of assets.records.DETAILS."""
+    """What a material shows from nearby, one of embodied.assets.records.DETAILS."""
     return DETAIL_OF_PAINTER.get(material.told["by"], DETAIL_OF_FAMILY.get(material.family))

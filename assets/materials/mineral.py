@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
-from assets.materials.maps import (
+from embodied.assets.materials.maps import (
     Canvas,
     Color,
     Colors,

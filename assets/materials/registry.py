@@ -9,12 +9,11 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-
-from assets import rows
-from assets.materials import art, maps, mineral, surface, textile, wood
-from assets.materials.maps import Canvas, Maps
-from assets.materials.material import ROLES, Material
-from assets.rows import CatalogueError, Field, Row
+from embodied.assets import rows
+from embodied.assets.materials import art, maps, mineral, surface, textile, wood
+from embodied.assets.materials.maps import Canvas, Maps
+from embodied.assets.materials.material import ROLES, Material
+from embodied.assets.rows import CatalogueError, Field, Row
 
 PAINTERS = rows.made_in(art, maps, mineral, surface, textile, wood)
 """What a row may name with "by", as '<module>.<name>': recipes, and the layouts, faces, motifs and cloths they take."""

@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-
-from assets.materials.maps import Canvas, Colors, Maps, blurred, coordinates, maps_of, mix, rgb, smooth_step
-from assets.records import Color
+from embodied.assets.materials.maps import Canvas, Colors, Maps, blurred, coordinates, maps_of, mix, rgb, smooth_step
+from embodied.assets.records import Color
 
 
 def paint(on: Canvas, color: Color, rough: float = 0.85, nap: float = 1.0) -> Maps:

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, rgb, smooth_step
-from assets.records import Color
+from embodied.assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, rgb, smooth_step
+from embodied.assets.records import Color
 
 LIGHT_FROM = (0.55, 0.83)
 """Where light on folds comes from, in a tile, right and up: on upright cloth from above."""

@@ -8,8 +8,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
-from assets.materials.maps import Canvas, Layout, Maps, fbm, look_up, maps_of, mix, noise, planks, rgb, smooth_step
+from embodied.assets.materials.maps import (
+    Canvas,
+    Layout,
+    Maps,
+    fbm,
+    look_up,
+    maps_of,
+    mix,
+    noise,
+    planks,
+    rgb,
+    smooth_step,
+)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, from_values, measure
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House

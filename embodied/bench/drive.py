@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, measure, one_core, share
 from embodied.generate import generate_house

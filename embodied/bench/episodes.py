@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.assistants.route_system import build_routes
 from embodied.bench.timing import Measure, measure
 from embodied.datasets.build import DatasetConfig, make_dataset_house

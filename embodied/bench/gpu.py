@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from assets.catalogue import Catalogue
 from embodied import gl
+from embodied.assets.catalogue import Catalogue
 from embodied.bench.bakes import QUALITIES
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, from_values, measure

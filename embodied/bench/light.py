@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from assets.cache import write_bytes, write_json
 from embodied import gl
+from embodied.assets.cache import write_bytes, write_json
 from embodied.bench.timing import Report
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
@@ -33,7 +33,7 @@ from embodied.render.jpeg import jpeg
 from embodied.world import gloss_of
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 HOUSES, VIEWS = 4, 3
 """How many houses are compared, and rooms of each."""

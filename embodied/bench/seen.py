@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, measure, one_core, share
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, measure, one_core
 from embodied.datasets.skyboxes import write_skybox

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, measure, share
 from embodied.generate import HouseConfig, generate_house
 from embodied.navigation.graph import build_graph

@@ -19,7 +19,6 @@ from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import NoReturn
 
-from embodied.cli.origins import REMEDY, strangers
 from embodied.errors import UnableError
 
 COMMANDS = (
@@ -182,11 +181,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"error: {KILLED}", file=sys.stderr)
         return 2
     except ImportError as e:
-        found, extra = strangers(), EXTRAS.get((e.name or "").partition(".")[0])
-        if "--traceback" in argv or not (found or extra):
+        extra = EXTRAS.get((e.name or "").partition(".")[0])
+        if "--traceback" in argv or not extra:
             raise
         missing = f"this needs {e.name}, which is not installed; pip install 'embodied-houses[{extra}]'"
-        print(f"error: {'; '.join(found) + '; ' + REMEDY if found else missing}", file=sys.stderr)
+        print(f"error: {missing}", file=sys.stderr)
         return 2
 
 

@@ -16,8 +16,8 @@ from embodied.cli.common import Furnished, Printed, catalogue_of, show
 from embodied.cli.options import Option, any_path
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
-    from assets.records import Asset
+    from embodied.assets.catalogue import Catalogue
+    from embodied.assets.records import Asset
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ def sheet(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
 
 def attribution(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Write who made which model, under which licence."""
-    from assets.attribution import write_attribution
+    from embodied.assets.attribution import write_attribution
 
     out = args.out or Path("ATTRIBUTION.md")
     write_attribution(catalogue, out)

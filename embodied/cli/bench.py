@@ -24,7 +24,7 @@ from embodied.cli.options import Count, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import DRAWN, PictureSettings
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
     from embodied.bench.timing import Measure
 
 PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes", "light", "serve")
@@ -92,7 +92,7 @@ def run(args: Options) -> None:
 
 def _gpu(catalogue: Catalogue, cache: Path, seed: int, light: str) -> Iterator[Measure]:
     """Agents do not know the benchmarks, so what learns is handed over here."""
-    from agents.vision.speed import works
+    from embodied.agents.vision.speed import works
     from embodied.bench import gpu
 
     return gpu.gpu(catalogue, cache, seed, light, works, progress=note)

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from tqdm import tqdm
 
-from assets.cache import default_cache
+from embodied.assets.cache import default_cache
 from embodied.cli.options import AnyFolder, Option, any_path
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
     from embodied.house.house import House, Opening, Room
 
 T = TypeVar("T")
@@ -48,7 +48,7 @@ class Printed:
 
 def catalogue_of(args: Furnished) -> Catalogue:
     """The catalogue that --cache, --pack and --own describe."""
-    from assets.catalogue import load_catalogue
+    from embodied.assets.catalogue import load_catalogue
 
     return load_catalogue(args.cache, args.pack, args.own)
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from agents.bandit.config import Sizes
+from embodied.agents.bandit.config import Sizes
 from embodied.cli.common import Cached, note
 from embodied.cli.options import Count, InputPath, Option, OutputFolder, Settings, any_path
 
@@ -36,7 +36,7 @@ class Options(Cached):
 
 
 def run(args: Options) -> None:
-    from agents.bandit import corpus, libreoffice
+    from embodied.agents.bandit import corpus, libreoffice
 
     if args.folder and args.moses:
         raise ValueError("--from and --moses exclude each other; leave one out")

@@ -83,8 +83,8 @@ class Options(Furnished, Printed):
 
 def from_people(args: Options) -> None:
     """A data set with what people said."""
-    from agents.bandit.ratings import fitted
-    from assets.cache import write_json
+    from embodied.agents.bandit.ratings import fitted
+    from embodied.assets.cache import write_json
     from embodied.datasets.store import Dataset
     from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
     from embodied.serve.sessions import STARS

@@ -22,12 +22,12 @@ from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
     from embodied.house.house import House
     from embodied.interface import Episode, Route
     from embodied.navigation.graph import NavGraph
+    from embodied.viz.recording import Recognise
     from embodied.world import World
-    from viz.recording import Recognise
 
 SEED = 3
 """The demo house: a flat that is lit and drawn in a few minutes on two cores."""
@@ -164,13 +164,13 @@ def find_something(args: Options, world: World, viewers: tuple[str, ...]) -> dic
 def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
-    from agents.common.shipped import SHIPPED_AGENT
-    from agents.hanna.agent import HannaAgent
-    from agents.hanna.evaluation import hanna_policies
-    from agents.vision.bank import FeatureBank
-    from agents.vision.encoder import load_encoder
-    from agents.vision.features import encode_panoramas
-    from agents.vision.recognise import Recogniser
+    from embodied.agents.common.shipped import SHIPPED_AGENT
+    from embodied.agents.hanna.agent import HannaAgent
+    from embodied.agents.hanna.evaluation import hanna_policies
+    from embodied.agents.vision.bank import FeatureBank
+    from embodied.agents.vision.encoder import load_encoder
+    from embodied.agents.vision.features import encode_panoramas
+    from embodied.agents.vision.recognise import Recogniser
     from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
     from embodied.language import People
@@ -206,8 +206,8 @@ def recorded(
       recognise: names what the agent recognises there.
     """
     from embodied.evaluation.metrics import navigation_error, spl, success
-    from viz.recording import record_episode
-    from viz.sinks import Sinks
+    from embodied.viz.recording import record_episode
+    from embodied.viz.sinks import Sinks
 
     watch = lambda steps: bar(steps, "recording", "step")
     record_episode(world, episode, Sinks(path, viewers), eyes=eyes, watch=watch, recognise=recognise)

@@ -18,7 +18,6 @@ from pathlib import Path
 
 from embodied.cli import message_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
-from embodied.cli.origins import REMEDY, strangers
 from embodied.distribution import DISTRIBUTION
 from embodied.software import bring_atomic, load_atomic, unpack
 
@@ -68,7 +67,7 @@ def run(args: Options) -> int:
             again = ["doctor", "--cache", str(args.cache), *(w for p in args.pack for w in ("--pack", str(p)))]
             again += ["--json"] if args.json else []
             return subprocess.run([sys.executable, "-m", "embodied", *again], check=False).returncode
-    for look in (versions, extras, packages, renderer, packs, path_tracer, vulkan, body, disk):
+    for look in (versions, extras, renderer, packs, path_tracer, vulkan, body, disk):
         findings.append(look(args))
         if not args.json:
             print(line(findings[-1]), flush=True)
@@ -86,8 +85,8 @@ def line(f: Finding) -> str:
 
 def fix(catalogue_packs: tuple[Path, ...]) -> Iterator[str]:
     """Install what can be had without root and this machine lacks; yields what is done."""
-    from assets.importing.packs import OWN_FOLDER, find_packs
     from embodied import gl
+    from embodied.assets.importing.packs import OWN_FOLDER, find_packs
     from embodied.light.backend import find_llvm
 
     if not find_packs(catalogue_packs):
@@ -144,12 +143,6 @@ def _installed(names: Sequence[str]) -> tuple[list[str], list[str]]:
     return found, missing
 
 
-def packages(_: Options) -> Finding:
-    """Whether embodied, agents, assets and viz are ours wherever Python is started."""
-    found = strangers()
-    return Finding("packages", not found, "; ".join(found) or "embodied, agents, assets and viz are ours", REMEDY)
-
-
 def renderer(_: Options) -> Finding:
     """The off-screen renderer that MuJoCo gets."""
     from embodied import gl
@@ -163,7 +156,7 @@ def renderer(_: Options) -> Finding:
 
 def packs(args: Options) -> Finding:
     """The furniture libraries, and whether they hold every model of the catalogue."""
-    from assets.importing.packs import find_packs
+    from embodied.assets.importing.packs import find_packs
 
     remedy = (
         "embodied doctor --fix, or in a clone make wheels and pip install dist/embodied_houses_furniture-*.whl, or "

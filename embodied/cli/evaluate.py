@@ -73,7 +73,7 @@ def _agents(args: Options) -> tuple[list[str], list[Path]]:
     Raises:
       ValueError: an unknown agent, or several trained ones.
     """
-    from agents.common.shipped import SHIPPED
+    from embodied.agents.common.shipped import SHIPPED
     from embodied.evaluation.evaluate import agent_names
     from embodied.policies.ask import baselines
 
@@ -98,7 +98,7 @@ def _evaluate(
     args: Options, data: Dataset | None, names: Sequence[str], files: Sequence[Path], splits: Sequence[str]
 ) -> None:
     """Play, print the table, and write what goes into --out."""
-    from assets.cache import write_json
+    from embodied.assets.cache import write_json
     from embodied.evaluation import tables
     from embodied.records import episodes_file, fingerprint, save_lines
 
@@ -153,7 +153,7 @@ class _Changes:
     """What the command line changes about a split: who answers requests, and how long episodes are."""
 
     def __init__(self, args: Options, client: Callable[[], Any]) -> None:
-        from agents.language_models.assistant import assistant_maker
+        from embodied.agents.language_models.assistant import assistant_maker
         from embodied.envs.make import assistant_of
 
         self.own: Assistant | None = None
@@ -191,7 +191,7 @@ def _play(
     keep: Callable[[str, str, Sequence[Episode]], None],
 ) -> tuple[list[Row], dict[str, tuple[int, int]]]:
     """The rows of agents without training, and what a scripted listener makes of the routes that each was told."""
-    from agents.language_models.checking import understood
+    from embodied.agents.language_models.checking import understood
     from embodied.evaluation.evaluate import LOOKING, evaluate
 
     looks = bool({LLM, *LOOKING.get(args.kind, {})} & set(names)) or args.kind == "ask" or args.assistant != TEMPLATE
@@ -278,9 +278,9 @@ def _agent(
 
 
 def _model_agent(args: Options, split: SplitData, client: Any) -> Agent:
-    from agents.language_models.agent import LanguageModelAgent
-    from agents.language_models.telling import Teller, agent_prompt
-    from agents.language_models.words import SeenNames
+    from embodied.agents.language_models.agent import LanguageModelAgent
+    from embodied.agents.language_models.telling import Teller, agent_prompt
+    from embodied.agents.language_models.words import SeenNames
     from embodied.gym.eyes import PanoramaStore
     from embodied.world import World
 

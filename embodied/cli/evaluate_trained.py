@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from embodied.cli.common import bar, note
 
 if TYPE_CHECKING:
-    from agents.vision.lessons import Lessons
+    from embodied.agents.vision.lessons import Lessons
     from embodied.cli.evaluate_options import Options
     from embodied.datasets.store import Dataset, SplitData
     from embodied.evaluation.tables import Row
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 def columns_of(kind: str) -> Sequence[str]:
     """The measures of the paper's tables."""
-    from agents.hanna.evaluation import COLUMNS as HANNA
-    from agents.hari.judging import COLUMNS as HARI
-    from agents.vln.study import COLUMNS as VLN
-    from agents.vnla.judging import COLUMNS as VNLA
+    from embodied.agents.hanna.evaluation import COLUMNS as HANNA
+    from embodied.agents.hari.judging import COLUMNS as HARI
+    from embodied.agents.vln.study import COLUMNS as VLN
+    from embodied.agents.vnla.judging import COLUMNS as VNLA
 
     return {"hanna": HANNA, "hari": HARI, "vln": VLN, "vnla": VNLA}[kind]
 
@@ -49,11 +49,11 @@ def evaluate_trained(
     Raises:
       ValueError: an unknown row.
     """
-    from agents.common.parallel import use_threads
-    from agents.common.weights import weights_digest
-    from agents.studies.episodes import JUDGES, evaluate_frozen
-    from agents.vision.drawn import pictures_of
-    from agents.vision.occasions import OCCASIONS
+    from embodied.agents.common.parallel import use_threads
+    from embodied.agents.common.weights import weights_digest
+    from embodied.agents.studies.episodes import JUDGES, evaluate_frozen
+    from embodied.agents.vision.drawn import pictures_of
+    from embodied.agents.vision.occasions import OCCASIONS
     from embodied.identity import identity_of
 
     use_threads(args.threads)
@@ -92,8 +92,8 @@ class Known:
 
 def _hanna(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """Tables 4.3 to 4.5."""
-    from agents.hanna.agent import HannaAgent
-    from agents.hanna.evaluation import WITHOUT_LEARNING, players
+    from embodied.agents.hanna.agent import HannaAgent
+    from embodied.agents.hanna.evaluation import WITHOUT_LEARNING, players
 
     lessons, agent = _lessons(args, data), HannaAgent.load(file)
 
@@ -106,8 +106,8 @@ def _hanna(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 
 def _vnla(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """The learned asker beside other askers, direct intervention and agents without learning."""
-    from agents.vnla.agent import VnlaAgent
-    from agents.vnla.judging import WITHOUT_LEARNING, player, row_names, rules_of_row
+    from embodied.agents.vnla.agent import VnlaAgent
+    from embodied.agents.vnla.judging import WITHOUT_LEARNING, player, row_names, rules_of_row
 
     lessons, agent = _lessons(args, data), VnlaAgent.load(file)
     note(f"rules of play: {agent.config.rules}; trained on pictures {agent.about.pictures}")
@@ -123,7 +123,7 @@ def _vnla(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 
 def _vln(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """The follower beside agents without learning."""
-    from agents.vln.agent import VlnAgent
+    from embodied.agents.vln.agent import VlnAgent
     from embodied.evaluation.evaluate import PLAIN
 
     lessons, agent = _lessons(args, data), VlnAgent.load(file)
@@ -139,9 +139,9 @@ def _vln(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 
 def _hari(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """Rows of Table 4.7 for one agent, in the environment that it was trained for."""
-    from agents.hari.agent import load_agent
-    from agents.hari.judging import policies, validation_means
-    from agents.hari.run import rules_of
+    from embodied.agents.hari.agent import load_agent
+    from embodied.agents.hari.judging import policies, validation_means
+    from embodied.agents.hari.run import rules_of
 
     agent = load_agent(file)
     means = validation_means(data, agent, seed=args.seed, tasks=agent.config.validation_tasks)
@@ -155,8 +155,8 @@ def _hari(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 
 
 def _lessons(args: Options, data: Dataset) -> Lessons:
-    from agents.vision.lessons import Lessons
-    from agents.vision.run import encoder_of
+    from embodied.agents.vision.lessons import Lessons
+    from embodied.agents.vision.run import encoder_of
 
     encoder, shown = encoder_of(args.encoder, args.network), args.shown if args.kind == "hanna" else "same"
     return Lessons(data, encoder, args.pictures, shown=shown, cache=args.cache)
@@ -164,10 +164,10 @@ def _lessons(args: Options, data: Dataset) -> Lessons:
 
 def record_trained(args: Options, data: Dataset, run: Path, first: int) -> None:
     """Record the `first` episodes of the trained agent on each split, in their houses as the data set holds them."""
-    from assets.catalogue import load_catalogue
+    from embodied.assets.catalogue import load_catalogue
     from embodied.cli.view import record_again
-    from viz.report import load_run
-    from viz.sinks import Sinks
+    from embodied.viz.report import load_run
+    from embodied.viz.sinks import Sinks
 
     catalogue, counts, pictures = load_catalogue(args.cache), Counter[str](), args.pictures or "unlit"
     for number, listed in enumerate(load_run(run)):

@@ -44,7 +44,7 @@ from embodied.render.pictures import PICTURES
 if TYPE_CHECKING:
     import numpy as np
 
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
     from embodied.datasets.store import Dataset
     from embodied.house.house import House
     from embodied.scene.lit_pages import LitPages
@@ -202,9 +202,9 @@ def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str
     """
     import numpy as np
 
-    from agents.vision.drawn import pictures_of
-    from agents.vision.features import feature_path, load_features
-    from agents.vision.run import encoder_of
+    from embodied.agents.vision.drawn import pictures_of
+    from embodied.agents.vision.features import feature_path, load_features
+    from embodied.agents.vision.run import encoder_of
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args.encoder, args.network)

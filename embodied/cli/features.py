@@ -32,9 +32,9 @@ class Options(WithData, Encoded, Lit, WithDevice):
 
 
 def run(args: Options) -> None:
-    from agents.common.parallel import check_device
-    from agents.vision.occasions import OCCASIONS
-    from agents.vision.run import encoder_of, make_features
+    from embodied.agents.common.parallel import check_device
+    from embodied.agents.vision.occasions import OCCASIONS
+    from embodied.agents.vision.run import encoder_of, make_features
 
     check_device(args.device)
     make_features(

@@ -17,15 +17,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from agents.common.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
+from embodied.agents.common.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
 from embodied.cli.common import Printed, note, show
 from embodied.cli.learning import Nav
 from embodied.cli.options import AnyFolder, Count, Option, OutputRrd, any_path
 
 if TYPE_CHECKING:
-    from agents.iliad.nav.showing import NavTold
-    from agents.iliad.nav.student import NavStudent
-    from agents.iliad.nav.world import NavWalk, Trip
+    from embodied.agents.iliad.nav.showing import NavTold
+    from embodied.agents.iliad.nav.student import NavStudent
+    from embodied.agents.iliad.nav.world import NavWalk, Trip
     from embodied.datasets.store import Dataset
 
 
@@ -71,9 +71,9 @@ def run(args: Options) -> None:
 
 def own_request(args: Options, file: Path, request: str) -> None:
     """What the student makes of the user's words."""
-    from agents.iliad.regex.data import WordTask
-    from agents.iliad.regex.rules import LETTERS
-    from agents.iliad.regex.run import load_student
+    from embodied.agents.iliad.regex.data import WordTask
+    from embodied.agents.iliad.regex.rules import LETTERS
+    from embodied.agents.iliad.regex.run import load_student
 
     if not args.word or not set(args.word) <= set(LETTERS):
         raise ValueError(f"--word should be lower-case letters, got {args.word!r}")
@@ -86,8 +86,8 @@ def own_request(args: Options, file: Path, request: str) -> None:
 
 def episodes(args: Options, file: Path) -> None:
     """Episodes with the student's own teacher."""
-    from agents.iliad.regex.run import load_student, prepare
-    from agents.iliad.regex.showing import lines_of, tell
+    from embodied.agents.iliad.regex.run import load_student, prepare
+    from embodied.agents.iliad.regex.showing import lines_of, tell
     from embodied.seeds import stream
 
     if args.shared is None or not (file == SHIPPED_STUDENT or (args.shared / "data.json").exists()):
@@ -103,10 +103,10 @@ def episodes(args: Options, file: Path) -> None:
 
 def walks(args: Options, file: Path) -> None:
     """Episodes of NAV with the student's own teacher, or another one."""
-    from agents.iliad.nav.config import NavConfig
-    from agents.iliad.nav.run import NavSource, prepare
-    from agents.iliad.nav.showing import lines_of, tell
-    from agents.iliad.nav.stages import config_of, load_follower
+    from embodied.agents.iliad.nav.config import NavConfig
+    from embodied.agents.iliad.nav.run import NavSource, prepare
+    from embodied.agents.iliad.nav.showing import lines_of, tell
+    from embodied.agents.iliad.nav.stages import config_of, load_follower
     from embodied.seeds import stream
 
     if args.data is None:
@@ -136,10 +136,10 @@ def walks(args: Options, file: Path) -> None:
 
 def _record(args: Options, data: Dataset, student: NavStudent, trip: Trip, shown: tuple[NavTold, NavWalk]) -> None:
     """The first episode as a Rerun recording, with what the student saw."""
-    from agents.iliad.nav.showing import episode_of
-    from agents.vision.drawn import drawn_world, pictures_of
-    from viz.recording import record_episode
-    from viz.sinks import Sinks
+    from embodied.agents.iliad.nav.showing import episode_of
+    from embodied.agents.vision.drawn import drawn_world, pictures_of
+    from embodied.viz.recording import record_episode
+    from embodied.viz.sinks import Sinks
 
     told, walk = shown
     with drawn_world(data, trip.world, args.cache, pictures_of(data, trip.world, args.pictures)) as eyes:

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from agents.common.shipped import SHIPPED_ENCODER
-from agents.vision.config import RENDER_PRESETS, TORCHVISIONS
+from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.vision.config import RENDER_PRESETS, TORCHVISIONS
 from embodied.cli.common import Cached
 from embodied.cli.options import PICTURE_HELP, Count, InputFolder, InputPath, Option, OutputFolder, any_path, positive
 
 PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
 PRESETS = Option(words=tuple(RENDER_PRESETS), metavar="KIND")
 SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "later-camera", "later-view")
-"""As in agents.vision.occasions, which --help should not import."""
+"""As in embodied.agents.vision.occasions, which --help should not import."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class Encoded(EncoderFile):
 
     def encoder_digest(self) -> str:
         """The digest of the encoder, which names its features."""
-        from agents.vision.run import encoder_of
+        from embodied.agents.vision.run import encoder_of
 
         return encoder_of(self.encoder, self.network).digest
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from assets.cache import write_json
+from embodied.assets.cache import write_json
 from embodied.cli.common import Furnished, Printed, catalogue_of, show
 from embodied.cli.options import Option, house_folder, whole
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS

@@ -41,14 +41,14 @@ class ParaphraseOptions(WithModel, Cached):
 
 
 def serve(args: ServeOptions) -> int:
-    from agents.language_models.small import command
+    from embodied.agents.language_models.small import command
 
     return subprocess.run(command(args.port, args.threads), check=False).returncode
 
 
 def paraphrase(args: ParaphraseOptions) -> None:
-    from agents.language_models.paraphrase import paraphrased
-    from assets.catalogue import load_catalogue
+    from embodied.agents.language_models.paraphrase import paraphrased
+    from embodied.assets.catalogue import load_catalogue
     from embodied.datasets.store import Dataset
     from embodied.records import save_lines
 

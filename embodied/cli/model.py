@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from agents.language_models.cache import AnswerCache
-from agents.language_models.client import FORMS, Client, ServerSettings
+from embodied.agents.language_models.cache import AnswerCache
+from embodied.agents.language_models.client import FORMS, Client, ServerSettings
 from embodied.cli.options import InputFolder, InputPath, Settings
 
 

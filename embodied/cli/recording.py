@@ -54,7 +54,7 @@ def viewers_of(args: Viewers) -> Iterator[tuple[str, ...]]:
         yield ()
         return
     from embodied import gl
-    from viz.sinks import open_viewers
+    from embodied.viz.sinks import open_viewers
 
     with open_viewers(spawn=args.spawn, connect=args.connect, serve=args.serve, bind=args.bind) as viewers:
         if args.spawn and gl.info().software:
@@ -67,7 +67,7 @@ def viewers_of(args: Viewers) -> Iterator[tuple[str, ...]]:
 
 def film(world: World, episode: Episode, path: Path, size: tuple[int, int], camera: PhotoCamera | None = None) -> Path:
     """Write what the agent saw as a video with smooth motion and the dialogue; returns the path."""
-    from viz.video import film_episode
+    from embodied.viz.video import film_episode
 
     def frame(number: int, c: np.ndarray) -> np.ndarray:
         rgb = world.renderer.view(c[:3], c[3], c[4], VIDEO_ANGLE, size).rgb

@@ -71,7 +71,7 @@ def one(args: Options, node: int, world: World) -> None:
     """Draw one viewpoint as an equirectangular PNG, or a view from it, or both."""
     import cv2
 
-    from assets.cache import write_bytes
+    from embodied.assets.cache import write_bytes
     from embodied.render.photograph import PhotoCamera
 
     nodes = len(world.graph.ids)

@@ -57,8 +57,8 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> None:
     from embodied.policies.baselines import WITHOUT_LEARNING
     from embodied.render.photograph import PhotoCamera
     from embodied.tasks.find import find_pool, find_task
-    from viz.recording import Pictures, record_episode
-    from viz.sinks import Sinks
+    from embodied.viz.recording import Pictures, record_episode
+    from embodied.viz.sinks import Sinks
 
     camera = PhotoCamera(args.camera, args.seed)
     with world_of(args) as world:

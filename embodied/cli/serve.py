@@ -26,7 +26,7 @@ from embodied.errors import UnableError
 from embodied.render.pictures import PictureSettings
 
 if TYPE_CHECKING:
-    from agents.language_models.client import Client
+    from embodied.agents.language_models.client import Client
     from embodied.datasets.store import Dataset
     from embodied.interface import Agent, Place
     from embodied.serve.game import AgentMaker
@@ -63,7 +63,7 @@ NEEDED = ("starlette", "uvicorn", "websockets")
 def run(args: Options) -> None:
     if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
         raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
-    from agents.language_models.assistant import assistant_maker
+    from embodied.agents.language_models.assistant import assistant_maker
     from embodied.serve.run import open_study, serve
     from embodied.serve.study import load_study
 
@@ -135,12 +135,12 @@ def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentM
     data = Dataset(folder)
 
     def shipped(places: Mapping[str, Place]) -> Agent:
-        from agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER, SHIPPED_VNLA
-        from agents.hanna.agent import HannaAgent
-        from agents.vision.drawn import pictures_of
-        from agents.vision.encoder import load_encoder
-        from agents.vision.features import feature_path, load_bank
-        from agents.vnla.agent import VnlaAgent
+        from embodied.agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER, SHIPPED_VNLA
+        from embodied.agents.hanna.agent import HannaAgent
+        from embodied.agents.vision.drawn import pictures_of
+        from embodied.agents.vision.encoder import load_encoder
+        from embodied.agents.vision.features import feature_path, load_bank
+        from embodied.agents.vnla.agent import VnlaAgent
 
         agent = VnlaAgent.load(SHIPPED_VNLA) if data.kind == "vnla" else HannaAgent.load(SHIPPED_AGENT)
         pictures = {n: pictures_of(data, n, None) for n in places}
@@ -149,7 +149,7 @@ def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentM
         return agent.policy(load_bank(paths, encoder, places, pictures))
 
     def model(places: Mapping[str, Place]) -> Agent:
-        from agents.language_models.agent import LanguageModelAgent
+        from embodied.agents.language_models.agent import LanguageModelAgent
 
         return LanguageModelAgent(client())
 

@@ -31,21 +31,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from agents.ask.config import AskerConfig, AskEvaluation
-from agents.bandit.config import SCALES as BANDIT_SCALES
-from agents.bandit.config import BanditConfig
-from agents.common.settings import EvaluationSettings
-from agents.find.config import FinderConfig
-from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
-from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, IntentionConfig
-from agents.iliad.config import LearnerConfig
-from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
-from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.vision.config import VisionConfig
-from agents.vln.config import SCALES as VLN_SCALES
-from agents.vln.config import SPEAKER_SCALES, FollowerSettings
-from agents.vnla.config import SCALES as VNLA_SCALES
-from agents.vnla.config import VnlaSettings
+from embodied.agents.ask.config import AskerConfig, AskEvaluation
+from embodied.agents.bandit.config import SCALES as BANDIT_SCALES
+from embodied.agents.bandit.config import BanditConfig
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.find.config import FinderConfig
+from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
+from embodied.agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, IntentionConfig
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
+from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
+from embodied.agents.vision.config import VisionConfig
+from embodied.agents.vln.config import SCALES as VLN_SCALES
+from embodied.agents.vln.config import SPEAKER_SCALES, FollowerSettings
+from embodied.agents.vnla.config import SCALES as VNLA_SCALES
+from embodied.agents.vnla.config import VnlaSettings
 from embodied.cli.common import Cached, note
 from embodied.cli.learning import (
     PRESETS,
@@ -77,7 +77,7 @@ from embodied.cli.train import EVALUATION, TRAINING, RegexFiles, Strips
 from embodied.records import load_json
 
 if TYPE_CHECKING:
-    from agents.studies.engine import StudyLearner
+    from embodied.agents.studies.engine import StudyLearner
     from embodied.interface import Agent
 
 Tables = Annotated[tuple[str, ...], Option(metavar="TABLE", name="TABLE")]
@@ -282,7 +282,7 @@ class CheckOptions:
 
 def run_table(args: Any, learner: StudyLearner, **names: Any) -> int:
     """Make the tables of a study and print them."""
-    from agents.studies.engine import run_study
+    from embodied.agents.studies.engine import run_study
 
     made = run_study(
         learner,
@@ -307,21 +307,21 @@ def study_of(kind: Any, args: Any, **more: Any) -> Any:
 
 
 def hanna(args: HannaOptions) -> int:
-    from agents.hanna.study import HannaStudy
+    from embodied.agents.hanna.study import HannaStudy
 
     return run_table(args, study_of(HannaStudy, args, judging=(args.judge_seed,), elsewhere=args.judged_in))
 
 
 def find(args: FindOptions) -> int:
-    from agents.find.study import FindStudy
+    from embodied.agents.find.study import FindStudy
 
     return run_table(args, study_of(FindStudy, args))
 
 
 def vision(args: VisionOptions) -> int:
-    from agents.common.parallel import check_device
-    from agents.vision.drawn import StripSource
-    from agents.vision.study import EncoderStudy
+    from embodied.agents.common.parallel import check_device
+    from embodied.agents.vision.drawn import StripSource
+    from embodied.agents.vision.study import EncoderStudy
 
     check_device(args.device)
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
@@ -330,7 +330,7 @@ def vision(args: VisionOptions) -> int:
 
 
 def hari(args: HariOptions) -> int:
-    from agents.hari.study import HariStudy
+    from embodied.agents.hari.study import HariStudy
 
     config, execution = args.config, EXECUTION_SCALES[args.scale]
     judging = tuple(range(config.seed, config.seed + args.judging_seeds))
@@ -339,28 +339,28 @@ def hari(args: HariOptions) -> int:
 
 
 def vnla(args: VnlaOptions) -> int:
-    from agents.vnla.study import VnlaStudy
+    from embodied.agents.vnla.study import VnlaStudy
 
     return run_table(args, study_of(VnlaStudy, args))
 
 
 def vln(args: VlnOptions) -> int:
-    from agents.vln.study import VlnStudy
+    from embodied.agents.vln.study import VlnStudy
 
     return run_table(args, study_of(VlnStudy, args, speaker=SPEAKER_SCALES[args.scale]))
 
 
 def bandit(args: BanditOptions) -> int:
-    from agents.bandit.ratings import Rater
-    from agents.bandit.study import BanditStudy
+    from embodied.agents.bandit.ratings import Rater
+    from embodied.agents.bandit.study import BanditStudy
 
     rater = load_json(args.rater, Rater) if args.rater else None
     return run_table(args, study_of(BanditStudy, args, rater=rater))
 
 
 def iliad(args: RegexOptions | NavOptions) -> int:
-    from agents.iliad.nav.run import NavSource
-    from agents.iliad.study import IliadStudy, NavStudyWorld, RegexStudyWorld, StudyWorld
+    from embodied.agents.iliad.nav.run import NavSource
+    from embodied.agents.iliad.study import IliadStudy, NavStudyWorld, RegexStudyWorld, StudyWorld
 
     world: StudyWorld
     if isinstance(args, NavOptions):
@@ -371,14 +371,14 @@ def iliad(args: RegexOptions | NavOptions) -> int:
 
 
 def check(args: CheckOptions) -> int:
-    from agents.studies.engine import check
+    from embodied.agents.studies.engine import check
 
     print("\n".join(check(args.folder)) or f"no stored tables in {args.folder}")
     return 0
 
 
 def ask(args: AskOptions) -> int:
-    from agents.ask.study import AskStudy
+    from embodied.agents.ask.study import AskStudy
 
     learner = study_of(AskStudy, args)
     if args.server.model:
@@ -389,8 +389,8 @@ def ask(args: AskOptions) -> int:
 
 def model_agent(args: AskOptions, places: object) -> Agent:
     """The language model that the options name."""
-    from agents.language_models.agent import LanguageModelAgent
-    from agents.language_models.telling import Teller, agent_prompt
+    from embodied.agents.language_models.agent import LanguageModelAgent
+    from embodied.agents.language_models.telling import Teller, agent_prompt
 
     return LanguageModelAgent(client_of(args), Teller(prompt=agent_prompt(args.prompts)))
 

@@ -11,17 +11,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from agents.common.settings import EvaluationSettings
-from agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
-from agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
-from agents.iliad.config import LearnerConfig
-from agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
-from agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
-from agents.vision.config import StripTraining, VisionConfig
-from agents.vln.config import FORCING, SPEAKER_SCALES, FollowerSettings, SpeakerSettings
-from agents.vln.config import SCALES as VLN_SCALES
-from agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
-from agents.vnla.config import SCALES as VNLA_SCALES
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
+from embodied.agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
+from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
+from embodied.agents.vision.config import StripTraining, VisionConfig
+from embodied.agents.vln.config import FORCING, SPEAKER_SCALES, FollowerSettings, SpeakerSettings
+from embodied.agents.vln.config import SCALES as VLN_SCALES
+from embodied.agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.cli.common import note
 from embodied.cli.learning import (
     SCALE,
@@ -41,7 +41,7 @@ from embodied.cli.learning import (
 from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, Settings, part, whole
 
 if TYPE_CHECKING:
-    from agents.vision.lessons import Lessons
+    from embodied.agents.vision.lessons import Lessons
     from embodied.interface import Episode
 
 WATCHED = 2
@@ -200,17 +200,17 @@ class TrainNav(TrainIliad, Nav):
 
 
 def train_vision(args: TrainVision) -> None:
-    from agents.vision.drawn import StripSource
-    from agents.vision.run import train_vision
+    from embodied.agents.vision.drawn import StripSource
+    from embodied.agents.vision.run import train_vision
 
     source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
     train_vision(source, args.config, args.out, device=args.device, workers=args.workers, note=note)
 
 
 def train_detector(args: TrainDetector) -> None:
-    from agents.vision.drawn import StripSource
-    from agents.vision.encoder import load_encoder
-    from agents.vision.run import detector_for
+    from embodied.agents.vision.drawn import StripSource
+    from embodied.agents.vision.encoder import load_encoder
+    from embodied.agents.vision.run import detector_for
     from embodied.datasets.store import Dataset
 
     strips = args.strips or args.out / "strips"
@@ -234,36 +234,36 @@ def train_detector(args: TrainDetector) -> None:
 
 
 def train_hanna(args: TrainHanna) -> None:
-    from agents.hanna.run import train_agent
+    from embodied.agents.hanna.run import train_agent
 
     lessons = _lessons(args, "hanna")
     train_agent(lessons, args.config, args.evaluation, args.out, begin=args.begin, **_session(args))
 
 
 def train_vnla(args: TrainVnla) -> None:
-    from agents.vnla.run import train_agent
+    from embodied.agents.vnla.run import train_agent
 
     train_agent(_lessons(args, "vnla"), args.config, args.evaluation, args.out, **_session(args))
 
 
 def train_follower(args: TrainFollower) -> None:
-    from agents.vln.run import train_follower
+    from embodied.agents.vln.run import train_follower
 
     lessons = _lessons(args, "vln")
     train_follower(lessons, args.config, args.evaluation, args.out, speaker=args.speaker, **_session(args))
 
 
 def train_speaker(args: TrainSpeaker) -> None:
-    from agents.vln.speaker import train_speaker
+    from embodied.agents.vln.speaker import train_speaker
 
     train_speaker(_lessons(args, "vln"), args.config, args.out, note=note)
 
 
 def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: str) -> Lessons:
     """What an agent by imitation learns from; under torchrun, PyTorch has its device."""
-    from agents.common.parallel import join_launcher
-    from agents.vision.lessons import Lessons
-    from agents.vision.run import encoder_of
+    from embodied.agents.common.parallel import join_launcher
+    from embodied.agents.vision.lessons import Lessons
+    from embodied.agents.vision.run import encoder_of
     from embodied.datasets.store import dataset_of
 
     encoder = encoder_of(args.encoder, args.network)
@@ -273,7 +273,7 @@ def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: 
 
 
 def train_execution(args: TrainExecution) -> None:
-    from agents.hari.run import train_execution
+    from embodied.agents.hari.run import train_execution
     from embodied.datasets.store import dataset_of
 
     data = dataset_of(args.data, "hari")
@@ -281,8 +281,8 @@ def train_execution(args: TrainExecution) -> None:
 
 
 def train_intention(args: TrainIntention) -> None:
-    from agents.hari.agent import load_executor
-    from agents.hari.run import train_intention
+    from embodied.agents.hari.agent import load_executor
+    from embodied.agents.hari.run import train_intention
     from embodied.datasets.store import dataset_of
 
     data = dataset_of(args.data, "hari")
@@ -291,9 +291,9 @@ def train_intention(args: TrainIntention) -> None:
 
 
 def train_regex(args: TrainRegex) -> None:
-    from agents.iliad.config import folder_name
-    from agents.iliad.regex.config import students_of
-    from agents.iliad.regex.run import learn, prepare
+    from embodied.agents.iliad.config import folder_name
+    from embodied.agents.iliad.regex.config import students_of
+    from embodied.agents.iliad.regex.run import learn, prepare
 
     regex, learner = args.world, args.learner
     grounds = prepare(regex, args.out / "shared", words=args.words, templates=args.templates, note=note)
@@ -302,8 +302,8 @@ def train_regex(args: TrainRegex) -> None:
 
 
 def train_nav(args: TrainNav) -> None:
-    from agents.iliad.config import folder_name
-    from agents.iliad.nav.run import NavSource, learn, prepare
+    from embodied.agents.iliad.config import folder_name
+    from embodied.agents.iliad.nav.run import NavSource, learn, prepare
 
     nav, learner = args.world, args.learner
     source = NavSource(args.data, args.encoder_digest(), args.pictures, args.cache)
@@ -322,10 +322,10 @@ def _recorder(
     args: TrainHanna | TrainVnla | TrainFollower | TrainIntention, *, sees: bool
 ) -> Callable[[int, Sequence[Episode]], None]:
     """Writes the first validation episodes of each validation as Rerun recordings, with what it saw if it sees."""
-    from agents.vision.drawn import drawn_world, pictures_of
+    from embodied.agents.vision.drawn import drawn_world, pictures_of
     from embodied.datasets.store import Dataset
-    from viz.recording import record_episode
-    from viz.sinks import Sinks
+    from embodied.viz.recording import record_episode
+    from embodied.viz.sinks import Sinks
 
     data = Dataset(args.data)
 
@@ -343,7 +343,7 @@ def _with_threads(train: Callable[[Any], None]) -> Callable[[Any], None]:
     """The command that trains once PyTorch has its threads."""
 
     def run(args: Any) -> None:
-        from agents.common.parallel import use_threads
+        from embodied.agents.common.parallel import use_threads
 
         use_threads(args.threads)
         train(args)

@@ -19,12 +19,12 @@ from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
-    from agents.vision.config import RenderedInputs
-    from assets.catalogue import Catalogue
+    from embodied.agents.vision.config import RenderedInputs
+    from embodied.assets.catalogue import Catalogue
     from embodied.datasets.store import Dataset
     from embodied.interface import Episode
-    from viz.report import Listed
-    from viz.sinks import Sinks
+    from embodied.viz.report import Listed
+    from embodied.viz.sinks import Sinks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ def run(args: Options) -> None:
     if args.folder.suffix == ".rrd":
         show_file(args)
         return
-    from viz.report import load_run, summary_line, write_page
+    from embodied.viz.report import load_run, summary_line, write_page
 
     found = load_run(args.folder)
     if args.episode is not None:
@@ -66,7 +66,7 @@ def show_file(args: Options) -> None:
         raise FileNotFoundError(
             f"{args.folder} does not exist; make one with `embodied demo` or `embodied rollout --rrd`"
         )
-    from viz.sinks import open_file, send_file
+    from embodied.viz.sinks import open_file, send_file
 
     if args.connect is None:
         open_file(args.folder, serve=args.serve, bind=args.bind)
@@ -78,7 +78,7 @@ def show_file(args: Options) -> None:
 def record_one(args: Options, found: Sequence[Listed], number: int) -> None:
     """Draw one episode of a run again, into a recording."""
     from embodied.datasets.store import Dataset
-    from viz.sinks import Sinks
+    from embodied.viz.sinks import Sinks
 
     if not 0 <= number < len(found):
         raise ValueError(f"--episode {number} does not exist; this run has the episodes 0 to {len(found) - 1}")
@@ -115,7 +115,7 @@ def record_again(
     Raises:
       DatasetError: it was played in a house that is not in the data set.
     """
-    from viz.recording import record_episode
+    from embodied.viz.recording import record_episode
 
     name = episode.task.world
     data.place_of(episode)
@@ -123,7 +123,7 @@ def record_again(
     with contextlib.ExitStack() as stack:
         eyes = None
         if seen is not None:
-            from agents.vision.drawn import drawn_world  # loads torch
+            from embodied.agents.vision.drawn import drawn_world  # loads torch
 
             eyes = stack.enter_context(drawn_world(data, name, cache, seen))
         world = stack.enter_context(data.open_world(name, catalogue, cache, pictures, size=384))
@@ -140,7 +140,7 @@ def looked_at(run: Path) -> RenderedInputs:
     Raises:
       RecordError: a damaged run.json.
     """
-    from agents.vision.config import RenderedInputs
+    from embodied.agents.vision.config import RenderedInputs
     from embodied.records import from_plain, read_json
 
     path = run / "run.json"

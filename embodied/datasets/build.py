@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 import joblib
 from joblib.externals.loky import process_executor
 
-from assets.cache import digest, drafts, sweep, write_bytes, write_json
-from assets.catalogue import GROUPS, Catalogue, load_catalogue
-from assets.closure import code_digest
+from embodied.assets.cache import digest, drafts, sweep, write_bytes, write_json
+from embodied.assets.catalogue import GROUPS, Catalogue, load_catalogue
+from embodied.assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
 from embodied.datasets.parts import part_tasks
 from embodied.datasets.scale import Scale, SplitPlan, quota, scale

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import shapely
 
-from assets.cache import digest
+from embodied.assets.cache import digest
 from embodied.datasets.build import VERSION, DatasetConfig
 from embodied.house.house import House
 from embodied.interface import Episode, FindObject, FollowRoute, Place, Route, Task

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.datasets.matterport import (
     CAMERA,
     REGIONS,

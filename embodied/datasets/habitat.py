@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from assets.cache import write_bytes
-from assets.json_file import RecordError, parse, shown
+from embodied.assets.cache import write_bytes
+from embodied.assets.json_file import RecordError, parse, shown
 from embodied.datasets.matterport import tokenised
 from embodied.envs.continuous import Aim, ContinuousEnv, Excursion, Follower, Grounds, Point, Walk, seen_from
 from embodied.interface import FollowRoute, Place, Task

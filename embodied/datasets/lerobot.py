@@ -30,7 +30,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from assets.cache import drafts, sweep, write_bytes, write_json
+from embodied.assets.cache import drafts, sweep, write_bytes, write_json
 from embodied.assistants.words import described
 from embodied.datasets.checks import DatasetError
 from embodied.geometry import wrap

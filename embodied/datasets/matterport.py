@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from assets.cache import atomic_path
-from assets.json_file import read_toml
 from embodied.action_spaces import bearing_order, directions, nearest_views
+from embodied.assets.cache import atomic_path
+from embodied.assets.json_file import read_toml
 from embodied.errors import UnableError
 from embodied.geometry import heading_of_yaw, wrap
 from embodied.interface import STEP, TURNS, VIEW_PITCHES, VIEW_YAWS, VIEWS, Pose

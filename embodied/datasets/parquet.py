@@ -21,7 +21,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from assets.cache import atomic_path, write_bytes
+from embodied.assets.cache import atomic_path, write_bytes
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.folders import filled
 from embodied.interface import Ask, Episode, Move

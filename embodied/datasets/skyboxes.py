@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.mattersim.pictures import DEPTH, DEPTH_UNITS, FACES, RGB, tiles_of
 from embodied.mattersim.tiles import BLOCK
 from embodied.render.panorama import Panorama, ray_stretch

@@ -36,7 +36,7 @@ from embodied.render.pictures import PictureSettings
 from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
     from embodied.world import World
 
 T = TypeVar("T")

@@ -24,7 +24,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from PIL import Image
 
-from assets.cache import write_json
+from embodied.assets.cache import write_json
 from embodied.datasets.folders import write_lines
 from embodied.datasets.habitat import with_experts, write_vlnce
 from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder

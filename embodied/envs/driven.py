@@ -29,8 +29,8 @@ from embodied.navigation.free_space import EYE
 from embodied.scene.model import build_spec, owner_of_name
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
     from embodied.action_spaces import Moves
+    from embodied.assets.catalogue import Catalogue
     from embodied.house.house import House
 
 RADIUS, HEIGHT = 0.19, 1.4

@@ -22,7 +22,7 @@ from embodied.interface import Assistant, Language, Place, Route, Task
 from embodied.language.plain import PlainLanguage
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
     from embodied.house.house import Placement
     from embodied.tasks.ask import Look
 

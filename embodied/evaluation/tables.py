@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.evaluation import metrics
 from embodied.interface import Episode
 

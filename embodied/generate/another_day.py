@@ -16,7 +16,7 @@ from embodied.house.shapes import footprint
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
     from embodied.navigation.graph import NavGraph
 
 GONE, MOVED = 0.3, 0.7

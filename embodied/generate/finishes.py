@@ -1,6 +1,6 @@
 """One palette per house, and what each room wears of it: floors, walls, doors, an accent wall here and there.
 
-Names of materials only ('oak_planks/0'); assets.materials makes them.
+Names of materials only ('oak_planks/0'); embodied.assets.materials makes them.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from assets.json_file import from_plain, read_toml
+from embodied.assets.json_file import from_plain, read_toml
 
 
 @dataclass(frozen=True)

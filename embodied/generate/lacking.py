@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.generate.furnish.tables import tables, tables_of
 from embodied.generate.kinds import BEDROOMS
 from embodied.house.house import DOORS, House

@@ -6,8 +6,8 @@ import dataclasses
 import functools
 from collections.abc import Mapping
 
-from assets.catalogue import Catalogue
-from assets.records import Asset
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.records import Asset
 from embodied.generate.tastes import TABLE, TASTES, Taste
 from embodied.house.validation import STYLES
 from embodied.novelty import FAMILIAR, NOVEL, novel_among

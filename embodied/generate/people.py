@@ -19,8 +19,8 @@ from embodied.navigation.graph import RADIUS, unreachable_rooms
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
-    from assets.records import Asset
+    from embodied.assets.catalogue import Catalogue
+    from embodied.assets.records import Asset
     from embodied.navigation.graph import NavGraph
 
 CLASS = "person"

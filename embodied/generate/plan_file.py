@@ -12,9 +12,9 @@ from __future__ import annotations
 import itertools
 from pathlib import Path
 
-from assets.catalogue import Catalogue
-from assets.json_file import read_json
-from assets.records import ROOM_KINDS
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.json_file import read_json
+from embodied.assets.records import ROOM_KINDS
 from embodied.generate.access import connect, has_outer_doors, walls_between
 from embodied.generate.config import HouseConfig
 from embodied.generate.footprint import Rect

@@ -11,7 +11,7 @@ from typing import SupportsIndex, TypeVar
 
 import numpy as np
 
-from assets.catalogue import Catalogue, load_catalogue
+from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.generate.clearing import cleared
 from embodied.generate.config import RETRIES, HouseConfig
 from embodied.generate.finishes import Palette, draw_palette, dressed

@@ -21,7 +21,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from assets.cache import default_cache
+from embodied.assets.cache import default_cache
 from embodied.datasets.habitat import object_excursions, read_objectnav, read_vlnce, route_excursions
 from embodied.datasets.store import Dataset
 from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Lens, Move, own_way

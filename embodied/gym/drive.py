@@ -16,8 +16,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from assets.cache import default_cache
-from assets.catalogue import load_catalogue
+from embodied.assets.cache import default_cache
+from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig

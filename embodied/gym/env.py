@@ -26,7 +26,7 @@ import gymnasium as gym
 import numpy as np
 from PIL import Image, ImageDraw, ImageOps
 
-from assets.cache import default_cache
+from embodied.assets.cache import default_cache
 from embodied.assistants.ask import QUESTIONS
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
@@ -464,7 +464,7 @@ def require_rendered(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]
 
 def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Callable[[], HelpEnv]:
     """The same rule of play with a body."""
-    from assets.catalogue import load_catalogue
+    from embodied.assets.catalogue import load_catalogue
     from embodied.envs.driven import DrivenEnv, DrivenHannaEnv  # physics, only where wanted
 
     kinds = {"find": DrivenEnv, "vln": DrivenEnv, "hanna": DrivenHannaEnv}

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from assets.cache import atomic_path, digest
-from assets.catalogue import load_catalogue
-from assets.closure import code_digest
-from assets.records import ROOM_KINDS
+from embodied.assets.cache import atomic_path, digest
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.closure import code_digest
+from embodied.assets.records import ROOM_KINDS
 from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.parts import part_tasks
@@ -30,7 +30,7 @@ from embodied.render.pictures import PictureSettings
 from embodied.world import makers, open_world
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 TASKS = 200
 """Tasks of a generated house."""

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from assets.catalogue import load_catalogue
-from assets.records import ROOM_KINDS
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.records import ROOM_KINDS
 from embodied.envs.base import ActionError
 from embodied.gym.eyes import LARGE, Sensor
 from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Intention, Mode, Move, Observation, Stop

@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 from PIL import Image, ImageDraw, ImageFont
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.geometry import rectangle, rotation
 from embodied.house.house import House, Opening, Placement, Room, Stair
 from embodied.house.shapes import footprint, inward

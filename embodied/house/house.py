@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from assets.cache import write_bytes
-from assets.json_file import RecordError, from_plain, parse, shown
-from assets.records import ROOM_KINDS
+from embodied.assets.cache import write_bytes
+from embodied.assets.json_file import RecordError, from_plain, parse, shown
+from embodied.assets.records import ROOM_KINDS
 
 SCHEMA = 1
 """Version of house.json; a file of another version is refused."""
@@ -76,7 +76,7 @@ class Room:
     id: str
     """'<kind>_<number>', unique in the house: 'bedroom_2'."""
     kind: str
-    """One of assets.records.ROOM_KINDS."""
+    """One of embodied.assets.records.ROOM_KINDS."""
     polygon: tuple[tuple[float, float], ...]
     """Corners counter-clockwise along wall centre lines, metres."""
     floor_finish: str

@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from assets.catalogue import Catalogue
-from assets.materials import MATERIALS
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.materials import MATERIALS
 from embodied.house.house import House, HouseError, Placement
 
 STYLES = ("light", "warm", "dark", "classic", "colourful")

@@ -15,8 +15,8 @@ from embodied.language.templates import WORDS
 from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
-    from assets.records import Asset
+    from embodied.assets.catalogue import Catalogue
+    from embodied.assets.records import Asset
 
 ROOM_NOUNS = WORDS.rooms
 ROOM_OF_NOUN = {noun.lower(): kind for kind, nouns in ROOM_NOUNS.items() for noun in nouns}

@@ -15,7 +15,7 @@ from embodied.language.clauses import LEFT, RIGHT, Referent
 from embodied.language.lexicon import UNFIT, says
 
 if TYPE_CHECKING:
-    from assets.records import Asset
+    from embodied.assets.records import Asset
 
 SMALLEST = 5
 """Fewest pixels of a sighting (of 24576 around) by which a thing is noticed."""

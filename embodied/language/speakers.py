@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.json_file import from_plain, read_toml
+from embodied.assets.json_file import from_plain, read_toml
 from embodied.novelty import FAMILIAR
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from assets.closure import code_digest
+from embodied.assets.closure import code_digest
 
 APART = (
-    "assets",
-    "assets.catalogue",
-    "assets.data",
+    "embodied.assets",
+    "embodied.assets.catalogue",
+    "embodied.assets.data",
     "embodied",
     "embodied.light",
     "embodied.light.settings",

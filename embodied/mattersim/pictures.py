@@ -15,8 +15,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from assets.archives import MOST_PIXELS
-from assets.decoding import colours, numbers, size_of
+from embodied.assets.archives import MOST_PIXELS
+from embodied.assets.decoding import colours, numbers, size_of
 from embodied.geometry import yaw_of_heading
 from embodied.mattersim.tiles import tiles_in
 from embodied.render.panorama import (

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import struct
 
-from assets.decoding import EXIF
+from embodied.assets.decoding import EXIF
 
 START_OF_FRAME, RESTART_INTERVAL, START_OF_SCAN = 0xC0, 0xDD, 0xDA
 WHOLE = bytes([3, 1, 0x11, 0, 2, 0x11, 1, 3, 0x11, 1])

@@ -18,8 +18,8 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
-from assets.cache import write_bytes
-from assets.json_file import RecordError, parse_file, shown
+from embodied.assets.cache import write_bytes
+from embodied.assets.json_file import RecordError, parse_file, shown
 from embodied.house.house import DOORS, House, HouseError, Room
 from embodied.navigation.free_space import EYE, free_floor, sight_floor
 

@@ -30,7 +30,7 @@ from embodied.scene.model import compile_scene, drawn_meshes, give_memory_back
 from embodied.scene.part import Part
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 MULTISAMPLES = 4
 """Of a pixel, where a GPU draws."""

@@ -16,13 +16,13 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from tqdm import tqdm
 
-from assets.cache import atomic_path
+from embodied.assets.cache import atomic_path
 from embodied.scene import model as scene
 from embodied.scene.part import Part
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
-    from assets.records import Asset
+    from embodied.assets.catalogue import Catalogue
+    from embodied.assets.records import Asset
 
 COLUMNS, ROWS = 6, 4
 TILE, LABEL, INSET = 300, 44, 104

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from assets.materials.detail import PIXELS, TILE, pyramid
-from assets.records import DETAILS
+from embodied.assets.materials.detail import PIXELS, TILE, pyramid
+from embodied.assets.records import DETAILS
 from embodied.render.camera import Camera
 
 COARSEST = 8e-3

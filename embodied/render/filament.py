@@ -31,7 +31,7 @@ from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import build_spec, compile_spec
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 EXPOSURE = 0.73
 """Stops that make an emissive white come out white with linear tone mapping (measured against the classic renderer)."""

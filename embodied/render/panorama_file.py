@@ -29,9 +29,9 @@ from typing import BinaryIO, Self
 import cv2
 import numpy as np
 
-from assets.cache import atomic_path
-from assets.decoding import colours, numbers, size_of
-from assets.json_file import RecordError, from_plain, parse
+from embodied.assets.cache import atomic_path
+from embodied.assets.decoding import colours, numbers, size_of
+from embodied.assets.json_file import RecordError, from_plain, parse
 from embodied.render.panorama import Panorama
 
 MAGIC = b"EMBPANO1"

@@ -44,7 +44,7 @@ except ImportError as e:
     ) from e
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 SEEN = ("rgb", "depth", "ids")
 APART = 5e-4

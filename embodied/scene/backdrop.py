@@ -11,9 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from assets.archives import read_picture
-from assets.cache import digest, write_bytes
-from assets.closure import code_digest
+from embodied.assets.archives import read_picture
+from embodied.assets.cache import digest, write_bytes
+from embodied.assets.closure import code_digest
 from embodied.house.house import House
 from embodied.scene.far_canvas import KNOTS, Canvas, FarLight, Things, elevations, share_down
 from embodied.scene.far_land import DRY, paint_ground, paint_water, ridge

@@ -14,14 +14,21 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from assets.cache import atomic_path, digest
-from assets.closure import code_digest
-from assets.json_file import parse_file
-from assets.records import Asset, MeshPart
+from embodied.assets.cache import atomic_path, digest
+from embodied.assets.closure import code_digest
+from embodied.assets.json_file import parse_file
+from embodied.assets.records import Asset, MeshPart
 from embodied.geometry import r2
 from embodied.house.house import House, Room
 
-APART = ("assets", "assets.data", "embodied", "embodied.house", "embodied.house.house", "embodied.scene")
+APART = (
+    "embodied.assets",
+    "embodied.assets.data",
+    "embodied",
+    "embodied.house",
+    "embodied.house.house",
+    "embodied.scene",
+)
 """What the code of boxes does not count: packages' names, the catalogue's rows, and houses, which they know nothing
 of."""
 CELLS = (20, 14, 10, 7, 5, 3, 2)

@@ -12,14 +12,14 @@ import mujoco
 import numpy as np
 import shapely
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.house.house import House
 from embodied.house.shapes import footprint
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import UNDERFOOT, build_spec, compile_spec
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 EYE = 1.5
 """Height of cameras above the floor, metres."""

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import PIL.Image
 import trimesh
 
-from assets.cache import write_bytes
-from assets.records import Finish
+from embodied.assets.cache import write_bytes
+from embodied.assets.records import Finish
 from embodied.house.house import House
 from embodied.scene.house_meshes import Part, house_parts
 from embodied.scene.model import load_texture
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 
 def export_glb(house: House, catalogue: Catalogue, path: Path, *, ceilings: bool = True) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typing
 
-from assets.records import Finish, MeshPart
+from embodied.assets.records import Finish, MeshPart
 from embodied.house.house import House
 from embodied.scene.part import Part
 from embodied.scene.shell import shell_owners, shell_parts

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.built.primitives import Shape, between, box, cylinder, frame, joined, part, quads, tube, upright
-from assets.records import Finish
+from embodied.assets.built.primitives import Shape, between, box, cylinder, frame, joined, part, quads, tube, upright
+from embodied.assets.records import Finish
 from embodied.house.house import House, Opening
 from embodied.house.shapes import inward
 from embodied.scene.outdoors import facade_finish

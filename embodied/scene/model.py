@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from assets.archives import read_picture
 from embodied import gl
+from embodied.assets.archives import read_picture
 
 gl.prepare()
 
@@ -25,7 +25,7 @@ import cv2
 import mujoco
 import numpy as np
 
-from assets.records import Finish, MeshPart
+from embodied.assets.records import Finish, MeshPart
 from embodied.house.house import House, Placement
 from embodied.scene import backdrop, collision
 from embodied.scene.house_meshes import Part, house_parts, owners
@@ -34,7 +34,7 @@ from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.shell import shell_parts
 
 if TYPE_CHECKING:
-    from assets.catalogue import Catalogue
+    from embodied.assets.catalogue import Catalogue
 
 VISUAL, COLLISION = 2, 3
 """Geom groups."""

@@ -10,8 +10,20 @@ import numpy as np
 import shapely
 from scipy.spatial import ConvexHull
 
-from assets.built.primitives import Shape, bar, box, extruded, flat, joined, part, projected_uv, quads, sheet, tube
-from assets.records import Finish
+from embodied.assets.built.primitives import (
+    Shape,
+    bar,
+    box,
+    extruded,
+    flat,
+    joined,
+    part,
+    projected_uv,
+    quads,
+    sheet,
+    tube,
+)
+from embodied.assets.records import Finish
 from embodied.house.house import House
 from embodied.house.shapes import inward, room_union
 from embodied.scene.buildings import DOOR, LIT, PANE, ROOF, TRIM, WALL, Faces, faces_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from assets.records import MeshPart
+from embodied.assets.records import MeshPart
 
 KINDS = ("object", "wall", "floor", "ceiling", "opening", "outdoor")
 

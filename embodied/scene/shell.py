@@ -13,8 +13,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from assets.built.primitives import Shape, flat, joined, part, quads
-from assets.records import Finish
+from embodied.assets.built.primitives import Shape, flat, joined, part, quads
+from embodied.assets.records import Finish
 from embodied.house.house import House, Opening, Room
 from embodied.scene import joinery, outdoors, stairs
 from embodied.scene.part import Part

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import shapely
 
-from assets.built.primitives import bar, box, part, quads
-from assets.records import Finish
+from embodied.assets.built.primitives import bar, box, part, quads
+from embodied.assets.records import Finish
 from embodied.house.house import House, Stair
 from embodied.scene.part import Part
 

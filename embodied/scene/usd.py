@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import PIL.Image
 
-from assets.cache import atomic_path
+from embodied.assets.cache import atomic_path
 from embodied.errors import UnableError
 from embodied.house.house import House
 from embodied.scene.lit_pages import LitMesh, LitPages

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from assets.built.primitives import Shape
+from embodied.assets.built.primitives import Shape
 from embodied.house.house import House, Opening
 
 TOLERANCE = 2e-3

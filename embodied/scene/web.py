@@ -15,7 +15,7 @@ import numpy as np
 import PIL.Image
 import trimesh
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.house.house import House
 from embodied.scene.lit_pages import LitMesh, LitPages
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.assistants.route_system import WORDINGS
 from embodied.datasets.build import UnitFacts, save_facts, share, write_index

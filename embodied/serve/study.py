@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from assets.json_file import read_toml
+from embodied.assets.json_file import read_toml
 from embodied.records import RecordError, from_plain
 
 KINDS = ("play", "rate", "describe")

@@ -11,11 +11,11 @@ import sys
 import zipfile
 from pathlib import Path
 
-from assets.attribution import write_attribution
-from assets.catalogue import load_catalogue
-from assets.importing.importer import obj_files
-from assets.importing.packs import SYSTEM_FOLDER, find_packs
-from assets.importing.sh3f import CATALOGUE, Pack, open_pack
+from embodied.assets.attribution import write_attribution
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.importing.importer import obj_files
+from embodied.assets.importing.packs import SYSTEM_FOLDER, find_packs
+from embodied.assets.importing.sh3f import CATALOGUE, Pack, open_pack
 
 HERE = Path(__file__).resolve().parent
 STAMP = (2020, 12, 22, 0, 0, 0)

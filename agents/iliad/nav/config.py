@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from agents.common.settings import (
+from embodied.agents.common.settings import (
     AT_LEAST_ONE,
     EVERYBODY,
     LEARNED_WORDS,
@@ -17,7 +17,7 @@ from agents.common.settings import (
     require,
     require_word,
 )
-from agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.config import LearnerConfig
 
 TEACHERS = ("learned", "grammar", "people")
 PRAGMATICS = ("program", "text")
@@ -86,7 +86,7 @@ class NavConfig:
 
 
 FOLLOWER = NavConfig(dropout=0.2, environment_dropout=0.3, progress_weight=0.5, room_weight=0.5, guided=0.5)
-"""As of VLN's follower (agents.vln.config)."""
+"""As of VLN's follower (embodied.agents.vln.config)."""
 NAV_SCALES: dict[str, NavConfig] = {
     "mini": replace(
         FOLLOWER,

@@ -6,16 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.common.more_paths import SaidBy, more_routes
-from agents.common.vocabulary import build_vocabulary
-from agents.common.word_vectors import vocabulary_with
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.student import NavEyes
-from agents.iliad.nav.world import Trip, trips_of
-from agents.vision.config import drawing
-from agents.vision.drawn import pictures_of
-from agents.vision.features import feature_path, load_bank
-from assets.cache import digest
+from embodied.agents.common.more_paths import SaidBy, more_routes
+from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.common.word_vectors import vocabulary_with
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.student import NavEyes
+from embodied.agents.iliad.nav.world import Trip, trips_of
+from embodied.agents.vision.config import drawing
+from embodied.agents.vision.drawn import pictures_of
+from embodied.agents.vision.features import feature_path, load_bank
+from embodied.assets.cache import digest
+
 from embodied.datasets.store import Dataset
 from embodied.novelty import FAMILIAR
 from embodied.tasks.vln import vln_task
@@ -50,7 +51,7 @@ def nav_data(
 
     Args:
       encoder: digest of the encoder that made the features.
-      picture_kind: of the pictures, as in agents.vision.run.pictures_of.
+      picture_kind: of the pictures, as in embodied.agents.vision.run.pictures_of.
       cache: where catalogue, sightings and more paths are kept; only they need it.
 
     Raises:

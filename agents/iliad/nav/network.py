@@ -6,12 +6,11 @@ B walks, T steps, E size of a view's features and direction, h hidden size.
 from __future__ import annotations
 
 import torch
+from embodied.agents.common.choosing import Choice
+from embodied.agents.common.vocabulary import END_NUMBER
+from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
+from embodied.agents.iliad.writing import Bridge, Remembered, Writer, before, write
 from torch import Tensor, nn
-
-from agents.common.choosing import Choice
-from agents.common.vocabulary import END_NUMBER
-from agents.hanna.attention import DotAttend, FeedForward, MultiAttend
-from agents.iliad.writing import Bridge, Remembered, Writer, before, write
 
 
 class WalkDescriber(nn.Module):

@@ -7,21 +7,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.common.more_paths import SaidBy
-from agents.common.paraphrases import varied
-from agents.common.session import Note
-from agents.common.vocabulary import build_vocabulary
-from agents.common.word_vectors import vocabulary_with
-from agents.iliad.config import LearnerConfig
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, nav_data
-from agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
-from agents.iliad.nav.student import LoopFree, NavStudent
-from agents.iliad.nav.teacher import LearnedNavTeacher, OtherWords, PeopleNavTeacher
-from agents.iliad.nav.world import NavMarginal, NavWorld, Trip
-from agents.iliad.protocol import DescribingTeacher
-from agents.iliad.training import IliadProblem, train
-from assets.catalogue import load_catalogue
+from embodied.agents.common.more_paths import SaidBy
+from embodied.agents.common.paraphrases import varied
+from embodied.agents.common.session import Note
+from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.common.word_vectors import vocabulary_with
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, nav_data
+from embodied.agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
+from embodied.agents.iliad.nav.student import LoopFree, NavStudent
+from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, OtherWords, PeopleNavTeacher
+from embodied.agents.iliad.nav.world import NavMarginal, NavWorld, Trip
+from embodied.agents.iliad.protocol import DescribingTeacher
+from embodied.agents.iliad.training import IliadProblem, train
+from embodied.assets.catalogue import load_catalogue
+
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.identity import identity_of
 from embodied.interface import SeenPlace
@@ -40,7 +41,7 @@ class NavSource:
     encoder: str
     """Digest of the encoder that made them."""
     picture_kind: str | None
-    """Of the pictures, as in agents.vision.run.pictures_of."""
+    """Of the pictures, as in embodied.agents.vision.run.pictures_of."""
     cache: Path
 
     def data(self, config: NavConfig) -> NavData:
@@ -122,7 +123,9 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
     explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
     validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
-    identity = identity_of("agents.iliad.nav.run", world="nav", data=data.digest, pictures=data.pictures, teacher=c)
+    identity = identity_of(
+        "embodied.agents.iliad.nav.run", world="nav", data=data.digest, pictures=data.pictures, teacher=c
+    )
     return IliadProblem(
         NavWorld(eyes.places), teacher, NavMarginal(eyes.places), student, explorer,
         splits["train"], validation, identity,

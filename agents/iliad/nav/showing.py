@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from agents.iliad.nav.student import NavStudent
-from agents.iliad.nav.world import HORIZON, RADIUS, NavWalk, NavWorld, Trip
-from agents.iliad.protocol import DescribingTeacher
-from agents.iliad.showing import learned_from
-from agents.iliad.showing import lines_of as learned_lines
+from embodied.agents.iliad.nav.student import NavStudent
+from embodied.agents.iliad.nav.world import HORIZON, RADIUS, NavWalk, NavWorld, Trip
+from embodied.agents.iliad.protocol import DescribingTeacher
+from embodied.agents.iliad.showing import learned_from
+from embodied.agents.iliad.showing import lines_of as learned_lines
+
 from embodied.envs.base import HelpEnv
 from embodied.interface import Episode, FollowRoute, Move, Reply, Stop, Task
 from embodied.seeds import stream

@@ -8,24 +8,24 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from embodied.agents.common.choosing import greedy_choice
+from embodied.agents.common.session import Note
+from embodied.agents.common.tensor_file import load_into
+from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.common.word_vectors import use_vectors, vocabulary_with
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.data import NavData
+from embodied.agents.iliad.nav.network import WalkDescriber
+from embodied.agents.iliad.nav.student import NavEyes, NavStudent
+from embodied.agents.iliad.nav.teacher import LONGEST, arrival, said, walked
+from embodied.agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
+from embodied.agents.iliad.stages import TeachingStage
+from embodied.agents.iliad.training import success_rate
+from embodied.agents.iliad.writing import log_likelihood
+from embodied.agents.vln.config import FollowerSettings
+from embodied.agents.vln.network import FollowerNetwork
 from torch import Tensor, nn
 
-from agents.common.choosing import greedy_choice
-from agents.common.session import Note
-from agents.common.tensor_file import load_into
-from agents.common.weights import load_weights, save_weights, seeded
-from agents.common.word_vectors import use_vectors, vocabulary_with
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.data import NavData
-from agents.iliad.nav.network import WalkDescriber
-from agents.iliad.nav.student import NavEyes, NavStudent
-from agents.iliad.nav.teacher import LONGEST, arrival, said, walked
-from agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
-from agents.iliad.stages import TeachingStage
-from agents.iliad.training import success_rate
-from agents.iliad.writing import log_likelihood
-from agents.vln.config import FollowerSettings
-from agents.vln.network import FollowerNetwork
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
@@ -150,7 +150,7 @@ def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavDa
     students |= {"varied_words"}
     settings = {k: v for k, v in dataclasses.asdict(config).items() if k not in students}
     parts = {"stage": name, "updates": updates, "seed": config.data_seed, "settings": settings, "data": data.digest}
-    identity, rate = identity_of("agents.iliad.nav.stages", **parts), config.teacher_rate
+    identity, rate = identity_of("embodied.agents.iliad.nav.stages", **parts), config.teacher_rate
     about = _about(config, data.eyes)
     return TeachingStage("nav", name, Path(folder), updates, rate, config.data_seed, identity, about)
 

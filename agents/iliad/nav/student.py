@@ -9,18 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 import torch.nn.functional as F
+from embodied.agents.common.choosing import Choice, greedy_choice, sampled_choice
+from embodied.agents.common.losses import IGNORE, negative_log_likelihood
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.hanna.percept import orientation
+from embodied.agents.iliad.nav.config import NavConfig
+from embodied.agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
+from embodied.agents.iliad.protocol import ExecutionScores
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vln.network import COPIES, FollowerNetwork, Said, Seen
+from embodied.assets.records import ROOM_KINDS
 from torch import Tensor, nn
 
-from agents.common.choosing import Choice, greedy_choice, sampled_choice
-from agents.common.losses import IGNORE, negative_log_likelihood
-from agents.common.vocabulary import Vocabulary
-from agents.hanna.percept import orientation
-from agents.iliad.nav.config import NavConfig
-from agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
-from agents.iliad.protocol import ExecutionScores
-from agents.vision.bank import FeatureBank
-from agents.vln.network import COPIES, FollowerNetwork, Said, Seen
-from assets.records import ROOM_KINDS
 from embodied.action_spaces import PanoramicMoves
 from embodied.geometry import wrap
 from embodied.interface import TURNS, VIEW_PITCHES, VIEW_YAWS, Place, Pose, Sight

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
+from embodied.agents.iliad.regex.rules import ALPHABET, LETTERS, columns
 from torch import Tensor
-
-from agents.common.vocabulary import Vocabulary, build_vocabulary
-from agents.iliad.regex.rules import ALPHABET, LETTERS, columns
 
 PAD, END = 0, 1
 """Of characters; END also stands before the first one."""

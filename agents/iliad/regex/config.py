@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, Limit, require, require_word
-from agents.iliad.config import LearnerConfig
+from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, Limit, require, require_word
+from embodied.agents.iliad.config import LearnerConfig
 
 TEACHERS = ("learned", "grammar")
 PRAGMATICS = ("program", "text")

@@ -10,7 +10,8 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from agents.iliad.regex.rules import ANY, ANYWHERE, LETTER, SHAPES, START, VOWEL, RuleShape
+from embodied.agents.iliad.regex.rules import ANY, ANYWHERE, LETTER, SHAPES, START, VOWEL, RuleShape
+
 from embodied.seeds import stream
 
 SPECIFIC = 12

@@ -7,12 +7,11 @@ hidden size. The student is a speller of rules, the teacher's executor a speller
 from __future__ import annotations
 
 import torch
+from embodied.agents.common.choosing import Choice
+from embodied.agents.common.vocabulary import END_NUMBER
+from embodied.agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD
+from embodied.agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
 from torch import Tensor, nn
-
-from agents.common.choosing import Choice
-from agents.common.vocabulary import END_NUMBER
-from agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD
-from agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
 
 
 class Speller(nn.Module):

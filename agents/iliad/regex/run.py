@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.common.session import Note
-from agents.iliad.config import LearnerConfig
-from agents.iliad.protocol import DescribingTeacher
-from agents.iliad.regex.coding import Requests, request_words
-from agents.iliad.regex.config import RegexConfig, data_of
-from agents.iliad.regex.data import RegexData, WordTask, make_data, read_templates, rules_without_requests
-from agents.iliad.regex.networks import Speller
-from agents.iliad.regex.stages import (
+from embodied.agents.common.session import Note
+from embodied.agents.iliad.config import LearnerConfig
+from embodied.agents.iliad.protocol import DescribingTeacher
+from embodied.agents.iliad.regex.coding import Requests, request_words
+from embodied.agents.iliad.regex.config import RegexConfig, data_of
+from embodied.agents.iliad.regex.data import RegexData, WordTask, make_data, read_templates, rules_without_requests
+from embodied.agents.iliad.regex.networks import Speller
+from embodied.agents.iliad.regex.stages import (
     load_network,
     new_network,
     pretrain_student,
@@ -23,12 +23,13 @@ from agents.iliad.regex.stages import (
     teach_describer,
     teach_executor,
 )
-from agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
-from agents.iliad.regex.words import read_words
-from agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld
-from agents.iliad.training import IliadProblem, train
-from assets.cache import digest
-from assets.json_file import read_text
+from embodied.agents.iliad.regex.teacher import GrammarTeacher, LearnedTeacher
+from embodied.agents.iliad.regex.words import read_words
+from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, RegexWorld
+from embodied.agents.iliad.training import IliadProblem, train
+from embodied.assets.cache import digest
+from embodied.assets.json_file import read_text
+
 from embodied.identity import differences, identity_of, read_finished, write_finished
 from embodied.records import from_plain, to_json
 from embodied.seeds import stream
@@ -86,7 +87,7 @@ def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print)
     rng = stream(c.data_seed, "regex", "unlabeled")
     rules = tuple(rules_without_requests(grounds.data, c, c.unlabeled, rng=rng))
     splits = grounds.data.splits
-    identity = identity_of("agents.iliad.regex.run", world="regex", data=grounds.digest, teacher=c)
+    identity = identity_of("embodied.agents.iliad.regex.run", world="regex", data=grounds.digest, teacher=c)
     return IliadProblem(
         RegexWorld(), grounds.teacher, RegexMarginal(rules), student(), student(),
         splits["train"], splits["validation"][:VALIDATION], identity,

@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from agents.iliad.showing import learned_from
-from agents.iliad.showing import lines_of as learned_lines
+from embodied.agents.iliad.showing import learned_from
+from embodied.agents.iliad.showing import lines_of as learned_lines
+
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
-    from agents.iliad.protocol import DescribingTeacher
-    from agents.iliad.regex.data import WordTask
-    from agents.iliad.regex.world import RegexStudent
+    from embodied.agents.iliad.protocol import DescribingTeacher
+    from embodied.agents.iliad.regex.data import WordTask
+    from embodied.agents.iliad.regex.world import RegexStudent
 
 
 @dataclass(frozen=True)

@@ -10,22 +10,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from embodied.agents.common.choosing import greedy_choice
+from embodied.agents.common.session import Note
+from embodied.agents.common.tensor_file import load_into
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.iliad.protocol import NOTHING
+from embodied.agents.iliad.regex.coding import Requests, changes, characters, texts
+from embodied.agents.iliad.regex.config import RegexConfig
+from embodied.agents.iliad.regex.data import RegexData, WordTask, rules_without_requests
+from embodied.agents.iliad.regex.networks import ChangeDescriber, Speller
+from embodied.agents.iliad.regex.rules import outputs
+from embodied.agents.iliad.stages import Network, TeachingStage
+from embodied.agents.iliad.writing import log_likelihood
+from embodied.assets.cache import digest
 from torch import Tensor, nn
 
-from agents.common.choosing import greedy_choice
-from agents.common.session import Note
-from agents.common.tensor_file import load_into
-from agents.common.vocabulary import Vocabulary
-from agents.common.weights import load_weights, save_weights, seeded
-from agents.iliad.protocol import NOTHING
-from agents.iliad.regex.coding import Requests, changes, characters, texts
-from agents.iliad.regex.config import RegexConfig
-from agents.iliad.regex.data import RegexData, WordTask, rules_without_requests
-from agents.iliad.regex.networks import ChangeDescriber, Speller
-from agents.iliad.regex.rules import outputs
-from agents.iliad.stages import Network, TeachingStage
-from agents.iliad.writing import log_likelihood
-from assets.cache import digest
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
@@ -143,7 +143,12 @@ def _stage(name: str, folder: Path, updates: int, config: RegexConfig, requests:
         settings["marginal"] = config.marginal
     words = requests.vocabulary.words
     identity = identity_of(
-        "agents.iliad.regex.stages", stage=name, updates=updates, seed=seed, settings=settings, words=digest(words)
+        "embodied.agents.iliad.regex.stages",
+        stage=name,
+        updates=updates,
+        seed=seed,
+        settings=settings,
+        words=digest(words),
     )
     about = RegexAbout(config, words)
     return TeachingStage("regex", name, Path(folder), updates, config.teacher_rate, seed, identity, about)

@@ -6,16 +6,15 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-
-from agents.common.choosing import greedy_choice, sampled_choice
-from agents.iliad.describing import DescribingNetworks, EachDescribed
-from agents.iliad.protocol import NOTHING, one_request
-from agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
-from agents.iliad.regex.config import RegexConfig
-from agents.iliad.regex.data import Grammar, WordTask
-from agents.iliad.regex.networks import ChangeDescriber, Speller
-from agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
-from agents.iliad.regex.world import Written
+from embodied.agents.common.choosing import greedy_choice, sampled_choice
+from embodied.agents.iliad.describing import DescribingNetworks, EachDescribed
+from embodied.agents.iliad.protocol import NOTHING, one_request
+from embodied.agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
+from embodied.agents.iliad.regex.config import RegexConfig
+from embodied.agents.iliad.regex.data import Grammar, WordTask
+from embodied.agents.iliad.regex.networks import ChangeDescriber, Speller
+from embodied.agents.iliad.regex.rules import LETTERS, REPLACEMENTS, SAME, RuleShape
+from embodied.agents.iliad.regex.world import Written
 
 _OWN_RULE = re.compile(r"\((\^?)\)\(([a-zCV.]{1,2})\)\((\$?)\)@((?:[a-z]|\\2){0,2})")
 Case = tuple[WordTask, Written, str]

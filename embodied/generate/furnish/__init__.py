@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 
-from assets.catalogue import Catalogue
+from embodied.assets.catalogue import Catalogue
 from embodied.generate.config import RETRIES
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.hanging import hang_all

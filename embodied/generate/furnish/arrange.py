@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.generate.furnish.space import Box, Params, RoomSpace, Thing, Wall, box, overlap, same_box
 
 WALL_GAP = 0.02

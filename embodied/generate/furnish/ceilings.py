@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.lights import ALWAYS, LUMENS
 from embodied.generate.furnish.space import Thing, box, overlap

@@ -9,7 +9,7 @@ from typing import Unpack
 
 import numpy as np
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.generate.furnish.arrange import Item, ScoredPose, pack
 from embodied.generate.furnish.space import Box, Params, RoomSpace, Thing
 from embodied.generate.furnish.stock import AssetLimits, Stock

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from assets.records import Asset, Size
+from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, ScoredPose, floor_poses, is_flat, wall_poses
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import LIKES, Spot, depth_before

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.generate.furnish.ceilings import ceiling_lamps, detectors
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import has_window

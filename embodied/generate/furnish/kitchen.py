@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.generate.furnish.arrange import Item, ScoredPose, wall_poses
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.groups import put_group

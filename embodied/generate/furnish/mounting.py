@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from assets.records import Asset, Size
+from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.space import Thing, Wall, box, overlap
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.generate.furnish.ceilings import hang_from_ceiling
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.groups import put_group

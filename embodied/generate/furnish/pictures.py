@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from assets.records import Asset, Size
+from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import free_stretch
 from embodied.generate.furnish.mounting import Hanging, along_stretches, at, hang_first, mount, spot_behind, stretches

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from assets.records import Asset, Size, SupportSurface
+from embodied.assets.records import Asset, Size, SupportSurface
 from embodied.generate.furnish.arrange import Item, ScoredPose, floor_poses, wall_poses
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import door_distance, nearest

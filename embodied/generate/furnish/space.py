@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import shapely
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.house.house import DOORS, House, Opening, Room, Stair
 from embodied.navigation.free_space import LOW
 

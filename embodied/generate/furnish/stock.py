@@ -9,8 +9,8 @@ from typing import TypedDict, Unpack
 
 import numpy as np
 
-from assets.catalogue import Catalogue
-from assets.records import Asset, Size
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.style import Style, liking
 from embodied.generate.furnish.tables import Tables
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from assets.records import Asset
+from embodied.assets.records import Asset
 from embodied.house.house import HouseError
 
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from assets.catalogue import Catalogue
-from assets.json_file import RecordError, from_plain, read_toml
-from assets.records import Size
+from embodied.assets.catalogue import Catalogue
+from embodied.assets.json_file import RecordError, from_plain, read_toml
+from embodied.assets.records import Size
 
 FILES = ("groups.toml", "rooms.toml", "smalls.toml")
 BUILT = ("kitchen_line",)

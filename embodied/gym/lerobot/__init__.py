@@ -20,7 +20,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 
-from assets.cache import write_bytes
+from embodied.assets.cache import write_bytes
 from embodied.envs.continuous import POSITION
 from embodied.gym import continuous, drive
 from embodied.gym.driving import DriveSettings

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from assets.cache import digest, write_bytes, write_json
-from assets.catalogue import Catalogue
+from embodied.assets.cache import digest, write_bytes, write_json
+from embodied.assets.catalogue import Catalogue
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light.backend import REMEDY, device, rest, warn
 from embodied.light.baking.compose import Composer, Solved, page_of

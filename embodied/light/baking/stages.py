@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.cache import atomic_path, digest, write_bytes
+from embodied.assets.cache import atomic_path, digest, write_bytes
 from embodied.light.backend import device, warn
 from embodied.light.baking.compose import Solved
 from embodied.light.baking.solve import Radiosity

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.records import Finish, MeshPart
+from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.light.pages.unwrap import Unwrapped, areas_of, cached_model, pack, unwrap_planes
 

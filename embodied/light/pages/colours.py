@@ -11,9 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from assets.archives import read_picture
-from assets.cache import atomic_path, digest
-from assets.closure import code_digest
+from embodied.assets.archives import read_picture
+from embodied.assets.cache import atomic_path, digest
+from embodied.assets.closure import code_digest
 from embodied.light.arrays import Array
 from embodied.light.backend import array, bilinear, dr, floats, mi, wholes
 from embodied.light.pages.atlas import Page, flat_areas
@@ -22,8 +22,8 @@ from embodied.light.pages.cover import Cover
 DARKEST, LIGHTEST = 0.02, 0.88
 """Reflectances are kept between these."""
 APART = (
-    "assets",
-    "assets.data",
+    "embodied.assets",
+    "embodied.assets.data",
     "embodied",
     "embodied.light",
     *(f"embodied.light.pages.{name}" for name in ("atlas", "cover", "unwrap")),

@@ -16,9 +16,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from assets.archives import open_arrays, read_picture
-from assets.cache import write_files
-from assets.json_file import read_json
+from embodied.assets.archives import open_arrays, read_picture
+from embodied.assets.cache import write_files
+from embodied.assets.json_file import read_json
 from embodied.house.house import House
 from embodied.light.backend import LightError, warn
 from embodied.light.memory import Memory, once

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from assets.records import DETAILS, Finish
+from embodied.assets.records import DETAILS, Finish
 from embodied.light.pages.atlas import Atlas, Page
 from embodied.light.pages.unwrap import areas_of, told_apart
 from embodied.scene.lit_pages import LitMesh

@@ -18,9 +18,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from assets.cache import digest
-from assets.closure import code_digest
-from assets.records import MeshPart
+from embodied.assets.cache import digest
+from embodied.assets.closure import code_digest
+from embodied.assets.records import MeshPart
 from embodied.geometry import r2
 from embodied.light.arrays import Array
 from embodied.light.backend import added_up, dr, floats, fraction, mi, scene_of, vector
@@ -34,7 +34,7 @@ REST = 0.05
 """Seconds after which the threads of an atlas are surely asleep."""
 _retired: list[tuple[Any, float]] = []
 """The atlas that is freed next, and since when it rests."""
-APART = ("assets", "assets.data", "embodied", "embodied.light")
+APART = ("embodied.assets", "embodied.assets.data", "embodied", "embodied.light")
 """What the code of an unwrapping does not count: what packages offer by name, and the catalogue's rows."""
 
 

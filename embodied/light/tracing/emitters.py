@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from assets.archives import open_arrays
-from assets.cache import write_bytes
+from embodied.assets.archives import open_arrays
+from embodied.assets.cache import write_bytes
 from embodied.geometry import r2
 from embodied.house.house import House, Opening
 from embodied.house.shapes import inward
