@@ -16,6 +16,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
+from tqdm import tqdm
+
 from embodied.assets import materials
 from embodied.assets.built import BASICS, MAKERS
 from embodied.assets.cache import default_cache
@@ -25,7 +27,6 @@ from embodied.assets.importing.packs import find_packs, pack_of
 from embodied.assets.importing.sh3f import open_pack
 from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
 from embodied.assets.rows import DATA, CatalogueError, check_classes, read_json, read_models
-from tqdm import tqdm
 
 __all__ = ["Catalogue", "CatalogueError", "load_catalogue"]
 

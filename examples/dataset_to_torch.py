@@ -14,10 +14,10 @@ import argparse
 from pathlib import Path
 
 import torch
-from embodied.agents.vision.pictures import ViewpointPictures
-from embodied.assets.cache import default_cache
 from torch.utils.data import DataLoader
 
+from embodied.agents.vision.pictures import ViewpointPictures
+from embodied.assets.cache import default_cache
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
 from embodied.datasets.store import Dataset
 from embodied.gym.eyes import ViewSettings

@@ -16,9 +16,9 @@ from collections.abc import Callable
 import gymnasium
 import numpy as np
 import torch
-from embodied.agents.vision.encoder import load_encoder
 
 import embodied  # noqa: F401 - registers the environments
+from embodied.agents.vision.encoder import load_encoder
 from embodied.gym.eyes import ViewSettings
 from embodied.render.pictures import PictureSettings
 

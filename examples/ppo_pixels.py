@@ -33,6 +33,13 @@ import gymnasium
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.vec_env import DummyVecEnv
+
+from embodied.action_spaces import MonocularMoves
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.encoder import load_encoder
@@ -41,13 +48,6 @@ from embodied.agents.vision.labels import look, visible_in_views
 from embodied.agents.vision.live import shipped_features
 from embodied.assets.cache import atomic_path, default_cache
 from embodied.assets.catalogue import load_catalogue
-from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-from stable_baselines3.common.vec_env import DummyVecEnv
-
-from embodied.action_spaces import MonocularMoves
 from embodied.datasets.build import make_dataset_house
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig

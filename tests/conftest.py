@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 import pytest
-from embodied.assets.cache import default_cache
 
+from embodied.assets.cache import default_cache
 from embodied.house.house import House, Opening, Placement, Room, Storey
 
 FINISHES = {

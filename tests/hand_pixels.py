@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 from conftest import two_rooms
-from embodied.agents.vision.labels import HouseStrips
 from handmade import HandCatalogue, furnished
 
+from embodied.agents.vision.labels import HouseStrips
 from embodied.envs.base import HelpEnv
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import CameraSensor, PanoramaStore, ViewSettings

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from hand_worlds import grid_world
+
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Split
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
-from hand_worlds import grid_world
-
 from embodied.envs.make import environment_maker, tasks_under
 from embodied.language.plain import PlainLanguage
 from embodied.tasks.vnla import vnla_pool, vnla_task

@@ -7,8 +7,8 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from embodied.assets.catalogue import load_catalogue
 
+from embodied.assets.catalogue import load_catalogue
 from embodied.generate import generate_house
 from embodied.house.house import House, Opening, Placement, Room, Storey
 from embodied.navigation.graph import NavGraph, graph_of

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from embodied.assets.records import Asset, Finish, MeshPart, SupportSurface
 
+from embodied.assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
 from embodied.scene.house_meshes import house_parts

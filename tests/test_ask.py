@@ -11,14 +11,14 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
+from hand_worlds import grid_world
+
 from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.foresight import CHOICES, Foresight
 from embodied.agents.ask.learned import LearnedAsker, facts, fit
 from embodied.agents.ask.study import AskStudy
 from embodied.agents.studies.engine import run_study
-from gymnasium.utils.env_checker import check_env
-from hand_worlds import grid_world
-
 from embodied.assistants.ask import in_view, understood
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact import contact
+from handmade_models import CUBE, write_own, write_pack
+
 from embodied.assets.attribution import attribution
 from embodied.assets.built import MAKERS
 from embodied.assets.catalogue import load_catalogue
@@ -19,7 +21,6 @@ from embodied.assets.importing.packs import find_packs
 from embodied.assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
 from embodied.assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, SupportSurface, bounds
 from embodied.assets.rows import DATA, CatalogueError
-from handmade_models import CUBE, write_own, write_pack
 
 SOME = (
     "scopia/bed1",

@@ -16,6 +16,10 @@ import zipfile
 import numpy as np
 import pytest
 from conftest import two_rooms
+from tqdm import tqdm
+
+import embodied
+from embodied import cli
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.hanna.training_config import TrainingConfig
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
@@ -24,10 +28,6 @@ from embodied.assets.cache import atomic_path
 from embodied.assets.catalogue import CatalogueError, load_catalogue
 from embodied.assets.importing.sh3f import CATALOGUE, PackError, open_pack
 from embodied.assets.materials import finish
-from tqdm import tqdm
-
-import embodied
-from embodied import cli
 from embodied.cli.options import field_docs
 from embodied.datasets.build import for_each_unit
 from embodied.errors import UnableError

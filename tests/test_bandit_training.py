@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+
 from embodied.agents.bandit import corpus, libreoffice
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import CorpusError, Pair, Sizes
@@ -24,7 +25,6 @@ from embodied.agents.common.session import Session
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
 from embodied.agents.common.weights import load_weights
 from embodied.agents.studies.engine import run_study
-
 from embodied.cli import main
 from embodied.errors import UnableError
 from embodied.identity import read_finished

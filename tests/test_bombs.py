@@ -15,6 +15,7 @@ import deflate
 import numpy as np
 import pytest
 import simplejpeg
+
 from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint
 from embodied.agents.common.session import Session
 from embodied.agents.iliad.regex.words import read_words
@@ -23,7 +24,6 @@ from embodied.agents.vision.labels import HouseStrips
 from embodied.assets.archives import open_arrays, read_picture
 from embodied.assets.closure import ROOT
 from embodied.assets.json_file import RecordError, read_toml
-
 from embodied.datasets import habitat
 from embodied.errors import UnableError
 from embodied.generate.furnish.tables import tables

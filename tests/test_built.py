@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+
 from embodied.assets.built import MAKERS, soft, storage, tableware
 from embodied.assets.built.primitives import (
     ball,

@@ -9,8 +9,8 @@ import sys
 import time
 
 import pytest
-from embodied.assets import cache as caches
 
+from embodied.assets import cache as caches
 from embodied.cli import main
 
 

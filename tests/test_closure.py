@@ -6,11 +6,11 @@ import re
 import shutil
 from pathlib import Path
 
-import embodied.assets.closure as closure_module
 import pytest
+
+import embodied.assets.closure as closure_module
 from embodied.assets.closure import ROOT, closure, code_digest
 from embodied.assets.importing import importer
-
 from embodied.datasets.build import program
 from embodied.light import settings
 from embodied.light.pages import colours, unwrap

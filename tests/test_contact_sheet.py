@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from embodied.assets.catalogue import load_catalogue
 from handmade_models import CUBE, write_own
 
+from embodied.assets.catalogue import load_catalogue
 from embodied.render.contact_sheet import LABEL, TILE, draw_sheets, sheet
 
 pytestmark = pytest.mark.gl

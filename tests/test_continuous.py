@@ -11,10 +11,10 @@ import gymnasium
 import numpy as np
 import pytest
 from conftest import two_rooms
-from embodied.assets.json_file import RecordError
 from gymnasium.utils.env_checker import check_env
 from handmade import HandCatalogue, furnished
 
+from embodied.assets.json_file import RecordError
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.habitat import (
     from_habitat,

@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from embodied.assets.cache import digest
 from hand_data import build, built, content
 
+from embodied.assets.cache import digest
 from embodied.datasets.store import Dataset, DatasetError
 from embodied.house.house import HouseError
 from embodied.locks import LockedError

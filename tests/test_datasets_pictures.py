@@ -10,6 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hand_data import build, small_house
+from handmade import HandCatalogue
+from test_cluster import FakeRay
+
 from embodied.agents.vision import drawn, occasions
 from embodied.agents.vision import run as vision
 from embodied.agents.vision.config import PLAIN, RENDER_PRESETS
@@ -17,10 +21,6 @@ from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.features import encode_panoramas, feature_path, load_features
 from embodied.agents.vision.occasions import OCCASIONS, shown_path
 from embodied.agents.vision.resnet import ARCHITECTURES
-from hand_data import build, small_house
-from handmade import HandCatalogue
-from test_cluster import FakeRay
-
 from embodied.cli.dataset import chosen_pictures
 from embodied.datasets import build as building
 from embodied.datasets.store import Dataset

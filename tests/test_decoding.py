@@ -5,8 +5,9 @@ import io
 import cv2
 import numpy as np
 import pytest
-from embodied.assets.decoding import colours, numbers
 from PIL import Image
+
+from embodied.assets.decoding import colours, numbers
 
 FILTERS = [getattr(cv2, f"IMWRITE_PNG_FILTER_{name}") for name in ("NONE", "SUB", "UP", "AVG", "PAETH")]
 

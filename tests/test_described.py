@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from embodied.viz.described import label, middle, panorama_pixels
 from hand_worlds import HandWorld, hand_graph, room, thing
 
 from embodied.assistants.descriptions import Describer, spoken_of
 from embodied.house.house import House, Opening, Storey
 from embodied.interface import Feature, Pose
+from embodied.viz.described import label, middle, panorama_pixels
 
 
 @pytest.fixture

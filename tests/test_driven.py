@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import two_rooms
-from embodied.assets.catalogue import load_catalogue
 
 import embodied.gym.env
+from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.anna import Anna
 from embodied.datasets.store import StoredPlace
 from embodied.envs.driven import DrivenHannaEnv, Driver, is_overhead

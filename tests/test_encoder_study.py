@@ -6,6 +6,9 @@ import argparse
 import dataclasses
 
 import pytest
+from hand_data import build, small_house
+from hand_pixels import coloured_strips, world_in
+
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.studies.engine import run_study
 from embodied.agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing, lit_name
@@ -15,9 +18,6 @@ from embodied.agents.vision.encoder import load_encoder, random_encoder, save_en
 from embodied.agents.vision.resnet import ARCHITECTURES
 from embodied.agents.vision.run import detector_for
 from embodied.agents.vision.study import EncoderStudy
-from hand_data import build, small_house
-from hand_pixels import coloured_strips, world_in
-
 from embodied.cli.learning import by_name
 from embodied.cli.options import add_options, read_options
 from embodied.cli.study import VisionOptions

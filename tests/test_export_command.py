@@ -9,13 +9,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
-from embodied.agents.common.shipped import SHIPPED_ENCODER
-from embodied.agents.vision.encoder import load_encoder
-from embodied.agents.vision.features import feature_path, save_features
 from hand_data import build, built, read_features, small_house
 from handmade import HandCatalogue, furnished
 
 from embodied import cli
+from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.vision.encoder import load_encoder
+from embodied.agents.vision.features import feature_path, save_features
 from embodied.datasets.folders import names_of
 from embodied.render.pictures import PictureSettings
 from embodied.world import open_world

@@ -17,18 +17,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from hand_data import build, content, paint, small_house
+from hand_worlds import grid_world
+from test_locks import own_files
+
+from embodied import cli
 from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint, restore, write_checkpoint
 from embodied.agents.common.session import Session
 from embodied.agents.common.tensor_file import save_tensors
 from embodied.assets.cache import DRAFTS
 from embodied.assets.catalogue import CatalogueError, load_catalogue
 from embodied.assets.closure import ROOT
-from embodied.viz import sinks
-from hand_data import build, content, paint, small_house
-from hand_worlds import grid_world
-from test_locks import own_files
-
-from embodied import cli
 from embodied.bench.timing import Measure, Report
 from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
@@ -45,6 +44,7 @@ from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
+from embodied.viz import sinks
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 import torch
+from hand_worlds import grid_world, line_world
+
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
@@ -15,8 +17,6 @@ from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, n
 from embodied.agents.find.way_map import WayMap
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Split
-from hand_worlds import grid_world, line_world
-
 from embodied.envs.make import environment_maker
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import shapely
 from conftest import FINISHES, two_rooms
+
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.records import ROOM_KINDS
-
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.config import RETRIES
 from embodied.generate.furnish import furnish

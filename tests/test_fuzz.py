@@ -23,6 +23,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 import torch
 from conftest import two_rooms
+from hand_data import built
+
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.network import REMEDY, BanditAbout, Translator, load_network, save_network
 from embodied.agents.bandit.training import NumberedCorpus
@@ -42,10 +44,6 @@ from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.features import load_features, save_features
 from embodied.agents.vision.labels import HouseStrips
 from embodied.assets.catalogue import load_catalogue
-from embodied.viz.report import judged
-from embodied.viz.sinks import Sinks, check_recording, open_recording
-from hand_data import built
-
 from embodied.datasets.store import Dataset
 from embodied.errors import UnableError
 from embodied.evaluation import tables
@@ -60,6 +58,8 @@ from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import MAGIC, TAIL, PanoramaFile, write_panoramas
 from embodied.render.sightings import load_table, save_table, sightings_table
 from embodied.seeds import stream
+from embodied.viz.report import judged
+from embodied.viz.sinks import Sinks, check_recording, open_recording
 
 pytestmark = pytest.mark.slow
 

@@ -11,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.materials import MATERIALS
 from embodied.assets.records import ROOM_KINDS
-
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.clearing import cleared
 from embodied.generate.config import RETRIES

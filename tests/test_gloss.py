@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 from conftest import two_rooms
-from embodied.assets.records import Finish
 from handmade import HandCatalogue, furnished
 
+from embodied.assets.records import Finish
 from embodied.light.in_numpy import embree
 from embodied.light.tracing.rays import mitsuba_among, rays_among
 from embodied.render import gloss

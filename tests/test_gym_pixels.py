@@ -8,14 +8,14 @@ import gymnasium as gym
 import numpy as np
 import psutil
 import pytest
-from embodied.agents.vision.encoder import random_encoder
-from embodied.agents.vision.features import encode_panoramas
-from embodied.agents.vision.live import LiveFeatures
 from hand_data import built
 from hand_pixels import tasks_in, world_in
 from hand_worlds import grid_world
 
 import embodied.gym.env
+from embodied.agents.vision.encoder import random_encoder
+from embodied.agents.vision.features import encode_panoramas
+from embodied.agents.vision.live import LiveFeatures
 from embodied.envs.base import HelpEnv
 from embodied.gym import eyes as module
 from embodied.gym.env import HelpGymEnv

@@ -9,7 +9,6 @@ import math
 import av
 import numpy as np
 import pytest
-from embodied.viz.video import _captions, film_episode
 from hand_hanna import LINE_ROUTES, LINE_TASK, grid_setup, line_env
 from hand_worlds import grid_world, line_world
 
@@ -34,6 +33,7 @@ from embodied.policies.baselines import (
 )
 from embodied.seeds import stream
 from embodied.teachers.hanna import HannaTeacher, base37_entropy, lost_as_programmed, segments
+from embodied.viz.video import _captions, film_episode
 
 # ANNA
 

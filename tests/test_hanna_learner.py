@@ -17,6 +17,10 @@ import numpy as np
 import pytest
 import torch
 import torch.distributed as dist
+from hand_data import metrics_of
+from hand_worlds import grid_world
+
+from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.checkpoint import CheckpointError, restore
 from embodied.agents.common.choosing import choose_at, choose_greedily, choose_sampled
@@ -46,10 +50,6 @@ from embodied.agents.hanna.run import HannaLearner
 from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Split
-from hand_data import metrics_of
-from hand_worlds import grid_world
-
-from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
 from embodied.envs.hanna import HannaEnv

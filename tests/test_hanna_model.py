@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 import torch
+
 from embodied.agents.hanna.attention import (
     DotAttend,
     FeedForward,

@@ -9,6 +9,10 @@ import itertools
 import numpy as np
 import pytest
 import torch
+from hand_data import built
+from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
+
+from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.playing import TaskSet
@@ -52,10 +56,6 @@ from embodied.agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, Rule
 from embodied.agents.hari.study import HariStudy
 from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
 from embodied.agents.studies.engine import run_study
-from hand_data import built
-from hand_worlds import HandWorld, grid_world, hand_graph, room, thing
-
-from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
 from embodied.envs.hari import Costs, HariEnv, shaped_costs

@@ -6,12 +6,12 @@ import re
 
 import pytest
 import torch
+from hand_worlds import grid_world
+
 from embodied.agents.common.shipped import SHIPPED_HARI, WEIGHTS
 from embodied.agents.common.weights import origin_of
 from embodied.agents.hari.agent import HariAgent, load_agent
 from embodied.agents.hari.policy import policy_of
-from hand_worlds import grid_world
-
 from embodied.envs.hari import HariRules
 from embodied.envs.make import environment_maker
 from embodied.evaluation import metrics

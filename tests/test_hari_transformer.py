@@ -2,8 +2,9 @@
 
 import pytest
 import torch
-from embodied.agents.hari.transformer import Packing, Transformer, fast_dropout
 from torch import nn
+
+from embodied.agents.hari.transformer import Packing, Transformer, fast_dropout
 
 
 @pytest.fixture

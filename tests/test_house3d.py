@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from embodied.viz.house3d import BUDGET, FIGURES, _lit_piece, _share
 
 from embodied.scene.lit_pages import LitMesh
+from embodied.viz.house3d import BUDGET, FIGURES, _lit_piece, _share
 
 
 def test_a_vertex_on_the_rim_of_its_chart_has_the_colour_of_its_faces():

@@ -9,8 +9,8 @@ import math
 import numpy as np
 import pytest
 import shapely
-from embodied.assets.catalogue import load_catalogue
 
+from embodied.assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish import groups, likes
 from embodied.generate.furnish.context import Context

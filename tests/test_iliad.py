@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.session import Session, descend
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
@@ -24,8 +26,6 @@ from embodied.agents.iliad.learners import (
 )
 from embodied.agents.iliad.protocol import NOTHING, ExecutionScores
 from embodied.agents.iliad.training import IliadProblem, episodes_to, success_rate, train
-from torch import Tensor, nn
-
 from embodied.seeds import stream
 
 silent = lambda line: None

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from hand_worlds import grid_world, line_world
+
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.hanna.percept import orientation
@@ -29,8 +31,6 @@ from embodied.agents.iliad.training import IliadProblem, success_rate, train
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vln.network import COPIES
 from embodied.assets.records import ROOM_KINDS
-from hand_worlds import grid_world, line_world
-
 from embodied.interface import FindObject, Pose, Route, Task
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task

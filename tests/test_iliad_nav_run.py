@@ -9,6 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
+from hand_data import built, noise_features, small_house
+
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.word_vectors import Lexicon
 from embodied.agents.iliad.config import LearnerConfig
@@ -21,8 +23,6 @@ from embodied.agents.iliad.nav.teacher import OtherWords, PeopleNavTeacher
 from embodied.agents.iliad.nav.world import NavWorld, walk_along
 from embodied.agents.iliad.study import IliadStudy, NavStudyWorld
 from embodied.agents.studies.engine import run_study
-from hand_data import built, noise_features, small_house
-
 from embodied.cli import main
 from embodied.datasets.store import Dataset
 from embodied.interface import Sight, Stop

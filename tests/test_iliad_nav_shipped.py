@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hand_worlds import grid_world
+
+from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_WALKER
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.iliad.nav.stages import load_follower
@@ -11,9 +14,6 @@ from embodied.agents.iliad.nav.student import NavEyes, NavStudent
 from embodied.agents.iliad.nav.world import MOVES, Trip, walk_along
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
-from hand_worlds import grid_world
-
-from embodied.action_spaces import PanoramicMoves
 from embodied.interface import Pose
 
 WORLD = grid_world()

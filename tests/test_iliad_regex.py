@@ -9,6 +9,9 @@ import time
 
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.iliad.config import LearnerConfig
@@ -45,9 +48,6 @@ from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, Regex
 from embodied.agents.iliad.study import IliadStudy, RegexStudyWorld
 from embodied.agents.iliad.training import IliadProblem, train
 from embodied.agents.studies.engine import run_study
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from embodied.cli import main
 from embodied.seeds import stream
 

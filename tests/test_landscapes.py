@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 import pytest
 import shapely
-from embodied.assets.catalogue import load_catalogue
 
+from embodied.assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig
 from embodied.house.house import LANDSCAPES, SEASONS, House, HouseError, Sky
 from embodied.light.tracing.sky import paint

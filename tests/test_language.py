@@ -7,9 +7,9 @@ import re
 
 import numpy as np
 import pytest
+
 from embodied.agents.common.more_paths import SaidBy
 from embodied.assets.catalogue import load_catalogue
-
 from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset

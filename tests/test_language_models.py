@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from embodied.assets.catalogue import load_catalogue
 from hand_chat import ChatServer, Parrot, first_allowed, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
+from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant
 from embodied.envs.base import HelpEnv
 from embodied.envs.make import ask_environment_maker, environment_maker, look_of

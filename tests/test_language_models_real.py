@@ -19,7 +19,6 @@ from embodied.agents.language_models.assistant import ModelAssistant
 from embodied.agents.language_models.cache import AnswerCache
 from embodied.agents.language_models.client import Client, ServerSettings
 from embodied.agents.language_models.small import NAME, command
-
 from embodied.envs.make import ask_environment_maker, environment_maker, look_of
 from embodied.evaluation.metrics import usage
 from embodied.evaluation.rollout import play

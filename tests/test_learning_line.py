@@ -9,6 +9,8 @@ import json
 import numpy as np
 import pytest
 import torch
+from hand_data import build, metrics_of
+
 from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
@@ -22,8 +24,6 @@ from embodied.agents.vision.encoder import load_encoder, random_encoder, save_en
 from embodied.agents.vision.features import feature_path, save_features
 from embodied.agents.vision.lessons import Lessons
 from embodied.agents.vision.run import encoder_of
-from hand_data import build, metrics_of
-
 from embodied.cli import features, main, options
 from embodied.cli.train import TrainHanna
 from embodied.cli.view import looked_at

@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 import pytest
 from conftest import two_rooms
-from embodied.assets.records import Finish
 from hand_light import TINY
 from handmade import box_mesh
 
+from embodied.assets.records import Finish
 from embodied.bench.light import psnr, ssim
 from embodied.geometry import r2
 from embodied.house.house import House, Light, Room, Sky, Storey

@@ -14,17 +14,12 @@ import numpy as np
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
+
+from embodied import generate
 from embodied.agents.vision import features, recognise
 from embodied.agents.vision.config import PLAIN
 from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
-from embodied.viz import recording
-from embodied.viz.blueprint import blueprint_of, sees_title
-from embodied.viz.recording import Pictures, camera_axes, record
-from embodied.viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
-from embodied.viz.video import camera_track, write_video
-
-from embodied import generate
 from embodied.cli import demo, main
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.metrics import spl, success
@@ -37,6 +32,11 @@ from embodied.policies.baselines import RandomWalk, Shortest
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings
 from embodied.tasks.find import find_pool, find_task
+from embodied.viz import recording
+from embodied.viz.blueprint import blueprint_of, sees_title
+from embodied.viz.recording import Pictures, camera_axes, record
+from embodied.viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
+from embodied.viz.video import camera_track, write_video
 from embodied.world import open_world
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]

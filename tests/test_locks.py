@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 from conftest import two_rooms
-from embodied.assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes, write_files
 from hand_data import built, content
 
 from embodied import cli
+from embodied.assets.cache import DRAFTS, MARK, abandoned, atomic_path, sweep, write_bytes, write_files
 from embodied.errors import UnableError
 from embodied.locks import LOCK, LockedError, locked
 

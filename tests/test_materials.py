@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from embodied.assets.closure import code_digest
 from embodied.assets.materials import MATERIALS, fingerprint, finish, make_maps, normal_map, of_role
 from embodied.assets.materials.maps import fbm, herringbone, hexagons, noise, planks

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import shapely
 from conftest import two_rooms
-from embodied.assets.catalogue import load_catalogue
 from hand_worlds import generated
 
+from embodied.assets.catalogue import load_catalogue
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.house.house import HouseError, Placement
 from embodied.mattersim.graphs import load_graphs

@@ -7,7 +7,6 @@ import warnings
 import embodied.assets.importing.packs as packs
 from embodied.assets.built import BASICS
 from embodied.assets.catalogue import _tell_once, load_catalogue
-
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.lacking import lacking
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from embodied.assets.catalogue import CatalogueError, load_catalogue
 from hand_data import build
 
+from embodied.assets.catalogue import CatalogueError, load_catalogue
 from embodied.datasets.build import DatasetConfig
 from embodied.datasets.scale import KINDS
 from embodied.generate import HouseConfig, generate_house

@@ -16,6 +16,9 @@ import numpy as np
 import pytest
 import trimesh
 from conftest import two_rooms
+from handmade_models import CUBE, write_own, write_pack
+from PIL import Image
+
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.importing import importer
 from embodied.assets.importing.meshing import crease_normals
@@ -24,9 +27,6 @@ from embodied.assets.importing.own import import_own, read_own
 from embodied.assets.importing.sh3f import PackError
 from embodied.assets.records import bounds
 from embodied.assets.rows import DATA, CatalogueError, read_json
-from handmade_models import CUBE, write_own, write_pack
-from PIL import Image
-
 from embodied.house.house import Placement
 from embodied.navigation.graph import graph_of
 from embodied.world import open_world

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 import trimesh
 from conftest import two_rooms
-from embodied.assets.catalogue import load_catalogue
-from embodied.assets.importing.meshing import face_normals
-from embodied.assets.importing.obj import MeshError
-from embodied.assets.records import Finish, MeshPart, bounds
 from handmade import HandCatalogue
 from handmade_models import write_own
 from PIL import Image
 from test_own import glb
 
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.importing.meshing import face_normals
+from embodied.assets.importing.obj import MeshError
+from embodied.assets.records import Finish, MeshPart, bounds
 from embodied.house.house import Placement
 from embodied.render.classic import Renderer
 from embodied.scene.glb import export_glb, pbr_material

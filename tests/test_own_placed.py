@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import two_rooms
-from embodied.assets.catalogue import load_catalogue
-from embodied.assets.json_file import RecordError
 from handmade_models import CUBE, write_own, write_pack
 
+from embodied.assets.catalogue import load_catalogue
+from embodied.assets.json_file import RecordError
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.generate.furnish import furnish
 from embodied.house.house import House

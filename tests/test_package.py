@@ -10,8 +10,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from embodied.assets.closure import code_digest
 
+from embodied.assets.closure import code_digest
 from embodied.distribution import DISTRIBUTION
 
 ROOT = Path(__file__).resolve().parent.parent

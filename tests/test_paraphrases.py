@@ -7,6 +7,7 @@ import re
 import shutil
 
 import pytest
+
 from embodied.agents.common.paraphrases import UNHEARD, VARIED, Wordings, paraphrase, varied
 from embodied.agents.common.vocabulary import tokenize
 from embodied.agents.iliad.nav.config import NavConfig
@@ -17,7 +18,6 @@ from embodied.agents.studies import wordings as studied
 from embodied.agents.studies.wordings import PARAPHRASED, SPEAKERS, SYNONYMS, WORDING, code_of
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import ROOT, code_digest
-
 from embodied.interface import Pose
 from embodied.language import parse
 from embodied.language.clauses import Enter, Exit, Past, StopIn, Turn

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import shapely
 from conftest import two_rooms
-from embodied.assets.records import Asset, SupportSurface
 from hand_worlds import grid_world, thing
 
+from embodied.assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
 from embodied.generate.another_day import another_day
 from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, POLITE, add_people, meet, sits, stands

@@ -8,11 +8,11 @@ import pickle
 import numpy as np
 import pytest
 import torch
-from embodied.agents.vision.pictures import ViewpointPictures
-from embodied.assets.records import ROOM_KINDS
 from hand_data import build, paint, painted_panorama, small_house
 from handmade import HandCatalogue
 
+from embodied.agents.vision.pictures import ViewpointPictures
+from embodied.assets.records import ROOM_KINDS
 from embodied.datasets import build as building
 from embodied.datasets.build import Unit
 from embodied.gym.eyes import ViewSettings

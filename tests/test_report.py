@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 
 import pytest
-from embodied.viz.report import Listed, _name, judged, load_run, write_page
 
 from embodied.interface import Episode, FindObject, Pose, Task
 from embodied.records import RecordError, episodes_file, save_lines
+from embodied.viz.report import Listed, _name, judged, load_run, write_page
 
 TASK = Task("a/find/1", "find", "a", Pose(0), FindObject("mug", None, ("mug_1",)), (1,), "find a mug", 0.0, 9)
 

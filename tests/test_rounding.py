@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from embodied.assets.importing.importer import FOLDS, RawPart, finish_parts
 from embodied.assets.importing.meshing import CREASE, face_normals
 from embodied.assets.importing.rounding import COARSE, DEEP, FINE, folded, is_coarse, refined, rounded

@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 import pytest
 from conftest import two_rooms
+from handmade import HandCatalogue, box_mesh, furnished
+
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.importing.packs import find_packs
 from embodied.assets.records import Asset, Finish, MeshPart, SupportSurface
-from handmade import HandCatalogue, box_mesh, furnished
-
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import Placement
 from embodied.scene import collision

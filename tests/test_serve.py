@@ -11,14 +11,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hand_data import noise_features
+from hand_serve import HEAD, TOGETHER, make_data, write_study
+
 from embodied.agents.bandit.ratings import Rater, fitted
 from embodied.agents.common.weights import load_weights
 from embodied.agents.iliad.nav.stages import NavAbout
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.agents.vnla.run import vocabulary_of
-from hand_data import noise_features
-from hand_serve import HEAD, TOGETHER, make_data, write_study
-
 from embodied.cli import main as start
 from embodied.envs.base import ActionError
 from embodied.errors import UnableError

@@ -6,6 +6,7 @@ import dataclasses
 import math
 
 import pytest
+
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.common.settings import RunSettings, ValidatedRunSettings
 from embodied.agents.hanna.training_config import TrainingConfig

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 import pytest
 import shapely
+
 from embodied.assets.built import MAKERS
 from embodied.assets.materials import MATERIALS
 from embodied.assets.records import Finish
-
 from embodied.house.house import House, Opening, Room, Stair, Storey
 from embodied.house.shapes import room_union
 from embodied.scene.house_meshes import house_parts, owners

@@ -9,6 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hand_vnla import TINY as VNLA
+from hand_vnla import lesson
+from test_hanna_learner import agent_for, setting
+
 from embodied.agents.hanna.evaluation import sight_policies
 from embodied.agents.hanna.places import Query, auc, measured, precision_recall, threshold
 from embodied.agents.vision.bank import FeatureBank
@@ -16,10 +20,6 @@ from embodied.agents.vision.features import VIEW_SIZE, strip_of
 from embodied.agents.vision.lessons import Split
 from embodied.agents.vision.occasions import OCCASIONS, strip_around
 from embodied.agents.vision.strip import VFOV
-from hand_vnla import TINY as VNLA
-from hand_vnla import lesson
-from test_hanna_learner import agent_for, setting
-
 from embodied.cli.learning import SHOWN
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from embodied.viz import sinks
 
 from embodied.errors import UnableError
+from embodied.viz import sinks
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from embodied.assets.importing import packs
 
 from embodied import gl, software
+from embodied.assets.importing import packs
 from embodied.cli import doctor
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from embodied.viz.story import Story
 from hand_worlds import line_world
 
 from embodied.assistants.words import described
@@ -21,6 +20,7 @@ from embodied.interface import (
     Task,
     Viewpoint,
 )
+from embodied.viz.story import Story
 
 GOAL = FindObject("mug", "hall", ("mug_1",))
 

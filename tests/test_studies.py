@@ -18,11 +18,11 @@ from typing import Any
 
 import pytest
 import torch
+from hand_data import built, small_house
+
 from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.studies.engine import check, run_study
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
-from hand_data import built, small_house
-
 from embodied.cli import main
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from embodied.assets.records import Finish, MeshPart
 from handmade import box_mesh
 
+from embodied.assets.records import Finish, MeshPart
 from embodied.light.pages import cover, unwrap
 from embodied.light.pages.atlas import Page, UnwrappedThing, coarsened
 from embodied.light.pages.cover import rasterise

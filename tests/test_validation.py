@@ -6,10 +6,10 @@ import dataclasses
 import functools
 
 import pytest
-from embodied.assets.catalogue import Catalogue, CatalogueError, load_catalogue
-from embodied.assets.records import ROOM_KINDS
 from hand_worlds import generated
 
+from embodied.assets.catalogue import Catalogue, CatalogueError, load_catalogue
+from embodied.assets.records import ROOM_KINDS
 from embodied.datasets.matterport import REGIONS
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish.tables import tables

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 import torch
+
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.tensor_file import read_weights, save_tensors
 from embodied.agents.vision import labels, strip
@@ -33,7 +34,6 @@ from embodied.agents.vision.probe import LabelledFeatures, ProbeScores, as_numbe
 from embodied.agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
 from embodied.agents.vision.training import batches, photograph_strip, strip_count, train_encoder, turn_strip
 from embodied.assets.cache import write_json
-
 from embodied.errors import UnableError
 from embodied.interface import Sight
 from embodied.light import lightings_of

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hand_pixels import coloured_strips
+
 from embodied.agents.common.shipped import SHIPPED_DETECTOR
 from embodied.agents.common.weights import origin_of
 from embodied.agents.vision.config import StripTraining
@@ -9,8 +11,6 @@ from embodied.agents.vision.detector import Detector, train_detector
 from embodied.agents.vision.encoder import load_encoder, random_encoder
 from embodied.agents.vision.recognise import Recogniser
 from embodied.agents.vision.strip import CELL, COLUMNS, ROWS, cell_direction, directions
-from hand_pixels import coloured_strips
-
 from embodied.render.panorama import Panorama
 
 FACES = (6, 32, 32)

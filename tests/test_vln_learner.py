@@ -8,6 +8,9 @@ import math
 import numpy as np
 import pytest
 import torch
+from hand_data import built
+from hand_worlds import grid_world
+
 from embodied.agents.common.losses import IGNORE
 from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
 from embodied.agents.common.vocabulary import build_vocabulary
@@ -20,9 +23,6 @@ from embodied.agents.vln.network import Said
 from embodied.agents.vln.policy import VlnMoment, channels_of
 from embodied.agents.vln.run import VlnLearner, losses_of, mixed, teacher_share
 from embodied.agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
-from hand_data import built
-from hand_worlds import grid_world
-
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import SplitData, dataset_of
 from embodied.envs.make import environment_maker

@@ -10,6 +10,9 @@ import math
 import numpy as np
 import pytest
 import torch
+from hand_vnla import TINY, lesson, split_under
+
+from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.playing import play_with_memory
@@ -31,9 +34,6 @@ from embodied.agents.vnla.network import (
 )
 from embodied.agents.vnla.policy import SupervisedVnla, VnlaMoment, carried_out, for_training
 from embodied.agents.vnla.run import VnlaLearner, losses_of
-from hand_vnla import TINY, lesson, split_under
-
-from embodied.action_spaces import WORDS
 from embodied.envs.vnla import RULES, teacher_of
 from embodied.evaluation.rollout import play
 from embodied.identity import identity_of

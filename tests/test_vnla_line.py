@@ -6,12 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from hand_data import built, metrics_of
+
 from embodied.agents.vision.config import drawing
 from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.features import feature_path, save_features
 from embodied.agents.vnla.agent import VnlaAgent
-from hand_data import built, metrics_of
-
 from embodied.cli import main
 from embodied.cli.view import looked_at
 from embodied.identity import read_finished

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from hand_vnla import tasks_of
+from hand_worlds import grid_world
+
 from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vnla.agent import VnlaAgent
-from hand_vnla import tasks_of
-from hand_worlds import grid_world
-
 from embodied.envs.make import environment_maker
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode

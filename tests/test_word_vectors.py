@@ -7,6 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
+from torch import nn
+
 from embodied.agents.common import word_vectors
 from embodied.agents.common.paraphrases import UNHEARD, in_synonyms, reworded
 from embodied.agents.common.vocabulary import build_vocabulary
@@ -14,8 +16,6 @@ from embodied.agents.common.word_vectors import Lexicon, WordEmbedding, take_wei
 from embodied.agents.hanna.attention import TextEncoder
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
-from torch import nn
-
 from embodied.errors import UnableError
 from embodied.interface import Candidates, Mode, Observation, Sight, Stop, act
 

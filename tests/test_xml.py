@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 import pytest
-from embodied.agents.bandit.libreoffice import _blocks
 
+from embodied.agents.bandit.libreoffice import _blocks
 from embodied.scene.usd import prim_name
 
 ROOT = Path(__file__).parents[1]

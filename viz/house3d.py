@@ -10,10 +10,10 @@ import cv2
 import fast_simplification
 import numpy as np
 import rerun as rr
-from embodied.assets.archives import read_picture
-from embodied.assets.records import Finish, MeshPart
 from scipy.spatial import cKDTree
 
+from embodied.assets.archives import read_picture
+from embodied.assets.records import Finish, MeshPart
 from embodied.geometry import rotation
 from embodied.scene.house_meshes import Part
 from embodied.scene.lit_pages import LitMesh, LitPages

@@ -18,11 +18,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
-from embodied.viz.blueprint import blueprint_of
-from embodied.viz.described import boxes, log_described, log_recognised
-from embodied.viz.house3d import light_meshes, lit_meshes, log_house
-from embodied.viz.sinks import Sinks, open_recording
-from embodied.viz.story import Story
 from scipy.spatial.transform import Rotation
 
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Step, Stop, Task
@@ -32,6 +27,11 @@ from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
+from embodied.viz.blueprint import blueprint_of
+from embodied.viz.described import boxes, log_described, log_recognised
+from embodied.viz.house3d import light_meshes, lit_meshes, log_house
+from embodied.viz.sinks import Sinks, open_recording
+from embodied.viz.story import Story
 from embodied.world import World
 
 PALETTE = {

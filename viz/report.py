@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib as mpl
-from embodied.assets.cache import write_bytes
 from matplotlib.figure import Figure
 
+from embodied.assets.cache import write_bytes
 from embodied.interface import Ask, Episode
 from embodied.language.prose import prose
 from embodied.records import RecordError, episodes_file, load_lines, parse_file

@@ -18,8 +18,8 @@ from urllib.parse import quote, urlsplit
 import rerun as rr
 import rerun.blueprint as rrb
 import rerun_cli
-from embodied.assets.cache import atomic_path, write_json
 
+from embodied.assets.cache import atomic_path, write_json
 from embodied.errors import UnableError
 
 APPLICATION = "embodied"

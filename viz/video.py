@@ -8,9 +8,9 @@ from pathlib import Path
 
 import av
 import numpy as np
-from embodied.assets.cache import atomic_path
 from PIL import Image, ImageDraw
 
+from embodied.assets.cache import atomic_path
 from embodied.geometry import wrap
 from embodied.house.floor_plan import font
 from embodied.interface import Episode, Pose

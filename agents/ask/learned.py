@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import nn
+
 from embodied.agents.ask.config import AskerConfig
 from embodied.agents.ask.foresight import CHOICES, Choice, Foresight, carried_out, possible, thinks
 from embodied.agents.common.weights import load_weights, seeded
-from torch import nn
-
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import play
 from embodied.interface import Action, Detection, Intention, Observation, Situation, Task

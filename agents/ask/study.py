@@ -17,7 +17,6 @@ from embodied.agents.common.weights import save_weights
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.assets.catalogue import load_catalogue
-
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+
 from embodied.agents.bandit.bleu import corpus_parts, sentence_bleu
 from embodied.agents.bandit.network import Translator
 from embodied.agents.bandit.training import NumberedCorpus, sampled

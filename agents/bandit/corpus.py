@@ -14,7 +14,6 @@ from pathlib import Path
 
 from embodied.agents.bandit.config import Sizes
 from embodied.assets.cache import digest, write_bytes, write_json
-
 from embodied.locks import locked
 from embodied.records import RecordError, from_plain, read_json
 from embodied.seeds import stream

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import lxml.etree  # type: ignore[import-untyped]
 import lxml.html  # type: ignore[import-untyped]
-from embodied.agents.bandit.corpus import CorpusError, Pair
 
+from embodied.agents.bandit.corpus import CorpusError, Pair
 from embodied.errors import UnableError
 
 PACKAGES = ("libreoffice-help-de", "libreoffice-help-en-us", "libreoffice-l10n-de")

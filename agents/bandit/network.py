@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import TypeVar
 
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.common.rows import Rows
 from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
 from embodied.agents.common.weights import load_weights, save_weights
-from torch import Tensor, nn
-
 from embodied.identity import Identity
 
 Network = TypeVar("Network", bound=nn.Module)

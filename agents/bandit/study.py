@@ -22,7 +22,6 @@ from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.session import Note
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
-
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 

@@ -18,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.bandit.bleu import corpus_bleu, sentence_bleu
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest, load
@@ -30,8 +32,6 @@ from embodied.agents.common.losses import Decisions, actor_loss, critic_loss
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.vocabulary import Vocabulary, most_frequent
 from embodied.agents.common.weights import weights_digest
-from torch import Tensor
-
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.bandit.network import Translator
 from embodied.agents.common.choosing import Choice, greedy_choice
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, Vocabulary
-from torch import Tensor
 
 POOL = 20
 """Batches that are sorted by length together."""

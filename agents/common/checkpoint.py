@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import torch
-from embodied.assets.cache import write_bytes
 from torch import Tensor
 
+from embodied.assets.cache import write_bytes
 from embodied.identity import CODE, MAKERS, Identity, differences
 
 FORMAT = "embodied-checkpoint-2"

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Unpack
 
 import torch
+from torch import Tensor
+
 from embodied.agents.common import parallel
 from embodied.agents.common.playing import TaskSet, play_with_memory
 from embodied.agents.common.session import (
@@ -27,8 +29,6 @@ from embodied.agents.common.session import (
     tasks_of_update,
 )
 from embodied.agents.common.settings import MAY_CHANGE
-from torch import Tensor
-
 from embodied.errors import UnableError
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

@@ -12,7 +12,6 @@ from typing import TypeVar
 from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
-
 from embodied.assistants.route_system import sampled_paths, worded
 from embodied.datasets.store import Dataset
 from embodied.interface import TURNS, FollowRoute, Route, Task

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import from_plain, read_toml
-
 from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedPolicy, Rngs, Situations
 from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
 from embodied.language.grammar import kind_of, normalised, parse

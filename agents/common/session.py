@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypedDict, TypeVar, Unpack
 
 import torch
+
 from embodied.agents.common import parallel
 from embodied.agents.common.checkpoint import Stateful, restore, write_checkpoint
 from embodied.assets.cache import write_bytes, write_json
 from embodied.assets.json_file import read_text
-
 from embodied.errors import UnableError
 from embodied.identity import Identity
 from embodied.interface import Episode

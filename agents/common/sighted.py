@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+from torch import nn
+
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.common.weights import half_precision, load_weights, save_weights, seeded
 from embodied.agents.common.word_vectors import use_vectors, vocabulary_with
-from torch import nn
-
 from embodied.identity import Identity
 
 

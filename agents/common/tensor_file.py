@@ -11,8 +11,9 @@ from pathlib import Path
 import safetensors
 import safetensors.torch
 import torch
-from embodied.assets.cache import write_bytes
 from torch import Tensor, nn
+
+from embodied.assets.cache import write_bytes
 
 CHECKSUM = "checksum"
 """Name of the entry that holds `checksum_of` all else."""

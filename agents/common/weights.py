@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
-from embodied.agents.common.tensor_file import checksum_of, load_tensors, save_tensors
 from torch import Tensor, nn
 
+from embodied.agents.common.tensor_file import checksum_of, load_tensors, save_tensors
 from embodied.identity import Identity
 from embodied.records import from_json, parse, to_json
 

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from embodied.agents.common.settings import LEARNED_WORDS
-from embodied.agents.common.vocabulary import Vocabulary
 from torch import Tensor, nn
 
+from embodied.agents.common.settings import LEARNED_WORDS
+from embodied.agents.common.vocabulary import Vocabulary
 from embodied.errors import UnableError
 
 Vectors = Callable[[Sequence[str]], np.ndarray]

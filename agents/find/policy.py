@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import Tensor
+
 from embodied.agents.common.choosing import Chooser, choose_greedily
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.find.network import SeekNetwork
 from embodied.agents.find.way_map import WayMap, directions
 from embodied.agents.vision.bank import FeatureBank
-from torch import Tensor
-
 from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Situation, Situations, Stop
 
 STOP = -1

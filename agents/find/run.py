@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import torch
 import torch.nn.functional as F
+
+from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
 from embodied.agents.common.playing import play_with_memory
@@ -32,8 +34,6 @@ from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watc
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Lessons, Split
 from embodied.assets.catalogue import load_catalogue
-
-from embodied.action_spaces import PanoramicMoves
 from embodied.datasets.store import Dataset
 from embodied.envs.make import environment_maker
 from embodied.evaluation import metrics

@@ -16,7 +16,6 @@ from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.vision.lessons import Lessons
 from embodied.agents.vision.run import encoder_of
 from embodied.agents.vision.sighted_study import SightedStudy
-
 from embodied.datasets.store import Dataset, SplitData
 from embodied.envs.make import environment_maker
 

@@ -11,8 +11,9 @@ import math
 
 import torch
 import torch.nn.functional as F
-from embodied.agents.common.word_vectors import WordEmbedding
 from torch import Tensor, nn
+
+from embodied.agents.common.word_vectors import WordEmbedding
 
 SIMILARITY_THRESHOLD = 0.9
 """A past situation counts as nearly identical above this cosine (Eq D.3)."""

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import torch
+from torch import nn
+
 from embodied.agents.common.choosing import choose_at
 from embodied.agents.hanna.agent import HannaAgent
 from embodied.agents.hanna.asking import RULES, ask_every
@@ -17,8 +19,6 @@ from embodied.agents.hanna.network import Scores
 from embodied.agents.hanna.percept import Percept
 from embodied.agents.hanna.policy import HannaPolicy, PerfectInterpretation
 from embodied.agents.vision.bank import FeatureBank
-from torch import nn
-
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.tables import Samples, measured
 from embodied.interface import Agent, Ask, Episode, Place

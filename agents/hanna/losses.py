@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 import torch.nn.functional as F
-from embodied.agents.common.losses import IGNORE, negative_log_likelihood
 from torch import Tensor
+
+from embodied.agents.common.losses import IGNORE, negative_log_likelihood
 
 
 def curiosity(logits: Tensor, labels: Tensor, negatives: Tensor, floor: float = 0.0) -> Tensor:

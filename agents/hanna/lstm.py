@@ -9,13 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.common.rows import Rows
 from embodied.agents.common.word_vectors import WordEmbedding
 from embodied.agents.hanna.attention import DotAttend
 from embodied.agents.hanna.network import AgentNetwork
 from embodied.agents.hanna.percept import SLOTS, VIEWS, Percept, action_size
 from embodied.agents.hanna.training_config import TrainingConfig
-from torch import Tensor, nn
 
 
 @dataclass(frozen=True, eq=False)

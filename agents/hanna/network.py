@@ -19,6 +19,8 @@ from typing import Any
 
 import torch
 import torch.nn.functional as F
+from torch import Tensor, nn
+
 from embodied.agents.common.rows import Rows
 from embodied.agents.hanna.attention import (
     DotAttend,
@@ -39,7 +41,6 @@ from embodied.agents.hanna.percept import (
     target_similarity,
 )
 from embodied.agents.hanna.training_config import TrainingConfig
-from torch import Tensor, nn
 
 SHORT = 12
 """Words up to which an instruction is encoded with the short ones."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 import torch.nn.functional as F
-from embodied.agents.common.rows import Rows
 from torch import Tensor
 
+from embodied.agents.common.rows import Rows
 from embodied.interface import Move, Observation, Stop
 
 VIEWS = 36

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.stats
+
 from embodied.agents.hanna.recognition import Likeness, matches
 from embodied.agents.vision.drawn import pictures_of
 from embodied.agents.vision.features import feature_path, load_features
 from embodied.agents.vision.occasions import OCCASIONS, shown_path
-
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.navigation.graph import NavGraph

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
 from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
@@ -30,8 +32,6 @@ from embodied.agents.hanna.percept import (
 from embodied.agents.hanna.recognition import Likeness, PlaceMap
 from embodied.agents.hanna.trail import Trail, weigh, weigh_by_image
 from embodied.agents.vision.bank import FeatureBank
-from torch import Tensor
-
 from embodied.interface import (
     Actions,
     Ask,

@@ -11,6 +11,7 @@ import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
+
 from embodied.agents.hanna.percept import HEADINGS, VIEWS
 
 

@@ -26,7 +26,6 @@ from embodied.agents.hanna.policy import HannaMemory, for_training
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Lessons, Split
-
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task, Teacher

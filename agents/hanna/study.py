@@ -23,7 +23,6 @@ from embodied.agents.vision.lessons import Lessons
 from embodied.agents.vision.occasions import OCCASIONS
 from embodied.agents.vision.sighted_study import SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy, spoken
-
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 

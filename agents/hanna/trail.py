@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+
 from embodied.agents.hanna.percept import HEADINGS, VIEWS
 from embodied.agents.hanna.recognition import PlaceMap
-
 from embodied.interface import Action, Mode, Move, Observation
 
 UNLIKELY = 1e-6

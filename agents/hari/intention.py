@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import torch
+from torch import Tensor
+
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.playing import TaskSet
@@ -23,8 +25,6 @@ from embodied.agents.common.session import Options, Progress, Session, descend, 
 from embodied.agents.hari.agent import HariAgent, save_agent
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead
 from embodied.agents.hari.policy import Choice, policy_of
-from torch import Tensor
-
 from embodied.envs.hari import shaped_costs
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import torch
+
 from embodied.agents.hari.agent import HariAgent
 from embodied.agents.hari.intention import counts_of
 from embodied.agents.hari.policy import policy_of
 from embodied.agents.hari.rules import RULES, RandomWithBudgets, RuleAgent
 from embodied.agents.hari.run import CONDITIONS, task_split_of
-
 from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
 from embodied.interface import Agent

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.hari.config import ExecutionConfig
 from embodied.agents.hari.transformer import Packing, Transformer
 from embodied.agents.hari.words import SIZES, Inputs
-from torch import Tensor, nn
 
 INTENTIONS = ("cur", "goal", "sub", "do", "done")
 """A-bar of 4.3.3.2, in the order of the intention policy's outputs."""

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.hari.agent import Executor, HariAgent
 from embodied.agents.hari.networks import INTENTIONS, Encoded, RecurrentHead, shown_probabilities
 from embodied.agents.hari.words import collate, percept_of_rows
-from torch import Tensor
-
 from embodied.interface import (
     Action,
     Actions,

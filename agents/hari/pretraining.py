@@ -18,6 +18,9 @@ from typing import Unpack
 
 import numpy as np
 import torch
+from torch import Tensor
+
+from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import (
     Options,
@@ -32,9 +35,6 @@ from embodied.agents.common.session import (
 from embodied.agents.hari.agent import Executor, save_executor
 from embodied.agents.hari.config import ExecutionConfig
 from embodied.agents.hari.words import Inputs, collate, padded, percept
-from torch import Tensor
-
-from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.assistants.hari import LONGEST, described_subgoal
 from embodied.identity import Identity

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+
 from embodied.agents.hari.agent import Executor
 from embodied.agents.hari.networks import INTENTIONS
 from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider
-
 from embodied.interface import Actions, Observations, Rngs
 
 CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]

@@ -15,7 +15,6 @@ from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.intention import train
 from embodied.agents.hari.pretraining import PretrainingData, pretrain
 from embodied.agents.hari.words import feature_words
-
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules

@@ -18,7 +18,6 @@ from embodied.agents.hari.run import CONDITIONS, rules_of, train_execution, trai
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
-
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
 from embodied.agents.iliad.protocol import NOTHING, Executions, Tasks, one_request
 
 

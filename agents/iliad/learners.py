@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.common.losses import Decisions, actor_loss
 from embodied.agents.iliad.protocol import (
     NOTHING,
@@ -23,7 +25,6 @@ from embodied.agents.iliad.protocol import (
     Student,
     Tasks,
 )
-from torch import Tensor
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import copy
 from typing import Any
 
 import torch
+
 from embodied.agents.common.session import descend
 from embodied.agents.common.weights import seeded
 

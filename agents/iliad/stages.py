@@ -12,12 +12,12 @@ from typing import TypeVar
 
 import numpy as np
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate
 from embodied.agents.common.tensor_file import load_into, read_weights
 from embodied.agents.common.weights import origin_of, save_weights
-from torch import Tensor, nn
-
 from embodied.identity import Identity, differences
 from embodied.seeds import stream
 

@@ -25,7 +25,6 @@ from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.agents.studies.wordings import SPEAKERS, WORDING, code_of, saying, speakers_table, words_table
 from embodied.assets.cache import digest
-
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import torch
+
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
 from embodied.agents.iliad.learners import Asked, IliadLesson, RunningMean, adel, dagger, mixture, reinforce
 from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
-
 from embodied.identity import Identity
 from embodied.seeds import stream
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.common.choosing import Choice
 from embodied.agents.common.rows import Rows
-from torch import Tensor, nn
 
 PAD = 0
 

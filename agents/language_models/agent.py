@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
 from embodied.agents.language_models.client import Answer, Client
 from embodied.agents.language_models.telling import Teller, action_in, schema_of, told
-
 from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Stop, Thought
 
 PATIENCE = 4

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+
 from embodied.agents.language_models.client import Client, object_schema
 from embodied.agents.language_models.prompts import read_prompt
-
 from embodied.assistants.ask import AskAssistant
 from embodied.envs.make import assistant_of
 from embodied.interface import Assistant, Intention, Reply, Situation

@@ -20,7 +20,6 @@ from typing import Any
 
 from embodied.agents.language_models.cache import AnswerCache
 from embodied.assets.cache import digest
-
 from embodied.errors import UnableError
 from embodied.interface import Usage
 from embodied.records import RecordError, from_json, parse, to_json

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+
 from embodied.agents.language_models.client import Client, object_schema
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.agents.language_models.words import walk_in_words
-
 from embodied.interface import SeenPlace, Usage
 
 STARS = 5

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium as gym
-from embodied.agents.language_models.telling import Teller, schema_of, told
-from embodied.agents.language_models.words import actions_of
 from gymnasium import spaces
 
+from embodied.agents.language_models.telling import Teller, schema_of, told
+from embodied.agents.language_models.words import actions_of
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.spaces import number
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from embodied.agents.language_models.checking import arrives
 from embodied.agents.language_models.client import Client, object_schema
 from embodied.agents.language_models.prompts import read_prompt
-
 from embodied.interface import STEP, Route, SeenPlace, Usage
 
 STYLES = (

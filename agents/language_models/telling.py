@@ -12,7 +12,6 @@ from embodied.agents.language_models.client import Message, object_schema
 from embodied.agents.language_models.pictures import Panoramas, shown
 from embodied.agents.language_models.prompts import Prompt, read_prompt
 from embodied.agents.language_models.words import Namer, actions_of, sees, side, ways
-
 from embodied.interface import Action, Ask, Intention, Observation, Stop
 
 REMEMBERED = 8

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import joblib
+
 from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.parallel import use_threads
 from embodied.agents.common.session import Note
@@ -27,7 +28,6 @@ from embodied.agents.common.weights import weights_digest
 from embodied.agents.studies.pages import draw, page
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.assets.cache import digest, write_bytes, write_json
-
 from embodied.evaluation.tables import PERCENT, Samples, interval, less
 from embodied.identity import (
     CODE,

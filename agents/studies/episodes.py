@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import torch
+
 from embodied.agents.studies.engine import Measured, StudyLearner
 from embodied.agents.studies.tables import StudyRow
-
 from embodied.datasets.store import Dataset, SplitData
 from embodied.evaluation.evaluate import evaluate, spread
 from embodied.evaluation.rollout import play

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure as Picture
+
 from embodied.agents.studies.tables import StudyTable
 from embodied.assets.cache import atomic_path
-from matplotlib.figure import Figure as Picture
 
 
 def page(body: Mapping[str, Any], picture: str | None = None) -> str:

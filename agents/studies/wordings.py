@@ -15,7 +15,6 @@ from embodied.agents.common.settings import EVERYBODY
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
-
 from embodied.interface import Agent
 from embodied.novelty import FAMILIAR, NOVEL
 

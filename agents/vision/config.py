@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, require
-
 from embodied.render.photograph import check_camera
 from embodied.render.pictures import PictureSettings
 

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import Tensor, nn
+
 from embodied.agents.common.session import Note
 from embodied.agents.common.shipped import SHIPPED_DETECTOR
 from embodied.agents.common.tensor_file import load_into
@@ -23,8 +25,6 @@ from embodied.agents.vision.labels import HouseStrips, visible_in_views
 from embodied.agents.vision.probe import average_precision
 from embodied.agents.vision.strip import inside_windows
 from embodied.agents.vision.training import StripBatch, classes_of, learn
-from torch import Tensor, nn
-
 from embodied.identity import Identity, identity_of
 
 WIDTH = 128

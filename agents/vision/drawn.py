@@ -9,10 +9,10 @@ from pathlib import Path
 
 import joblib
 import numpy as np
+
 from embodied.agents.vision.config import RENDER_PRESETS, drawing, lit_name
 from embodied.agents.vision.labels import HouseStrips, all_classes, look
 from embodied.assets.catalogue import load_catalogue
-
 from embodied.datasets.store import Dataset
 from embodied.house.house import House
 from embodied.light import bake_all, lightings_of

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.common.tensor_file import load_into, read_weights
 from embodied.agents.common.weights import load_weights, save_weights, seeded
 from embodied.agents.vision.lite import LITE, Lite, folded
 from embodied.agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
 from embodied.agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
-from torch import Tensor
-
 from embodied.identity import Identity
 
 DIGESTED = "embodied-encoder-1"

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import torch
+
 from embodied.agents.common.tensor_file import load_tensors, save_tensors
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.config import PLAIN, drawing, lit_name
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.strip import HEIGHT, VFOV
-
 from embodied.house.house import House
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
 from embodied.light import lightings_of

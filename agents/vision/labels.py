@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+
 from embodied.agents.vision.features import EQUIRECT, margin, strip_of
 from embodied.agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
 from embodied.assets.archives import open_arrays
 from embodied.assets.cache import DAMAGED, atomic_path
 from embodied.assets.records import ROOM_KINDS
-
 from embodied.house.house import OPENING_KINDS, House
 from embodied.scene.house_meshes import owners
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
-
     from embodied.world import World
 
 VISIBLE = 0.003

@@ -22,7 +22,6 @@ from embodied.agents.vision.features import feature_path, load_bank
 from embodied.agents.vision.occasions import OCCASIONS, showing
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
-
 from embodied.datasets.store import Dataset
 from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.evaluate import spread

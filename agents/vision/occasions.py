@@ -13,6 +13,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.drawn import pictures_of
 from embodied.agents.vision.encoder import Encoder
@@ -31,7 +32,6 @@ from embodied.assets.cache import digest, write_json
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.json_file import read_json
-
 from embodied.datasets.store import Dataset
 from embodied.generate.another_day import another_day
 from embodied.house.house import House

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 import torch
+
 from embodied.agents.vision.labels import VISIBLE, ids_to_labels
 from embodied.assets.records import ROOM_KINDS
-
 from embodied.datasets.store import Dataset
 from embodied.gym.eyes import FAR, PIXELS, ViewSettings, framed
 from embodied.gym.playground import pictures_of

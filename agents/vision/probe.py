@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import Tensor
+
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.labels import HouseStrips, mean_log_depth_of_views, visible_in_views
-from torch import Tensor
-
 from embodied.datasets.store import Dataset
 
 

@@ -11,7 +11,6 @@ from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.features import strip_of
 from embodied.agents.vision.labels import SHELL
 from embodied.agents.vision.strip import COLUMNS, cell_direction
-
 from embodied.render.panorama import Panorama, Recognised
 
 

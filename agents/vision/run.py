@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+
 from embodied.agents.common.parallel import check_device, use_threads
 from embodied.agents.common.session import Note
 from embodied.agents.vision.config import StripTraining, VisionConfig, drawing, lit_name
@@ -23,7 +24,6 @@ from embodied.agents.vision.occasions import Occasion, make_shown
 from embodied.agents.vision.probe import as_numbers, labelled, read
 from embodied.agents.vision.training import save_training, train_encoder, trained_classes, whitened
 from embodied.assets.cache import write_json
-
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
 from embodied.identity import Identity, identity_of

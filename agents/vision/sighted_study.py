@@ -16,7 +16,6 @@ from embodied.agents.studies.wordings import SPEAKERS, code_of, hearing
 from embodied.agents.vision.lessons import Lessons
 from embodied.agents.vision.run import encoder_of
 from embodied.assets.cache import default_cache
-
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
+
 from embodied.agents.common.session import descend
 from embodied.agents.vision.encoder import Network, load_encoder
 from embodied.agents.vision.strip import COLUMNS

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from embodied.agents.common.session import Note
 from embodied.agents.common.weights import kind_of, weights_digest
 from embodied.agents.studies.engine import Measured, StudyLearner
@@ -29,7 +30,6 @@ from embodied.agents.vision.labels import HouseStrips, visible_in_views
 from embodied.agents.vision.probe import labelled, read
 from embodied.agents.vision.run import trained_encoder, training_houses
 from embodied.agents.vision.training import frequent_classes
-
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of

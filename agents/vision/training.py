@@ -19,6 +19,8 @@ import cv2
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import Tensor, nn
+
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.weights import seeded
@@ -29,8 +31,6 @@ from embodied.agents.vision.lite import Lite, load_imagenet
 from embodied.agents.vision.strip import CELL, COLUMNS
 from embodied.assets.cache import digest, write_json
 from embodied.assets.records import ROOM_KINDS
-from torch import Tensor, nn
-
 from embodied.identity import Identity, identity_of
 from embodied.records import load_json
 from embodied.render.photograph import camera_traits, photograph

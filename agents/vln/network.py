@@ -10,12 +10,13 @@ import dataclasses
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.common.rows import Rows
 from embodied.agents.common.word_vectors import WordEmbedding
 from embodied.agents.hanna.attention import DotAttend
 from embodied.agents.vln.config import FollowerSettings
 from embodied.assets.records import ROOM_KINDS
-from torch import Tensor, nn
 
 SPREAD = 0.15
 """Deviation, as a share of the instruction, with which attention begins around the words for the way ahead."""

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.common.choosing import Chooser, choose_greedily
 from embodied.agents.common.losses import IGNORE
 from embodied.agents.common.rows import RunningRows, hidden_channels
@@ -16,8 +18,6 @@ from embodied.agents.hanna.percept import action_index, candidate_rows, orientat
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vln.network import COPIES, FollowerNetwork, Heard, Said, Seen
 from embodied.assets.records import ROOM_KINDS
-from torch import Tensor
-
 from embodied.geometry import wrap
 from embodied.interface import (
     VIEW_PITCHES,

@@ -14,6 +14,8 @@ from typing import Unpack
 
 import torch
 import torch.nn.functional as F
+from torch import Tensor
+
 from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
@@ -28,8 +30,6 @@ from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import SupervisedVln, VlnMoment
 from embodied.agents.vln.speaker import load_speaker, spoken_tasks
-from torch import Tensor
-
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task
 from embodied.novelty import FAMILIAR

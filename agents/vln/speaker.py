@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.common.choosing import choose_sampled, sampled_choice
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensor_file import load_into
@@ -30,8 +32,6 @@ from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import SpeakerSettings
 from embodied.agents.vln.network import COPIES
 from embodied.agents.vln.policy import SPOKEN, channels_of
-from torch import Tensor
-
 from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.store import SplitData
 from embodied.evaluation.metrics import without_repeats

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+
 from embodied.agents.common.session import Note
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES
@@ -18,7 +19,6 @@ from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
 from embodied.agents.vln.run import train_follower
 from embodied.agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
-
 from embodied.evaluation.evaluate import spread
 from embodied.identity import Identity, key_of
 from embodied.records import save_lines

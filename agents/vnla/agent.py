@@ -11,7 +11,6 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.config import ASK_RULES, VnlaSettings
 from embodied.agents.vnla.network import VnlaNetwork
 from embodied.agents.vnla.policy import SupervisedVnla, VnlaPolicy
-
 from embodied.interface import Agent
 from embodied.teachers.vnla import AskRules
 

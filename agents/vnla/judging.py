@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.agent import VnlaAgent
-
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import torch
 import torch.nn.functional as F
-from embodied.agents.common.rows import Rows
-from embodied.agents.common.word_vectors import WordEmbedding
-from embodied.agents.vnla.config import VnlaSettings
 from torch import Tensor, nn
 
 from embodied.action_spaces import WORDS
+from embodied.agents.common.rows import Rows
+from embodied.agents.common.word_vectors import WordEmbedding
+from embodied.agents.vnla.config import VnlaSettings
 
 ACTIONS = len(WORDS) + 1
 """Navigation actions: those of WORDS in their order, and stop."""

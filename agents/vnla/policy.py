@@ -14,6 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import Tensor
+
+from embodied.action_spaces import WORDS
 from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
 from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
@@ -30,9 +33,6 @@ from embodied.agents.vnla.network import (
     VnlaNetwork,
     VnlaPercept,
 )
-from torch import Tensor
-
-from embodied.action_spaces import WORDS
 from embodied.interface import (
     TURNS,
     Actions,

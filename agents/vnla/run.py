@@ -15,6 +15,9 @@ from pathlib import Path
 from typing import Unpack
 
 import torch
+from torch import Tensor
+
+from embodied.action_spaces import WORDS
 from embodied.agents.common import imitation
 from embodied.agents.common.losses import negative_log_likelihood
 from embodied.agents.common.session import Progress
@@ -25,9 +28,6 @@ from embodied.agents.vision.lessons import Lessons, Split
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from embodied.agents.vnla.policy import VnlaMoment, for_training
-from torch import Tensor
-
-from embodied.action_spaces import WORDS
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset
 from embodied.envs.vnla import teacher_of

@@ -21,7 +21,6 @@ from embodied.agents.vnla.agent import VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
 from embodied.agents.vnla.run import train_agent
-
 from embodied.datasets.store import SplitData
 from embodied.interface import Agent
 

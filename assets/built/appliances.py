@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from embodied.assets.built.maker import BLACK, CHROME, GAP, STEEL, Order, parts_of, plain
 from embodied.assets.built.primitives import box, cylinder, lathe
 from embodied.assets.records import Finish, MeshPart

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from embodied.assets.built.maker import BLACK, PORCELAIN, Order, handle, parts_of, plain
 from embodied.assets.built.primitives import Shape, bar, box, cylinder, lathe, pillow
 from embodied.assets.records import MeshPart

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+
 from embodied.assets.built.maker import CHROME, GLASS, PAPER, PORCELAIN, Order, carcass, front, handle, parts_of, plain
 from embodied.assets.built.primitives import (
     Shape,

@@ -6,6 +6,8 @@ import itertools
 
 import numpy as np
 import shapely
+from scipy.interpolate import PchipInterpolator
+
 from embodied.assets.built.maker import BLACK, BRASS, MIRROR, PAPER, WHITE, Order, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,
@@ -21,7 +23,6 @@ from embodied.assets.built.primitives import (
     upright,
 )
 from embodied.assets.records import MeshPart
-from scipy.interpolate import PchipInterpolator
 
 GLAZES = {
     "white": plain((0.85, 0.83, 0.78), 0.55),

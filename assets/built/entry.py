@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+
 from embodied.assets.built.maker import Order, parts_of, plain
 from embodied.assets.built.primitives import Shape, bar, box, extruded, joined, lathe, sheet, tube
 from embodied.assets.records import MeshPart

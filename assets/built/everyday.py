@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from embodied.assets.built.maker import BLACK, GLASS, PAPER, STEEL, Order, parts_of, plain
 from embodied.assets.built.primitives import (
     Shape,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from embodied.assets.built.maker import BLACK, CHROME, WHITE, Order, parts_of, plain
 from embodied.assets.built.primitives import Shape, box, cylinder, lathe, quads, tube
 from embodied.assets.records import MeshPart

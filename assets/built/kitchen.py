@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+
 from embodied.assets.built.maker import (
     BLACK,
     CHROME,

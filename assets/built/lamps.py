@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+
 from embodied.assets.built.maker import BULB, LIGHTS, SHADE, WHITE, Order, parts_of, plain, tinted
 from embodied.assets.built.primitives import Shape, ball, box, cylinder, joined, lathe, quads, sheet, tube
 from embodied.assets.records import Finish, MeshPart

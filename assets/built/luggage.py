@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+
 from embodied.assets.built.maker import BLACK, CHROME, STEEL, Order, parts_of, plain
 from embodied.assets.built.primitives import Shape, box, flat, joined, sheet, tube
 from embodied.assets.records import MeshPart

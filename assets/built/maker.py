@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
 from embodied.assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, outline, part, tube
 from embodied.assets.records import Asset, Color, Finish, MeshPart, Size, SupportSurface
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from embodied.assets.built.maker import SOIL, Order, parts_of, plain
 from embodied.assets.built.primitives import Shape, lathe, sheet, tube
 from embodied.assets.records import MeshPart, Size

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from embodied.assets.records import Finish, MeshPart, bounds
 from numpy.typing import ArrayLike
+
+from embodied.assets.records import Finish, MeshPart, bounds
 
 
 @dataclass(frozen=True, eq=False)

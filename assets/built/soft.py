@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from embodied.assets.built.maker import WHITE, Order, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
+
 from embodied.assets.built.maker import BLACK, BRASS, GLASS, STEEL, Order, parts_of, plain
 from embodied.assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, tube
 from embodied.assets.records import MeshPart

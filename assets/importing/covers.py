@@ -12,14 +12,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from PIL import Image
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
 from embodied.assets.importing.meshing import face_normals
 from embodied.assets.importing.mtl_finish import CLOTH
 from embodied.assets.materials.maps import Canvas, blurred
 from embodied.assets.materials.textile import folds, leather
 from embodied.assets.materials.wood import furniture
-from PIL import Image
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 LEATHER = re.compile(r"leather|cuero|cuir|leder|\bskai\b", re.IGNORECASE)
 WOOD = re.compile(

@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
+
 from embodied.assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart, Tell
 from embodied.assets.importing.meshing import face_normals
 from embodied.assets.importing.obj import FARTHEST, MAX_FACES, MeshError
@@ -25,7 +27,6 @@ from embodied.assets.importing.textures import mirrored, palette, sampled, shrun
 from embodied.assets.json_file import parse
 from embodied.assets.json_file import shown as short
 from embodied.assets.records import Finish
-from PIL import Image
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 PICTURES = ("PNG", "JPEG")

@@ -18,6 +18,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
+from PIL import Image, UnidentifiedImageError
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
 from embodied.assets.archives import open_arrays
 from embodied.assets.cache import atomic_path, digest, write_bytes, write_json
 from embodied.assets.closure import code_digest
@@ -30,9 +34,6 @@ from embodied.assets.importing.sh3f import Pack, PackError
 from embodied.assets.importing.textures import cut, filled, palette, shrunk, tinted
 from embodied.assets.json_file import read_json
 from embodied.assets.records import Finish, ImportRecipe, MeshPart, bounds
-from PIL import Image, UnidentifiedImageError
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 log = logging.getLogger(__name__)
 

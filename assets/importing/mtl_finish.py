@@ -7,6 +7,7 @@ import re
 from typing import Any
 
 import numpy as np
+
 from embodied.assets.importing.obj import MtlMaterial
 from embodied.assets.records import Finish
 

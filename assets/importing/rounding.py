@@ -8,6 +8,7 @@ of sofas, cushions and tubes have round outlines and not only round shading.
 from __future__ import annotations
 
 import numpy as np
+
 from embodied.assets.importing.meshing import corner_angles, crease_normals, face_normals
 
 SAG = 0.0012

@@ -7,9 +7,10 @@ import functools
 import cv2
 import numpy as np
 import shapely
-from embodied.assets.importing.meshing import weld
 from PIL import Image
 from scipy.ndimage import distance_transform_edt
+
+from embodied.assets.importing.meshing import weld
 
 PALETTE = 2304
 """Most colours of vertices that are told apart: texels of a square of 48 are far enough apart for decimation, which

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+
 from embodied.assets.cache import atomic_path, digest, write_json
 from embodied.assets.closure import code_digest
 from embodied.assets.json_file import read_json

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
+
 from embodied.assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, rgb, smooth_step
 from embodied.assets.records import Color
 

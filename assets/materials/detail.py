@@ -9,6 +9,7 @@ import functools
 
 import cv2
 import numpy as np
+
 from embodied.assets.materials.maps import Canvas, blurred
 from embodied.assets.materials.textile import Weave, leather
 from embodied.assets.records import DETAILS

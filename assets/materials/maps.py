@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import scipy.fft
+
 from embodied.assets.records import Color
 
 Colors = tuple[Color, ...]

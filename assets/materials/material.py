@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
+
 from embodied.assets.materials.maps import Maps
 
 ROLES = (

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+
 from embodied.assets.materials.maps import (
     Canvas,
     Color,

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+
 from embodied.assets import rows
 from embodied.assets.materials import art, maps, mineral, surface, textile, wood
 from embodied.assets.materials.maps import Canvas, Maps

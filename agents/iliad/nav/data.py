@@ -16,7 +16,6 @@ from embodied.agents.vision.config import drawing
 from embodied.agents.vision.drawn import pictures_of
 from embodied.agents.vision.features import feature_path, load_bank
 from embodied.assets.cache import digest
-
 from embodied.datasets.store import Dataset
 from embodied.novelty import FAMILIAR
 from embodied.tasks.vln import vln_task

@@ -6,11 +6,12 @@ B walks, T steps, E size of a view's features and direction, h hidden size.
 from __future__ import annotations
 
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.common.choosing import Choice
 from embodied.agents.common.vocabulary import END_NUMBER
 from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
 from embodied.agents.iliad.writing import Bridge, Remembered, Writer, before, write
-from torch import Tensor, nn
 
 
 class WalkDescriber(nn.Module):

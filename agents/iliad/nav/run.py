@@ -22,7 +22,6 @@ from embodied.agents.iliad.nav.world import NavMarginal, NavWorld, Trip
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, train
 from embodied.assets.catalogue import load_catalogue
-
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.identity import identity_of
 from embodied.interface import SeenPlace

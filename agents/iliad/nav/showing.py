@@ -12,7 +12,6 @@ from embodied.agents.iliad.nav.world import HORIZON, RADIUS, NavWalk, NavWorld, 
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.showing import learned_from
 from embodied.agents.iliad.showing import lines_of as learned_lines
-
 from embodied.envs.base import HelpEnv
 from embodied.interface import Episode, FollowRoute, Move, Reply, Stop, Task
 from embodied.seeds import stream

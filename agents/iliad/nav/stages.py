@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from torch import Tensor, nn
+
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensor_file import load_into
@@ -24,8 +26,6 @@ from embodied.agents.iliad.training import success_rate
 from embodied.agents.iliad.writing import log_likelihood
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import FollowerNetwork
-from torch import Tensor, nn
-
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 

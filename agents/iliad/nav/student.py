@@ -9,6 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import Tensor, nn
+
+from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.choosing import Choice, greedy_choice, sampled_choice
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
 from embodied.agents.common.vocabulary import Vocabulary
@@ -19,9 +22,6 @@ from embodied.agents.iliad.protocol import ExecutionScores
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vln.network import COPIES, FollowerNetwork, Said, Seen
 from embodied.assets.records import ROOM_KINDS
-from torch import Tensor, nn
-
-from embodied.action_spaces import PanoramicMoves
 from embodied.geometry import wrap
 from embodied.interface import TURNS, VIEW_PITCHES, VIEW_YAWS, Place, Pose, Sight
 from embodied.teachers.shortest import next_node

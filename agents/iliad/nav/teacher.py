@@ -9,6 +9,8 @@ from typing import Protocol
 import numpy as np
 import torch
 import torch.nn.functional as F
+from torch import Tensor
+
 from embodied.agents.common.choosing import greedy_choice, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.iliad.describing import DescribingNetworks, EachDescribed
@@ -16,8 +18,6 @@ from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
 from embodied.agents.iliad.protocol import NOTHING, DescribingTeacher
-from torch import Tensor
-
 from embodied.evaluation.metrics import sdtw
 from embodied.interface import SeenPlace
 

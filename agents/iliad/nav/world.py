@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from embodied.agents.iliad.protocol import one_request
 
+from embodied.agents.iliad.protocol import one_request
 from embodied.interface import FollowRoute, Place, Pose, Task
 from embodied.navigation.graph import NavGraph, count_hops
 from embodied.teachers.shortest import next_node

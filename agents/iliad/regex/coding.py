@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from torch import Tensor
+
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.iliad.regex.rules import ALPHABET, LETTERS, columns
-from torch import Tensor
 
 PAD, END = 0, 1
 """Of characters; END also stands before the first one."""

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from embodied.agents.iliad.regex.config import RegexConfig
 from embodied.agents.iliad.regex.language import PARTS, RequestTemplate, templates
 from embodied.agents.iliad.regex.rules import LETTERS, RuleShape, compiled, outputs, random_rule, random_shape
 from embodied.agents.iliad.regex.words import made_up
-
 from embodied.records import parse_file
 from embodied.seeds import stream
 

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from embodied.agents.iliad.regex.rules import ANY, ANYWHERE, LETTER, SHAPES, START, VOWEL, RuleShape
-
 from embodied.seeds import stream
 
 SPECIFIC = 12

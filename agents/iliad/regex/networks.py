@@ -7,11 +7,12 @@ hidden size. The student is a speller of rules, the teacher's executor a speller
 from __future__ import annotations
 
 import torch
+from torch import Tensor, nn
+
 from embodied.agents.common.choosing import Choice
 from embodied.agents.common.vocabulary import END_NUMBER
 from embodied.agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD
 from embodied.agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
-from torch import Tensor, nn
 
 
 class Speller(nn.Module):

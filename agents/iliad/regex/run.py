@@ -29,7 +29,6 @@ from embodied.agents.iliad.regex.world import RegexMarginal, RegexStudent, Regex
 from embodied.agents.iliad.training import IliadProblem, train
 from embodied.assets.cache import digest
 from embodied.assets.json_file import read_text
-
 from embodied.identity import differences, identity_of, read_finished, write_finished
 from embodied.records import from_plain, to_json
 from embodied.seeds import stream

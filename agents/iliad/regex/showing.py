@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from embodied.agents.iliad.showing import learned_from
 from embodied.agents.iliad.showing import lines_of as learned_lines
-
 from embodied.seeds import stream
 
 if TYPE_CHECKING:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from torch import Tensor, nn
+
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensor_file import load_into
@@ -24,8 +26,6 @@ from embodied.agents.iliad.regex.rules import outputs
 from embodied.agents.iliad.stages import Network, TeachingStage
 from embodied.agents.iliad.writing import log_likelihood
 from embodied.assets.cache import digest
-from torch import Tensor, nn
-
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
+
 from embodied.agents.common.choosing import greedy_choice, sampled_choice
 from embodied.agents.iliad.describing import DescribingNetworks, EachDescribed
 from embodied.agents.iliad.protocol import NOTHING, one_request

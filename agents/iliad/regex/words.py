@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import numpy as np
-from embodied.assets.json_file import read_text
 
+from embodied.assets.json_file import read_text
 from embodied.seeds import stream
 
 _PARTS = {
