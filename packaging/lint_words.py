@@ -31,9 +31,9 @@ def docstrings(tree: ast.Module) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         for statement in body if isinstance(body, list) else ():
-            if isinstance(statement, ast.Expr) and isinstance(value := statement.value, ast.Constant):
-                if isinstance(value.value, str):
-                    yield statement.lineno, value.value.strip()
+            text = getattr(getattr(statement, "value", None), "value", None)
+            if isinstance(statement, ast.Expr) and isinstance(text, str):
+                yield statement.lineno, text.strip()
 
 
 def local_names(tree: ast.Module) -> Iterator[tuple[int, str]]:
