@@ -5,7 +5,7 @@ tables.
     python docs/build_results.py --check    # exits 1 where a page is not what the data say
 
 A page shows a table between two comments; `columns` chooses columns by key, `rows` chooses rows and may rename them,
-and `brief` leaves out notes and command:
+and `brief` leaves out the command. Notes and all settings are on the page of all tables:
 
     <!-- table: hanna-4.5 columns: success_unseen_houses rows: Learned | No ask = No help brief -->
     <!-- end -->
@@ -34,6 +34,9 @@ PLACE = re.compile(
     re.DOTALL,
 )
 BESIDE = re.compile(r"(<!-- beside: (?P<columns>[^>]*?) of: (?P<rows>[^>]*?) -->\n).*?<!-- end -->", re.DOTALL)
+LONGEST_CAPTION = 40
+"""Words."""
+SENTENCE_END = re.compile(r"(?<=[.])\s+(?=[A-Z0-9])")
 OLDER = "Measured with an earlier version."
 
 
@@ -84,7 +87,7 @@ def cell(row: dict, key: str, digits: int, most: int) -> str:
 
 
 def markdown(table: dict, columns: str | None = None, rows: str | None = None, *, brief: bool = False) -> str:
-    """The table and what one must know to read it."""
+    """The table, its caption and, unless `brief`, the commands that make it."""
     keys = [c.strip() for c in columns.split(",")] if columns else [c["key"] for c in table["columns"]]
     shown = {c["key"]: c for c in table["columns"]}
     chosen = [shown[key] for key in keys]
@@ -95,15 +98,20 @@ def markdown(table: dict, columns: str | None = None, rows: str | None = None, *
     wanted = [part.strip().partition(" = ") for part in rows.split(" | ")] if rows else []
     for row, title in [(named[x], y or x) for x, _, y in wanted] or [(row, row["label"]) for row in table["rows"]]:
         lines.append(f"| {title} | " + " | ".join(cell(row, k, *digits[k]) for k in digits) + " |")
-    caption = [f"*{table['title']}" + (f" ({table['paper']})" if table["paper"] else "") + f".* {table['settings']}"]
+    text = "\n".join(lines) + f"\n\n{caption(table)}\n"
+    return text + (f"\n```\n{table['command']}\n```\n" if table["command"] and not brief else "")
+
+
+def caption(table: dict) -> str:
+    """The title of a table and as many sentences of its settings as `LONGEST_CAPTION` leaves room for."""
+    text = f"*{table['title']}" + (f" ({table['paper']})" if table["paper"] else "") + ".*"
     if any(row.get("printed") for row in table["rows"]):
-        caption.append("In brackets: the paper's number.")
-    code = (table["identity"] or {}).get("judged", {}).get("code")
-    caption.append(f"Code {code}." if code else OLDER)
-    notes = "".join(f"- {note}\n" for note in table["notes"])
-    command = f"```\n{table['command']}\n```\n" if table["command"] else ""
-    text = "\n".join(lines) + "\n\n" + " ".join(caption) + "\n"
-    return text if brief else text + (f"\n{notes}" if notes else "") + f"\n{command}"
+        text += " In brackets: the paper's number."
+    for sentence in SENTENCE_END.split(table["settings"]):
+        if len(f"{text} {sentence}".split()) > LONGEST_CAPTION:
+            break
+        text += f" {sentence}"
+    return text
 
 
 def filled(text: str) -> str:
@@ -136,8 +144,10 @@ def details() -> str:
     parts = ["# All tables\n\nEvery stored table in full, as `docs/results/data` has it.\n"]
     for path in sorted(DATA.glob("*.json")):
         table = json.loads(path.read_text(encoding="utf-8"))
-        parts.append(f"## {table['table']}\n\n{markdown(table)}")
-    return "\n".join(parts)
+        parts += [f"## {table['table']}\n\n{markdown(table, brief=True)}", table["settings"]]
+        parts += [] if (table["identity"] or {}).get("judged", {}).get("code") else [OLDER]
+        parts.append("".join(f"- {note}\n" for note in table["notes"]) + f"\n```\n{table['command']}\n```\n")
+    return "\n\n".join(parts)
 
 
 def main() -> int:

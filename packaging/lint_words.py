@@ -56,7 +56,7 @@ def constants(tree: ast.Module) -> set[str]:
         elif isinstance(statement, ast.AnnAssign):
             targets.append(statement.target)
     names = {n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)}
-    return {name for name in names if CONSTANT.fullmatch(name)}
+    return {name for name in names if len(name) > 1 and CONSTANT.fullmatch(name)}
 
 
 def faults(sources: dict[str, ast.Module]) -> Iterator[tuple[str, str]]:

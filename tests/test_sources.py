@@ -80,3 +80,8 @@ def test_every_link_between_pages_leads_somewhere():
         if "://" not in target and Path(target).name not in MADE and not (ROOT / name).parent.joinpath(target).exists()
     ]
     assert not broken, "\n".join(broken)
+
+
+def test_a_page_of_results_can_be_read_in_five_minutes():
+    pages = [p for p in (ROOT / "docs/results").glob("*.md") if p.name != "details.md"]  # which is generated
+    assert {p.name: n for p in pages if (n := len(p.read_text(encoding="utf-8").split())) > 1200} == {}
