@@ -28,13 +28,13 @@ from embodied.assets.cache import atomic_path
 from embodied.assets.catalogue import CatalogueError, load_catalogue
 from embodied.assets.importing.sh3f import CATALOGUE, PackError, open_pack
 from embodied.assets.materials import finish
-from embodied.cli.options import field_docs
 from embodied.datasets.build import for_each_unit
 from embodied.errors import UnableError
 from embodied.generate import HouseConfig
 from embodied.gl import GLError
 from embodied.house.house import House, HouseError
 from embodied.light.backend import LightError
+from embodied.options import field_docs
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.scene.model import load_texture

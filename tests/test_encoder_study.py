@@ -19,8 +19,8 @@ from embodied.agents.vision.resnet import ARCHITECTURES
 from embodied.agents.vision.run import detector_for
 from embodied.agents.vision.study import EncoderStudy
 from embodied.cli.learning import by_name
-from embodied.cli.options import add_options, read_options
 from embodied.cli.study import VisionOptions
+from embodied.options import add_options, read_options
 from embodied.records import read_json
 
 

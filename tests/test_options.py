@@ -11,7 +11,7 @@ import pytest
 
 from embodied import cli
 from embodied.cli.light import hour
-from embodied.cli.options import any_folder, any_path, file_to_write, folder_to_write, positive, video_side, whole
+from embodied.options import any_folder, any_path, file_to_write, folder_to_write, positive, video_side, whole
 
 
 def said(capsys, *words: str) -> str:

@@ -85,7 +85,7 @@ class PrintCompletion(argparse.Action):
 
         whole = globals()["parser"](*COMMANDS)
         for action in _actions(whole):
-            if (getattr(action.type, "__module__", "") or "").endswith("cli.options") and action.metavar in FILES:
+            if (getattr(action.type, "__module__", "") or "").endswith("embodied.options") and action.metavar in FILES:
                 action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE  # type: ignore[attr-defined]
         print(shtab.complete(whole, str(values)))
         raise SystemExit(0)
@@ -142,7 +142,7 @@ def parser(*chosen: str) -> argparse.ArgumentParser:
         )
         if name in chosen:
             module = importlib.import_module(f"embodied.cli.{name}")
-            from embodied.cli.options import add_command, add_commands
+            from embodied.options import add_command, add_commands
 
             if hasattr(module, "COMMANDS"):
                 add_commands(sub, module.COMMANDS, "WHAT", "what")

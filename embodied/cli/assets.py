@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, show
-from embodied.cli.options import Option, any_path
+from embodied.options import Option, any_path
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue

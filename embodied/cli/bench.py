@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
-from embodied.cli.options import Count, Option, OutputFolder, drawn_as, whole
+from embodied.options import Count, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import DRAWN, PictureSettings
 
 if TYPE_CHECKING:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from embodied.cli.common import Cached, Printed, show
-from embodied.cli.options import Option, whole
+from embodied.cli.common import Printed, show
+from embodied.options import Cached, Option, whole
 
 KINDS = (
     "assets",

@@ -6,14 +6,13 @@ import dataclasses
 import json
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from tqdm import tqdm
 
-from embodied.assets.cache import default_cache
-from embodied.cli.options import AnyFolder, Option, any_path
+from embodied.options import Cached, Option, any_path
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
@@ -24,12 +23,6 @@ PATIENCE = 2.0
 """Seconds after which a bar appears."""
 SELDOM = 30.0
 """Seconds between two states of a bar that no terminal shows, where each is a line."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cached:
-    cache: AnyFolder = field(default_factory=default_cache)
-    """Folder that keeps expensive products; it is safe to delete."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Annotated
 
 from embodied.agents.bandit.config import Sizes
-from embodied.cli.common import Cached, note
-from embodied.cli.options import Count, InputPath, Option, OutputFolder, Settings, any_path
+from embodied.cli.common import note
+from embodied.options import Cached, Count, InputPath, Option, OutputFolder, Settings, any_path
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
-from embodied.cli.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
 from embodied.datasets.scale import KINDS, SCALES, described, own_size
+from embodied.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import KINDS as PICTURE_KINDS
 from embodied.render.pictures import PictureSettings
 

@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, note, show
-from embodied.cli.options import CubeFace, Option, OutputFolder, OutputRrd, drawn_as, whole
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.options import CubeFace, Option, OutputFolder, OutputRrd, drawn_as, whole
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:

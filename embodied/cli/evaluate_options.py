@@ -8,7 +8,7 @@ from typing import Annotated
 from embodied.cli.common import Furnished, Printed
 from embodied.cli.learning import SHOWN, Encoded, Threaded
 from embodied.cli.model import WithModel
-from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder
+from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
 VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")

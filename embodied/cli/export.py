@@ -24,9 +24,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.cli.common import Cached, Furnished, Printed, bar, catalogue_of, note, show
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
 from embodied.cli.learning import Encoded
-from embodied.cli.options import (
+from embodied.options import (
+    Cached,
     Count,
     HouseFolder,
     InputFolder,

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from embodied.cli.common import note
 from embodied.cli.learning import SHOWN, Encoded, Lit, WithData, WithDevice
-from embodied.cli.options import Count, Option
+from embodied.options import Count, Option
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, fetch, show
-from embodied.cli.options import InputPath, OutputFolder, Settings
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.config import SHAPES
 from embodied.generate.plan_file import house_of_plan, load_plan
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.house.validation import STYLES
 from embodied.novelty import NOVELTIES
+from embodied.options import InputPath, OutputFolder, Settings
 
 KIND = "kind of house (what is not given is drawn from the seed)"
 WORDS = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated
 from embodied.agents.common.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
 from embodied.cli.common import Printed, note, show
 from embodied.cli.learning import Nav
-from embodied.cli.options import AnyFolder, Count, Option, OutputRrd, any_path
+from embodied.options import AnyFolder, Count, Option, OutputRrd, any_path
 
 if TYPE_CHECKING:
     from embodied.agents.iliad.nav.showing import NavTold

@@ -10,8 +10,17 @@ from typing import Annotated, NamedTuple
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.vision.config import RENDER_PRESETS, TORCHVISIONS
-from embodied.cli.common import Cached
-from embodied.cli.options import PICTURE_HELP, Count, InputFolder, InputPath, Option, OutputFolder, any_path, positive
+from embodied.options import (
+    PICTURE_HELP,
+    Cached,
+    Count,
+    InputFolder,
+    InputPath,
+    Option,
+    OutputFolder,
+    any_path,
+    positive,
+)
 
 PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
 PRESETS = Option(words=tuple(RENDER_PRESETS), metavar="KIND")

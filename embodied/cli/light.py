@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.assets.cache import write_json
 from embodied.cli.common import Furnished, Printed, catalogue_of, show
-from embodied.cli.options import Option, house_folder, whole
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
+from embodied.options import Option, house_folder, whole
 
 if TYPE_CHECKING:
     from embodied.house.house import House

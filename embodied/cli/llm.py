@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from embodied.cli.common import Cached
 from embodied.cli.learning import Threaded
 from embodied.cli.model import WithModel, client_of
-from embodied.cli.options import Count, InputFolder, Option, file_to_write, whole
+from embodied.options import Cached, Count, InputFolder, Option, file_to_write, whole
 
 
 @dataclass(frozen=True, kw_only=True)

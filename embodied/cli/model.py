@@ -8,7 +8,7 @@ from typing import Annotated
 
 from embodied.agents.language_models.cache import AnswerCache
 from embodied.agents.language_models.client import FORMS, Client, ServerSettings
-from embodied.cli.options import InputFolder, InputPath, Settings
+from embodied.options import InputFolder, InputPath, Settings
 
 
 @dataclass(frozen=True, kw_only=True)

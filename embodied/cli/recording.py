@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import bar, note
-from embodied.cli.options import Option, OutputRrd, file_ending_in, video_side
+from embodied.options import Option, OutputRrd, file_ending_in, video_side
 
 if TYPE_CHECKING:
     import numpy as np

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, check_machine, fetch, note, show
-from embodied.cli.options import CubeFace, Option, OutputPng, drawn_as, house_folder, whole
+from embodied.options import CubeFace, Option, OutputPng, drawn_as, house_folder, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import PICTURES, PictureSettings

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_machine, fetch, show
-from embodied.cli.options import Count, CubeFace, HouseFolder, Option, drawn_as
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.options import Count, CubeFace, HouseFolder, Option, drawn_as
 from embodied.render.photograph import CAMERAS
 from embodied.render.pictures import DRAWN, PictureSettings
 

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.cli.model import WithModel, client_of
-from embodied.cli.options import Count, Option, OutputFolder, any_path, whole
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
+from embodied.options import Count, Option, OutputFolder, any_path, whole
 from embodied.render.pictures import PictureSettings
 
 if TYPE_CHECKING:

@@ -46,7 +46,7 @@ from embodied.agents.vln.config import SCALES as VLN_SCALES
 from embodied.agents.vln.config import SPEAKER_SCALES, FollowerSettings
 from embodied.agents.vnla.config import SCALES as VNLA_SCALES
 from embodied.agents.vnla.config import VnlaSettings
-from embodied.cli.common import Cached, note
+from embodied.cli.common import note
 from embodied.cli.learning import (
     PRESETS,
     SCALE,
@@ -62,8 +62,10 @@ from embodied.cli.learning import (
     by_name,
 )
 from embodied.cli.model import WithModel, client_of
-from embodied.cli.options import (
+from embodied.cli.train import EVALUATION, TRAINING, RegexFiles, Strips
+from embodied.options import (
     REPEATS,
+    Cached,
     Count,
     InputFolder,
     InputPath,
@@ -73,7 +75,6 @@ from embodied.cli.options import (
     any_folder,
     whole,
 )
-from embodied.cli.train import EVALUATION, TRAINING, RegexFiles, Strips
 from embodied.records import load_json
 
 if TYPE_CHECKING:

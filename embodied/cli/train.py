@@ -38,7 +38,7 @@ from embodied.cli.learning import (
     WithData,
     WithDevice,
 )
-from embodied.cli.options import Count, InputFolder, InputPath, Option, OutputFolder, Settings, part, whole
+from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder, Settings, part, whole
 
 if TYPE_CHECKING:
     from embodied.agents.vision.lessons import Lessons

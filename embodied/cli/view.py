@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
-from embodied.cli.options import InputFolder, Option, OutputRrd, any_path, drawn_as, whole
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
+from embodied.options import InputFolder, Option, OutputRrd, any_path, drawn_as, whole
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:

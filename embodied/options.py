@@ -21,6 +21,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
+from embodied.assets.cache import default_cache
+
 C = typing.TypeVar("C")
 METAVARS: Mapping[type, str] = {int: "N", float: "X", str: "WORD", Path: "FILE"}
 MOST = 10**7
@@ -211,6 +213,12 @@ HouseFolder = Annotated[Path, Option(house_folder, "DIR")]
 OutputFolder = Annotated[Path, Option(folder_to_write, "DIR")]
 OutputPng = Annotated[Path, Option(file_ending_in(".png"), "PNG")]
 OutputRrd = Annotated[Path, Option(file_ending_in(".rrd"), "FILE")]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Cached:
+    cache: AnyFolder = dataclasses.field(default_factory=default_cache)
+    """Folder that keeps expensive products; it is safe to delete."""
 
 
 def drawn_as(kinds: Sequence[str]) -> Option:
