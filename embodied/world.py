@@ -17,7 +17,7 @@ from embodied.assets.cache import default_cache, digest
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.house.house import House
-from embodied.house.validation import load_house
+from embodied.house.lighting import load_lit_house
 from embodied.interface import Sighting
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
@@ -349,7 +349,8 @@ def open_folder(
     pictures: PictureSettings | str = PictureSettings(),
     **changes: Any,
 ) -> World:
-    """The world of a folder that `embodied house` wrote; its panoramas go to panoramas.pano there.
+    """The world of a folder that `embodied house` wrote, as `embodied light` lit it; its panoramas go to panoramas.pano
+    there.
 
     Args:
       catalogue, cache, pictures, changes: as in `open_world`.
@@ -361,9 +362,7 @@ def open_folder(
     """
     folder, cache = Path(folder), cache or default_cache()
     catalogue = catalogue or load_catalogue(cache)
-    if not (folder / "house.json").exists():
-        raise FileNotFoundError(f"{folder} holds no house.json; name a folder that `embodied house` wrote")
-    house = load_house(folder / "house.json", catalogue)
+    house = load_lit_house(folder, catalogue)
     graph, pictures = build_graph(house), PictureSettings.of(pictures, **changes)
     file = folder / "panoramas.pano"
     return World(house, catalogue, graph, cache, pictures, file=file, may_differ=("renderer",))

@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 import logging
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
+from embodied.cli import main
+from embodied.house.house import HouseError
 from embodied.navigation.graph import graph_of
 from embodied.render.panorama_file import PanoramaFile
 from embodied.world import World, open_folder, open_world
@@ -124,6 +127,29 @@ def test_a_house_edited_after_its_panoramas_gets_new_ones(house, tmp_path, caplo
     assert path == again.path == tmp_path / "panoramas.pano"
     with PanoramaFile(path) as file:
         assert file.meta["house"] == edited.digest
+
+
+def test_light_is_kept_beside_the_house_and_shown_by_its_folder(two_room_house, tmp_path, monkeypatch, caplog):
+    (folder := tmp_path / "home").mkdir()
+    house = two_room_house
+    house.save(folder / "house.json")
+    before = (folder / "house.json").read_bytes()
+    manifest = {"key": "k", "total_seconds": 1, "processor_seconds": 1, "check": {}}
+    baked = SimpleNamespace(manifest=manifest)
+    monkeypatch.setattr("embodied.light.bake_all", lambda lightings, *_, **__: [baked for _ in lightings])
+    monkeypatch.setattr("embodied.light.backend.device", lambda: "llvm")
+    light = ["light", str(folder), "--cache", str(tmp_path)]
+    assert main([*light, "--time", "dusk"]) == main([*light, "--weather", "overcast", "--lights", "2"]) == 0
+    assert (folder / "house.json").read_bytes() == before, "features belong to it"
+    shown = open_folder(folder, cache=tmp_path).house
+    assert (shown.sky.hour, shown.sky.weather) == (19.2, "overcast") and shown.placements == house.placements
+    dataclasses.replace(house, seed=99).save(folder / "house.json")
+    assert open_folder(folder, cache=tmp_path).house.sky == house.sky and "another house" in caplog.text
+    (folder / "house.json").write_bytes(before)
+    lights = folder / "lights.json"
+    lights.write_text(lights.read_text().replace("overcast", "tea"))
+    with pytest.raises(HouseError, match=r"lights\.json.*weather"):
+        open_folder(folder, cache=tmp_path)
 
 
 def test_unknown_nodes_and_folders_are_refused(world, tmp_path):

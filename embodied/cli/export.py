@@ -314,7 +314,7 @@ def run_drives(args: DriveOptions) -> None:
 
 
 def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> None:
-    from embodied.house.validation import load_house
+    from embodied.house.lighting import load_lit_house
     from embodied.locks import locked
     from embodied.scene.export import export_mjcf
 
@@ -327,7 +327,7 @@ def run_house(what: str, args: GlbOptions | MjcfOptions | UsdOptions) -> None:
         if args.light == "none":
             raise ValueError("USD is written of a lit house; leave --light none out")
     catalogue = catalogue_of(args)
-    house = load_house(args.house / "house.json", catalogue)
+    house = load_lit_house(args.house, catalogue)
     lit = light(args, house, catalogue)
     if isinstance(args, MjcfOptions):
         with locked(args.out):

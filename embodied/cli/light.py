@@ -1,21 +1,20 @@
 """Light a generated house once, so that rendering it is fast and photo-realistic.
 
 Bakes global illumination (sky, sun and lamps, several bounces) into textures, which the cache keeps. Rerun an
-interrupted command to resume. --lights also lights the house at other hours, each in less than half of the time, and
-lists them in lights.json.
+interrupted command to resume. Another hour, weather, landscape, season or lamps are kept in lights.json beside
+house.json, and pictures and exports of the folder show them; delete the file to go back. --lights also lights the
+house at other hours, each in less than half of the time, and lists them there.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import dataclasses
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.assets.cache import write_json
 from embodied.cli.common import Furnished, Printed, catalogue_of, show
 from embodied.house.house import LANDSCAPES, SEASONS, WEATHERS
 from embodied.options import Option, house_folder, whole
@@ -46,8 +45,7 @@ class Options(Furnished, Printed):
     folder: Annotated[Path, Option(house_folder, "DIR", name="folder")]
     """Folder that `embodied house` wrote."""
     time: Annotated[float | None, Option(hour, "TIME")] = None
-    """Hour of the day: dawn, morning, noon, afternoon, dusk, night, or one such as 17:30 or 17.5. This and the four
-    options below are written into house.json."""
+    """Hour of the day: dawn, morning, noon, afternoon, dusk, night, or one such as 17:30 or 17.5."""
     weather: Annotated[str | None, Option(words=WEATHERS)] = None
     """The sky."""
     landscape: Annotated[str | None, Option(words=LANDSCAPES)] = None
@@ -63,30 +61,19 @@ class Options(Furnished, Printed):
 
 
 def run(args: Options) -> None:
+    from embodied.house.lighting import load_lit_house, save_lightings
+    from embodied.light import bake_all, lightings_of, progress_bar
     from embodied.light.backend import device
     from embodied.locks import locked
 
-    if not (args.folder / "house.json").exists():
-        raise FileNotFoundError(f"{args.folder} holds no house.json; name a folder that `embodied house` wrote")
-    device()  # says what is missing
-    changes = [getattr(args, n) for n in ("time", "weather", "lamps", "landscape", "season")]
-    writes = args.lights > 1 or any(c is not None for c in changes)
-    with locked(args.folder) if writes else contextlib.nullcontext():
-        light(args)
-
-
-def light(args: Options) -> None:
-    """Write the house anew where its sky changes, and light it."""
-    from embodied.house.validation import load_house
-    from embodied.light import bake_all, lightings_of, progress_bar
-
-    path = args.folder / "house.json"
     catalogue = catalogue_of(args)
-    house = load_house(path, catalogue)
+    house = load_lit_house(args.folder, catalogue)
+    device()  # says what is missing
     changed = with_sky(house, args.time, args.weather, args.lamps, args.landscape, args.season)
-    if changed.digest != house.digest:
-        changed.save(path)
     lightings = lightings_of(changed, args.lights)
+    if args.lights > 1 or changed != house:
+        with locked(args.folder):
+            save_lightings(args.folder, lightings)
     with progress_bar() as progress:
         bakes = bake_all(lightings, catalogue, args.cache, args.quality, progress=progress)
     facts = [
@@ -95,9 +82,6 @@ def light(args: Options) -> None:
         | {"processor_seconds": b.manifest["processor_seconds"], "check": b.manifest["check"]}
         for h, b in zip(lightings, bakes)
     ]
-    if args.lights > 1:
-        sky = lambda h: dataclasses.asdict(h.sky) | {"on": [x.id for x in h.lights if x.on]}
-        write_json(args.folder / "lights.json", [sky(h) | f for h, f in zip(lightings, facts)], indent=1)
     text = "; ".join(f"{h.sky.hour:g} h, {h.sky.weather}" for h in lightings)
     told = (
         f"{changed.name} is lit at {text}\n"
