@@ -50,13 +50,11 @@ class Catalogue:
         assets: Mapping[str, Asset],
         recipes: Mapping[str, ImportRecipe],
         cache: Path,
-        packs: Sequence[Path] = (),
         own: Mapping[str, OwnModel] = MappingProxyType({}),
         groups: Sequence[Path] = (),
     ) -> None:
         self.assets: Mapping[str, Asset] = MappingProxyType(dict(sorted(assets.items())))
         self.cache = Path(cache)
-        self.packs = tuple(packs)
         self._recipes = dict(recipes)
         self._own = dict(own)
         self.groups = tuple(groups)
@@ -66,7 +64,7 @@ class Catalogue:
 
     def __reduce__(self) -> tuple[type[Catalogue], tuple[object, ...]]:
         """What another process needs to make it again; meshes are read from the cache there."""
-        return Catalogue, (dict(self.assets), self._recipes, self.cache, self.packs, self._own, self.groups)
+        return Catalogue, (dict(self.assets), self._recipes, self.cache, self._own, self.groups)
 
     @functools.cached_property
     def classes(self) -> tuple[str, ...]:
@@ -97,13 +95,13 @@ class Catalogue:
           CatalogueError: unknown key.
         """
         kept = {key: self._asset(key) for key in keys}
-        return Catalogue(kept, self._recipes, self.cache, self.packs, self._own, self.groups)
+        return Catalogue(kept, self._recipes, self.cache, self._own, self.groups)
 
     @functools.cached_property
     def furnishing(self) -> Catalogue:
         """What new houses are furnished with: everything but the simple furniture of `assets.built.basics`; where no
         furniture models are installed, only what code builds, the simple furniture included."""
-        if self._recipes.keys() <= self._own.keys() or find_packs(self.packs):
+        if self._recipes.keys() <= self._own.keys() or find_packs():
             return self.only(self.assets.keys() - BASICS) if BASICS & self.assets.keys() else self
         _tell_once()
         return self.only(key for key in self.assets if key not in self._recipes or key in self._own)
@@ -145,7 +143,7 @@ class Catalogue:
 
     def missing(self) -> tuple[str, ...]:
         """Models that no furniture library holds, sorted; those in the cache can be used all the same."""
-        libraries = [open_pack(p) for p in find_packs(self.packs)]
+        libraries = [open_pack(p) for p in find_packs()]
         wanted = {k: self._recipes[k].model or k for k in self._recipes if k not in self._own}
         return tuple(sorted(k for k, model in wanted.items() if not any(model in p.entries for p in libraries)))
 
@@ -166,7 +164,7 @@ class Catalogue:
         if key in self._own:
             return import_own(self._own[key], recipe, self.cache)
         model = recipe.model or key
-        pack = pack_of(model, self.packs)
+        pack = pack_of(model)
         return import_model(pack, dataclasses.replace(recipe, rotation=pack.entries[model].rotation), self.cache)
 
     def _scale(self, key: str, size: tuple[float, float, float], params: Params) -> tuple[MeshPart, ...]:
@@ -189,14 +187,11 @@ def _tell_once() -> None:
     )
 
 
-def load_catalogue(
-    cache: Path | None = None, packs: Sequence[Path] | Path | str = (), own: Sequence[Path] | Path | str = ()
-) -> Catalogue:
+def load_catalogue(cache: Path | None = None, *, own: Sequence[Path] | Path | str = ()) -> Catalogue:
     """Read the reviewed catalogue; quick, and the furniture packs need not be installed.
 
     Args:
       cache: folder for imported meshes and textures; the user's cache folder if None.
-      packs: .sh3f files or folders of them that replace the system's furniture folder.
       own: folders of a user's own models, each with a catalogue.json, or of furniture groups, a groups.toml, or both
         (docs/assets.md).
 
@@ -205,14 +200,14 @@ def load_catalogue(
       >>> 'mug' in catalogue.classes
       True
     """
-    packs_given, own_given = ((Path(p),) if isinstance(p, (str, Path)) else p for p in (packs, own))
+    own_folders = (Path(own),) if isinstance(own, (str, Path)) else own
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
     assets |= {key: maker.asset for key, maker in MAKERS.items()}
     models: dict[str, OwnModel] = {}
     groups: list[Path] = []
-    for folder in map(Path, own_given):
+    for folder in map(Path, own_folders):
         if (folder / GROUPS).is_file():
             groups.append(folder / GROUPS)
             if not (folder / "catalogue.json").exists():
@@ -221,7 +216,7 @@ def load_catalogue(
         if twice := sorted(set(more) & set(assets)):
             raise CatalogueError(f'{folder} has the keys {twice}, which are taken; give it another "pack" name')
         assets, recipes, models = assets | more, recipes | more_recipes, models | more_models
-    catalogue = Catalogue(assets, recipes, cache or default_cache(), packs_given, models, groups)
+    catalogue = Catalogue(assets, recipes, cache or default_cache(), models, groups)
     for name in catalogue.own_classes:
         if why := _placed_nowhere(catalogue.of_class(name)):
             log.warning("class %r is placed in no house: %s", name, why)

@@ -15,6 +15,7 @@ from handmade_models import CUBE, write_own, write_pack
 from embodied.assets.attribution import attribution
 from embodied.assets.built import MAKERS
 from embodied.assets.catalogue import load_catalogue
+from embodied.assets.importing import packs
 from embodied.assets.importing.importer import finish_parts, read_obj
 from embodied.assets.importing.obj import MeshError, parse_obj
 from embodied.assets.importing.packs import find_packs
@@ -168,10 +169,15 @@ def test_a_damaged_cache_is_repaired(tmp_path, damage, suffix):
     assert suffix == "npz" or file.read_bytes() == whole
 
 
-def test_a_missing_pack_is_named_with_the_remedy(tmp_path):
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(PackError, match="sweethome3d-furniture"):
-        load_catalogue(tmp_path, packs=[tmp_path / "empty"]).mesh("scopia/bed1")
+def test_a_missing_pack_is_named_with_the_remedy_and_an_installed_one_is_found_by_all(tmp_path, monkeypatch):
+    library = next(p for p in find_packs() if "scopia/bed1" in open_pack(p).entries)
+    for name in ("SYSTEM_FOLDER", "OWN_FOLDER"):
+        monkeypatch.setattr(packs, name, tmp_path / name)
+    monkeypatch.setattr(packs, "WHEEL", "no_such_package")
+    with pytest.raises(PackError, match="sweethome3d-furniture.*--pack"):
+        load_catalogue(tmp_path).mesh("scopia/bed1")
+    assert list(packs.install_packs([library])) == [tmp_path / "OWN_FOLDER" / library.name]
+    assert load_catalogue(tmp_path).mesh("scopia/bed1")
     with pytest.raises(PackError, match="does not exist"):
         find_packs([tmp_path / "none.sh3f"])
 

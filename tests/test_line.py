@@ -243,10 +243,10 @@ def test_doctor_knows_the_renderer_and_the_furniture(shared_cache, capsys):
     assert findings["renderer"]["ok"] and findings["furniture"]["ok"] and "mujoco" in findings["versions"]["text"]
 
 
-def test_doctor_tells_the_remedy_when_the_furniture_is_missing(shared_cache, tmp_path, capsys):
-    main(["doctor", "--pack", str(tmp_path / "none.sh3f"), "--cache", str(shared_cache)])
-    said = capsys.readouterr()
-    assert "none.sh3f" in said.out + said.err and "doctor --fix" in said.out
+def test_doctor_tells_the_remedy_when_the_furniture_is_missing(shared_cache, monkeypatch, capsys):
+    monkeypatch.setattr("embodied.assets.importing.packs._installed", tuple)
+    main(["doctor", "--cache", str(shared_cache)])
+    assert "no furniture library found" in (said := capsys.readouterr().out) and "doctor --fix" in said
 
 
 @pytest.mark.parametrize(
@@ -256,6 +256,8 @@ def test_doctor_tells_the_remedy_when_the_furniture_is_missing(shared_cache, tmp
         (["house", "--seed", "1", "--storeys", "9", "--out", "x"], "storeys"),
         (["render", "nowhere"], "house.json"),
         (["render", "nowhere", "--node", "3"], "--equirect"),
+        (["doctor", "--pack", "none.sh3f"], "--fix"),
+        (["doctor", "--fix", "--pack", "none.sh3f"], "none.sh3f"),
         (["light", "nowhere", "--time", "tea"], "--time"),
         (["view", "nowhere.rrd"], "nowhere.rrd"),
         (["rollout", "--episodes", "0"], "--episodes"),

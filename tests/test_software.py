@@ -105,12 +105,12 @@ def test_where_pip_has_no_furniture_debians_is_brought_or_the_way_to_make_it_is_
     for where, name in ((gl, "available"), (doctor, "load_atomic")):
         monkeypatch.setattr(where, name, lambda: True)
     monkeypatch.setattr("embodied.light.backend.find_llvm", lambda: "here")
-    said = list(doctor.fix(()))
+    said = list(doctor.fix())
     assert said[:2] == [
         "pip install embodied-houses-furniture",
         "pip finds no such wheel; apt-get download sweethome3d-furniture, which goes into this environment",
     ]
     if apt:
-        assert len(said) == 2 and packs.find_packs() == (own / "Scopia.sh3f",) and not list(doctor.fix(()))
+        assert len(said) == 2 and packs.find_packs() == (own / "Scopia.sh3f",) and not list(doctor.fix())
     else:
         assert len(said) == 3 and "make wheels" in said[2] and packs.find_packs() == ()

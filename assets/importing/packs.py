@@ -5,22 +5,23 @@ from __future__ import annotations
 import functools
 import importlib.util
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from embodied.assets.cache import write_bytes
 from embodied.assets.importing.sh3f import Pack, PackError, open_pack
 
 SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
 """Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""
 OWN_FOLDER = Path(sys.prefix, "share", "sweethome3d", "furniture")
-"""Where `embodied doctor --fix` puts those of that package."""
+"""Where `embodied doctor --fix` puts those of that package, and libraries that --pack names."""
 WHEEL = "embodied_furniture"
 """The package of `pip install embodied-houses[furniture]`: the models of those libraries that the catalogue uses."""
 
 
 def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
-    """The .sh3f files of `packs` (files or folders), or, if none are given, those of the system, of this environment
-    or of the wheel.
+    """The .sh3f files of `packs` (files or folders), or, if none are given, those of this environment, of the system
+    and of the wheel, in this order.
 
     Raises:
       PackError: a path in `packs` does not exist.
@@ -38,11 +39,20 @@ def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
 
 
 def _installed() -> tuple[Path, ...]:
-    for folder in (SYSTEM_FOLDER, OWN_FOLDER):
-        if folder.is_dir():
-            return (folder,)
     spec = importlib.util.find_spec(WHEEL)
-    return tuple(Path(folder) for folder in (spec and spec.submodule_search_locations) or ())
+    return OWN_FOLDER, SYSTEM_FOLDER, *map(Path, (spec and spec.submodule_search_locations) or ())
+
+
+def install_packs(packs: Sequence[Path]) -> Iterator[Path]:
+    """Copy .sh3f files to where every command finds them; yields the copies.
+
+    Raises:
+      PackError: no such file, or no furniture library.
+    """
+    for path in find_packs(packs) if packs else ():
+        open_pack(path)
+        write_bytes(OWN_FOLDER / path.name, path.read_bytes())
+        yield OWN_FOLDER / path.name
 
 
 @functools.lru_cache(maxsize=16)
@@ -51,13 +61,13 @@ def cached_pack(path: Path, stamp: tuple[int, int]) -> Pack:
     return open_pack(path)
 
 
-def pack_of(key: str, packs: Sequence[Path] = ()) -> Pack:
+def pack_of(key: str) -> Pack:
     """The library that holds the model `key`.
 
     Raises:
       PackError: no library is installed, or none of them holds it.
     """
-    found = find_packs(packs)
+    found = find_packs()
     for path in found:
         stat = path.stat()
         pack = cached_pack(path, (stat.st_size, stat.st_mtime_ns))
@@ -66,9 +76,9 @@ def pack_of(key: str, packs: Sequence[Path] = ()) -> Pack:
     if not found:
         raise PackError(
             f"no furniture models are installed, so {key!r} cannot be imported; embodied doctor --fix, "
-            "or apt-get install sweethome3d-furniture, or name .sh3f files with --pack"
+            "or apt-get install sweethome3d-furniture, or embodied doctor --fix --pack FILE.sh3f"
         )
     raise PackError(
         f"no furniture library holds {key!r}, looked in {[p.name for p in found]}; "
-        "apt-get install sweethome3d-furniture (version 1.8 or later), or name the file with --pack"
+        "apt-get install sweethome3d-furniture (version 1.8 or later), or embodied doctor --fix --pack FILE.sh3f"
     )

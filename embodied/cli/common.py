@@ -27,8 +27,6 @@ SELDOM = 30.0
 
 @dataclass(frozen=True, kw_only=True)
 class Furnished(Cached):
-    pack: Annotated[tuple[Path, ...], Option(any_path, "FILE", repeated=True)] = ()
-    """A .sh3f furniture library; may be repeated (default: those of the system package)."""
     own: Annotated[tuple[Path, ...], Option(any_path, "DIR", repeated=True)] = ()
     """Folder with your own models and a catalogue.json, or your groups.toml (docs/assets.md); may be repeated."""
 
@@ -40,10 +38,10 @@ class Printed:
 
 
 def catalogue_of(args: Furnished) -> Catalogue:
-    """The catalogue that --cache, --pack and --own describe."""
+    """The catalogue that --cache and --own describe."""
     from embodied.assets.catalogue import load_catalogue
 
-    return load_catalogue(args.cache, args.pack, args.own)
+    return load_catalogue(args.cache, own=args.own)
 
 
 def check_machine(pictures: str) -> None:

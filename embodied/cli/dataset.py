@@ -133,7 +133,7 @@ def run(args: Options) -> None:
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
     if args.ray in (None, "local") and not (args.out / "dataset.json").exists():
         check_machine(chosen_pictures(args.kind, args.pictures, args.size, None).kind)
-    how: dict[str, Any] = {"workers": args.workers, "watch": watch, "packs": args.pack, "ray_address": args.ray}
+    how: dict[str, Any] = {"workers": args.workers, "watch": watch, "ray_address": args.ray}
     build_dataset(config, args.out, args.cache, own=args.own, **how)
     data = Dataset(args.out)
     pictures = chosen_pictures(args.kind, args.pictures, args.size, data.pictures)

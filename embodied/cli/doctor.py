@@ -15,10 +15,12 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
 from embodied.cli import message_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.distribution import DISTRIBUTION
+from embodied.options import Option, any_path
 from embodied.software import bring_atomic, load_atomic, unpack
 
 LIBRARIES = (
@@ -52,20 +54,23 @@ class Finding:
 class Options(Furnished, Printed):
     fix: bool = False
     """Install without root what is missing: furniture models, software OpenGL and LLVM by pip, libatomic by apt-get."""
+    pack: Annotated[tuple[Path, ...], Option(any_path, "FILE", repeated=True)] = ()
+    """With --fix: install this .sh3f furniture library for all commands; may be repeated."""
 
 
 def run(args: Options) -> int:
+    if args.pack and not args.fix:
+        raise ValueError("--pack goes together with --fix, which installs the furniture library for all commands")
     findings = []
     if args.fix:
         done = False
-        for said in fix(catalogue_packs=args.pack):
+        for said in fix(args.pack):
             note(said)
             done = True
         if not done:
             note("nothing is missing that can be brought without root")
         else:  # libraries are found by processes that start when they are there
-            again = ["doctor", "--cache", str(args.cache), *(w for p in args.pack for w in ("--pack", str(p)))]
-            again += ["--json"] if args.json else []
+            again = ["doctor", "--cache", str(args.cache), *["--json"] * args.json]
             return subprocess.run([sys.executable, "-m", "embodied", *again], check=False).returncode
     for look in (versions, extras, renderer, packs, path_tracer, vulkan, body, disk):
         findings.append(look(args))
@@ -83,13 +88,15 @@ def line(f: Finding) -> str:
     return f"[{mark}] {f.name:<12} {f.text}" + ("" if f.ok else f"\n       {'':<12} -> {f.remedy}")
 
 
-def fix(catalogue_packs: tuple[Path, ...]) -> Iterator[str]:
-    """Install what can be had without root and this machine lacks; yields what is done."""
+def fix(libraries: tuple[Path, ...] = ()) -> Iterator[str]:
+    """Install these furniture libraries, and what this machine lacks and can have without root; yields what is done."""
     from embodied import gl
-    from embodied.assets.importing.packs import OWN_FOLDER, find_packs
+    from embodied.assets.importing.packs import OWN_FOLDER, find_packs, install_packs
     from embodied.light.backend import find_llvm
 
-    if not find_packs(catalogue_packs):
+    for path in install_packs(libraries):
+        yield f"{path.name} is installed in {path.parent}"
+    if not find_packs():
         yield "pip install embodied-houses-furniture"
         if not _pip("embodied-houses-furniture"):
             yield "pip finds no such wheel; apt-get download sweethome3d-furniture, which goes into this environment"
@@ -164,7 +171,7 @@ def packs(args: Options) -> Finding:
         "until then houses hold the simple furniture that is built in code"
     )
     try:
-        found, missing = find_packs(args.pack), catalogue_of(args).missing()
+        found, missing = find_packs(), catalogue_of(args).missing()
     except (ValueError, OSError) as e:
         return Finding("furniture", False, message_of(e), remedy, False)
     text = ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in found) or "no furniture library found"

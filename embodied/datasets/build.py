@@ -152,7 +152,6 @@ def build_dataset(
     workers: int = 1,
     make_house: HouseMaker | None = None,
     watch: Watch | None = None,
-    packs: tuple[Path, ...] = (),
     own: tuple[Path, ...] = (),
     ray_address: str | None = None,
 ) -> Path:
@@ -175,8 +174,8 @@ def build_dataset(
     folder = Path(folder)
     work, own = units(config.plan), tuple(p.resolve() for p in own)
     if own:
-        config = dataclasses.replace(config, own=_groups_digest(own, cache, packs))
-    arguments = (config, folder.resolve(), Path(cache), make_house or make_dataset_house, packs, own)
+        config = dataclasses.replace(config, own=_groups_digest(own, cache))
+    arguments = (config, folder.resolve(), Path(cache), make_house or make_dataset_house, own)
     with locked(folder):
         _claim(folder, config)
         for_each_unit(build_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
@@ -191,7 +190,6 @@ def draw_panoramas(
     pictures: PictureSettings | str,
     workers: int = 1,
     watch: Watch | None = None,
-    packs: tuple[Path, ...] = (),
     ray_address: str | None = None,
 ) -> None:
     """Draw the panoramas of all houses into their folders, unless they are there; a lit house is lit first.
@@ -201,7 +199,7 @@ def draw_panoramas(
 
     Args:
       pictures: how all of them are drawn, as in embodied.open_world.
-      workers, watch, packs, ray_address: as in `build_dataset`.
+      workers, watch, ray_address: as in `build_dataset`.
 
     Raises:
       LockedError: another process writes into the folder.
@@ -210,17 +208,17 @@ def draw_panoramas(
       >>> pictures = embodied.PictureSettings(size=64)
       >>> embodied.draw_panoramas(config, Path('data/hanna'), embodied.default_cache(), pictures=pictures)
     """
-    arguments = (Path(folder).resolve(), Path(cache), PictureSettings.of(pictures), packs)
+    arguments = (Path(folder).resolve(), Path(cache), PictureSettings.of(pictures))
     work = units(config.plan)
     with locked(Path(folder)):
         for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)
 
 
-def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings, packs: tuple[Path, ...]) -> str:
+def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings) -> str:
     """The panoramas of one house, from its saved files; returns its name."""
     home = folder / "houses" / unit.name
     house, graph = House.load(home / "house.json"), from_matterport(home / "connectivity.json")
-    catalogue = load_catalogue(cache, packs)
+    catalogue = load_catalogue(cache)
     path, may = home / "panoramas.pano", ("renderer",)  # nodes of a cluster may have other drivers
     new = not path.exists()
     with World(house, catalogue, graph, cache, pictures, file=path, may_differ=may) as world:
@@ -273,13 +271,7 @@ def _lasting(job: Callable[..., str], *arguments: Any) -> str:
 
 
 def build_unit(
-    unit: Unit,
-    config: DatasetConfig,
-    folder: Path,
-    cache: Path,
-    make_house: HouseMaker,
-    packs: tuple[Path, ...] = (),
-    own: tuple[Path, ...] = (),
+    unit: Unit, config: DatasetConfig, folder: Path, cache: Path, make_house: HouseMaker, own: tuple[Path, ...] = ()
 ) -> str:
     """Build one house's folder unless it is there; returns its name.
 
@@ -296,7 +288,7 @@ def build_unit(
     with drafts(home.parent) as private:
         draft = private / unit.name
         draft.mkdir()
-        _write_unit(unit, config, draft, load_catalogue(cache, packs, own), cache, make_house)
+        _write_unit(unit, config, draft, load_catalogue(cache, own=own), cache, make_house)
         draft.rename(home)
     return unit.name
 
@@ -403,7 +395,7 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
         write_bytes(path, (json.dumps({**mine, "program": program()}, sort_keys=True, indent=1) + "\n").encode())
 
 
-def _groups_digest(own: Sequence[Path], cache: Path, packs: Sequence[Path]) -> str:
+def _groups_digest(own: Sequence[Path], cache: Path) -> str:
     """
     Raises:
       ValueError: a folder of `own` holds models, no groups.toml, or one that is wrong.
@@ -413,7 +405,7 @@ def _groups_digest(own: Sequence[Path], cache: Path, packs: Sequence[Path]) -> s
             f"{foreign[0]} should hold a {GROUPS} and no catalogue.json: whoever reads a data set has the furniture "
             "that ships, not your models; leave it out, or use it with `embodied house`, `light` and so on"
         )
-    tables_of(load_catalogue(cache, packs, own))
+    tables_of(load_catalogue(cache, own=own))
     return digest(*((p / GROUPS).read_bytes() for p in own))[:16]
 
 
