@@ -55,15 +55,16 @@ def write_study(folder: Path, parts: str = TOGETHER, head: str = HEAD, name: str
 
 
 class Served:
-    """A server of a study; killed and started again at will."""
+    """A server of a study; killed and started again at will. PORT in its options is its own."""
 
     def __init__(self, study: Path, *options: str) -> None:
-        self.study, self.options = study, options
+        self.study = study
         self.people = study.with_suffix(".people")
         with socket.socket() as s:
             s.bind(("127.0.0.1", 0))
             self.port = s.getsockname()[1]
         self.address = f"http://127.0.0.1:{self.port}"
+        self.options = [o.replace("PORT", str(self.port)) for o in options]
         self.start()
 
     def start(self) -> None:

@@ -6,6 +6,7 @@ import asyncio
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,6 +30,7 @@ from embodied.language.prose import prose
 from embodied.language.said import PeoplesWords
 from embodied.policies.baselines import RandomWalk
 from embodied.records import load_lines, parse, to_json
+from embodied.serve.address import page_address
 from embodied.serve.app import app_of
 from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game, set_table
@@ -391,6 +393,18 @@ def test_whoever_drives_moves_to_a_viewpoint_when_it_is_the_nearest(data):
         set_table(Part("p", assistant="simulated", moves="drive"), data)
 
 
+async def fetched(app, path):
+    """Status and body of the answer of an ASGI application."""
+    sent = []
+    scope = {"type": "http", "method": "GET", "path": path, "headers": [], "query_string": b""}
+
+    async def send(message):
+        sent.append(message)
+
+    await app(scope, asyncio.sleep, send)
+    return sent[0]["status"], b"".join(m.get("body", b"") for m in sent[1:])
+
+
 def test_live_pictures_are_of_this_moment_and_for_whoever_drives(data, tmp_path, monkeypatch):
     drawn = []
     picture = lambda camera, size: drawn.append(camera) or np.full((*size, 3), 100, np.uint8)
@@ -407,14 +421,7 @@ def test_live_pictures_are_of_this_moment_and_for_whoever_drives(data, tmp_path,
         return screen_of(play.sessions, play.sessions.people["ann"], server.pictures, "")["live"]
 
     async def get(name):
-        said = []
-        scope = {"type": "http", "method": "GET", "path": f"/live/{name}.jpg", "headers": [], "query_string": b""}
-
-        async def send(message):
-            said.append(message)
-
-        await app(scope, asyncio.sleep, send)
-        return said[0]["status"], b"".join(m.get("body", b"") for m in said[1:])
+        return await fetched(app, f"/live/{name}.jpg")
 
     async def look():
         first, before = live(), len(drawn)
@@ -451,6 +458,89 @@ def test_alpha_is_krippendorffs():
     rng = np.random.default_rng(0)
     assert abs(agreement([(str(i % 400), float(rng.integers(5))) for i in range(1600)])) < 0.08
     assert agreement([("a", 1.0), ("b", 2.0)]) is None
+
+
+# Where the page is -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("typed", "spelt"),
+    [
+        ("HTTPS://Study.Example.ORG:443/", "https://study.example.org"),
+        ("http://study.example.org:80", "http://study.example.org"),
+        ("https://study.example.org:8443/Kitchen/", "https://study.example.org:8443/Kitchen"),
+        ("http://[0:0::0:1]:8080", "http://[::1]:8080"),
+        ("https://bücher.example/a b", "https://xn--bcher-kva.example/a%20b"),
+    ],
+)
+def test_an_address_is_spelt_as_browsers_spell_it(typed, spelt):
+    assert page_address(typed) == spelt == page_address(spelt)
+
+
+@pytest.mark.parametrize(
+    ("typed", "reason"),
+    [
+        ("study.example.org", "write https://study.example.org"),
+        ("localhost:8080", "write https://localhost:8080"),
+        *[
+            (t, "such as https://study.example.org")
+            for t in ("ftp://a", "https://", "http://a:70000", "http://me@a", "http://a?b", "http://a..b")
+        ],
+    ],
+)
+def test_what_is_no_address_of_a_page_is_refused_with_the_remedy(typed, reason, capsys):
+    with pytest.raises(SystemExit):
+        start(["serve", "STUDY.toml", "--address", typed])
+    assert reason in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def opened(data, tmp_path_factory):
+    def at(*addresses):
+        study = write_study(data.folder.parent, TOGETHER, name="addressed")
+        draw = lambda data, name: data.folder / "houses" / name / "panoramas.pano"
+        return open_study(study, tmp_path_factory.mktemp("addressed"), draw, addresses=addresses or None).server
+
+    return at
+
+
+@pytest.mark.parametrize(
+    ("addresses", "page", "host", "welcome"),
+    [
+        (["https://Uni.example:443/kitchen"], "https://uni.example", "localhost:8080", True),
+        (["https://uni.example"], "http://uni.example", "uni.example", False),
+        (["https://uni.example"], "https://uni.example:8443", "uni.example", False),
+        (["https://uni.example"], "null", "uni.example", False),
+        ([], "http://lab:8080", "LAB:8080", True),
+        ([], "https://lab", "lab:443", True),
+        ([], "https://evil.example", "lab", False),
+        ([], "null", "null", False),
+    ],
+)
+def test_a_page_of_another_origin_is_told_which_it_is_and_which_may_connect(
+    opened, caplog, addresses, page, host, welcome
+):
+    server = opened(*addresses)
+    told = [server.refusal(SimpleNamespace(headers={"origin": page, "host": host})) for _ in range(2)]
+    if welcome:
+        assert told == [None, None] and not caplog.messages
+    else:
+        assert page in told[0] and "--address" in told[0] and all(a in told[0] for a in addresses)
+        assert len(caplog.messages) == 1 and page in caplog.messages[0], "said once to whoever runs the study"
+
+
+def test_a_study_under_a_path_is_served_there_and_where_a_proxy_takes_the_path_away(opened):
+    app = app_of(opened("https://uni.example/kitchen/"))
+    for path, status in (
+        ("/kitchen", 307),
+        ("/kitchen/", 200),
+        ("/", 200),
+        ("/kitchen/static/app.js", 200),
+        ("/kitchens/", 404),
+    ):
+        assert asyncio.run(fetched(app, path))[0] == status, path
+    page = asyncio.run(fetched(app, "/"))[1].decode()
+    assert re.findall('(?:src|href)="/', page) == [] and 'src="static/app.js"' in page
 
 
 # What learners make of it ------------------------------------------------------------------------

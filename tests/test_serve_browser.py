@@ -56,7 +56,7 @@ def browser():
 def server(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browsed")
     data = make_data(folder)
-    served = Served(write_study(folder, PARTS))
+    served = Served(write_study(folder, PARTS), "--address", "http://127.0.0.1:PORT/kitchen")
     served.data, served.tasks = data, data.tasks("val_seen")
     yield served
     served.stop()

@@ -2,7 +2,8 @@
 import { defineConfig } from "vite";
 
 export default defineConfig({
-  base: "/static/",
+  base: "./",
+  experimental: { renderBuiltUrl: (file) => `static/${file}` }, // beside the page, under whatever path it is served
   build: {
     outDir: "../embodied/serve/static",
     emptyOutDir: true,

@@ -8,6 +8,7 @@ a data set of them.
 
 from __future__ import annotations
 
+import argparse
 import functools
 import importlib.util
 import json
@@ -24,6 +25,7 @@ from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 from embodied.options import Count, Option, OutputFolder, any_path, whole
 from embodied.render.pictures import PictureSettings
+from embodied.serve.address import page_address
 
 if TYPE_CHECKING:
     from embodied.agents.language_models.client import Client
@@ -37,6 +39,14 @@ LOOPBACK = "127.0.0.1"
 LOOPBACKS = (LOOPBACK, "localhost", "::1")
 
 
+def any_address(text: str) -> str:
+    """The address of a page."""
+    try:
+        return page_address(text)
+    except ValueError as e:
+        raise argparse.ArgumentTypeError(str(e)) from e
+
+
 @dataclass(frozen=True, kw_only=True)
 class Options(WithModel, Furnished, Printed):
     study: Annotated[Path, Option(any_path, "STUDY.toml", name="study")]
@@ -46,11 +56,11 @@ class Options(WithModel, Furnished, Printed):
     host: Annotated[str, Option(metavar="ADDRESS")] = LOOPBACK
     """Address to listen on; the default is this machine only. Put a proxy with TLS in front of it rather than listen on
     0.0.0.0."""
-    port: Annotated[int, Option(whole(0, 65535), "N")] = 8080
+    port: Annotated[int, Option(whole(1, 65535), "N")] = 8080
     """Port to listen on."""
-    address: Annotated[str | None, Option(metavar="URL")] = None
-    """Address of the page as people see it, such as https://study.example.org; links are made with it and connections
-    from it are accepted."""
+    address: Annotated[str | None, Option(any_address, "URL")] = None
+    """Address of the page as people see it, such as https://study.example.org or https://example.org/study; links are
+    made with it and connections from it are accepted."""
     invitations: Count | None = None
     """Make N single-use links instead of one for everybody."""
     summary: bool = False
@@ -69,7 +79,7 @@ def run(args: Options) -> None:
 
     study = load_study(args.study)
     out = args.out or args.study.with_suffix(".people")
-    address = (args.address or f"http://{args.host}:{args.port}").rstrip("/")
+    address = args.address or listening_at(args.host, args.port)
     client = functools.cache(lambda: client_of(args))
     opened = open_study(
         args.study,
@@ -77,7 +87,7 @@ def run(args: Options) -> None:
         lambda data, name: drawn(data, name, study, args),
         agents_of(args.study.parent / study.data, client),
         {"llm": assistant_maker("llm", client, args.prompts)},
-        origins_of(args),
+        addresses_of(args),
         lambda data, name: live_world(data, name, study, args),
     )
     if args.summary:
@@ -119,11 +129,16 @@ def world_of(data: Dataset, name: str, pictures: PictureSettings, args: Options)
     return open_world(place.house, catalogue_of(args), args.cache, pictures, graph=place.graph)
 
 
-def origins_of(args: Options) -> tuple[str, ...] | None:
-    """Addresses of the page that may connect; None where the server listens to all and nobody said its address."""
-    own = tuple(f"http://{name}:{args.port}" for name in ("127.0.0.1", "localhost", "[::1]"))
+def listening_at(host: str, port: int) -> str:
+    """The address of the page without a proxy in front."""
+    return page_address(f"http://{f'[{host}]' if ':' in host else host}:{port}")
+
+
+def addresses_of(args: Options) -> tuple[str, ...] | None:
+    """Addresses of the page; None where the server listens to all and nobody said its address."""
+    own = tuple(listening_at(name, args.port) for name in LOOPBACKS)
     if args.address:
-        return (*own, args.address.rstrip("/"))
+        return (args.address, *own)
     return own if args.host in LOOPBACKS else None
 
 

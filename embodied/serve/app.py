@@ -14,17 +14,17 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from embodied.envs.base import ActionError
 from embodied.records import parse, to_json
+from embodied.serve.address import origin_of, path_of
 from embodied.serve.driving import Live
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
@@ -44,6 +44,8 @@ RATE, BURST = 8.0, 30.0
 JOIN_RATE, JOIN_BURST = 2.0, 60.0
 """People per second that may join."""
 SOCKETS = 2000
+LOGGED_STRANGERS = 100
+"""Addresses of other pages that are logged, each once."""
 PATIENCE = 30.0
 """Seconds that a new connection has to say who it is."""
 SAFE = {
@@ -85,18 +87,25 @@ class Server:
         store: Store,
         pictures: Pictures,
         secret: str,
-        origins: Iterable[str] | None = None,
+        addresses: Iterable[str] | None = None,
         live: Live | None = None,
     ) -> None:
         """
         Args:
           secret: makes links and completion codes.
           live: draws what people see who drive.
-          origins: addresses of the page that may connect, 'https://study.example.org'; None for the one that the
-            browser asked for, whatever its name is.
+          addresses: of the page, 'https://study.example.org/kitchen'; pages at others may not connect. None for the one
+            that the browser asked for, whatever its name is.
+
+        Raises:
+          ValueError: not the address of a page.
         """
         self.sessions, self.store, self.pictures, self.live = sessions, store, pictures, live
-        self.origins = None if origins is None else frozenset(origins)
+        addresses = None if addresses is None else tuple(addresses)
+        self.origins = None if addresses is None else tuple(origin_of(a) for a in addresses)
+        self.paths = frozenset(path_of(a) for a in addresses or ()) - {""}
+        """Under which a proxy may pass requests on; others are as at the root."""
+        self._strangers: set[str] = set()
         self._secret = secret.encode()
         self._sockets: dict[str, WebSocket] = {}
         self._open = 0
@@ -187,10 +196,13 @@ class Server:
 
     async def connect(self, socket: WebSocket) -> None:
         """Serve one WebSocket until it closes."""
-        if not self.same_origin(socket) or self._open >= SOCKETS:
+        if socket.headers.get("origin") is None:  # no page of a browser
             await socket.close(4403)
             return
         await socket.accept()
+        if refusal := self.refusal(socket):
+            await self._refuse(socket, refusal)
+            return
         self._open += 1
         person: Person | None = None
         try:
@@ -201,9 +213,7 @@ class Server:
             person = await self._enter(socket, hello)
             await self._serve(socket, person)
         except Refused as e:
-            with suppress(RuntimeError, WebSocketDisconnect):
-                await socket.send_text(json.dumps({"screen": "refused", "text": str(e)}))
-                await socket.close(4400)
+            await self._refuse(socket, str(e))
         except (WebSocketDisconnect, TimeoutError, RuntimeError, KeyError):
             # it has gone, also while something was sent; KeyError: a binary message
             pass
@@ -216,14 +226,29 @@ class Server:
             with suppress(RuntimeError, WebSocketDisconnect):
                 await socket.close()
 
-    def same_origin(self, socket: WebSocket) -> bool:
-        """Whether the page that connects is ours; browsers always say which page that is."""
-        origin = socket.headers.get("origin")
-        if origin is None:
-            return False
-        if self.origins is not None:
-            return origin in self.origins
-        return urlsplit(origin).netloc == socket.headers.get("host")
+    async def _refuse(self, socket: WebSocket, text: str) -> None:
+        with suppress(RuntimeError, WebSocketDisconnect):
+            await socket.send_text(json.dumps({"screen": "refused", "text": text}))
+            await socket.close(4400)
+
+    def refusal(self, socket: WebSocket) -> str | None:
+        """The reason why a page may not connect, in words for who reads it; browsers always say which page it is."""
+        if self._open >= SOCKETS:
+            return "Too many people are here just now. Please try again later."
+        page = socket.headers["origin"]
+        try:
+            page = origin_of(page)
+            wanted = self.origins or (origin_of(f"{page.split(':')[0]}://{socket.headers.get('host')}"),)
+        except ValueError:  # 'null': a file, or a frame without rights
+            wanted = self.origins or ()
+        if page in wanted:
+            return None
+        text = f"This page was opened at {page}, but the study is at {' or '.join(wanted[:1]) or 'another address'}. "
+        text += f"Please open the link that you were given. (The server admits {page} if it is started with --address.)"
+        if page not in self._strangers and len(self._strangers) < LOGGED_STRANGERS:
+            self._strangers.add(page)
+            log.warning("refused the page at %s: the study is at %s; see --address", page, ", ".join(wanted))
+        return text
 
     async def _enter(self, socket: WebSocket, hello: dict[str, Any]) -> Person:
         """Whoever connects: somebody known by their token, or somebody new by a link."""
@@ -424,7 +449,21 @@ def app_of(server: Server) -> ASGIApp:
         Route("/live/{game}/{name}.jpg", live),
         WebSocketRoute("/ws", server.connect),
     ]
-    return with_headers(Starlette(routes=routes, lifespan=lifespan))
+    return with_headers(under_paths(Starlette(routes=routes, lifespan=lifespan), server.paths))
+
+
+def under_paths(app: ASGIApp, paths: Iterable[str]) -> ASGIApp:
+    """Serves the same under each of `paths` as at the root, as a proxy passes requests on that keeps their path."""
+
+    async def wrapped(scope: Scope, receive: Receive, send: Send) -> None:
+        asked = scope.get("path", "")
+        under = next((p for p in paths if asked == p or asked.startswith(p + "/")), "")
+        if under and asked == under and scope["type"] == "http":  # else the page's relative links would miss the path
+            await RedirectResponse(under + "/")(scope, receive, send)
+        else:
+            await app({**scope, "path": asked.removeprefix(under)} if under else scope, receive, send)
+
+    return wrapped
 
 
 def with_headers(app: ASGIApp) -> ASGIApp:

@@ -40,7 +40,7 @@ class Opened:
         """The links to give away: for everybody, single-use ones, and the results; asked again, the same ones.
 
         Args:
-          address: of the page, 'https://study.example.org'.
+          address: of the page, 'https://study.example.org/kitchen'.
         """
         words = [self.server.token("invitation", str(i)) for i in range(invitations)]
         self.server.invitations |= {key_of(w) for w in words}
@@ -57,7 +57,7 @@ def open_study(
     draw: PanoramaDrawer,
     agents: Mapping[str, AgentMaker] = POLICIES,
     assistants: Mapping[str, AssistantMaker] = MappingProxyType({}),
-    origins: Iterable[str] | None = None,
+    addresses: Iterable[str] | None = None,
     open_world: Callable[[Dataset, str], World] | None = None,
 ) -> Opened:
     """Open a study and read what people did before.
@@ -66,7 +66,7 @@ def open_study(
       folder: where the log and the results are kept.
       draw: see PanoramaDrawer.
       agents, assistants: by name, see `set_table`.
-      origins: see Server.
+      addresses: see Server.
       open_world: gives a house that can be drawn, for people who drive.
 
     Raises:
@@ -104,7 +104,7 @@ def open_study(
         sessions.apply(event)
     writer = Writer(folder, sessions)
     sessions.finished, sessions.judged = writer.game, writer.judged
-    return Opened(study, folder, Server(sessions, store, Pictures(files, secret), secret, origins, live))
+    return Opened(study, folder, Server(sessions, store, Pictures(files, secret), secret, addresses, live))
 
 
 def serve(opened: Opened, host: str, port: int) -> None:

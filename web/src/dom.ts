@@ -43,3 +43,6 @@ export function say(text: string, visible = false): void {
   status.textContent = text;
   status.className = visible && text ? "shown" : "";
 }
+
+/** The name under which this page stores something: studies at one host, under paths of their own, share nothing. */
+export const stored = (name: string): string => `embodied${location.pathname}${name}`;

@@ -1,6 +1,6 @@
 // Watching an episode: to give it stars, or to describe it.
 
-import { button, h, s } from "./dom";
+import { button, h, s, stored } from "./dom";
 import type { Connection } from "./socket";
 import { Panorama, prefetch } from "./panorama";
 import type { JudgeScreen } from "./types";
@@ -30,9 +30,9 @@ export class JudgeView implements View<JudgeScreen> {
     this.slider = h("input", { type: "range", min: 0, max: last, value: 0, "aria-label": "Step", input: () => this.seek(Number(this.slider.value)) });
     this.player = button("Play", () => this.play(!this.timer), "player");
     this.field = h("textarea", { id: "judgement", rows: 4, maxlength: 2000 });
-    this.field.value = sessionStorage.getItem(`embodied.draft.${state.unit}`) ?? "";
+    this.field.value = sessionStorage.getItem(stored(`draft.${state.unit}`)) ?? "";
     this.field.addEventListener("input", () => {
-      sessionStorage.setItem(`embodied.draft.${state.unit}`, this.field.value);
+      sessionStorage.setItem(stored(`draft.${state.unit}`), this.field.value);
       this.check();
     });
     this.sender = button("Send", () => {

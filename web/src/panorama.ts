@@ -6,8 +6,8 @@ import type { Way } from "./types";
 
 const DEGREES = 180 / Math.PI;
 
-/** The address of a panorama. */
-export const address = (pano: string, size: "small" | "large"): string => `/pano/${pano}/${size}.jpg`;
+/** The address of a panorama, relative to the page's. */
+export const address = (pano: string, size: "small" | "large"): string => `pano/${pano}/${size}.jpg`;
 
 const pictures = new Map<string, Promise<HTMLImageElement>>();
 

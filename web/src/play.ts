@@ -1,6 +1,6 @@
 // Playing an episode: as the agent, and as the assistant.
 
-import { button, h, s, say } from "./dom";
+import { button, h, s, say, stored } from "./dom";
 import type { Connection } from "./socket";
 import { address, Panorama, prefetch } from "./panorama";
 import { Plan } from "./plan";
@@ -25,7 +25,7 @@ class Words {
   private readonly key: string;
 
   constructor(label: string, action: string, name: string, send: (text: string) => void) {
-    this.key = `embodied.draft.${name}`;
+    this.key = stored(`draft.${name}`);
     this.field = h("textarea", { id: name, rows: 2, maxlength: LONGEST, enterkeyhint: "send", autocomplete: "off" });
     this.field.value = sessionStorage.getItem(this.key) ?? "";
     this.field.addEventListener("input", () => sessionStorage.setItem(this.key, this.field.value));
@@ -164,7 +164,7 @@ export class AgentView implements View<AgentScreen> {
   private async drive(live: string): Promise<void> {
     if (this.live.dataset.of === live) return;
     const [next, begun] = [new Image(), performance.now()];
-    next.src = `/live/${live}.jpg`;
+    next.src = `live/${live}.jpg`;
     this.live.dataset.of = live;
     try {
       await next.decode();

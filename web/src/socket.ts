@@ -1,11 +1,11 @@
 // The connection: what was sent is kept until the server has it on disk, over reconnects and reloads.
 
-import { say } from "./dom";
+import { say, stored } from "./dom";
 import type { Message, Screen } from "./types";
 
-const OUTBOX = "embodied.outbox";
-const TOKEN = "embodied.token";
-const JOIN = "embodied.join";
+const OUTBOX = stored("outbox");
+const TOKEN = stored("token");
+const JOIN = stored("join");
 
 export class Connection {
   private socket: WebSocket | null = null;
@@ -36,7 +36,9 @@ export class Connection {
   open(again = false): void {
     if (again) this.stopped = false;
     if (this.stopped || (this.socket && this.socket.readyState <= WebSocket.OPEN)) return;
-    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`);
+    const address = new URL("ws", location.href); // relative, as all that the page fetches
+    address.protocol = address.protocol.replace("http", "ws");
+    const socket = new WebSocket(address);
     this.socket = socket;
     socket.onopen = () => {
       const hello = this.word.results
