@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -13,15 +12,15 @@ Response = tuple[int, dict[str, str], bytes]
 Behaviour = Callable[[dict[str, Any]], Response]
 
 
-def said(text: str | None, **more: Any) -> Response:
-    """A whole chat completion; `more` are fields of its message."""
+def said(text: object, ended: str = "stop", **more: Any) -> Response:
+    """A whole chat completion that ended so; `more` are fields of its message."""
     message = {"role": "assistant", "content": text, **more}
     body = {
         "id": "1",
         "object": "chat.completion",
         "created": 0,
         "model": "m",
-        "choices": [{"index": 0, "message": message, "finish_reason": "stop"}],
+        "choices": [{"index": 0, "message": message, "finish_reason": ended}],
         "usage": {"prompt_tokens": 100, "completion_tokens": 10, "total_tokens": 110},
     }
     return 200, {"Content-Type": "application/json"}, json.dumps(body).encode()
@@ -50,7 +49,7 @@ class Parrot:
 class ChatServer:
     """Runs while the `with` block does."""
 
-    def __init__(self, behaviour: Behaviour = first_allowed, delay: float = 0.0) -> None:
+    def __init__(self, behaviour: Behaviour = first_allowed) -> None:
         self.behaviour, self.requests, self.headers = behaviour, list[dict[str, Any]](), list[dict[str, str]]()
         server = self
 
@@ -59,7 +58,6 @@ class ChatServer:
                 request = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
                 server.requests.append(request)
                 server.headers.append({k.lower(): v for k, v in self.headers.items()})
-                time.sleep(delay)
                 status, headers, body = server.behaviour(request)
                 try:
                     self.send_response(status)

@@ -37,7 +37,6 @@ HOMES = {
     "gymnasium": ("embodied/gym/", "agents/"),
     "starlette": ("embodied/serve/",),
     "uvicorn": ("embodied/serve/",),
-    "openai": ("agents/language_models/",),
     "warp": ("embodied/render/warp.py",),
 }
 """Heavy library -> path prefixes of the files that may import it."""

@@ -11,13 +11,11 @@ import urllib.request
 import pytest
 from hand_worlds import grid_world
 
-pytest.importorskip("openai", reason="the optional extra [llm] is not installed")
 pytest.importorskip("llama_cpp", reason="the optional extra [smollm] is not installed")
 
 from embodied.agents.language_models.agent import LanguageModelAgent
 from embodied.agents.language_models.assistant import ModelAssistant
-from embodied.agents.language_models.cache import AnswerCache
-from embodied.agents.language_models.client import Client, ServerSettings
+from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.agents.language_models.small import NAME, command
 from embodied.envs.make import ask_environment_maker, environment_maker, look_of
 from embodied.evaluation.metrics import usage

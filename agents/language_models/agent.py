@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from embodied.agents.language_models.client import Answer, Client
+from embodied.agents.language_models.client import Client
+from embodied.agents.language_models.completions import Answer
 from embodied.agents.language_models.telling import Teller, action_in, schema_of, told
 from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Stop, Thought
 
@@ -47,7 +48,7 @@ class LanguageModelAgent:
             trail.failures = 0
             action, words = action_in(o, answer.value), str(answer.value["reason"])
         trail.said.append(told(o, action))
-        return dataclasses.replace(action, thought=Thought(usage=answer.usage(self._client.settings), words=words))
+        return dataclasses.replace(action, thought=Thought(usage=self._client.usage(answer), words=words))
 
 
 def onward(o: Observation) -> Action:

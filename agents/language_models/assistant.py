@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.agents.language_models.client import Client, object_schema
+from embodied.agents.language_models.client import Client
+from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.assistants.ask import AskAssistant
 from embodied.envs.make import assistant_of
@@ -85,7 +86,7 @@ class ModelAssistant(WordedAssistant):
         )
         answer = self._client.ask(messages, SCHEMA)
         text = reply.text if answer.value is None else str(answer.value["answer"])
-        return dataclasses.replace(reply, text=text, usage=answer.usage(self._client.settings))
+        return dataclasses.replace(reply, text=text, usage=self._client.usage(answer))
 
 
 class PersonAssistant(WordedAssistant):

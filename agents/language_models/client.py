@@ -1,42 +1,42 @@
-"""One client for all roles: asks a chat-completions server, keeps every answer, and counts what is none.
+"""One client for all roles: asks a chat-completions server, and keeps every answer in one file.
 
-The network may fail and is tried again; an answer that is none (HTML, wrong JSON, megabytes, an unknown tool) is
-counted and kept like any other. Keys come from the environment and go into the request's header, nowhere else.
+What was asked before is never asked again. A server that fails is tried again, then it ends the run, which goes on
+from there. Keys come from the environment and go into the request's header, nowhere else.
 """
 
 from __future__ import annotations
 
-import functools
 import json
-import os
-import queue
+import logging
 import random
+import re
+import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from embodied.agents.language_models.cache import AnswerCache
+from embodied.agents.language_models.completions import TOOL, Answer, StoredAnswer, read_answer, read_completion
+from embodied.agents.language_models.transport import Endpoint, ServerError, completions_url
 from embodied.assets.cache import digest
 from embodied.errors import UnableError
 from embodied.interface import Usage
-from embodied.records import RecordError, from_json, parse, to_json
+from embodied.records import from_json, to_json
 
 FORMS = ("schema", "object", "tools", "text")
 """How JSON is asked for: structured output as OpenAI has it, as llama-cpp-python has it, a tool, or in words alone."""
-MOST_BYTES = 1_000_000
-"""Of a response; more is not read."""
-MOST_TEXT = 20_000
-"""Characters of an answer that are kept; a longer one is invalid."""
-AGAIN = (408, 409, 425, 429, 500, 502, 503, 504, 529)
-"""Status codes after which the same request is sent again."""
-TOOL = "answer"
-"""Name of the one tool that is offered with the form 'tools'."""
-
-KINDS: Mapping[str, Any] = {"object": dict, "string": str, "integer": int, "number": (int, float), "boolean": bool}
-"""Types of JSON Schema that answers are made of."""
+LONGEST_WAIT = 30.0
+"""Seconds between two tries."""
+UNSUPPORTED = re.compile(r"support|deprecated|only the default|not allowed|not permitted", re.IGNORECASE)
+"""Words of a server that does not know a setting, unlike one that finds its value wrong."""
+APPLICATION = 0x456D4C4D
+"""Marks a file of answers as ours ('EmLM')."""
+WRITE_WAIT = 60.0
+"""Seconds that a process waits for another one that writes to the same file."""
+log = logging.getLogger(__name__)
 
 Message = Mapping[str, Any]
 """Of the chat-completions protocol: 'role' and 'content', a text or parts ('text', 'image_url')."""
@@ -79,63 +79,106 @@ class ServerSettings:
             raise ValueError(f"tries, together and most_tokens should be at least 1 and times positive, got {self}")
 
 
-@dataclass(frozen=True)
-class _Kept:
-    """An answer as the cache holds it."""
+class AnswerCache:
+    """Owns the SQLite file of answers. Threads may share it, and so may processes, each with its own.
 
-    text: str = ""
-    """What the model wrote."""
-    problem: str = ""
-    """Why it is no answer."""
-    refused: bool = False
-    tokens_in: int = 0
-    tokens_out: int = 0
+    An answer is written as soon as it comes, so that a run that is cut short goes on where it stopped. The file holds
+    no key and no address of a server; pictures stand in it as digests.
+    """
 
+    def __init__(self, path: Path) -> None:
+        """
+        Args:
+          path: the file; made where there is none.
 
-@dataclass(frozen=True)
-class Answer(_Kept):
-    """What came back for one request."""
+        Raises:
+          ValueError: another file stands there.
+        """
+        self.path = Path(path)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._lock = threading.Lock()
+        try:
+            self._file = sqlite3.connect(self.path, timeout=WRITE_WAIT, isolation_level=None, check_same_thread=False)
+            (mark,) = self._file.execute("PRAGMA application_id").fetchone()
+            (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
+            if mark != APPLICATION and tables:
+                raise ValueError(f"{path} is a data base, but not of answers; choose another file")
+            if mark != APPLICATION:
+                self._file.execute(f"PRAGMA application_id = {APPLICATION}")
+            self._file.execute(
+                "CREATE TABLE IF NOT EXISTS answers (key TEXT PRIMARY KEY, request TEXT NOT NULL, answer TEXT NOT NULL)"
+                " WITHOUT ROWID"
+            )
+        except sqlite3.DatabaseError as e:
+            raise ValueError(f"{path} cannot be used to keep answers ({e}); choose another file") from e
 
-    value: Mapping[str, Any] | None = None
-    """The object that was wanted; None for an answer that is none."""
+    def get(self, key: str) -> str | None:
+        """The answer that is kept under a key, as JSON."""
+        row = self._execute("SELECT answer FROM answers WHERE key = ?", key)
+        return row[0] if row else None
 
-    def usage(self, s: ServerSettings) -> Usage:
-        """What it cost and what was wrong with it."""
-        price = (self.tokens_in * s.price_in + self.tokens_out * s.price_out) / 1e6
-        invalid = self.value is None and not self.refused
-        return Usage(1, self.tokens_in, self.tokens_out, round(price, 9), int(invalid), int(self.refused))
+    def put(self, key: str, request: str, answer: str) -> str:
+        """Keep an answer; returns the one that is kept from now on, which is the first that came."""
+        self._execute("INSERT OR IGNORE INTO answers VALUES (?, ?, ?)", key, request, answer)
+        return self.get(key) or answer
+
+    def __len__(self) -> int:
+        return int(self._execute("SELECT count(*) FROM answers")[0])
+
+    def close(self) -> None:
+        with self._lock:
+            self._file.close()
+
+    def _execute(self, command: str, *values: str) -> Any:
+        """The first row that a command gives."""
+        try:
+            with self._lock:
+                return self._file.execute(command, values).fetchone()
+        except sqlite3.Error as e:
+            raise UnableError(
+                f"{self.path} cannot be read and written ({e}); see to it and run the command again"
+            ) from e
 
 
 class Client:
-    """Owns the connection and the cache; threads may share it."""
+    """Owns the cache and asks the server; threads may share it."""
 
     def __init__(self, settings: ServerSettings, cache: AnswerCache, *, offline: bool = False) -> None:
         """
         Args:
           offline: only what is kept may be answered.
+
+        Raises:
+          ValueError: the settings hold no address of a server.
         """
         self.settings, self.cache, self.offline = settings, cache, offline
         self.sent = 0
         """Requests that were answered by the server, not from the cache."""
         self._lock, self._gate = threading.Lock(), threading.Semaphore(settings.together)
-        self._api: Any = None
+        self._endpoint = Endpoint(completions_url(settings.base_url), settings.key_variable, settings.timeout)
+        self._changes: dict[str, str] = {}
+        """New names of settings in the body; '' for one that is left out."""
+        self._warned = set[str]()
 
     def ask(self, messages: Sequence[Message], schema: Mapping[str, Any]) -> Answer:
         """The object of `schema` that the model answers with, from the cache where it was asked before.
 
         Raises:
-          UnableError: the server cannot be reached, or refuses the request.
+          UnableError: the server cannot be reached, fails, or refuses the request.
         """
         request = self._request(messages, schema)
         key = digest(request)
         kept = self.cache.get(key)
         if kept is None:
             with self._gate:
-                said = self._send(request)
+                completion = self._send(request)
             with self._lock:
                 self.sent += 1
-            kept = self.cache.put(key, json.dumps(_without_pictures(request), sort_keys=True), to_json(said))
-        return understood(from_json(_Kept, kept), schema)
+            kept = self.cache.put(key, json.dumps(_without_pictures(request), sort_keys=True), to_json(completion))
+        answer = read_answer(from_json(StoredAnswer, kept), schema)
+        if answer.cut and answer.value is None:
+            self._warn(f"an answer was {answer.problem}")
+        return answer
 
     def ask_all(self, asked: Sequence[tuple[Sequence[Message], Mapping[str, Any]]]) -> list[Answer]:
         """Several at a time, in order."""
@@ -144,8 +187,14 @@ class Client:
         with ThreadPoolExecutor(min(self.settings.together, len(asked))) as pool:
             return list(pool.map(lambda a: self.ask(*a), asked))
 
+    def usage(self, answer: Answer) -> Usage:
+        """Costs and faults of an answer."""
+        s, invalid = self.settings, answer.value is None and not answer.refused
+        price = (answer.tokens_in * s.price_in + answer.tokens_out * s.price_out) / 1e6
+        return Usage(1, answer.tokens_in, answer.tokens_out, round(price, 9), int(invalid), int(answer.refused))
+
     def _request(self, messages: Sequence[Message], schema: Mapping[str, Any]) -> dict[str, Any]:
-        """The body of the request, which is also what its answer is kept under."""
+        """The body of the request, which is also the key of its answer."""
         s = self.settings
         body: dict[str, Any] = {
             "model": s.model,
@@ -163,192 +212,54 @@ class Client:
             body["tools"] = [{"type": "function", "function": about}]
             body["tool_choice"] = {"type": "function", "function": {"name": TOOL}}
         else:
-            told = f"Answer with one JSON object of this schema and nothing else: {json.dumps(schema)}"
-            body["messages"] = [*body["messages"], {"role": "system", "content": told}]
+            wish = f"Answer with one JSON object of this schema and nothing else: {json.dumps(schema)}"
+            body["messages"] = [*body["messages"], {"role": "system", "content": wish}]
         return body
 
-    def _send(self, request: Mapping[str, Any]) -> _Kept:
+    def _send(self, request: Mapping[str, Any]) -> StoredAnswer:
         if self.offline:
             raise UnableError(f"{self.cache.path} does not hold the answer to this request; leave --offline out")
-        openai, httpx, s = _openai(), _httpx(), self.settings
-        told = 0.0
+        s, last = self.settings, ServerError("")
         for attempt in range(s.tries):
             if attempt:
-                pause = min(max(s.wait * 2 ** (attempt - 1), told), 30.0)
+                pause = min(max(s.wait * 2 ** (attempt - 1), last.wait), LONGEST_WAIT)
                 time.sleep(pause * random.uniform(0.75, 1.25))  # so that clients do not come back together
             try:
-                body = _within(2 * s.timeout, lambda: self._received(request))
-            except openai.APIStatusError as e:
-                problem = self._hidden(f"status {e.status_code}: {e}")
-                if e.status_code not in AGAIN:
-                    raise UnableError(f"{s.base_url} refuses the request: {problem}") from None
-                told = _seconds(e.response.headers.get("retry-after"))
-            except httpx.DecodingError:
-                return _Kept(problem="the response cannot be decompressed")
-            except (openai.APIConnectionError, httpx.HTTPError) as e:
-                problem = type(e).__name__
-            else:
-                return _said(body)
+                return read_completion(self._posted(request))
+            except ServerError as e:
+                last = e
+                if not e.passing:
+                    break
+                self._warn(f"{s.base_url}: {e}; it is tried again")
+        tries = f" after {s.tries} tries" if last.passing else ""
         raise UnableError(
-            f"no answer from {s.base_url} after {s.tries} tries ({problem}); start the server and run the same command "
-            f"again: {len(self.cache)} answers are kept in {self.cache.path}, it goes on from there"
+            f"no answer from {s.base_url}{tries}: {last}. Run the same command again: {len(self.cache)} answers are "
+            f"kept in {self.cache.path}, it goes on from there"
         )
 
-    def _received(self, request: Mapping[str, Any]) -> bytes | None:
-        with self._connection().chat.completions.with_streaming_response.create(**request) as response:
-            return _body(response.iter_bytes(), time.monotonic() + self.settings.timeout)
+    def _posted(self, request: Mapping[str, Any]) -> bytes:
+        """The content of the response, asked for with the settings that this server and its model know."""
+        while True:
+            changes = dict(self._changes)
+            body = {changes.get(n, n): v for n, v in request.items() if changes.get(n, n)}
+            try:
+                return self._endpoint.post({**body, "stream": False})
+            except ServerError as e:
+                if "max_completion_tokens" in e.words and "max_tokens" in body:
+                    self._changes["max_tokens"] = "max_completion_tokens"
+                elif "temperature" in e.words and UNSUPPORTED.search(e.words) and "temperature" in body:
+                    self._changes["temperature"] = ""
+                    self._warn(f"{self.settings.model} takes no temperature: it samples with its own")
+                else:
+                    raise
 
-    def _connection(self) -> Any:
+    def _warn(self, text: str) -> None:
+        """Warn of something once."""
         with self._lock:
-            if self._api is None:
-                s = self.settings
-                key = os.environ.get(s.key_variable) or "none"
-                hooks = {"response": [functools.partial(_cut_short, seconds=s.timeout)]}
-                own = _openai().DefaultHttpxClient(base_url=s.base_url, timeout=s.timeout, event_hooks=hooks)
-                settings = {"base_url": s.base_url, "timeout": s.timeout, "max_retries": 0}
-                self._api = _openai().OpenAI(api_key=key, http_client=own, **settings)
-        return self._api
-
-    def _hidden(self, text: str) -> str:
-        """A message without the key, however the server repeats it."""
-        key = os.environ.get(self.settings.key_variable)
-        return (text.replace(key, "***") if key else text)[:500]
-
-
-def understood(kept: _Kept, schema: Mapping[str, Any]) -> Answer:
-    """The answer as the object of a schema, or why it is none."""
-    value, problem = None, kept.problem
-    if not problem and not kept.refused:
-        try:
-            value = parse(_object_in(kept.text), "an answer")
-            problem = misfit(value, schema)
-        except RecordError as e:
-            problem = str(e)
-    value = value if isinstance(value, dict) and not problem and not kept.refused else None
-    return Answer(kept.text, problem, kept.refused, kept.tokens_in, kept.tokens_out, value)
-
-
-def misfit(value: object, schema: Mapping[str, Any], where: str = "the answer") -> str:
-    """What is wrong with a value by the part of JSON Schema that is used here; '' for nothing."""
-    kind = KINDS[schema["type"]]
-    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        return f"{where} should be of type {schema['type']}"
-    if "enum" in schema and value not in schema["enum"]:
-        return f"{where} should be one of {list(schema['enum'])[:20]}"
-    if isinstance(value, str) and len(value) > schema.get("maxLength", MOST_TEXT):
-        return f"{where} is too long"
-    if isinstance(value, int | float) and not schema.get("minimum", value) <= value <= schema.get("maximum", value):
-        return f"{where} is out of range"
-    if isinstance(value, dict):
-        known = schema.get("properties", {})
-        if missing := [n for n in schema.get("required", ()) if n not in value]:
-            return f"{where} lacks {missing}"
-        if unknown := [str(n)[:40] for n in value if n not in known]:
-            return f"{where} has unknown fields {unknown[:5]}"
-        return next((m for n, v in value.items() if (m := misfit(v, known[n], n))), "")
-    return ""
-
-
-def object_schema(**properties: Mapping[str, Any]) -> dict[str, Any]:
-    """A JSON schema of an object that has exactly these properties, in their order."""
-    return {
-        "type": "object",
-        "properties": dict(properties),
-        "required": list(properties),
-        "additionalProperties": False,
-    }
-
-
-def _said(body: bytes | None) -> _Kept:
-    """What a response says; whatever it holds, it is no error of ours."""
-    if body is None:
-        return _Kept(problem=f"more than {MOST_BYTES} bytes, or too slow")
-    try:
-        whole = parse(body, "a chat completion")
-    except RecordError:
-        return _Kept(problem="the response is not JSON")
-    used = whole.get("usage") if isinstance(whole, dict) else None
-    tokens = [_count(used, "prompt_tokens"), _count(used, "completion_tokens")]
-    try:
-        choice: Any = whole["choices"][0]  # type: ignore[index]
-        message, ended = choice["message"], choice.get("finish_reason")
-        text, calls, refusal = message.get("content"), message.get("tool_calls"), message.get("refusal")
-    except (KeyError, IndexError, TypeError, AttributeError):
-        return _Kept("", "the response is no chat completion", False, *tokens)
-    if refusal or ended == "content_filter":
-        return _Kept(str(refusal or "")[:MOST_TEXT], "", True, *tokens)
-    if calls:
-        text = _called(calls)
-    if not isinstance(text, str):
-        return _Kept("", "no text, or calls of unknown tools", False, *tokens)
-    if len(text) > MOST_TEXT:
-        return _Kept("", f"more than {MOST_TEXT} characters", False, *tokens)
-    return _Kept(text, "", False, *tokens)
-
-
-def _seconds(text: str | None) -> float:
-    """What a server asks to be waited for; 0 where it does not say so in seconds."""
-    return float(text) if text and text.isdigit() and len(text) < 6 else 0.0
-
-
-def _called(calls: Any) -> str | None:
-    """The arguments of the one call of the one tool; None for any other calls."""
-    try:
-        (call,) = calls
-        arguments = call["function"]["arguments"]
-        return arguments if call["function"]["name"] == TOOL and isinstance(arguments, str) else None
-    except (ValueError, KeyError, TypeError):
-        return None
-
-
-def _count(used: object, name: str) -> int:
-    value = used.get(name) if isinstance(used, dict) else None
-    return value if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 10**9 else 0
-
-
-def _object_in(text: str) -> str:
-    """The part of a text from its first brace to its last: models like to wrap JSON in words or fences."""
-    begin, end = text.find("{"), text.rfind("}")
-    return text[begin : end + 1] if 0 <= begin < end else text
-
-
-def _body(chunks: Iterable[bytes], deadline: float) -> bytes | None:
-    """The bytes of a response; None for more than MOST_BYTES, or when the time is up."""
-    parts, size = [], 0
-    for chunk in chunks:
-        size += len(chunk)
-        if size > MOST_BYTES or time.monotonic() > deadline:
-            return None
-        parts.append(chunk)
-    return b"".join(parts)
-
-
-def _within(seconds: float, call: Callable[[], bytes | None]) -> bytes | None:
-    """What a call returns; None when the time is up: headers that drip are read on, by a thread left behind."""
-    done: queue.SimpleQueue[tuple[bytes | None, BaseException | None]] = queue.SimpleQueue()
-
-    def run() -> None:
-        try:
-            done.put((call(), None))
-        except BaseException as e:  # raised where the call was made
-            done.put((None, e))
-
-    threading.Thread(target=run, daemon=True).start()
-    try:
-        value, error = done.get(timeout=seconds)
-    except queue.Empty:
-        return None
-    if error is not None:
-        raise error
-    return value
-
-
-def _cut_short(response: Any, seconds: float) -> None:
-    """Bound the body of an error or a redirection, which the client's library reads without a limit."""
-    if not response.is_success:
-        whole = response.stream
-        response.stream = _httpx().ByteStream(_body(whole, time.monotonic() + seconds) or b"")
-        whole.close()
+            is_new = text not in self._warned
+            self._warned.add(text)
+        if is_new:
+            log.warning("%s", text)
 
 
 def _without_pictures(value: Any) -> Any:
@@ -358,17 +269,3 @@ def _without_pictures(value: Any) -> Any:
     if isinstance(value, list):
         return [_without_pictures(v) for v in value]
     return f"picture {digest(value)[:32]}" if isinstance(value, str) and value.startswith("data:image/") else value
-
-
-def _openai() -> Any:
-    try:
-        import openai  # an optional extra
-    except ImportError as e:
-        raise UnableError("language models need the openai package: pip install 'embodied-houses[llm]'") from e
-    return openai
-
-
-def _httpx() -> Any:
-    import httpx2  # comes with openai
-
-    return httpx2

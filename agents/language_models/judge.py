@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.agents.language_models.client import Client, object_schema
+from embodied.agents.language_models.client import Client
+from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.agents.language_models.words import walk_in_words
 from embodied.interface import SeenPlace, Usage
@@ -34,11 +35,11 @@ class ModelJudge:
         """
         walk = walk_in_words(world, path, yaw)
         answer = self._client.ask(self._judge.messages(instruction=instruction, walk=walk), RATING)
-        self.usage += answer.usage(self._client.settings)
+        self.usage += self._client.usage(answer)
         return None if answer.value is None else (int(answer.value["stars"]) - 1) / (STARS - 1)
 
     def describe(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str:
         """One description of a walk, as embodied.language.RouteDescriber gives; '' where the answer is none."""
         answer = self._client.ask(self._describe.messages(walk=walk_in_words(world, path, yaw)), DESCRIPTION)
-        self.usage += answer.usage(self._client.settings)
+        self.usage += self._client.usage(answer)
         return "" if answer.value is None else str(answer.value["description"])

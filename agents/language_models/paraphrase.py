@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from embodied.agents.language_models.checking import arrives
-from embodied.agents.language_models.client import Client, object_schema
+from embodied.agents.language_models.client import Client
+from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.interface import STEP, Route, SeenPlace, Usage
 
@@ -64,7 +65,7 @@ def paraphrased(
     ]
     kept, invalid, unchanged, lost, usage = [], 0, 0, 0, Usage()
     for (house, route), answer in zip(routes, client.ask_all(asked), strict=True):
-        usage += answer.usage(client.settings)
+        usage += client.usage(answer)
         text = "" if answer.value is None else str(answer.value["instruction"]).strip()
         if not text:
             invalid += 1

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from embodied.agents.language_models.client import Message, object_schema
+from embodied.agents.language_models.client import Message
+from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.pictures import Panoramas, shown
 from embodied.agents.language_models.prompts import Prompt, read_prompt
 from embodied.agents.language_models.words import Namer, actions_of, sees, side, ways

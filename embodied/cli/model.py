@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from embodied.agents.language_models.cache import AnswerCache
-from embodied.agents.language_models.client import FORMS, Client, ServerSettings
+from embodied.agents.language_models.client import FORMS, AnswerCache, Client, ServerSettings
 from embodied.options import InputFolder, InputPath, Settings
 
 
