@@ -7,6 +7,7 @@ import http.server
 import json
 import threading
 import warnings
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -18,8 +19,9 @@ from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.foresight import CHOICES, Foresight
 from embodied.agents.ask.learned import LearnedAsker, facts, fit
 from embodied.agents.ask.study import AskStudy
+from embodied.agents.language_models.assistant import QUESTIONS
 from embodied.agents.studies.engine import run_study
-from embodied.assistants.ask import in_view, understood
+from embodied.assistants.ask import in_view
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.envs.make import ask_environment_maker, look_of
@@ -30,11 +32,13 @@ from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv, layout_of
 from embodied.gym.eyes import SensorSuite
 from embodied.interface import Ask, Intention, Move, Pose, Stop
+from embodied.language.questions import intention_of
 from embodied.policies.ask import RULES, Asker, Mind, baselines, reached
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks
 
 LITTLE = AskerConfig(hidden_size=16, passes=300)
+TYPED = (Intention.CONFIRM, Intention.APPEARANCE, Intention.REGION, Intention.ROUTE, Intention.DISAMBIGUATE)
 CHAIRS = ("red", "red", "blue", "blue")
 
 
@@ -165,7 +169,18 @@ def test_a_free_question_is_answered_by_what_it_means_or_not_at_all(tasks, make_
     assert env.last_step.reply.text.startswith("It is in")
     env.step(Ask(Intention.FREE, question="Do you like me?"))
     assert env.last_step.reply.text == "I do not know." and not env.last_step.reply.ruled_out
-    assert understood("How do I get there?") is Intention.ROUTE
+
+
+@pytest.mark.parametrize("kind", ["confirm", "disambiguate", "region", "route", "appearance", "none"])
+def test_questions_as_people_type_them_are_understood(kind):
+    text = (Path(__file__).parent / "data" / "free_questions.txt").read_text()
+    questions = text.split(f"[{kind}]\n")[1].split("\n[")[0].splitlines()
+    meant = {q: (i := intention_of(q)) and i.value for q in questions if q}
+    assert len(meant) >= 40 and {q: m for q, m in meant.items() if (m or "none") != kind} == {}
+
+
+def test_the_questions_that_agents_word_are_understood_as_they_are_meant():
+    assert all(intention_of(QUESTIONS[i]) is i for i in TYPED)
 
 
 def test_following_told_routes_always_arrives(world, tasks, make_env):

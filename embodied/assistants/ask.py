@@ -11,6 +11,7 @@ from embodied.geometry import wrap
 from embodied.house.house import Placement
 from embodied.interface import STEP, FindDescribed, Intention, Place, Reply, Situation, Subtask
 from embodied.language.plain import PlainLanguage
+from embodied.language.questions import intention_of
 from embodied.navigation.graph import nearest
 from embodied.tasks.ask import Look
 from embodied.tasks.goals import footprint_distance
@@ -30,14 +31,6 @@ FARTHEST = 6.0
 LONGEST = 6
 """Nodes of a route that one answer tells."""
 UNKNOWN = "I do not know."
-KEYWORDS = (
-    (Intention.ROUTE, ("how do i get", "way", "route", "direction", "go to", "left", "right")),
-    (Intention.REGION, ("room", "where")),
-    (Intention.APPEARANCE, ("look", "colour", "color", "made", "material", "big", "size")),
-    (Intention.DISAMBIGUATE, ("which",)),
-    (Intention.CONFIRM, ("is it this", "is this", "this one", "correct", "is that")),
-)
-"""By which words the template understands a free question, the first that fits."""
 
 
 def in_view(world: Place, node: int, goal: FindDescribed) -> list[tuple[str, float, float]]:
@@ -75,7 +68,7 @@ class AskAssistant:
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
         """The truth, and which placements it rules out."""
         if question is Intention.FREE:
-            meant = understood(situation.question)
+            meant = intention_of(situation.question)
             if meant is None or meant not in self.intentions(situation):
                 return Reply(text=UNKNOWN, intention=question)
         else:
@@ -121,12 +114,6 @@ class AskAssistant:
             return "You are there.", subtask
         text = self._language.route(s.world, nodes, s.pose.yaw, rng=rng)
         return text + ("" if nodes == whole else " From there it is further."), subtask
-
-
-def understood(text: str) -> Intention | None:
-    """The typed question that a free one amounts to, as far as a template understands it."""
-    text = text.lower()
-    return next((q for q, keys in KEYWORDS if any(k in text for k in keys)), None)
 
 
 def _goal(s: Situation) -> FindDescribed:
