@@ -14,12 +14,14 @@ from hand_data import build, small_house
 from handmade import HandCatalogue
 from test_cluster import FakeRay
 
-from embodied.agents.vision import drawn, occasions
+from embodied.agents.vision import capture, drawn
 from embodied.agents.vision import run as vision
-from embodied.agents.vision.config import PLAIN, RENDER_PRESETS
+from embodied.agents.vision.capture import captured_path
+from embodied.agents.vision.config import CAPTURE_CONDITIONS, PLAIN, RENDER_PRESETS, CaptureCondition
+from embodied.agents.vision.drawn import houses_of
 from embodied.agents.vision.encoder import random_encoder
+from embodied.agents.vision.extract import Extractor
 from embodied.agents.vision.features import encode_panoramas, feature_path, load_features
-from embodied.agents.vision.occasions import OCCASIONS, shown_path
 from embodied.agents.vision.resnet import ARCHITECTURES
 from embodied.cli.dataset import chosen_pictures
 from embodied.datasets import build as building
@@ -53,7 +55,7 @@ def data(tmp_path_factory) -> Dataset:
 
 @pytest.fixture(autouse=True)
 def hand_catalogue(monkeypatch):
-    for module in (building, drawn, occasions):
+    for module in (building, drawn, capture):
         monkeypatch.setattr(module, "load_catalogue", lambda *_: HandCatalogue())
 
 
@@ -151,31 +153,27 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
 
     lines: list[str] = []
 
-    def features(kind: str | None, houses: int | None = None, **how: Any) -> str:
+    def features(kind: str | None, *conditions: CaptureCondition, first: int | None = None, **how: Any) -> str:
         lines.clear()
-        vision.make_features(
-            data.folder, encoder, data.folder / "cache", picture_kind=kind, first=houses, note=lines.append, **how
-        )
+        extract = Extractor(data.folder, encoder, data.folder / "cache", kind, (CaptureCondition(), *conditions))
+        vision.make_features(extract, houses_of(data, data.splits, first), note=lines.append, **how)
         return lines[-1]
 
     for name in names:
         pano(data, name).unlink(missing_ok=True)
     of_each = {data.names(split)[0] for split in data.splits}
-    assert features(None, houses=1).startswith(f"{len(of_each)} of {len(of_each)} houses made")
+    assert features(None, first=1).startswith(f"{len(of_each)} of {len(of_each)} houses made")
     shutil.rmtree(data.folder / "features")
     assert features(None).startswith("3 of 3 houses made, pictures: 3 unlit_16")
     for name in names:
         pretend_drawn(data, name, lit, code="whoever drew them")
     assert features(None).startswith("3 of 3 houses made, pictures: 3 fast_gloss_16")
     assert features("fast").startswith("0 of 3 houses made")
-    camera = OCCASIONS["camera"]
-    assert features("unlit", shown=[camera]).startswith("0 of 3 houses made"), "they are still there"
-    assert sorted(lines[:-1]) == [f"{n}: 1 of 1 kinds of pictures made that are shown" for n in sorted(names)]
-    assert all(shown_path(data, n, camera, encoder.digest, SMALL).exists() for n in names)
-    features("unlit", shown=[camera])
-    assert sorted(lines[:-1]) == [f"{n}: 0 of 1 kinds of pictures made that are shown" for n in sorted(names)]
-    with pytest.raises(ValueError, match="2 lightings want pictures with light, not 'unlit': say --pictures fast"):
-        features("unlit", lights=2)
+    camera = CAPTURE_CONDITIONS["camera"]
+    assert features("unlit", camera).startswith("3 of 3 houses made")
+    assert {line.split(": ")[1].split(";")[0] for line in lines[:-1]} == {"+robot"}, "the others are still there"
+    assert all(captured_path(data, n, camera, encoder.digest, SMALL).exists() for n in names)
+    assert features("unlit", camera).startswith("0 of 3 houses made")
     name = names[0]
     path = feature_path(data.folder / "features", encoder.digest, name, lit)
     found, _ = load_features(path, encoder=encoder.digest, source=data.place(name).house.digest, pictures=lit)

@@ -11,7 +11,7 @@ from hand_pixels import coloured_strips, world_in
 
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.studies.engine import run_study
-from embodied.agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing, lit_name
+from embodied.agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import Detector, DetectorNetwork
 from embodied.agents.vision.drawn import StripSource
 from embodied.agents.vision.encoder import load_encoder, random_encoder, save_encoder
@@ -32,12 +32,10 @@ def data(tmp_path_factory):
 
 @pytest.fixture
 def setting(data, tmp_path, monkeypatch):
-    """Two lightings of a house to learn from and of one to judge in, without light too, and two kinds of encoders."""
+    """Lit and unlit pictures of a house to learn from and of one to judge in, and two kinds of encoders."""
     for name in (*data.names("train"), *data.names("val_unseen")):
         nodes = len(data.place(name).graph.positions)
-        for k in range(2):
-            path = tmp_path / "strips" / drawing(RENDER_PRESETS["fast"]) / f"{lit_name(name, k)}.npz"
-            coloured_strips(name, nodes, seed=k).save(path)
+        coloured_strips(name, nodes, seed=0).save(tmp_path / "strips" / drawing(RENDER_PRESETS["fast"]) / f"{name}.npz")
         coloured_strips(name, nodes, seed=5).save(
             tmp_path / "strips" / drawing(RENDER_PRESETS["unlit"]) / f"{name}.npz"
         )
@@ -46,7 +44,7 @@ def setting(data, tmp_path, monkeypatch):
     files = [tmp_path / f"{k}.safetensors" for k in range(3)]
     for k, path in enumerate(files):
         save_encoder(random_encoder(seed=k), path)
-    source = StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "fast", 2)
+    source = StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "fast")
     ready = {"two": files[:2], "one": files[2:]}
     return EncoderStudy(source, VisionConfig(least_views=1), (0,), pictures=("fast", "unlit"), ready=ready)
 
@@ -69,7 +67,7 @@ def test_encoders_that_are_there_are_judged_in_every_kind_of_pictures_and_none_i
 
 @pytest.mark.slow
 def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setting, tmp_path):
-    source = dataclasses.replace(setting.source, picture_kind="unlit", lights=1)
+    source = dataclasses.replace(setting.source, picture_kind="unlit")
     config = dataclasses.replace(setting.config, epochs=1)
     ready = {"one": setting.ready["one"]}
     study = dataclasses.replace(setting, source=source, config=config, houses=(1,), lit_houses=1, ready=ready)
@@ -87,7 +85,7 @@ def test_encoders_learn_in_fewer_and_in_more_houses_some_of_them_lit(data, setti
 
 @pytest.mark.slow
 def test_a_detector_learns_from_lit_and_unlit_houses_and_is_measured_in_others(setting, tmp_path):
-    source = dataclasses.replace(setting.source, picture_kind="unlit", lights=1)
+    source = dataclasses.replace(setting.source, picture_kind="unlit")
     encoder, config, lines = random_encoder(seed=0), StripTraining(epochs=1, batch=2, least_views=1), list[str]()
     with pytest.raises(ValueError, match="name a larger data set"):
         detector_for(encoder, source, config, tmp_path / "run", also=source, note=lines.append)

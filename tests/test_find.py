@@ -40,7 +40,7 @@ def split_of(world, marked: bool = True) -> Split:
 
 def finder_for(split: Split, **settings) -> Finder:
     config = FinderConfig(
-        hidden_size=32, dropout=0.0, **{"batch": 16, "learning_rate": 1e-2, "glimpses": 60, "cooldown": 0.2, **settings}
+        hidden_size=32, dropout=0.0, **{"batch": 16, "learning_rate": 1e-2, "cooldown": 0.2, **settings}
     )
     words = build_vocabulary(t.request for t in split.tasks)
     requests = np.stack([words.encode(r, WORDS) for r in sorted({t.request for t in split.tasks})])

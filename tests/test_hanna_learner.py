@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import datetime as dt
 import functools
@@ -502,18 +501,6 @@ def test_a_loss_that_is_no_number_stops_the_run_and_keeps_the_checkpoint(tmp_pat
     with pytest.raises(DivergedError, match="update 2.*last checkpoint is intact"):
         run(tmp_path, split=bad)
     assert (tmp_path / "checkpoint.pt").read_bytes() == before
-
-
-@pytest.mark.parametrize("shown", [True, False])
-def test_an_agent_learns_in_every_lighting_and_is_validated_in_each_houses_own(tmp_path, shown):
-    split = setting()
-    own = {n: split.bank._table[a:b].numpy() for n, (a, b) in split.bank._rows.spans.items()}
-    dark = {n: np.full_like(x, np.nan) for n, x in own.items()}
-    bank = FeatureBank(own, split.bank.digest, [dark] if shown else [])
-    config = dataclasses.replace(TINY, iterations=3, validate_every=1)
-    with pytest.raises(DivergedError, match="loss") if shown else contextlib.nullcontext():
-        agent, shown_in = agent_for(split, config), dataclasses.replace(split, bank=bank)
-        imitation.train(HannaLearner(agent, shown_in, HannaTeacher()), split, tmp_path, identity(agent), note=str)
 
 
 def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):

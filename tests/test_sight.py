@@ -16,11 +16,10 @@ from test_hanna_learner import agent_for, setting
 from embodied.agents.hanna.evaluation import sight_policies
 from embodied.agents.hanna.places import Query, auc, measured, precision_recall, threshold
 from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.capture import strip_around
 from embodied.agents.vision.features import VIEW_SIZE, strip_of
 from embodied.agents.vision.lessons import Split
-from embodied.agents.vision.occasions import OCCASIONS, strip_around
 from embodied.agents.vision.strip import VFOV
-from embodied.cli.learning import SHOWN
 from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import interval
@@ -127,13 +126,13 @@ def test_with_black_pictures_the_rules_of_an_agent_are_worth_nothing():
 
 def test_pictures_are_of_another_time_and_what_is_seen_is_of_now():
     own, later = {"a": np.ones((2, 36, 4), np.float32)}, {"a": np.full((2, 36, 4), 5.0, np.float32)}
-    bank = FeatureBank(own, "digest").showing(later)
+    bank = FeatureBank(own, "digest").with_goal_images(later)
     seen, picture = Sight("a", 1), Sight("a", 1, picture=True)
     assert bank.features(seen)[0, 0] == 1 and bank.features(picture)[0, 0] == 5
     assert bank.gather([picture, None, seen])[:, 0, 0].tolist() == [5, 0, 1]
     assert not bank.blind().features(picture).any()
     with pytest.raises(ValueError, match="same worlds"):
-        FeatureBank(own, "digest").showing({"b": own["a"]})
+        FeatureBank(own, "digest").with_goal_images({"b": own["a"]})
 
 
 def test_precision_and_recall_count_places_that_are_found_where_they_are():
@@ -149,10 +148,6 @@ def test_precision_and_recall_count_places_that_are_found_where_they_are():
     shares = [interval([found[k]]).mean for k in ("right place first", "precision", "recall")]
     assert shares == [1 / 2, 1 / 3, 1 / 2]
     assert auc(np.array([1.0, 2.0]), np.array([0.0, 1.5])) == 3 / 4
-
-
-def test_the_command_line_names_every_occasion():
-    assert tuple(OCCASIONS) == SHOWN
 
 
 def test_a_single_view_lies_in_its_strip_where_a_panorama_shows_it():

@@ -7,7 +7,6 @@ import math
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -18,7 +17,7 @@ from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.tensor_file import read_weights, save_tensors
 from embodied.agents.vision import labels, strip
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing, lit_name
+from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing
 from embodied.agents.vision.encoder import (
     Encoder,
     load_encoder,
@@ -36,7 +35,6 @@ from embodied.agents.vision.training import batches, photograph_strip, strip_cou
 from embodied.assets.cache import write_json
 from embodied.errors import UnableError
 from embodied.interface import Sight
-from embodied.light import lightings_of
 from embodied.records import read_json
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
@@ -402,37 +400,6 @@ def test_features_of_two_encoders_do_not_mix(tmp_path):
         load_bank({"a": tmp_path / "1.safetensors", "b": tmp_path / "2.safetensors"})
     with pytest.raises(ValueError, match="must all be"):
         FeatureBank({"a": np.zeros((1, 35, 4))}, "digest")
-
-
-def test_a_bank_shows_each_house_in_a_lighting_that_is_drawn():
-    own = {name: np.full((nodes, 36, 4), v, np.float32) for name, nodes, v in (("a", 2, 1.0), ("b", 3, 2.0))}
-    bank = FeatureBank(own, "digest", [{n: 10 * x for n, x in own.items()}, {n: 100 * x for n, x in own.items()}])
-
-    def shown(b: FeatureBank) -> tuple[float, float]:
-        return float(b.features(Sight("a", 1))[0, 0]), float(b.gather([Sight("b", 2)])[0, 0, 0])
-
-    drawn = [shown(bank.relit(np.random.default_rng(seed))) for seed in range(60)]
-    assert set(drawn) == {(x, 2 * y) for x in (1.0, 10.0, 100.0) for y in (1.0, 10.0, 100.0)}
-    assert drawn[7] == shown(bank.relit(np.random.default_rng(7))) and shown(bank) == (1.0, 2.0)
-    assert bank.relit(np.random.default_rng(3)).to("cpu").look([Sight("b", 0)], [35])[0, 0] == drawn[3][1]
-    with pytest.raises(ValueError, match="same worlds with as many nodes"):
-        FeatureBank(own, "digest", [{"a": own["a"]}])
-
-
-def test_features_of_other_lightings_lie_beside_a_house_and_know_which_light(tmp_path, two_room_house):
-    encoder, path = random_encoder(seed=1), tmp_path / "house.safetensors"
-    place = SimpleNamespace(house=two_room_house, graph=SimpleNamespace(ids=["x", "y"]))
-    for k, lit in enumerate(lightings_of(two_room_house, 3)):
-        name = lit_name("house", k)
-        save_features(tmp_path / f"{name}.safetensors", np.full((2, 36, 4), k), encoder, lit.digest)
-    bank = load_bank({"house": path}, places={"house": place}, lights=3)
-    shown = {float(bank.relit(np.random.default_rng(s)).features(Sight("house", 0))[0, 0]) for s in range(30)}
-    assert shown == {0.0, 1.0, 2.0} and bank.lightings == 3
-    (tmp_path / "house@2.safetensors").write_bytes((tmp_path / "house@1.safetensors").read_bytes())
-    with pytest.raises(ValueError, match="made from source .*--lights 3"):
-        load_bank({"house": path}, places={"house": place}, lights=3)
-    with pytest.raises(FileNotFoundError, match="house@3.*embodied features --lights 4"):
-        load_bank({"house": path}, lights=4)
 
 
 def test_encoder_moves_between_settings_without_changing_features():

@@ -23,16 +23,12 @@ class BanditConfig(RunSettings):
     """Sentences per update."""
     pretraining_passes: int = 10
     """Epochs of supervised pre-training; the weakly trained reference has one."""
-    decay_from: int = 5
-    """Epoch from which the learning rate halves when the perplexity of the dev set rises."""
     critic_passes: int = 5
     """Epochs of pre-training the critic on sampled translations."""
     pretraining_rate: float = 1e-3
     """Learning rate of pre-training, of translator and critic."""
     bandit_rate: float = 1e-4
     """Learning rate of learning from ratings, of translator and critic, and of the supervised control."""
-    bandit_set: str = "bandit_overlap"
-    """The split that is rated: 'bandit_overlap' (the dissertation's case) or 'bandit_disjoint'."""
     clip: float = 5.0
     """Largest gradient norm, that of the authors' program (docs/sources.md, S73)."""
     checkpoint_minutes: float = 2.0
@@ -40,12 +36,10 @@ class BanditConfig(RunSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(self, AT_LEAST_ONE, "hidden_size", "longest", "pretraining_passes", "critic_passes", "decay_from")
+        require(self, AT_LEAST_ONE, "hidden_size", "longest", "pretraining_passes", "critic_passes")
         require(self, POSITIVE, "pretraining_rate", "bandit_rate", "clip")
         least = Limit(lambda x: x >= 4, "at least 4, for padding, unknown words and the end")
         require(self, least, "source_words", "target_words")
-        if not self.bandit_set.startswith("bandit"):
-            raise ValueError(f"bandit_set must be a split whose name begins with 'bandit', got {self.bandit_set!r}")
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from embodied.agents.bandit.behaviour import COLUMNS, behaviour, translator_of_r
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest
 from embodied.agents.bandit.ratings import CLEAN, Rater, rater_of
-from embodied.agents.bandit.training import NumberedCorpus, bandit, material, pretrain, teach_critic
+from embodied.agents.bandit.training import RATED, NumberedCorpus, bandit, material, pretrain, teach_critic
 from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.session import Note
 from embodied.agents.studies.engine import Measured, StudyLearner
@@ -181,7 +181,7 @@ class BanditStudy(StudyLearner):
         return dataclasses.replace(self.config, seed=seed, bandit_rate=train.get(RATE, self.config.bandit_rate))
 
     def _corpus(self) -> str:
-        return _corpus(self.data, self.config.bandit_set)
+        return _corpus(self.data)
 
     def _material(self, seed: int) -> NumberedCorpus:
         return _material(self.data, dataclasses.replace(self.config, seed=seed))
@@ -196,5 +196,5 @@ _material = functools.lru_cache(maxsize=8)(material)
 
 
 @functools.lru_cache(maxsize=8)
-def _corpus(folder: Path, bandit_set: str) -> str:
-    return corpus_digest(folder, ("supervised", "dev", "test", bandit_set))
+def _corpus(folder: Path) -> str:
+    return corpus_digest(folder, ("supervised", "dev", "test", RATED))

@@ -42,6 +42,10 @@ Finish = Callable[[int, Mapping[str, float], History], Mapping[str, float]]
 """Is given a pass, the sums of its numbers and what the passes before gave; returns what is kept of it."""
 LEARNERS = ("reference", "supervised", "a2c")
 """'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
+RATED = "bandit_overlap"
+"""The split that is rated, the dissertation's case."""
+DECAY_FROM = 5
+"""Epoch from which the learning rate halves when the perplexity of the dev set rises."""
 _PRETRAINING = (
     "hidden_size",
     "source_words",
@@ -49,7 +53,6 @@ _PRETRAINING = (
     "longest",
     "batch",
     "pretraining_passes",
-    "decay_from",
     "pretraining_rate",
     "clip",
     "seed",
@@ -97,12 +100,12 @@ def material(folder: Path, config: BanditConfig) -> NumberedCorpus:
       CorpusError: see embodied.agents.bandit.corpus.load.
     """
     names = ("supervised", "dev", "test")
-    corpus = load(folder, (*names, config.bandit_set), longest=config.longest)
+    corpus = load(folder, (*names, RATED), longest=config.longest)
     source = most_frequent((w for a, _ in corpus["supervised"] for w in a), most=config.source_words)
     target = most_frequent((w for _, b in corpus["supervised"] for w in b), most=config.target_words)
     splits = {name: numbered(pairs, source, target) for name, pairs in corpus.items()}
     return NumberedCorpus(
-        config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (config.bandit_set,))
+        config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (RATED,))
     )
 
 
@@ -131,7 +134,7 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
             save_network(translator, m.config, m.lexicons, folder / "weak.safetensors", identity)
         if found < min(before, default=math.inf):
             save_network(translator, m.config, m.lexicons, folder / "full.safetensors", identity)
-        if turn + 1 >= config.decay_from and before and found > before[-1]:
+        if turn + 1 >= DECAY_FROM and before and found > before[-1]:
             for group in optimizer.param_groups:
                 group["lr"] /= 2
         return {
@@ -196,7 +199,7 @@ def bandit(
     """
     if learner not in LEARNERS:
         raise ValueError(f"learner must be one of {LEARNERS}, got {learner!r}")
-    config, data = m.config, m.splits[m.config.bandit_set]
+    config, data = m.config, m.splits[RATED]
     translator, critic = m.translator(), m.critic()
     load_network(translator, reference)
     optimizers = {"translator": adam(translator, config.bandit_rate)}
@@ -207,7 +210,7 @@ def bandit(
         optimizers["critic"] = adam(critic, config.bandit_rate)
         parts |= {"critic": critic, "critic optimizer": optimizers["critic"]}
         about["critic"] = weights_digest(critic_file)
-    identity = m.identity("bandit", "critic_passes", "bandit_rate", "bandit_set", ratings=m.bandit_digest, **about)
+    identity = m.identity("bandit", "critic_passes", "bandit_rate", ratings=m.bandit_digest, **about)
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         said, scores = rated_samples(translator, m, data, chosen, "bandit", turn)

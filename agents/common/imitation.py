@@ -34,7 +34,9 @@ from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
 from embodied.interface import Agent, Ask, Episode, Place, Task
-from embodied.seeds import stream
+
+VALIDATION_BATCH = 32
+"""Episodes evaluated in parallel; changes speed, not results."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +102,7 @@ class Learner:
         config, training = self.config, self.training
         chosen = parallel.share(tasks_of_update(training.tasks, update, config.batch, config.seed))
         tasks, seed = [self.training_task(t) for t in chosen], episode_seed(config.seed, update)
-        player = self.player(update, training.bank.relit(stream(config.seed, "lightings", update)))
+        player = self.player(update, training.bank)
         try:
             with seeded_dropout(config.seed + parallel.rank(), update):
                 self.network.train()
@@ -180,8 +182,7 @@ def validate(learner: Learner, split: TaskSet, session: Session) -> Sequence[Epi
     tasks = [learner.evaluation_task(t) for t in split.tasks[: config.validation_tasks]]
     learner.network.eval()
     with torch.inference_mode():
-        batch = learner.evaluation.evaluation_batch
-        episodes = play(split.make_env, learner.evaluated_agent(split), tasks, seed=config.seed, batch=batch)
+        episodes = play(split.make_env, learner.evaluated_agent(split), tasks, seed=config.seed, batch=VALIDATION_BATCH)
     values = {
         name: sum(f(e, split.worlds[e.task.world].graph) for e in episodes) / len(episodes)
         for name, f in metrics.PER_EPISODE.items()

@@ -101,9 +101,6 @@ class ImitationSettings(ValidatedRunSettings):
     """Weight decay, as in the authors' programs; the text does not mention it (docs/sources.md, S28)."""
     training_houses: int = 0
     """Train in this many of the data set's training houses; 0: in all."""
-    lights: int = 1
-    """Train on this many lightings of every house, one per update: its own, and random hours, weathers and lamps
-    (`embodied features --lights`)."""
     environment_dropout: float = 0.0
     """Share of feature channels hidden for a whole training episode (Tan et al. 2019; docs/sources.md, S35, S113)."""
     instruction_length: int = 50
@@ -117,7 +114,7 @@ class ImitationSettings(ValidatedRunSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require(self, AT_LEAST_ONE, "lights", "instruction_length")
+        require(self, AT_LEAST_ONE, "instruction_length")
         require(self, NOT_NEGATIVE, "weight_decay", "training_houses")
         require(self, NOT_ALL, "environment_dropout")
         require(self, SHARE, "cooldown")
@@ -137,10 +134,7 @@ class EvaluationSettings:
     A weak agent that decodes greedily walks in circles (docs/sources.md, S36)."""
     ask_threshold: float = 0.5
     """In evaluation, the learned rule asks where its probability of asking exceeds this."""
-    evaluation_batch: int = 32
-    """Episodes evaluated in parallel; changes speed, not results."""
 
     def __post_init__(self) -> None:
-        require(self, AT_LEAST_ONE, "evaluation_batch")
         require(self, NOT_NEGATIVE, "evaluation_temperature")
         require(self, SHARE, "ask_threshold")

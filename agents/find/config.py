@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from embodied.agents.common.settings import (
-    AT_LEAST_ONE,
-    NOT_ALL,
-    NOT_NEGATIVE,
-    ImitationSettings,
-    require,
-    require_word,
-)
+from embodied.agents.common.settings import AT_LEAST_ONE, NOT_ALL, ImitationSettings, require, require_word
 
 SEES_WHAT = ("all", "map", "nothing")
 THINGS = (
@@ -37,14 +30,10 @@ class FinderConfig(ImitationSettings):
     """Dropout rate of features and hidden units."""
     iterations: int = 800
     """Updates of the weights."""
-    glimpses: int = 600
-    """Updates at the start that train only the heads that read single views; later ones also use episodes (DAgger)."""
     learning_rate: float = 3e-3
     """Learning rate of Adam."""
     cooldown: float = 0.5
     """The last share of the updates, over which the learning rate falls to zero."""
-    house_tasks: int = 100
-    """Tasks of each training house."""
     validate_every: int = 400
     """Updates between validations."""
 
@@ -52,6 +41,5 @@ class FinderConfig(ImitationSettings):
         super().__post_init__()
         require_word(self, "agent", AGENTS)
         require_word(self, "sees", SEES_WHAT)
-        require(self, AT_LEAST_ONE, "hidden_size", "house_tasks")
+        require(self, AT_LEAST_ONE, "hidden_size")
         require(self, NOT_ALL, "dropout")
-        require(self, NOT_NEGATIVE, "glimpses")

@@ -44,6 +44,10 @@ from embodied.language.plain import PlainLanguage
 from embodied.seeds import stream
 from embodied.tasks.find import find_pool, find_task
 
+SINGLE_VIEWS = 0.75
+"""Share of the updates, at the start, that train only the heads that read single views (later: DAgger, too)."""
+HOUSE_TASKS = 100
+"""Tasks of each training house."""
 CLIP = 5.0
 """Norm to which gradients are cut."""
 SEEN_PIXELS = 12
@@ -122,7 +126,7 @@ class FindLearner(imitation.Learner):
 
     def learn(self, update: int) -> Mapping[str, float]:
         c, numbers, searches = self.config, dict[str, float](), list[Search]()
-        if update >= c.glimpses:
+        if update >= SINGLE_VIEWS * c.iterations:
             self.network.eval()
             searches, numbers = self._search(update)
         self.network.train()
@@ -147,7 +151,7 @@ class FindLearner(imitation.Learner):
 
 def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:
     """Train, or go on training, an agent; writes best.safetensors and what embodied.agents.common.session writes."""
-    training = find_split(lessons, "train", config.house_tasks, config.training_houses or None)
+    training = find_split(lessons, "train", HOUSE_TASKS, config.training_houses or None)
     validation = find_split(lessons, "val_unseen", -(-config.validation_tasks // len(lessons.data.names("val_unseen"))))
     vocabulary = build_vocabulary(t.request for t in training.tasks)
     about = lessons.about(FinderAbout, config, EvaluationSettings(), vocabulary)

@@ -15,7 +15,6 @@ from embodied.agents.hanna.asking import RULES, ask_patiently
 from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.network import AgentNetwork, HannaNetwork
 from embodied.agents.hanna.policy import HannaPolicy
-from embodied.agents.hanna.recognition import Likeness
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
 
@@ -65,7 +64,6 @@ class HannaAgent(SightedAgent):
             revisit_weight=judged.revisit_weight,
             use_goal_image=judged.use_goal_image,
             frontier_discount=judged.frontier_discount,
-            least=Likeness(judged.same_place, judged.same_picture, judged.same_view),
         )
 
 

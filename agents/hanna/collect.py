@@ -69,13 +69,11 @@ def labelled(
     )
 
 
-def imitation_loss(
-    x: Experience, alpha: float, episodes: int, floor: float = 0.0, price: float = 1.0
-) -> tuple[Tensor, Tensor]:
+def imitation_loss(x: Experience, alpha: float, episodes: int, floor: float = 0.0) -> tuple[Tensor, Tensor]:
     """Eqs 4.9 and 4.10: navigation and help-request losses, summed over steps, averaged over episodes.
 
-    `floor` as in losses.curiosity, `price` as in losses.help_loss.
+    `floor` as in losses.curiosity.
     """
     navigation = navigation_loss(x.moves, x.right_moves, x.negatives, alpha, floor).sum() / episodes
-    asking = help_loss(x.asks, x.right_asks, x.reasons, x.true_reasons, price).sum() / episodes
+    asking = help_loss(x.asks, x.right_asks, x.reasons, x.true_reasons).sum() / episodes
     return navigation, asking

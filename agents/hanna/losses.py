@@ -55,7 +55,7 @@ def reason_loss(logits: Tensor, reasons: Tensor, labels: Tensor) -> Tensor:
     return each.mean(-1) * (labels != IGNORE)
 
 
-def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons: Tensor, price: float = 1.0) -> Tensor:
+def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons: Tensor) -> Tensor:
     """L_ask of Eq 4.14, (N,); without reason logits its first term only.
 
     Args:
@@ -63,9 +63,6 @@ def help_loss(ask: Tensor, labels: Tensor, reason_logits: Tensor | None, reasons
       labels: (N,) int64, IGNORE outside the zones of attention.
       reason_logits: (N, 3) or None.
       reasons: (N, 3) float, 0 or 1.
-      price: what a request costs that the teacher would not have made, against one that is missing; the two weigh 2
-        together. 1 is the equation.
     """
-    weights = ask.new_tensor([price, 1.0]) * 2 / (1 + price)  # of what the teacher says: DO_NOTHING, REQUEST
-    loss = negative_log_likelihood(ask, labels) * weights[labels.clamp(min=0)]
+    loss = negative_log_likelihood(ask, labels)
     return loss if reason_logits is None else loss + reason_loss(reason_logits, reasons, labels)

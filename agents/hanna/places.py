@@ -13,9 +13,10 @@ import numpy as np
 import scipy.stats
 
 from embodied.agents.hanna.recognition import Likeness, matches
+from embodied.agents.vision.capture import captured_path
+from embodied.agents.vision.config import CAPTURE_CONDITIONS
 from embodied.agents.vision.drawn import pictures_of
 from embodied.agents.vision.features import feature_path, load_features
-from embodied.agents.vision.occasions import OCCASIONS, shown_path
 from embodied.datasets.store import Dataset
 from embodied.evaluation.tables import Samples
 from embodied.navigation.graph import NavGraph
@@ -120,14 +121,14 @@ def recognised(data: Dataset, split: str, shown: str, encoder: str, picture_kind
     """COLUMNS over all places of a split's houses; shares of pictures, the others one value per house.
 
     Args:
-      shown: AGAIN, or when the pictures were taken, one of OCCASIONS.
+      shown: AGAIN, or when the pictures were taken, one of CAPTURE_CONDITIONS.
       encoder: its digest.
     """
     asked, own = list[Query](), shown == AGAIN
     for name in data.names(split):
         drawn, graph = pictures_of(data, name, picture_kind), data.place(name).graph
         seen, _ = load_features(feature_path(data.folder / "features", encoder, name, drawn), encoder=encoder)
-        path = shown_path(data, name, OCCASIONS["camera" if own else shown], encoder, drawn)
+        path = captured_path(data, name, CAPTURE_CONDITIONS["camera" if own else shown], encoder, drawn)
         asked += queries(name, graph, seen, load_features(path, encoder=encoder)[0], turned=not own)
     least = Likeness()
     return measured(asked, least.place if own else least.view if shown.endswith("view") else least.picture)

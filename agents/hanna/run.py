@@ -58,7 +58,7 @@ class HannaLearner(imitation.Learner):
 
     def loss_of(self, episodes: Sequence[Episode], experience: Experience) -> imitation.BatchLoss:
         c, x = self.config, experience
-        losses = imitation_loss(x, c.alpha, c.batch, c.curiosity_floor, c.ask_price)
+        losses = imitation_loss(x, c.alpha, c.batch, c.curiosity_floor)
         known, askable = x.right_moves != IGNORE, x.right_asks != IGNORE
         numbers = {
             "right moves": float((x.moves.argmax(-1) == x.right_moves)[known].float().mean()),
@@ -94,7 +94,7 @@ def train_agent(
     """
     houses = config.training_houses or None
     lessons = lessons.said_by(FAMILIAR) if config.speakers == FAMILIAR else lessons
-    training = lessons.split("train", houses=houses, lights=config.lights)
+    training = lessons.split("train", houses=houses)
     validation = lessons.split("val_unseen", limit=config.validation_tasks)
     other = None if begin is None else HannaAgent.load(begin)
     if other and config.varied_words and not other.config.varied_words and config.word_vectors == LEARNED_WORDS:

@@ -19,8 +19,8 @@ from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import speakers_table, words_table
+from embodied.agents.vision.config import CAPTURE_CONDITIONS
 from embodied.agents.vision.lessons import Lessons
-from embodied.agents.vision.occasions import OCCASIONS
 from embodied.agents.vision.sighted_study import SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy, spoken
 from embodied.datasets.store import Dataset, SplitData
@@ -101,7 +101,7 @@ TABLES: Mapping[str, StudyTable] = {
     "speakers": speakers_table(learned, FULL, TEST[1:]),
     "places": StudyTable(
         "Recognising places in pictures from another time",
-        tuple(StudyRow(name, None, {PICTURE: name}) for name in (AGAIN, *OCCASIONS)),
+        tuple(StudyRow(name, None, {PICTURE: name}) for name in (AGAIN, *CAPTURE_CONDITIONS)),
         COLUMNS,
         ("test_unseen",),
     ),
@@ -162,8 +162,8 @@ class HannaStudy(SightedStudy):
     """A trained agent whose weights and words every row begins with; None: random weights."""
     elsewhere: Path | None = None
     """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
-    shown: str = "same"
-    """When the pictures that helpers show were taken (agents.vision.occasions.OCCASIONS), in training and judging."""
+    goal_image: str = "same"
+    """How the pictures that helpers show were taken, of agents.vision.config.CAPTURE_CONDITIONS, in training too."""
 
     name, agent_kind = "hanna", HannaAgent
     makers = ("embodied.agents.hanna.run",)
@@ -212,7 +212,7 @@ class HannaStudy(SightedStudy):
         return recognised(lessons.data, split, row.judge[PICTURE], lessons.encoder.digest, self.pictures)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {**super().judged(row, split.removesuffix(SHIPPED)), "shown": self.shown}
+        return {**super().judged(row, split.removesuffix(SHIPPED)), "shown": self.goal_image}
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         return counted(episodes, split.worlds)
@@ -222,8 +222,8 @@ class HannaStudy(SightedStudy):
         other = self.judged_in({}).digest[:16]
         judged = f" Judged in the data set {other}, not that of training." if self.elsewhere else ""
         return (
-            f"{super().about().removesuffix('.')}{begun}; goal images: {self.shown}.{judged} Judged at temperature "
-            f"{self.evaluation.evaluation_temperature:g} and by the rules of docs/sources.md, S36, S161, S162; in "
+            f"{super().about().removesuffix('.')}{begun}; goal images: {self.goal_image}.{judged} Judged at "
+            f"temperature {self.evaluation.evaluation_temperature:g} and by docs/sources.md, S36, S161, S162; in "
             f"{', '.join(PRINTED)} so in the columns 'as shipped' alone, in the others, beside the printed numbers, "
             "the likeliest action is taken."
         )
@@ -232,4 +232,4 @@ class HannaStudy(SightedStudy):
         return spoken(self.lessons_in(self.elsewhere or self.data), judge)
 
     def lessons_in(self, folder: Path) -> Lessons:
-        return dataclasses.replace(super().lessons_in(folder), device=self.device, shown=self.shown)
+        return dataclasses.replace(super().lessons_in(folder), device=self.device, goal_image=self.goal_image)

@@ -14,7 +14,6 @@ from embodied.agents.common.settings import (
     EVERYBODY,
     NOT_ALL,
     NOT_NEGATIVE,
-    POSITIVE,
     SHARE,
     SPEAKERS,
     EvaluationSettings,
@@ -60,8 +59,6 @@ class TrainingConfig(ImitationSettings):
     guided_asking: float = 0.0
     """Share of training episodes in which 'every5' asks instead of the learned rule, so that early mistakes in asking
     do not spoil the routes to learn from (docs/sources.md, S33)."""
-    ask_price: float = 1.0
-    """Weight of a needless request in the loss, relative to a missing one; 1: Eq 4.14."""
     read_assistance: bool = True
     """Read the words of routes; False: show only the goal image (Table 4.4)."""
     speakers: str = EVERYBODY
@@ -84,7 +81,6 @@ class TrainingConfig(ImitationSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
         require(self, AT_LEAST_ONE, "training_steps")
         require(self, NOT_NEGATIVE, "alpha")
-        require(self, POSITIVE, "ask_price")
         require(self, NOT_ALL, "dropout", "curiosity_floor")
         require(self, SHARE, "guided_asking")
 
@@ -108,13 +104,6 @@ class HannaEvaluation(EvaluationSettings):
     """In evaluation, `ask_threshold` before the first goal image (docs/sources.md, S162)."""
     route_ask_threshold: float = 0.5
     """In evaluation, `ask_threshold` on a route (docs/sources.md, S162)."""
-    same_place: float = 0.55
-    """In evaluation, two panoramas of the agent's own are of one place from this match of their features on."""
-    same_picture: float = 0.42
-    """In evaluation, a goal image was taken where the agent is from this match on; 0.58 suits the compact encoder, and
-    0.68 as --same-place."""
-    same_view: float = 0.25
-    """In evaluation, likewise for a goal image of a single view; 0.42 suits the compact encoder."""
     min_moves_between_requests: int = 0
     """In evaluation, moves after leaving a route before the learned rule asks again."""
 
@@ -123,7 +112,6 @@ class HannaEvaluation(EvaluationSettings):
         require(self, AT_LEAST_ONE, "evaluation_steps")
         require(self, NOT_NEGATIVE, "min_moves_between_requests")
         require(self, SHARE, "revisit_weight", "frontier_discount", "first_ask_threshold", "route_ask_threshold")
-        require(self, SHARE, "same_place", "same_picture", "same_view")
 
 
 SCALES: dict[str, TrainingConfig] = {

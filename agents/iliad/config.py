@@ -26,9 +26,7 @@ class LearnerConfig:
     mixing: float = 0.5
     """Lambda: the weight of executions from the marginal (Algorithm 9), or their share (Eq 3.14)."""
     anneal_every: int = 0
-    """Multiply lambda by `anneal_rate` after every so many updates; 0: never (L of Table C.1)."""
-    anneal_rate: float = 0.5
-    """Factor of annealing (beta of Algorithm 5)."""
+    """Halve lambda after every so many updates; 0: never (L of Table C.1)."""
     least_mixing: float = 0.1
     """Smallest lambda of annealing."""
     entropy: float = 0.1
@@ -50,7 +48,7 @@ class LearnerConfig:
         require_word(self, "learner", LEARNERS)
         require(self, AT_LEAST_ONE, "iterations", "batch", "validate_every")
         require(self, POSITIVE, "learning_rate", "clip", "checkpoint_minutes")
-        require(self, SHARE, "mixing", "anneal_rate", "least_mixing", "cooldown", "threshold")
+        require(self, SHARE, "mixing", "least_mixing", "cooldown", "threshold")
         require(self, NOT_NEGATIVE, "anneal_every", "entropy")
 
     @property
@@ -60,10 +58,10 @@ class LearnerConfig:
 
 
 def mixing_at(config: LearnerConfig, update: int) -> float:
-    """Lambda at an update: max(least, lambda beta) every L updates (Table C.1), or constant."""
+    """Lambda at an update: max(least, lambda beta) every L updates (Table C.1), or constant; beta is a half."""
     if not config.anneal_every:
         return config.mixing
-    return max(config.least_mixing, config.mixing * config.anneal_rate ** (update // config.anneal_every))
+    return max(config.least_mixing, config.mixing * 0.5 ** (update // config.anneal_every))
 
 
 def folder_name(learner: LearnerConfig) -> str:

@@ -41,9 +41,39 @@ def drawing(pictures: PictureSettings) -> str:
     return "_".join([quality, *map(str, lit), *other, *look, str(pictures.size), *rays])
 
 
-def lit_name(house: str, lighting: int) -> str:
-    """What the strips and features of a house in one of its lightings are filed under; 0 is its own."""
-    return f"{house}@{lighting}" if lighting else house
+@dataclass(frozen=True)
+class CaptureCondition:
+    """Differences of a picture from what the agent sees at the same place."""
+
+    lighting: int = 0
+    """Number in embodied.light.lightings_of: another hour, weather and lamps; 0 is the house's own."""
+    day: int = 0
+    """Day of embodied.generate.another_day: people elsewhere, small things moved; 0 is the agent's own."""
+    camera: str = "ideal"
+    """What took it, one of embodied.render.photograph.CAMERAS: exposure, balance, lens, noise, JPEG."""
+    view: bool = False
+    """A single view of 60 degrees along a drawn direction instead of a panorama."""
+
+    @property
+    def name(self) -> str:
+        """What its features are filed under, after the house."""
+        parts = [f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day)]
+        parts += [self.camera * (self.camera != "ideal"), "view" * self.view]
+        return "".join(f"+{p}" for p in parts if p)
+
+
+CAPTURE_CONDITIONS: Mapping[str, CaptureCondition] = {
+    "same": CaptureCondition(),
+    "camera": CaptureCondition(camera="robot"),
+    "hour": CaptureCondition(lighting=1),
+    "day": CaptureCondition(day=1),
+    "day-camera": CaptureCondition(day=1, camera="robot"),
+    "day-view": CaptureCondition(day=1, camera="robot", view=True),
+    "later": CaptureCondition(lighting=1, day=1),
+    "later-camera": CaptureCondition(lighting=1, day=1, camera="robot"),
+    "later-view": CaptureCondition(lighting=1, day=1, camera="robot", view=True),
+}
+"""What --goal-image may name, from what the agent sees itself to a single view at another hour of another day."""
 
 
 @dataclass(frozen=True)

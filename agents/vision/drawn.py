@@ -10,12 +10,11 @@ from pathlib import Path
 import joblib
 import numpy as np
 
-from embodied.agents.vision.config import RENDER_PRESETS, drawing, lit_name
+from embodied.agents.vision.config import RENDER_PRESETS, drawing
 from embodied.agents.vision.labels import HouseStrips, all_classes, look
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.house.house import House
-from embodied.light import bake_all, lightings_of
 from embodied.render.pictures import PictureSettings
 from embodied.world import World, open_world
 
@@ -50,22 +49,6 @@ def drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings
     return open_world(lit or place.house, catalogue, cache, pictures, graph=place.graph)
 
 
-def baked_lightings(data: Dataset, name: str, count: int, cache: Path, pictures: PictureSettings) -> tuple[House, ...]:
-    """A house in its own light and in `count` - 1 others; those that have to be baked are baked together, which costs
-    less.
-
-    Raises:
-      ValueError: several lightings of pictures without light.
-    """
-    lightings = lightings_of(data.place(name).house, count)
-    if count > 1:
-        if pictures.lit_by is None:
-            raise ValueError(f"{count} lightings want pictures with light, not {pictures.kind!r}: say --pictures fast")
-        drawn = pictures == data.drawn_pictures(name)
-        bake_all(lightings[1:] if drawn else lightings, load_catalogue(cache), cache, pictures.lit_by)
-    return lightings
-
-
 @dataclass(frozen=True)
 class StripSource:
     """The strips of a data set's houses, drawn so, kept in a folder."""
@@ -76,40 +59,30 @@ class StripSource:
     cache: Path
     picture_kind: str | None = None
     """As `pictures_of` takes it."""
-    lights: int = 1
-    """Lightings that every house is seen in; the first is its own."""
     share: float = 1.0
     """Share of the viewpoints of each house that is drawn, in regular steps."""
 
     def strips(
         self, names: Sequence[str], *, workers: int = 1, note: Callable[[str], None] = print
     ) -> list[HouseStrips]:
-        """The strips of houses, those of one house's lightings together, drawn where they are missing.
-
-        Raises:
-          ValueError: several lightings of pictures without light.
-        """
+        """The strips of houses, drawn where they are missing."""
         data = Dataset(self.data)
-        missing = [n for n in names if not all(p.exists() for p in self._paths(data, n))]
-        jobs = (joblib.delayed(self._draw)(n) for n in missing)
+        jobs = (joblib.delayed(self._draw)(n) for n in names if not self._path(data, n).exists())
         for name in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
             note(f"drawn: {name}")
-        return [HouseStrips.load(p) for n in names for p in self._paths(data, n)]
+        return [HouseStrips.load(self._path(data, n)) for n in names]
 
-    def _paths(self, data: Dataset, name: str) -> list[Path]:
-        """Where the strips of a house are, in its own light and in others."""
+    def _path(self, data: Dataset, name: str) -> Path:
+        """Where the strips of a house are."""
         part = "" if self.share == 1 else f"_{self.share:.4f}"
         folder = self.folder / f"{drawing(pictures_of(data, name, self.picture_kind))}{part}"
-        return [folder / f"{lit_name(name, k)}.npz" for k in range(self.lights)]
+        return folder / f"{name}.npz"
 
     def _draw(self, name: str) -> str:
         data = Dataset(self.data)
         pictures, classes = pictures_of(data, name, self.picture_kind), all_classes(load_catalogue(self.cache))
-        lightings = baked_lightings(data, name, self.lights, self.cache, pictures)
-        for lit, path in zip(lightings, self._paths(data, name), strict=True):
-            if not path.exists():
-                with drawn_world(data, name, self.cache, pictures, lit) as world:
-                    count = len(world.graph.positions)
-                    nodes = np.linspace(0, count - 1, math.ceil(self.share * count)).astype(int)
-                    look(world, classes, nodes).save(path)
+        with drawn_world(data, name, self.cache, pictures) as world:
+            count = len(world.graph.positions)
+            nodes = np.linspace(0, count - 1, math.ceil(self.share * count)).astype(int)
+            look(world, classes, nodes).save(self._path(data, name))
         return name

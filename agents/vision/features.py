@@ -1,8 +1,8 @@
 """From panoramas to the 36 x D features per node of appendix D.1, and their files.
 
-A feature file belongs to one house in one light, one encoder and one way of drawing, and says so: `<folder>/<encoder
-digest, 16 letters>/<drawing>/<house>.safetensors`, with `@k` after the house for its k-th other light. Row k of a node
-is view k of embodied.interface: turn k % 12 (counter-clockwise from +x), tilt k // 12 - 1.
+A feature file belongs to one house, one encoder and one way of drawing, and says so: `<folder>/<encoder digest, 16
+letters>/<drawing>/<house>.safetensors`. Row k of a node is view k of embodied.interface: turn
+k % 12 (counter-clockwise from +x), tilt k // 12 - 1.
 """
 
 from __future__ import annotations
@@ -15,12 +15,10 @@ import torch
 
 from embodied.agents.common.tensor_file import load_tensors, save_tensors
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.config import PLAIN, drawing, lit_name
+from embodied.agents.vision.config import PLAIN, drawing
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.strip import HEIGHT, VFOV
-from embodied.house.house import House
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
-from embodied.light import lightings_of
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings
 
@@ -86,24 +84,18 @@ def save_features(
 
 
 def load_features(
-    path: Path,
-    *,
-    encoder: str | None = None,
-    source: str | None = None,
-    pictures: PictureSettings | None = None,
-    lights: int = 1,
+    path: Path, *, encoder: str | None = None, source: str | None = None, pictures: PictureSettings | None = None
 ) -> tuple[np.ndarray, str]:
     """(n, 36, D) float16 features and the digest of their encoder.
 
     Args:
       encoder, source, pictures: what is expected, if anything.
-      lights: how many lightings of the house are wanted; errors say it.
 
     Raises:
       FileNotFoundError: there is no such file.
       ValueError: truncated, changed, of another format, encoder, house or way of drawing.
     """
-    path, command = Path(path), _command(pictures, lights)
+    path, command = Path(path), _command(pictures)
     remedy = f"make it again with `{command}`"
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; make it with `{command}`")
@@ -118,18 +110,18 @@ def load_features(
     return features.numpy(), about["encoder"]
 
 
-def has_features(path: Path, encoder: Encoder, house: House, pictures: PictureSettings) -> bool:
-    """Whether a file holds the features of a house by this encoder; False: missing, damaged, or of another house."""
+def has_features(path: Path, encoder: Encoder, source: str, pictures: PictureSettings) -> bool:
+    """True if a file holds the features of the house with the digest `source`; False: missing or damaged."""
     try:
-        load_features(path, encoder=encoder.digest, source=house.digest, pictures=pictures)
+        load_features(path, encoder=encoder.digest, source=source, pictures=pictures)
         return True
     except (FileNotFoundError, ValueError):
         return False
 
 
-def _command(pictures: PictureSettings | None, lights: int = 1) -> str:
+def _command(pictures: PictureSettings | None) -> str:
     picture_kind = "" if pictures is None or pictures.kind == PLAIN.kind else f" --pictures {pictures.kind}"
-    return f"embodied features{picture_kind}" + (f" --lights {lights}" if lights > 1 else "")
+    return f"embodied features{picture_kind}"
 
 
 def load_bank(
@@ -137,34 +129,27 @@ def load_bank(
     encoder: str | None = None,
     places: Mapping[str, Place] | None = None,
     pictures: Mapping[str, PictureSettings] | None = None,
-    lights: int = 1,
 ) -> FeatureBank:
     """The features of several worlds (name -> file); all must come from one encoder.
 
     Args:
       encoder: what is expected, if anything.
       places, pictures: whose features they should be, and how these are drawn, by name.
-      lights: lightings of every world, whose files lie beside those of its own light.
     """
-    lightings: list[dict[str, np.ndarray]] = []
-    digests = set()
-    for k in range(lights):
-        worlds = {}
-        for name in sorted(paths):
-            place = None if places is None else places[name]
-            source = None if place is None else lightings_of(place.house, k + 1)[k].digest
-            drawn = None if pictures is None else pictures[name]
-            path = paths[name].with_stem(lit_name(paths[name].stem, k))
-            worlds[name], digest = load_features(path, encoder=encoder, source=source, pictures=drawn, lights=lights)
-            if place is not None and len(worlds[name]) != len(place.graph.ids):
-                raise ValueError(
-                    f"{path}: {len(worlds[name])} nodes, {name!r} has {len(place.graph.ids)}; "
-                    f"make it again with `{_command(drawn, lights)}`"
-                )
-            digests.add(digest)
-        lightings.append(worlds)
+    worlds, digests = dict[str, np.ndarray](), set()
+    for name, path in sorted(paths.items()):
+        place = None if places is None else places[name]
+        source = None if place is None else place.house.digest
+        drawn = None if pictures is None else pictures[name]
+        worlds[name], digest = load_features(path, encoder=encoder, source=source, pictures=drawn)
+        if place is not None and len(worlds[name]) != len(place.graph.ids):
+            raise ValueError(
+                f"{path}: {len(worlds[name])} nodes, {name!r} has {len(place.graph.ids)}; "
+                f"make it again with `{_command(drawn)}`"
+            )
+        digests.add(digest)
     if len(digests) > 1:
         raise ValueError(
             f"features come from the encoders {sorted(d[:12] for d in digests)}; make them all with one encoder"
         )
-    return FeatureBank(lightings[0], digests.pop(), lightings[1:])
+    return FeatureBank(worlds, digests.pop())

@@ -15,11 +15,11 @@ from embodied.agents.common.settings import EvaluationSettings, ImitationSetting
 from embodied.agents.common.sighted import About
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.config import drawing
+from embodied.agents.vision.capture import with_goal_images
+from embodied.agents.vision.config import CAPTURE_CONDITIONS, drawing
 from embodied.agents.vision.drawn import pictures_of
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.features import feature_path, load_bank
-from embodied.agents.vision.occasions import OCCASIONS, showing
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
@@ -45,24 +45,15 @@ class Lessons:
     picture_kind: str | None = None
     """Of the pictures that the features come from, as in embodied.agents.vision.run.pictures_of."""
     device: str = "cpu"
-    shown: str = "same"
-    """When the pictures that helpers show were taken, one of embodied.agents.vision.occasions.OCCASIONS."""
+    goal_image: str = "same"
+    """How the pictures that helpers show were taken, one of embodied.agents.vision.config.CAPTURE_CONDITIONS."""
     cache: Path = field(default_factory=default_cache)
     """Where the furniture is, for other pictures than the agent sees."""
 
     def split(
-        self,
-        name: str,
-        *,
-        limit: int | None = None,
-        houses: int | None = None,
-        vnla: str = AS_PUBLISHED,
-        lights: int = 1,
+        self, name: str, *, limit: int | None = None, houses: int | None = None, vnla: str = AS_PUBLISHED
     ) -> Split:
         """At most `limit` tasks of a split, from its first `houses` houses; `vnla` as in Dataset.split.
-
-        Args:
-          lights: lightings of every house that the bank can show.
 
         Raises:
           ValueError: more houses than there are.
@@ -75,9 +66,10 @@ class Lessons:
         pictures = {n: pictures_of(data, n, kind) for n in split.worlds}
         paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
         tasks = split.tasks if limit is None else spread(split.tasks, limit)
-        bank = load_bank(paths, encoder, split.worlds, pictures, lights).to(self.device)
-        shown = showing(bank, data, list(split.worlds), OCCASIONS[self.shown], encoder, self.cache, kind)
-        return Split(split.worlds, tasks, split.make_env, shown)
+        bank = load_bank(paths, encoder, split.worlds, pictures).to(self.device)
+        condition = CAPTURE_CONDITIONS[self.goal_image]
+        bank = with_goal_images(bank, data, list(split.worlds), condition, encoder, self.cache, kind)
+        return Split(split.worlds, tasks, split.make_env, bank)
 
     def said_by(self, novelty: str) -> Lessons:
         """The same with routes as somebody of a novelty describes them."""
@@ -89,7 +81,7 @@ class Lessons:
 
     def identity(self) -> dict[str, str]:
         """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""
-        shown = {} if self.shown == "same" else {"shown": self.shown}
+        shown = {} if self.goal_image == "same" else {"shown": self.goal_image}
         return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train"), **shown}
 
     def about(self, kind: type[A], config: ImitationSettings, evaluation: EvaluationSettings, words: Vocabulary) -> A:

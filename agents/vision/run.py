@@ -12,24 +12,21 @@ from pathlib import Path
 
 import numpy as np
 
-from embodied.agents.common.parallel import check_device, use_threads
+from embodied.agents.common.parallel import check_device
 from embodied.agents.common.session import Note
-from embodied.agents.vision.config import StripTraining, VisionConfig, drawing, lit_name
+from embodied.agents.vision.config import StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import train_detector
-from embodied.agents.vision.drawn import StripSource, baked_lightings, drawn_world, houses_of, pictures_of
+from embodied.agents.vision.drawn import StripSource, houses_of, pictures_of
 from embodied.agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
-from embodied.agents.vision.features import encode_panoramas, feature_path, has_features, save_features
+from embodied.agents.vision.extract import Extractor
 from embodied.agents.vision.labels import HouseStrips
-from embodied.agents.vision.occasions import Occasion, make_shown
 from embodied.agents.vision.probe import as_numbers, labelled, read
 from embodied.agents.vision.training import save_training, train_encoder, trained_classes, whitened
 from embodied.assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
 from embodied.identity import Identity, identity_of
-from embodied.light import lightings_of
 from embodied.locks import locked
-from embodied.render.pictures import PictureSettings
 
 
 def train_vision(
@@ -90,7 +87,7 @@ def detector_for(
     names = training_houses(data, config)
     further = _further(data, Dataset(also.data)) if also else []
     with locked(out):
-        in_light = dataclasses.replace(source, picture_kind="fast", lights=1)
+        in_light = dataclasses.replace(source, picture_kind="fast")
         seen = source.strips(names, workers=workers, note=note)
         seen += in_light.strips(names[:lit], workers=workers, note=note)
         if also:
@@ -164,100 +161,22 @@ def encoder_of(path: Path, network: str | None = None) -> Encoder:
 
 
 def make_features(
-    folder: Path,
-    encoder: Encoder,
-    cache: Path,
-    *,
-    picture_kind: str | None = None,
-    splits: Sequence[str] = (),
-    first: int | None = None,
-    lights: int = 1,
-    threads: int = 1,
-    workers: int = 1,
-    ray: str | None = None,
-    shown: Sequence[Occasion] = (),
-    note: Note = print,
+    extract: Extractor, names: Sequence[str], *, workers: int = 1, ray: str | None = None, note: Note = print
 ) -> None:
-    """Features of every house of a data set, in so many lightings; houses that have them, from pictures drawn so, are
-    skipped.
+    """Extract the missing features of some houses.
 
     Args:
-      picture_kind: as embodied.agents.vision.drawn.pictures_of takes it.
-      splits: of whose houses; none for all.
-      first: so many houses of each split.
       ray: address of a Ray cluster to use instead of `workers`.
-      shown: when the pictures that helpers show were taken, of which there are to be features, too.
-
-    Raises:
-      ValueError: several lightings of pictures without light.
     """
-    data = Dataset(folder)
-    names = houses_of(data, splits or data.splits, first)
-    wanted = {n: pictures_of(data, n, picture_kind) for n in names}
-    houses = {n: lightings_of(data.place(n).house, lights) for n in names}
-    missing = [
-        (n, pictures)
-        for n, pictures in wanted.items()
-        if not all(
-            has_features(_path_of(data, n, k, encoder, pictures), encoder, lit, pictures)
-            for k, lit in enumerate(houses[n])
-        )
-    ]
 
     def watch(lines: Iterable[str], total: int) -> Iterable[str]:
         for line in lines:
             note(line)
             yield line
 
-    common = (data.folder.resolve(), encoder, cache, threads)
-    for_each_unit(_make_features, missing, (*common, lights), workers=workers, watch=watch, ray_address=ray)
-    others = tuple(at for at in shown if at != Occasion())
-    if others:
-        for_each_unit(
-            _make_shown, list(wanted.items()), (*common, others), workers=workers, watch=watch, ray_address=ray
-        )
-    note(f"{len(missing)} of {len(wanted)} houses made, {_ways(wanted.values())}, encoder {encoder.digest[:16]}")
-
-
-def _ways(pictures: Iterable[PictureSettings]) -> str:
-    """'pictures: 40 fast_256, 2 unlit_192'."""
-    count = Counter(drawing(p) for p in pictures)
-    return "pictures: " + ", ".join(f"{n} {way}" for way, n in sorted(count.items()))
-
-
-def _path_of(data: Dataset, name: str, lighting: int, encoder: Encoder, pictures: PictureSettings) -> Path:
-    return feature_path(data.folder / "features", encoder.digest, lit_name(name, lighting), pictures)
-
-
-def _make_features(
-    unit: tuple[str, PictureSettings], folder: Path, encoder: Encoder, cache: Path, threads: int, lights: int
-) -> str:
-    """The features of one house (name, how it is drawn) into the data set's folder; returns what was done."""
-    use_threads(threads)
-    (name, pictures), data, nodes = unit, Dataset(folder), 0
-    for k, lit in enumerate(baked_lightings(data, name, lights, cache, pictures)):
-        path = _path_of(data, name, k, encoder, pictures)
-        if has_features(path, encoder, lit, pictures):
-            continue
-        with drawn_world(data, name, cache, pictures, lit) as world:
-            if pictures.traced:
-                world.render_all()  # kept for the next encoder: they cost minutes a house
-            panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
-            save_features(path, encode_panoramas(encoder, panoramas), encoder, world.house.digest, pictures)
-            nodes += len(world.graph.positions)
-    return f"{name}: {nodes} nodes, {pictures.kind} pictures of {pictures.size} pixels"
-
-
-def _make_shown(
-    unit: tuple[str, PictureSettings],
-    folder: Path,
-    encoder: Encoder,
-    cache: Path,
-    threads: int,
-    occasions: Sequence[Occasion],
-) -> str:
-    """The features of what helpers show of one house (name, how it is drawn); returns what was done."""
-    use_threads(threads)
-    name, pictures = unit
-    made = make_shown(Dataset(folder), name, occasions, encoder, cache, pictures)
-    return f"{name}: {len(made)} of {len(occasions)} kinds of pictures made that are shown"
+    missing = [n for n in names if extract.missing(n)]
+    for_each_unit(extract, missing, (), workers=workers, watch=watch, ray_address=ray)
+    data = Dataset(extract.data)
+    count = Counter(drawing(pictures_of(data, n, extract.picture_kind)) for n in names)
+    ways = ", ".join(f"{n} {way}" for way, n in sorted(count.items()))
+    note(f"{len(missing)} of {len(names)} houses made, pictures: {ways}, encoder {extract.encoder.digest[:16]}")

@@ -189,12 +189,12 @@ class EncoderStudy(StudyLearner):
 
     def _drawn(self) -> dict[str, object]:
         return {
-            "data": Dataset(self.source.data).digest, "pictures": self.source.picture_kind, "lights": self.source.lights
+            "data": Dataset(self.source.data).digest, "pictures": self.source.picture_kind
         }  # fmt: skip
 
     def _source(self, way: str) -> StripSource:
         """Pictures as they learned from, or drawn otherwise."""
-        return dataclasses.replace(self.source, picture_kind=way, lights=1) if way else self.source
+        return dataclasses.replace(self.source, picture_kind=way) if way else self.source
 
 
 def _shown(name: str, houses: Sequence[HouseStrips]) -> bool:

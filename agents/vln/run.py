@@ -106,7 +106,7 @@ def train_follower(
       ValueError: spoken_share without a speaker.
     """
     heard = lessons.said_by(FAMILIAR) if config.speakers == FAMILIAR else lessons
-    training = heard.split("train", houses=config.training_houses or None, lights=config.lights)
+    training = heard.split("train", houses=config.training_houses or None)
     validation = heard.split("val_unseen", limit=config.validation_tasks)
     if config.more_paths:
         training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(lessons, training, config)])

@@ -13,7 +13,6 @@ TRAINED_UNDER: Mapping[str, str] = {
     "indirect": "direct",
     "direct": "direct",
     "direct-mute": "direct-mute",
-    "goal-aware": "goal-aware",
     "algorithm-6": "algorithm-6",
 }
 """Rule of play that an agent is judged under, to that which it is trained under: in training the advisor's actions
@@ -55,7 +54,7 @@ class VnlaSettings(ImitationSettings):
     blind: bool = False
     """Ablation without vision: all features are zero."""
     rules: str = "indirect"
-    """Rule of play in evaluation: indirect, direct, direct-mute, goal-aware or algorithm-6."""
+    """Rule of play in evaluation: indirect, direct, direct-mute or algorithm-6."""
     validate_every: int = 1000
     """Updates between validations."""
 

@@ -30,10 +30,10 @@ from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from embodied.agents.vnla.policy import VnlaMoment, for_training
 from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset
-from embodied.envs.vnla import teacher_of
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode
 from embodied.language.plain import PlainLanguage
+from embodied.teachers.vnla import VnlaTeacher
 
 
 class VnlaLearner(imitation.Learner):
@@ -42,7 +42,7 @@ class VnlaLearner(imitation.Learner):
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
         super().__init__(agent, training)
         config = self.config
-        teacher = teacher_of(TRAINED_UNDER[config.rules], rules_of(config))
+        teacher = VnlaTeacher(rules=rules_of(config))
         self._player = for_training(agent.policy(training.bank), teacher, config.environment_dropout)
 
     def player(self, update: int, bank: FeatureBank) -> Agent:
@@ -93,7 +93,7 @@ def train_agent(
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
     houses = config.training_houses or None
-    training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules], lights=config.lights)
+    training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules])
     validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
     words = vocabulary_of(lessons.data, houses, lessons.rewording(config))
     agent = VnlaAgent.new(lessons.about(VnlaAbout, config, evaluation, words), words.reword)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from embodied.cli.common import Furnished, Printed
-from embodied.cli.learning import SHOWN, Encoded, Threaded
+from embodied.cli.learning import GOAL_IMAGES, Encoded, Threaded
 from embodied.cli.model import WithModel
 from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
-VNLA_RULES = ("indirect", "direct", "direct-mute", "goal-aware", "algorithm-6")
+VNLA_RULES = ("indirect", "direct", "direct-mute", "algorithm-6")
 """As in embodied.envs.vnla, which --help should not import."""
 SEES = ("names", "strip", "panorama", "nothing")
 TEMPLATE = "template"
@@ -38,7 +38,7 @@ class TaskOptions:
     """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
     rules: Annotated[str, Option(words=VNLA_RULES)] = VNLA_RULES[0]
     """VNLA's rule of play: help in words (indirect), the advisor acts and says it (direct) or does not (direct-mute),
-    the program's 'forward' (goal-aware), Algorithm 6 as printed."""
+    Algorithm 6 as printed."""
     seeds: InputPath | None = None
     """ask: seeds of the houses, one per line."""
     unseen_classes: bool = False
@@ -62,7 +62,7 @@ class OfTrained:
     rows: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
     """Rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' where
     other agents are named)."""
-    shown: Annotated[str, Option(words=SHOWN)] = "same"
+    goal_image: Annotated[str, Option(words=GOAL_IMAGES)] = "same"
     """How goal images differ from what the agent sees there; same: not at all; camera: taken by a robot's camera; hour:
     at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
     another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees."""

@@ -52,8 +52,8 @@ def evaluate_trained(
     from embodied.agents.common.parallel import use_threads
     from embodied.agents.common.weights import weights_digest
     from embodied.agents.studies.episodes import JUDGES, evaluate_frozen
+    from embodied.agents.vision.config import CAPTURE_CONDITIONS
     from embodied.agents.vision.drawn import pictures_of
-    from embodied.agents.vision.occasions import OCCASIONS
     from embodied.identity import identity_of
 
     use_threads(args.threads)
@@ -74,7 +74,7 @@ def evaluate_trained(
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}
     facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
-    facts |= {"shown": dataclasses.asdict(OCCASIONS[args.shown]), "identity": identity_of(*JUDGES)}
+    facts |= {"goal_image": dataclasses.asdict(CAPTURE_CONDITIONS[args.goal_image]), "identity": identity_of(*JUDGES)}
     return found, facts
 
 
@@ -158,8 +158,8 @@ def _lessons(args: Options, data: Dataset) -> Lessons:
     from embodied.agents.vision.lessons import Lessons
     from embodied.agents.vision.run import encoder_of
 
-    encoder, shown = encoder_of(args.encoder, args.network), args.shown if args.kind == "hanna" else "same"
-    return Lessons(data, encoder, args.pictures, shown=shown, cache=args.cache)
+    encoder, goal_image = encoder_of(args.encoder, args.network), args.goal_image if args.kind == "hanna" else "same"
+    return Lessons(data, encoder, args.pictures, goal_image=goal_image, cache=args.cache)
 
 
 def record_trained(args: Options, data: Dataset, run: Path, first: int) -> None:

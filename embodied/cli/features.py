@@ -10,20 +10,20 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from embodied.cli.common import note
-from embodied.cli.learning import SHOWN, Encoded, Lit, WithData, WithDevice
+from embodied.cli.learning import GOAL_IMAGES, Encoded, WithData, WithDevice
 from embodied.options import Count, Option
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(WithData, Encoded, Lit, WithDevice):
+class FeatureOptions(WithData, Encoded, WithDevice):
     threads: Count = 2
     workers: Count = 1
     """Process N houses in parallel."""
     split: tuple[Annotated[str, Option(metavar="SPLIT")], ...] = ()
     """Use the houses of these splits (default: all)."""
-    houses: Count | None = None
+    first: Count | None = None
     """Use the first N houses of each split (default: all)."""
-    shown: tuple[Annotated[str, Option(words=SHOWN)], ...] = ()
+    goal_image: tuple[Annotated[str, Option(words=GOAL_IMAGES)], ...] = ()
     """Also make features of goal images that differ from what the agent sees there: camera: taken by a robot's camera;
     hour: at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
     another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees; same: identical."""
@@ -31,23 +31,20 @@ class Options(WithData, Encoded, Lit, WithDevice):
     """Use a Ray cluster instead: its address, or 'local'."""
 
 
-def run(args: Options) -> None:
+Options = FeatureOptions
+
+
+def run(args: FeatureOptions) -> None:
     from embodied.agents.common.parallel import check_device
-    from embodied.agents.vision.occasions import OCCASIONS
+    from embodied.agents.vision.config import CAPTURE_CONDITIONS
+    from embodied.agents.vision.drawn import houses_of
+    from embodied.agents.vision.extract import Extractor
     from embodied.agents.vision.run import encoder_of, make_features
+    from embodied.datasets.store import Dataset
 
     check_device(args.device)
-    make_features(
-        args.data,
-        encoder_of(args.encoder, args.network).to(args.device),
-        args.cache,
-        picture_kind=args.pictures,
-        splits=args.split,
-        first=args.houses,
-        lights=args.lights,
-        threads=args.threads,
-        workers=args.workers,
-        ray=args.ray,
-        shown=[OCCASIONS[word] for word in args.shown],
-        note=note,
-    )
+    data, encoder = Dataset(args.data), encoder_of(args.encoder, args.network).to(args.device)
+    conditions = tuple(CAPTURE_CONDITIONS[word] for word in ("same", *args.goal_image))
+    extract = Extractor(data.folder.resolve(), encoder, args.cache, args.pictures, conditions, args.threads)
+    names = houses_of(data, args.split or data.splits, args.first)
+    make_features(extract, names, workers=args.workers, ray=args.ray, note=note)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
-from embodied.agents.vision.config import RENDER_PRESETS, TORCHVISIONS
+from embodied.agents.vision.config import CAPTURE_CONDITIONS, RENDER_PRESETS, TORCHVISIONS
 from embodied.options import (
     PICTURE_HELP,
     Cached,
@@ -24,8 +24,7 @@ from embodied.options import (
 
 PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
 PRESETS = Option(words=tuple(RENDER_PRESETS), metavar="KIND")
-SHOWN = ("same", "camera", "hour", "day", "day-camera", "day-view", "later", "later-camera", "later-view")
-"""As in embodied.agents.vision.occasions, which --help should not import."""
+GOAL_IMAGES = tuple(CAPTURE_CONDITIONS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,9 +55,9 @@ class Encoded(EncoderFile):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shown:
-    shown: Annotated[str, Option(words=SHOWN)] = "same"
-    """How the goal images of training differ from what the agent sees, as in `embodied features --shown`."""
+class WithGoalImage:
+    goal_image: Annotated[str, Option(words=GOAL_IMAGES)] = "same"
+    """How the goal images of training differ from what the agent sees, as in `embodied features --goal-image`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,12 +94,6 @@ class Run(WithData, Timed):
     """Run folder; rerun the command to resume an interrupted run."""
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lit:
-    lights: Count = 1
-    """Render every house under N lightings: its own, and random hours, weathers and lamps."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,10 +55,10 @@ from embodied.cli.learning import (
     EncoderFile,
     NamedFiles,
     Nav,
-    Shown,
     Threaded,
     WithData,
     WithDevice,
+    WithGoalImage,
     by_name,
 )
 from embodied.cli.model import WithModel, client_of
@@ -118,7 +118,7 @@ class JudgeSeed:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, WithDevice, Shown):
+class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, WithDevice, WithGoalImage):
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
@@ -130,7 +130,7 @@ class HannaOptions(Study, Trained, Judged, JudgeSeed, WithData, EncoderFile, Wit
     """Evaluate in the unseen houses of another data set that has features (default: of --data)."""
     begin: InputPath | None = None
     """Initialise with the weights of this agent."""
-    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES, skip=("training_houses", "lights"))]
+    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES, skip=("training_houses",))]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
 
@@ -144,7 +144,7 @@ class FindOptions(Study, Trained, WithData, EncoderFile):
 
     judged_tasks: Count = 50
     """Evaluate on at most N tasks of each unseen house."""
-    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=("lights", *WORDLESS))]
+    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=WORDLESS)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,7 +325,7 @@ def vision(args: VisionOptions) -> int:
     from embodied.agents.vision.study import EncoderStudy
 
     check_device(args.device)
-    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
+    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures)
     ready = by_name(args.encoders)
     return run_table(args, study_of(EncoderStudy, args, source=source, pictures=args.test_pictures, ready=ready))
 

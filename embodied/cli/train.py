@@ -29,14 +29,13 @@ from embodied.cli.learning import (
     Drawn,
     Encoded,
     EncoderFile,
-    Lit,
     Nav,
     Run,
-    Shown,
     Threaded,
     Timed,
     WithData,
     WithDevice,
+    WithGoalImage,
 )
 from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder, Settings, part, whole
 
@@ -52,7 +51,7 @@ VNLA_WORDS = {"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRA
 
 
 @dataclass(frozen=True, kw_only=True)
-class Strips(Lit, Drawn, WithDevice):
+class Strips(Drawn, WithDevice):
     strips: OutputFolder | None = None
     """Folder for strips of views, to share them between runs (default: OUT/strips)."""
 
@@ -102,7 +101,7 @@ class Recorded:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainHanna(Recorded, Run, Encoded, WithDevice, Shown):
+class TrainHanna(Recorded, Run, Encoded, WithDevice, WithGoalImage):
     """The agent, on a HANNA data set with features.
 
     Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
@@ -203,7 +202,7 @@ def train_vision(args: TrainVision) -> None:
     from embodied.agents.vision.drawn import StripSource
     from embodied.agents.vision.run import train_vision
 
-    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures, args.lights)
+    source = StripSource(args.data, args.strips or args.out / "strips", args.cache, args.pictures)
     train_vision(source, args.config, args.out, device=args.device, workers=args.workers, note=note)
 
 
@@ -214,7 +213,7 @@ def train_detector(args: TrainDetector) -> None:
     from embodied.datasets.store import Dataset
 
     strips = args.strips or args.out / "strips"
-    source = StripSource(args.data, strips, args.cache, args.pictures, args.lights)
+    source = StripSource(args.data, strips, args.cache, args.pictures)
     also = None
     if args.also:
         folder = strips / Dataset(args.also).digest[:12]  # houses of both have the same names
@@ -267,7 +266,7 @@ def _lessons(args: TrainHanna | TrainVnla | TrainFollower | TrainSpeaker, kind: 
     from embodied.datasets.store import dataset_of
 
     encoder = encoder_of(args.encoder, args.network)
-    data, shown = dataset_of(args.data, kind), args.shown if isinstance(args, TrainHanna) else "same"
+    data, shown = dataset_of(args.data, kind), args.goal_image if isinstance(args, TrainHanna) else "same"
     device = "cpu" if isinstance(args, TrainSpeaker) else join_launcher(args.device)
     return Lessons(data, encoder, args.pictures, device, shown, args.cache)
 

@@ -17,9 +17,10 @@ from embodied.envs.ask import AskEnv, AskSettings
 from embodied.envs.base import HelpEnv
 from embodied.envs.hanna import HannaEnv
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
-from embodied.envs.vnla import RULES, check_rules, fitted, teacher_of
+from embodied.envs.vnla import RULES, check_rules, fitted
 from embodied.interface import Assistant, Language, Place, Route, Task
 from embodied.language.plain import PlainLanguage
+from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
@@ -68,7 +69,7 @@ def environment_maker(
         moves = PanoramicMoves()
         return lambda: HannaEnv(worlds, anna, moves)
     if kind == "vnla":
-        teacher, rule = teacher_of(vnla), RULES[vnla]
+        teacher, rule = VnlaTeacher(), RULES[vnla]
         advisor = assistant or Advisor(teacher, language or PlainLanguage())
         return lambda: rule(worlds, advisor, teacher.moves)
     if kind == "hari":
@@ -151,5 +152,4 @@ def tasks_under(
         return tuple(dataclasses.replace(t, horizon=hari.horizon) for t in tasks)
     if kind != "vnla" or vnla == AS_PUBLISHED:
         return tuple(tasks)
-    teacher = teacher_of(vnla)
-    return tuple(fitted(t, worlds[t.world], vnla, teacher) for t in tasks)
+    return tuple(fitted(t, vnla) for t in tasks)

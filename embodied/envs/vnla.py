@@ -6,28 +6,9 @@ import dataclasses
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
-from embodied.action_spaces import WORDS, Reach, directions
+from embodied.action_spaces import WORDS
 from embodied.envs.base import HelpEnv, required
-from embodied.geometry import wrap
-from embodied.interface import (
-    STEP,
-    Action,
-    Ask,
-    Intention,
-    Mode,
-    Move,
-    Observation,
-    Place,
-    Pose,
-    Reply,
-    Situation,
-    Stop,
-    Task,
-)
-from embodied.navigation.graph import nearest
-from embodied.teachers.vnla import AskRules, GoalAwareTeacher, VnlaTeacher
+from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Reply, Situation, Stop, Task
 
 
 class VnlaEnv(HelpEnv):
@@ -50,29 +31,6 @@ class VnlaEnv(HelpEnv):
         self.instruction = f"{reply.text} . {self.task.request}"
         self.subtask = reply.subtask
         self.time_on_task = 0
-
-
-class GoalAwareVnlaEnv(VnlaEnv):
-    """VNLA with the program's 'forward' (docs/sources.md, S44): it prefers the next node of the optimal path.
-
-    That tells the agent something about the goal whenever it goes forward, at test time too; it
-    is here for comparison with the published numbers. Its teacher is GoalAwareTeacher.
-    """
-
-    def _reachable(self) -> Reach:
-        candidates, poses = super()._reachable()
-        graph, pose = self.world.graph, self.pose
-        goal = nearest(graph, pose.node, self.task.goal_nodes)
-        nodes, yaw, _pitch = directions(graph, pose.node)
-        wanted = np.flatnonzero(nodes == int(graph.next_hop[pose.node, goal]))
-        if goal == pose.node or not len(wanted):
-            return candidates, poses
-        i = int(wanted[0])
-        if abs(wrap(yaw[i] - pose.yaw)) > STEP + 1e-9:
-            return candidates, poses
-        allowed = candidates.allowed.copy()
-        allowed[0] = True
-        return dataclasses.replace(candidates, allowed=allowed), (Pose(int(nodes[i]), pose.turn, pose.tilt), *poses[1:])
 
 
 class DirectVnlaEnv(VnlaEnv):
@@ -131,26 +89,9 @@ RULES: Mapping[str, type[HelpEnv]] = {
     "indirect": VnlaEnv,
     "direct": DirectVnlaEnv,
     "direct-mute": MuteDirectVnlaEnv,
-    "goal-aware": GoalAwareVnlaEnv,
     "algorithm-6": Algorithm6Env,
 }
 """Rules of play by the names that commands know them by; the first is the program's with help in words."""
-
-
-ALL_RULES = AskRules()
-
-
-def teacher_of(rules: str, asking: AskRules = ALL_RULES) -> VnlaTeacher:
-    """The teacher of a rule of play.
-
-    Args:
-      asking: when it would ask.
-
-    Raises:
-      ValueError: an unknown rule.
-    """
-    check_rules(rules)
-    return GoalAwareTeacher(rules=asking) if rules == "goal-aware" else VnlaTeacher(rules=asking)
 
 
 def check_rules(rules: str) -> None:
@@ -159,19 +100,8 @@ def check_rules(rules: str) -> None:
         raise ValueError(f"unknown rules {rules!r} of VNLA; use one of {sorted(RULES)}")
 
 
-def fitted(task: Task, world: Place, rules: str, teacher: VnlaTeacher) -> Task:
-    """The task with time enough under a rule of play (docs/sources.md, S111).
-
-    Algorithm 6 takes a step for every request and one to come back from every sub-task; the teacher of the goal-aware
-    rule may need more actions than ours. The budget is left as it is.
-    """
-    horizon = task.horizon
-    if rules == "algorithm-6":
-        horizon += 2 * math.ceil(task.budget or 0)
-    elif rules == "goal-aware":
-        horizon = max(horizon, len(teacher.words(world, task.start, task.goal_nodes, LONGEST)[0]))
-    return dataclasses.replace(task, horizon=horizon)
-
-
-LONGEST = 200
-"""Actions after which a teacher's walk is given up; no house is that large."""
+def fitted(task: Task, rules: str) -> Task:
+    """The task with time enough under a rule of play: Algorithm 6 takes a step for every request and one to come back
+    from every sub-task (docs/sources.md, S111)."""
+    more = 2 * math.ceil(task.budget or 0) if rules == "algorithm-6" else 0
+    return dataclasses.replace(task, horizon=task.horizon + more)

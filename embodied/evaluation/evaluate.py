@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from embodied.envs.make import AS_PUBLISHED
-from embodied.envs.vnla import teacher_of
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
 from embodied.interface import Agent, Episode, SeenPlace, Task
@@ -24,6 +23,7 @@ from embodied.policies.baselines import (
     never_ask,
 )
 from embodied.policies.listeners import ListeningInterpreter, ScriptedListener
+from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from embodied.datasets.store import SplitData
@@ -41,8 +41,8 @@ AGENTS: Mapping[str, Mapping[str, Callable[[], Agent]]] = {
     },
     "vnla": {
         "random walk": RandomWalk,
-        "shortest": lambda: Shortest(teacher_of(AS_PUBLISHED)),
-        "shortest, random": lambda: VnlaAsking(Shortest(teacher_of(AS_PUBLISHED)), "random"),
+        "shortest": lambda: Shortest(VnlaTeacher()),
+        "shortest, random": lambda: VnlaAsking(Shortest(VnlaTeacher()), "random"),
         "listener, none": lambda: VnlaAsking(SubgoalListener(), "none"),
         "listener, first": lambda: VnlaAsking(SubgoalListener(), "first"),
         "listener, random": lambda: VnlaAsking(SubgoalListener(), "random"),
@@ -80,7 +80,7 @@ def agent(kind: str, name: str, worlds: Mapping[str, SeenPlace] | None = None, r
       >>> agent = embodied.baseline('hanna', 'shortest')
     """
     if (kind, name) == ("vnla", "shortest"):
-        return Shortest(teacher_of(rules))
+        return Shortest(VnlaTeacher())
     if name in AGENTS[kind]:
         return AGENTS[kind][name]()
     if name not in LOOKING.get(kind, {}):

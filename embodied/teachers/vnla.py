@@ -11,10 +11,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from embodied.action_spaces import WORDS, MonocularMoves, directions
-from embodied.geometry import wrap
+from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.interface import (
-    STEP,
     TURNS,
     VIEWS,
     Ask,
@@ -32,7 +30,7 @@ from embodied.interface import (
 from embodied.navigation.graph import nearest
 
 if TYPE_CHECKING:
-    from embodied.navigation.graph import NavGraph
+    pass
 
 ACTION = 1e-3
 """Metres that one action weighs in planning: the shortest walk first, the fewest actions second."""
@@ -163,27 +161,6 @@ def pose_of(state: int) -> Pose:
     return Pose(node, view % TURNS, view // TURNS - 1)
 
 
-def stepwise_action(graph: NavGraph, pose: Pose, goals: Sequence[int]) -> str:
-    """The authors' teacher (docs/sources.md, S49): level, turn, tilt, then 'forward'; for the goal-aware 'forward'.
-
-    Returns:
-      One of WORDS, or 'stop'.
-    """
-    goal = nearest(graph, pose.node, goals)
-    if goal == pose.node:
-        return "stop"
-    nodes, yaw, pitch = directions(graph, pose.node)
-    i = int(np.flatnonzero(nodes == int(graph.next_hop[pose.node, goal]))[0])
-    bearing, slope = float(wrap(yaw[i] - pose.yaw)), float(pitch[i] - pose.pitch)
-    if abs(bearing) > STEP:
-        return "left" if bearing > 0 else "right"
-    if slope > STEP and pose.tilt < 1:
-        return "up"
-    if slope < -STEP and pose.tilt > -1:
-        return "down"
-    return "forward"
-
-
 @dataclass(frozen=True)
 class AskRules:
     """Thresholds of the help-request teacher (docs/sources.md, S50)."""
@@ -298,27 +275,3 @@ class VnlaTeacher:
             requests += asked
             time += not asked
         return tuple(labels)
-
-
-class GoalAwareTeacher(VnlaTeacher):
-    """The authors' teacher (docs/sources.md, S49), for the 'forward' that knows the goal (S44)."""
-
-    def words(self, world: Place, pose: Pose, goals: tuple[int, ...], most: int) -> tuple[tuple[str, ...], Pose]:
-        words: list[str] = []
-        while len(words) < most and (not words or words[-1] != "stop"):
-            words.append(stepwise_action(world.graph, pose, goals))
-            pose = self._after(world, pose, words[-1], goals)
-        return tuple(words), pose
-
-    def reference(self, situation: Situation) -> Move | Stop:
-        word = stepwise_action(situation.world.graph, situation.pose, situation.targets)
-        return Stop() if word == "stop" else Move(WORDS.index(word))
-
-    def _after(self, world: Place, pose: Pose, word: str, goals: Sequence[int]) -> Pose:
-        """The pose after a word of its own, which says 'forward' only where the next node of the way is ahead."""
-        if word == "stop":
-            return pose
-        if word == "forward":
-            goal = nearest(world.graph, pose.node, goals)
-            return Pose(int(world.graph.next_hop[pose.node, goal]), pose.turn, pose.tilt)
-        return self.moves.at(world, pose)[1][WORDS.index(word)]
