@@ -258,7 +258,8 @@ def _build_record(kind: type, value: object, where: str) -> typing.Any:
         if n not in value and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
     )
     if unknown or missing:
-        raise RecordError(f"{where}: unknown fields {unknown}, missing fields {missing}; it may hold {list(names)}")
+        wrong = [f"lacks the fields {missing}"] * bool(missing) + [f"has the unknown fields {unknown}"] * bool(unknown)
+        raise RecordError(f"{where} {' and '.join(wrong)}; it may hold {list(names)}")
     if "is" in value and value["is"] != kind.__name__:
         raise RecordError(f"{where} should be a {kind.__name__}, it says that it is {shown(value['is'])}")
     hints = _hints(kind)

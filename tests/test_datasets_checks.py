@@ -94,7 +94,7 @@ def test_a_file_that_was_changed_is_noticed(file, folder):
         (lambda t: t.update(radius=-1.0), "radius, horizon and budget"),
         (lambda t: t.update(horizon=0), "radius, horizon and budget"),
         (lambda t: t.update(surprise=1), "unknown fields"),
-        (lambda t: t.pop("request"), "missing fields"),
+        (lambda t: t.pop("request"), "lacks the fields"),
     ],
 )
 def test_a_task_that_cannot_be_is_refused_with_its_line(change, message, folder):

@@ -370,19 +370,19 @@ def _bandit(path: Path) -> object:
 
 
 BESIDE = [
-    (hari.load_agent, "hari", "{}", "missing fields"),
+    (hari.load_agent, "hari", "{}", "lacks the fields"),
     (hari.load_agent, "hari", "{", "as JSON"),
     (hari.load_agent, "hari", '{"names": [1], "execution": {}}', r"names\[0\] should be"),
     (hari.load_agent, "hari", '{"names": [], "execution": {"wings": 2}}', "unknown fields"),
     (hari.load_agent, "hari", '{"names": [], "execution": {"heads": 0}}', "at least 1"),
     (hari.load_agent, "hari", '{"names": [], "execution": {}}', "execution policy alone"),
     (hari.load_agent, "vnla", "{}", "holds 'vnla', 'hari' is wanted"),
-    (_bandit, "bandit", '{"config": {}}', "missing fields"),
+    (_bandit, "bandit", '{"config": {}}', "lacks the fields"),
     (_bandit, "bandit", '{"config": [], "source": [], "target": []}', "should be an object"),
     (_bandit, "bandit", '{"config": {"batch": 0}, "source": [], "target": []}', "at least 1"),
     (_bandit, "bandit", '{"config": {}, "source": [1], "target": []}', r"source\[0\] should be"),
     (load_student, "regex", '{"config": {"stages": 3}, "words": []}', "unknown fields"),
-    (config_of, "nav", '{"config": {}}', "missing fields"),
+    (config_of, "nav", '{"config": {}}', "lacks the fields"),
 ]
 
 

@@ -37,7 +37,7 @@ def test_files_are_read_line_by_line(tmp_path):
     assert list(load_lines(tmp_path / "routes.jsonl", Route)) == routes
     with open(tmp_path / "routes.jsonl", "a") as f:
         f.write('{"id": 3}\n')
-    with pytest.raises(RecordError, match=r"routes.jsonl:4: .*missing fields \['instruction'"):
+    with pytest.raises(RecordError, match=r"routes.jsonl:4: .*lacks the fields \['instruction'"):
         list(load_lines(tmp_path / "routes.jsonl", Route))
 
 

@@ -113,7 +113,8 @@ class Script:
 
 def test_a_mistake_in_a_study_is_told_with_its_place(tmp_path):
     for parts, said in (
-        ('[[parts]]\nname = "a"\nagnet = "person"\n', "agnet"),
+        ('[[parts]]\nname = "a"\nagnet = "person"\n', r"parts\[0\] has the unknown fields \['agnet'\]; it may hold"),
+        ('[[parts]]\nkind = "play"\n', r"parts\[0\] lacks the fields \['name'\]; it may hold"),
         ('[[parts]]\nname = "a"\nagent = "random"\nassistant = "none"\n', "nobody would take part"),
         ('[[parts]]\nname = "a"\nkind = "rate"\nof = "b"\n', "'b'"),
         (TOGETHER + TOGETHER, "name of its own"),
