@@ -24,16 +24,12 @@ from hand_chat import ChatServer, Parrot, first_allowed, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
-from embodied.agents.language_models.agent import LanguageModelAgent
+from embodied.agents.language_models.agent import LanguageModelAgent, Messages
 from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
-from embodied.agents.language_models.checking import arrives, understood
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.agents.language_models.completions import misfit, object_schema
-from embodied.agents.language_models.judge import ModelJudge
-from embodied.agents.language_models.messages import Messages
-from embodied.agents.language_models.paraphrase import paraphrased
-from embodied.agents.language_models.prompts import read_prompt
-from embodied.agents.language_models.telling import Teller
+from embodied.agents.language_models.prompts import PromptBuilder, read_prompt
+from embodied.agents.language_models.routes import ModelJudge, followed_replies, listener_arrives, paraphrased
 from embodied.agents.language_models.transport import MOST_BYTES, completions_url, proxy_of
 from embodied.agents.language_models.words import SeenNames
 from embodied.assets.catalogue import load_catalogue
@@ -496,7 +492,7 @@ def test_a_model_is_told_the_names_of_what_is_seen_and_where():
 
     world = Furnished(grid_world().house, grid_world().graph)
     o = find_env().reset(dataclasses.replace(find_tasks(1)[0], start=Pose(0, 0)))
-    text = Teller(SeenNames({"grid": world})).text(o)
+    text = PromptBuilder(SeenNames({"grid": world})).text(o)
     assert "sofa (30 degrees to the left, 2 m)" in text and "key" not in text
 
 
@@ -600,12 +596,12 @@ def test_paraphrases_that_lead_elsewhere_are_dropped_and_counted(seen, answers):
 
 def test_the_listener_tells_how_often_told_ways_are_understood(seen):
     route = a_route(seen, 0)
-    assert arrives(seen, "Go into the living room. Stop in the living room.", route.path, 0.0)
-    assert not arrives(seen, "blah blah", route.path, 0.0)
+    assert listener_arrives(seen, "Go into the living room. Stop in the living room.", route.path, 0.0)
+    assert not listener_arrives(seen, "blah blah", route.path, 0.0)
     reply = Reply("blah", subtask=Subtask("r", 20, path=route.path))
     stopped = Step(Pose(0), Mode.MAIN, "", (0,), "none", (), (1,), Ask(), reply, Pose(0))
     episode = Episode(find_tasks(1)[0], (stopped,), "limit")
-    assert understood([episode], {"grid": seen}) == (0, 1)
+    assert followed_replies([episode], {"grid": seen}) == (0, 1)
 
 
 def test_a_judge_rates_in_stars_and_describes(seen, answers):
@@ -645,7 +641,7 @@ def test_a_model_that_sees_is_shown_numbered_views(answers):
 
     with ChatServer() as server:
         for how in ("strip", "panorama"):
-            agent = LanguageModelAgent(client_of(server, answers), Teller(panoramas=Grey(), pictures=how))
+            agent = LanguageModelAgent(client_of(server, answers), PromptBuilder(panoramas=Grey(), pictures=how))
             play(find_env, agent, [dataclasses.replace(find_tasks(1)[0], horizon=1)], seed=0)
         sizes = []
         for request in server.requests:

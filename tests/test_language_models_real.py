@@ -16,7 +16,7 @@ pytest.importorskip("llama_cpp", reason="the optional extra [smollm] is not inst
 from embodied.agents.language_models.agent import LanguageModelAgent
 from embodied.agents.language_models.assistant import ModelAssistant
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
-from embodied.agents.language_models.small import NAME, command
+from embodied.cli.llm import SMOLLM, serving
 from embodied.envs.make import ask_environment_maker, environment_maker, look_of
 from embodied.evaluation.metrics import usage
 from embodied.evaluation.rollout import play
@@ -34,7 +34,7 @@ def served():
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
-    server = subprocess.Popen(command(port), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    server = subprocess.Popen(serving(port), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         for _ in range(240):
             try:
@@ -53,7 +53,7 @@ def test_a_real_model_acts_and_answers_and_replays_without_its_server(served, tm
     find = environment_maker("find", {"grid": world})
     task = find_task(find_pool(world, seed=0), 0, seed=0, language=PlainLanguage())
     tasks = [dataclasses.replace(task, horizon=1)]
-    settings = ServerSettings(NAME, served, form="object", most_tokens=60, together=1, timeout=300.0)
+    settings = ServerSettings(SMOLLM, served, form="object", most_tokens=60, together=1, timeout=300.0)
     client = Client(settings, AnswerCache(tmp_path / "answers.sqlite"))
     (first,) = play(find, LanguageModelAgent(client), tasks, seed=0)
     used = usage(first)

@@ -19,10 +19,8 @@ from embodied.envs.make import assistant_of
 from embodied.interface import Assistant, Intention, Reply, Situation
 from embodied.language import PlainLanguage
 
-NAMES = ("facts", "question", "request")
-"""What the template of prompts/assistant.md may name."""
-SCHEMA = object_schema(answer={"type": "string", "maxLength": 600})
-QUESTIONS = {
+ASSISTANT_ANSWER = object_schema(answer={"type": "string", "maxLength": 600})
+QUESTION_WORDS = {
     Intention.HELP: "Can you help me? Where should I go?",
     Intention.CONFIRM: "Is this the one?",
     Intention.APPEARANCE: "What does it look like?",
@@ -33,7 +31,7 @@ QUESTIONS = {
 
 
 def facts_of(base: Assistant, s: Situation, reply: Reply, *, rng: np.random.Generator) -> tuple[str, ...]:
-    """What whoever words a reply is told: the answer of the assistant itself, and the walk that it means."""
+    """The facts for whoever words a reply: the answer of the assistant itself, and the walk that it means."""
     if isinstance(base, AskAssistant):
         return base.facts(s, reply.intention, rng=rng)
     facts = (reply.text,) if reply.text else ()
@@ -46,7 +44,7 @@ def facts_of(base: Assistant, s: Situation, reply: Reply, *, rng: np.random.Gene
 
 def question_of(s: Situation, question: Intention) -> str:
     """A request for help in words."""
-    return s.question if question is Intention.FREE else QUESTIONS.get(question, question.value)
+    return s.question if question is Intention.FREE else QUESTION_WORDS.get(question, question.value)
 
 
 class WordedAssistant:
@@ -76,7 +74,7 @@ class ModelAssistant(WordedAssistant):
     def __init__(self, base: Assistant, client: Client, prompts: Path | None = None) -> None:
         """`prompts`: folder with an assistant.md of one's own."""
         super().__init__(base)
-        self._client, self._prompt = client, read_prompt("assistant", NAMES, prompts)
+        self._client, self._prompt = client, read_prompt("assistant", ("facts", "question", "request"), prompts)
 
     def worded(self, reply: Reply, facts: tuple[str, ...], situation: Situation, question: Intention) -> Reply:
         messages = self._prompt.messages(
@@ -84,7 +82,7 @@ class ModelAssistant(WordedAssistant):
             question=question_of(situation, question),
             request=situation.task.request,
         )
-        answer = self._client.ask(messages, SCHEMA)
+        answer = self._client.ask(messages, ASSISTANT_ANSWER)
         text = reply.text if answer.value is None else str(answer.value["answer"])
         return dataclasses.replace(reply, text=text, usage=self._client.usage(answer))
 
@@ -99,8 +97,8 @@ class PersonAssistant(WordedAssistant):
 
     def worded(self, reply: Reply, facts: tuple[str, ...], situation: Situation, question: Intention) -> Reply:
         known = "\n".join(f"  - {f}" for f in facts)
-        said = self._read(f"\nYou know:\n{known}\nThe agent asks: {question_of(situation, question)}\n> ").strip()
-        return dataclasses.replace(reply, text=said or reply.text)
+        words = self._read(f"\nYou know:\n{known}\nThe agent asks: {question_of(situation, question)}\n> ").strip()
+        return dataclasses.replace(reply, text=words or reply.text)
 
 
 def assistant_maker(name: str, client: Callable[[], Client], prompts: Path | None) -> Callable[[Assistant], Assistant]:

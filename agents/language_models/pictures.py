@@ -1,4 +1,4 @@
-"""What a model that sees is shown: candidate views as one numbered strip, or the panorama with numbered markers."""
+"""Pictures for a model that sees: candidate views as one numbered strip, or the panorama with numbered markers."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from embodied.house.floor_plan import font
 from embodied.interface import STEP, VIEW_PITCHES, Observation, Sight
 from embodied.render.panorama import Panorama
 
-VIEW = 224
+VIEW_SIZE = 224
 """Height and width of a candidate's view, pixels."""
-ANGLE = np.radians(75.0)
+VIEW_ANGLE = np.radians(75.0)
 """Its vertical field of view, radians."""
-HEIGHT = 384
-"""Of the panorama, pixels."""
-PICTURES = ("strip", "panorama")
+PANORAMA_HEIGHT = 384
+"""Height of the panorama, pixels."""
+PICTURE_FORMS = ("strip", "panorama")
 
 
 class Panoramas(Protocol):
@@ -32,16 +32,16 @@ def shown(o: Observation, panoramas: Panoramas, how: str) -> tuple[str, ...]:
     """The pictures of an observation as data URLs; the image that is looked for (HANNA) last.
 
     Args:
-      how: one of PICTURES.
+      how: one of PICTURE_FORMS.
 
     Raises:
       ValueError: another word.
     """
-    if how not in PICTURES:
-        raise ValueError(f"pictures should be one of {PICTURES}, got {how!r}")
+    if how not in PICTURE_FORMS:
+        raise ValueError(f"pictures should be one of {PICTURE_FORMS}, got {how!r}")
     here = panoramas.at(o.sight)
     first = strip(o, here) if how == "strip" else marked_panorama(o, here)
-    target = () if o.target is None else (_url(around(panoramas.at(o.target), 0.0, HEIGHT // 2)),)
+    target = () if o.target is None else (_url(around(panoramas.at(o.target), 0.0, PANORAMA_HEIGHT // 2)),)
     return (_url(first), *target)
 
 
@@ -51,24 +51,25 @@ def strip(o: Observation, panorama: Panorama) -> Image.Image:
     looks = [(yaw + float(o.candidates.bearing[i]), float(o.candidates.slope[i])) for i in numbers]
     if o.candidates.words or not looks:
         numbers, looks = [], [(yaw, float(VIEW_PITCHES[12 * (o.tilt + 1)]))]
-    sheet = Image.new("RGB", (VIEW * len(looks) + 4 * (len(looks) - 1), VIEW), "white")
+    sheet = Image.new("RGB", (VIEW_SIZE * len(looks) + 4 * (len(looks) - 1), VIEW_SIZE), "white")
     pen = ImageDraw.Draw(sheet)
     for k, (along, pitch) in enumerate(looks):
-        sheet.paste(Image.fromarray(panorama.view_rgb(along, pitch, ANGLE, size=(VIEW, VIEW))), (k * (VIEW + 4), 0))
+        view = panorama.view_rgb(along, pitch, VIEW_ANGLE, size=(VIEW_SIZE, VIEW_SIZE))
+        sheet.paste(Image.fromarray(view), (k * (VIEW_SIZE + 4), 0))
         if numbers:
-            _label(pen, k * (VIEW + 4) + 20, 20, numbers[k])
+            _label(pen, k * (VIEW_SIZE + 4) + 20, 20, numbers[k])
     return sheet
 
 
 def marked_panorama(o: Observation, panorama: Panorama) -> Image.Image:
     """Everything around, the gaze in the middle, a numbered marker towards each candidate."""
     yaw = o.turn * STEP
-    sheet = around(panorama, yaw, HEIGHT)
+    sheet = around(panorama, yaw, PANORAMA_HEIGHT)
     pen = ImageDraw.Draw(sheet)
     if not o.candidates.words:
         for i, bearing in enumerate(o.candidates.bearing):
-            x = (0.5 - float(bearing) / (2 * np.pi)) * 2 * HEIGHT
-            _label(pen, round(x), round(HEIGHT * (0.62 - float(o.candidates.slope[i]) / np.pi)), i)
+            x = (0.5 - float(bearing) / (2 * np.pi)) * 2 * PANORAMA_HEIGHT
+            _label(pen, round(x), round(PANORAMA_HEIGHT * (0.62 - float(o.candidates.slope[i]) / np.pi)), i)
     return sheet
 
 

@@ -6,14 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-import numpy as np
-
 from embodied.geometry import wrap
 from embodied.interface import STEP, Action, Ask, Description, Move, Observation, SeenPlace, Sight, Stop, viewpoint
 
 MOST_NAMES = 12
 """Things that are named of one place."""
-SMALLEST = 20
+SMALLEST_SIGHTING = 20
 """Fewest pixels of a sighting (of 24576 around) of what is named."""
 
 
@@ -33,7 +31,7 @@ class SeenNames:
     def names(self, sight: Sight) -> list[tuple[str, float, float]]:
         here = viewpoint(sight)
         seen = self._worlds[here.world].sightings(here.node)
-        return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST][:MOST_NAMES]
+        return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST_SIGHTING][:MOST_NAMES]
 
 
 def actions_of(o: Observation) -> dict[str, Action]:
@@ -97,14 +95,3 @@ def described(description: Description, turn: int) -> str:
             where = side((f.horizontal - turn) * STEP)
             said.append(f"go {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
     return ", ".join(said)
-
-
-def walk_in_words(world: SeenPlace, path: Sequence[int], yaw: float) -> str:
-    """What happened on a walk, plainly: turns, rooms, and what one stands by at its end."""
-    from embodied.language import PlainLanguage
-
-    plain = PlainLanguage().route(world, path, yaw, rng=np.random.default_rng(0))
-    kind = world.house.room_by_id[world.graph.room_of_node[path[0]]].kind.replace("_", " ")
-    near = sorted((s.distance, s.object_class) for s in world.sightings(path[-1]) if s.pixels >= SMALLEST)[:2]
-    end = f" By the end there is {' and '.join(name for _, name in near)}." if near else ""
-    return f"It begins in the {kind}: {plain}{end}"

@@ -191,7 +191,7 @@ def _play(
     keep: Callable[[str, str, Sequence[Episode]], None],
 ) -> tuple[list[Row], dict[str, tuple[int, int]]]:
     """The rows of agents without training, and what a scripted listener makes of the routes that each was told."""
-    from embodied.agents.language_models.checking import understood
+    from embodied.agents.language_models.routes import followed_replies
     from embodied.evaluation.evaluate import LOOKING, evaluate
 
     looks = bool({LLM, *LOOKING.get(args.kind, {})} & set(names)) or args.kind == "ask" or args.assistant != TEMPLATE
@@ -203,7 +203,7 @@ def _play(
 
         def kept(name: str, episodes: Sequence[Episode], split: SplitData = split) -> None:
             keep(split.name, name, episodes)
-            if looks and (routes := understood(episodes, _seen(split.worlds)))[1]:
+            if looks and (routes := followed_replies(episodes, _seen(split.worlds)))[1]:
                 heard[name] = routes
 
         worlds = _seen(split.worlds) if looks else None
@@ -279,18 +279,18 @@ def _agent(
 
 def _model_agent(args: Options, split: SplitData, client: Any) -> Agent:
     from embodied.agents.language_models.agent import LanguageModelAgent
-    from embodied.agents.language_models.telling import Teller, agent_prompt
+    from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt
     from embodied.agents.language_models.words import SeenNames
     from embodied.gym.eyes import PanoramaStore
     from embodied.world import World
 
     prompt = agent_prompt(args.prompts)
     if args.sees == "names":
-        return LanguageModelAgent(client, Teller(SeenNames(_seen(split.worlds)), prompt=prompt))
+        return LanguageModelAgent(client, PromptBuilder(SeenNames(_seen(split.worlds)), prompt=prompt))
     if args.sees == "nothing":
-        return LanguageModelAgent(client, Teller(prompt=prompt))
+        return LanguageModelAgent(client, PromptBuilder(prompt=prompt))
     drawn = {n: w for n, w in split.worlds.items() if isinstance(w, World)}
-    return LanguageModelAgent(client, Teller(None, PanoramaStore(drawn), args.sees, prompt))
+    return LanguageModelAgent(client, PromptBuilder(None, PanoramaStore(drawn), args.sees, prompt))
 
 
 def _seen(worlds: Mapping[str, Place]) -> Mapping[str, SeenPlace]:

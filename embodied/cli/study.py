@@ -391,9 +391,9 @@ def ask(args: AskOptions) -> int:
 def model_agent(args: AskOptions, places: object) -> Agent:
     """The language model that the options name."""
     from embodied.agents.language_models.agent import LanguageModelAgent
-    from embodied.agents.language_models.telling import Teller, agent_prompt
+    from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt
 
-    return LanguageModelAgent(client_of(args), Teller(prompt=agent_prompt(args.prompts)))
+    return LanguageModelAgent(client_of(args), PromptBuilder(prompt=agent_prompt(args.prompts)))
 
 
 COMMANDS: Mapping[str, Any] = {
