@@ -19,7 +19,7 @@ from embodied.assets.importing import packs
 from embodied.assets.importing.importer import finish_parts, read_obj
 from embodied.assets.importing.obj import MeshError, parse_obj
 from embodied.assets.importing.packs import find_packs
-from embodied.assets.importing.sh3f import MAX_ENTRY, PackError, open_pack
+from embodied.assets.importing.sh3f import CATALOGUE, MAX_ENTRY, PackError, open_pack
 from embodied.assets.records import ROOM_KINDS, SUPPORTS, ImportRecipe, SupportSurface, bounds
 from embodied.assets.rows import DATA, CatalogueError
 
@@ -220,6 +220,95 @@ def test_things_touch_the_top_of_a_cube_and_float_above_it(tmp_path):
     parts = load_catalogue(tmp_path, own=[own]).mesh("mine/box")
     at = lambda z: SupportSurface("top", z, -0.2, -0.15, 0.2, 0.15, 9.0)
     assert [contact(parts, at(z)) for z in (0.2, 0.21)] == [1, 0]
+
+
+# libraries
+
+
+def write_library(path: Path, rows: str, *models: str) -> Path:
+    with zipfile.ZipFile(path, "w") as z:
+        z.writestr(CATALOGUE, rows)
+        for name in models:
+            z.writestr(name, CUBE)
+    return path
+
+
+LIBRARY = r"""
+# a comment that ends in a backslash \
+id#1=me#oak
+name#1 = Oak
+model#1=/chairs/oak.obj
+width#1=10
+depth#1=10
+height#1=10
+! another kind of comment
+id#2 : me#elm
+name#2 : Elm
+model#2 : /chairs/el\
+    m.obj
+width#2 20
+depth#2 20
+height#2: 20
+id#3=me\#small
+model#3=/tables/plain.obj
+width#3=30
+depth#3=30
+height#3=30
+id#4=me\#large
+model#4=/tables/plain.obj
+width#4=40
+depth#4=40
+height#4=40
+model#5=/lamps/\u006camp.obj
+width#5=wide
+depth#5=50
+height#5=50
+model#6=/beds/bed.obj
+width#6=60
+depth#6=60
+height#6=60
+model#7=/beds/gone.obj
+model#8=/beds/bed.dae
+width#9=9
+"""
+SIZES = {"chairs/oak": 0.1, "chairs/elm": 0.2, "tables/plain/small": 0.3, "tables/plain/large": 0.4, "beds": 0.6}
+
+
+def test_every_row_of_a_library_is_a_model_of_its_own_and_a_bad_one_is_left_out(tmp_path, caplog):
+    models = "chairs/oak.obj", "chairs/elm.obj", "tables/plain.obj", "lamps/lamp.obj", "beds/bed.obj", "beds/bed.dae"
+    own = write_own(
+        tmp_path / "own", {k: {"file": "a.sh3f", "model": m, "class": "mug"} for k, m in zip("abcde", SIZES)}
+    )
+    write_library(own / "a.sh3f", LIBRARY, *models)
+    catalogue = load_catalogue(tmp_path, own=[own])
+    assert {k: e.size[0] for k, e in open_pack(own / "a.sh3f").entries.items()} == SIZES
+    for name, size in zip("abcde", SIZES.values()):
+        np.testing.assert_allclose(np.ptp(bounds(catalogue.mesh(f"mine/{name}")), axis=0), size, rtol=1e-4)
+    assert "4 of 9 models are left out" in caplog.text and caplog.text.count("left out") == 1
+    for words in (
+        "model 5 should have a number for width, got 'wide'",
+        "model 7 names 'beds/gone.obj', which is not in the library",
+        "model 8 should name an .obj file, got 'beds/bed.dae'",
+        "model 9 should name an .obj file, got ''",
+    ):
+        assert words in caplog.text
+
+
+def test_another_model_of_a_library_under_one_name_is_imported_anew(tmp_path):
+    own = tmp_path / "own"
+    for model, faces in (("chairs/oak", 12), ("chairs/elm", 2)):
+        write_own(own, {"a": {"file": "a.sh3f", "model": model, "class": "mug", "size": [1, 1, 1]}})
+        if faces == 12:
+            write_library(own / "a.sh3f", LIBRARY, "chairs/oak.obj")
+            with zipfile.ZipFile(own / "a.sh3f", "a") as z:
+                z.writestr("chairs/elm.obj", "\n".join(CUBE.split("\n")[:8] + ["f 1 3 4 2"]))
+        parts = load_catalogue(tmp_path, own=[own]).mesh("mine/a")
+        assert sum(len(p.faces) for p in parts) == faces
+
+
+def test_a_library_whose_rows_are_all_bad_says_so(tmp_path):
+    with pytest.raises(PackError, match="1 of 1 models are left out: model 1 should have a positive size"):
+        open_pack(write_library(tmp_path / "a.sh3f", "model#1=a.obj\nwidth#1=0\ndepth#1=1\nheight#1=1", "a.obj"))
 
 
 # hostile and broken packs

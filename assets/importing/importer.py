@@ -88,11 +88,10 @@ class RawPart:
     """Opacity below which texels of the image are cut away; None for none."""
 
 
-def import_model(pack: Pack, recipe: ImportRecipe, cache: Path, obj: str | None = None) -> tuple[MeshPart, ...]:
-    """The parts of a library's model (the OBJ entry `obj`, that of the recipe's key if None), from
-    the cache if it is there and sound."""
-    obj = obj or pack.entries[recipe.model or recipe.key].model
-    read = functools.partial(read_obj, pack.read, obj, f"{pack.path.name}: {obj}")
+def import_model(pack: Pack, recipe: ImportRecipe, cache: Path) -> tuple[MeshPart, ...]:
+    """The parts of a library's model, from the cache if it is there and sound."""
+    model = pack.entries[recipe.model or recipe.key].model
+    read = functools.partial(read_obj, pack.read, model, f"{pack.path.name}: {model}")
     return cached(recipe, pack.digest, cache, lambda tell: read(), quiet=True)  # the packs are reviewed
 
 

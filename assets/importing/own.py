@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from embodied.assets import rows
 from embodied.assets.cache import digest
 from embodied.assets.importing.glb import read_glb
-from embodied.assets.importing.importer import Reader, cached, import_model, obj_files, read_obj
+from embodied.assets.importing.importer import Reader, cached, obj_files, read_obj
 from embodied.assets.importing.mtl_finish import corrected
 from embodied.assets.importing.obj import MeshError
 from embodied.assets.importing.sh3f import MAX_ENTRY, open_pack
@@ -35,7 +35,7 @@ class OwnModel:
 
     file: Path
     entry: str = ""
-    """For a .sh3f file: the model's key in it, '<folder>/<model>'."""
+    """For a .sh3f file: the model's key in it (embodied.assets.importing.sh3f.Entry)."""
 
 
 def read_own(
@@ -83,14 +83,16 @@ def import_own(model: OwnModel, recipe: ImportRecipe, cache: Path) -> tuple[Mesh
     Raises:
       MeshError: damaged, or gone since the catalogue was read.
     """
-    if model.entry:
-        pack = open_pack(model.file)
-        entry = pack.entries[model.entry]
-        return import_model(pack, replace(recipe, rotation=entry.rotation), cache, entry.model)
     file, remedy = model.file, "save it again as PNG, JPEG, BMP or TGA"
-    if file.suffix.lower() == ".glb":
-        return cached(recipe, source_digest(model), cache, lambda tell: read_glb(file, tell))
-    read = lambda tell: read_obj(_reader(file), file.name, str(file), remedy, tell)
+    if model.entry:
+        pack = open_pack(file)
+        entry = pack.entries[model.entry]
+        recipe = replace(recipe, rotation=entry.rotation)
+        read = lambda tell: read_obj(pack.read, entry.model, f"{file}: {entry.model}", remedy, tell)
+    elif file.suffix.lower() == ".glb":
+        read = lambda tell: read_glb(file, tell)
+    else:
+        read = lambda tell: read_obj(_reader(file), file.name, str(file), remedy, tell)
     return cached(recipe, source_digest(model), cache, read)
 
 

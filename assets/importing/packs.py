@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import importlib.util
 import sys
 from collections.abc import Iterator, Sequence
@@ -55,12 +54,6 @@ def install_packs(packs: Sequence[Path]) -> Iterator[Path]:
         yield OWN_FOLDER / path.name
 
 
-@functools.lru_cache(maxsize=16)
-def cached_pack(path: Path, stamp: tuple[int, int]) -> Pack:
-    """The opened library at `path`; `stamp` (size, mtime) makes a changed file be read again."""
-    return open_pack(path)
-
-
 def pack_of(key: str) -> Pack:
     """The library that holds the model `key`.
 
@@ -69,8 +62,7 @@ def pack_of(key: str) -> Pack:
     """
     found = find_packs()
     for path in found:
-        stat = path.stat()
-        pack = cached_pack(path, (stat.st_size, stat.st_mtime_ns))
+        pack = open_pack(path)
         if key in pack.entries:
             return pack
     if not found:

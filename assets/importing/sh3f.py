@@ -1,31 +1,38 @@
 """Sweet Home 3D furniture libraries (.sh3f): zip files of OBJ models with a catalogue of real sizes.
 
 Nothing is ever extracted: entries are read into memory under limits, and a library whose names
-climb out of their folder, or whose entries swell like a zip bomb, is refused as a whole.
+climb out of their folder, or whose entries swell like a zip bomb, is refused as a whole. A row of
+the catalogue that makes no sense loses its own model only.
 """
 
 from __future__ import annotations
 
+import collections
 import functools
+import logging
 import math
 import os
 import re
 import zipfile
 import zlib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from types import MappingProxyType
 
 from embodied.assets.cache import digest
+from embodied.assets.importing.obj import decoded
 from embodied.assets.records import IDENTITY
 
+log = logging.getLogger(__name__)
 CATALOGUE = "PluginFurnitureCatalog.properties"
 MAX_ENTRY = 64 * 2**20
 """Bytes that one unpacked entry may have; the largest of Debian's five libraries is 9 MiB."""
 MAX_RATIO = 200
 """Unpacked over packed size above which a large entry is taken for a bomb; text packs 8 to 1."""
 MAX_ENTRIES = 20_000
+ESCAPES = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
+"""Letters that mean a blank after a backslash in Java properties."""
 
 
 class PackError(ValueError):
@@ -37,7 +44,7 @@ class Entry:
     """One model as its library describes it: what the import needs, words and licences are those of our catalogue."""
 
     key: str
-    """'<folder>/<model>', e.g. 'scopia/bed1'."""
+    """Its folder, e.g. 'scopia/bed1'; `_keys` says what it is where that holds several."""
     model: str
     """Path of the OBJ file inside the zip."""
     size: tuple[float, float, float]
@@ -85,40 +92,68 @@ def _opened(path: Path, changed: int, process: int) -> zipfile.ZipFile:
 
 
 def open_pack(path: Path) -> Pack:
-    """Read the table of contents and the catalogue of the library at `path`.
+    """The library at `path`, read again when the file has changed. Rows that give no model are logged.
 
     Raises:
-      PackError: missing, not a zip, unsafe names, a bomb, or a catalogue that makes no sense.
+      PackError: missing, not a zip, unsafe names, a bomb, or a catalogue without a model that can be read.
     """
-    path = Path(path)
+    path = Path(path).absolute()
+    try:
+        stat = path.stat()
+    except OSError as e:
+        raise PackError(f"furniture library {path} does not exist; apt-get install sweethome3d-furniture") from e
+    return _read_pack(path, stat.st_size, stat.st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=16)
+def _read_pack(path: Path, size: int, changed: int) -> Pack:
     try:
         with zipfile.ZipFile(path) as z:
             infos = z.infolist()
-    except FileNotFoundError as e:
-        raise PackError(f"furniture library {path} does not exist; apt-get install sweethome3d-furniture") from e
     except (zipfile.BadZipFile, RuntimeError, OSError, EOFError, ValueError) as e:
         raise PackError(f"{path} is not a .sh3f library ({e}); install it again or name another file") from e
     _check_contents(path, infos)
     toc = digest([[i.filename, i.file_size, i.CRC] for i in infos])
-    bare = Pack(path, toc, MappingProxyType({}))
-    if CATALOGUE not in {i.filename for i in infos}:
+    names = {i.filename for i in infos}
+    if CATALOGUE not in names:
         raise PackError(f"{path.name} has no {CATALOGUE}; it is not a furniture library of Sweet Home 3D")
-    fields = parse_properties(bare.read(CATALOGUE).decode("latin-1"))
-    return Pack(path, toc, MappingProxyType(_entries(path, fields)))
+    bare = Pack(path, toc, MappingProxyType({}))
+    entries, reasons = _entries(parse_properties(decoded(bare.read(CATALOGUE))), names)
+    if reasons:
+        which = "; ".join(reasons[:5]) + ("; ..." if len(reasons) > 5 else "")
+        words = f"{path.name}: {len(reasons)} of {len(reasons) + len(entries)} models are left out: {which}"
+        if not entries:
+            raise PackError(f"{words}. Correct its {CATALOGUE}")
+        log.warning(words)
+    return Pack(path, toc, MappingProxyType(entries))
 
 
 def parse_properties(text: str) -> dict[str, str]:
-    """Java properties as a dict; later keys win."""
-    text = re.sub(r"(?<!\\)\\\r?\n[ \t]*", "", text)
-    found = {}
-    for line in text.splitlines():
-        line = line.strip()
-        if not line or line[0] in "#!" or "=" not in line:
+    """Java properties as a dict; later keys win, blanks around values are dropped.
+
+    Source: java.util.Properties.load. '=', ':' or blanks end a key; an odd number of backslashes before a line's end
+    joins it with the next one.
+    """
+    fields: dict[str, str] = {}
+    joined = ""
+    for line in [*re.split(r"\r\n|\r|\n", text), ""]:
+        line = line.lstrip(" \t\f")
+        if not joined and line[:1] in ("", "#", "!"):
             continue
-        key, value = line.split("=", 1)
-        value = re.sub(r"\\u([0-9a-fA-F]{4})", lambda m: chr(int(m[1], 16)), value)
-        found[key.strip()] = re.sub(r"\\(.)", r"\1", value.strip())
-    return found
+        if len(line) - len(line.rstrip("\\")) & 1:
+            joined += line[:-1]
+            continue
+        key, value = re.findall(r"(?s)^((?:\\.|[^\\=: \t\f])*)[ \t\f]*[=:]?(.*)$", joined + line)[0]
+        fields[_unescaped(key)] = _unescaped(value).strip()
+        joined = ""
+    return fields
+
+
+def _unescaped(text: str) -> str:
+    plain = re.sub(
+        r"\\(?:u([0-9a-fA-F]{4})|(.))", lambda m: chr(int(m[1], 16)) if m[1] else ESCAPES.get(m[2], m[2]), text
+    )
+    return plain.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
 
 
 def key_of(model: str) -> str:
@@ -146,45 +181,75 @@ def _safe_name(path: Path, name: str) -> str:
     return name
 
 
-def _entries(path: Path, fields: Mapping[str, str]) -> dict[str, Entry]:
+def _entries(fields: Mapping[str, str], names: Collection[str]) -> tuple[dict[str, Entry], list[str]]:
+    """The models of a catalogue by key, and what is wrong with each of its rows that gives none."""
     rows: dict[int, dict[str, str]] = {}
-    for key, value in fields.items():
-        if m := re.fullmatch(r"(\w+)#(\d+)", key):
+    for field, value in fields.items():
+        if m := re.fullmatch(r"(\w+)#([0-9]{1,9})", field):
             rows.setdefault(int(m[2]), {})[m[1]] = value
-    entries = {}
+    entries, reasons = {}, []
     for number in sorted(rows):
         try:
-            entry = _entry(path, number, rows[number])
-        except PackError:
-            raise
+            entries[number] = _entry(rows[number], names)
         except ValueError as e:
-            raise PackError(f"{path.name}: model {number} has no numbers where they belong ({e}); it is damaged") from e
-        entries[entry.key] = entry
-    return entries
+            reasons.append(f"model {number} {e}")
+    keys = _keys({n: rows[n] for n in entries})
+    return {keys[n]: replace(entry, key=keys[n]) for n, entry in entries.items()}, reasons
 
 
-def _entry(path: Path, number: int, row: Mapping[str, str]) -> Entry:
-    where = f"{path.name}: model {number}"
-    if not row.get("model"):
-        raise PackError(f"{where} names no model file; the library is damaged")
-    model = _safe_name(path, row["model"].lstrip("/"))
-    width, depth, height = (_number(where, row, f) / 100.0 for f in ("width", "depth", "height"))
+def _keys(rows: Mapping[int, Mapping[str, str]]) -> dict[int, str]:
+    """The key of each row, by its number: the model's folder; the path of its file without the suffix where
+    the folder holds several; behind that, the name in the row's id where rows share the file, or at last the number."""
+    keys: dict[int, str] = {}
+    names: dict[int, str] = {}
+    waiting = sorted(rows)
+    for step in range(4):
+        names = {n: _names(n, row)[step] for n, row in rows.items()}
+        counts, taken = collections.Counter(names.values()), set(keys.values())
+        keys |= {n: names[n] for n in waiting if counts[names[n]] == 1 and names[n] not in taken}
+        waiting = [n for n in waiting if n not in keys]
+    return keys | {n: f"{names[n]}/{n}" for n in waiting}
+
+
+def _names(number: int, row: Mapping[str, str]) -> tuple[str, str, str, str]:
+    """What a row's model may be called, the shortest first."""
+    model = row.get("model", "").lstrip("/")
+    stem = str(PurePosixPath(model).with_suffix("")) if PurePosixPath(model).name else ""
+    name = row.get("id", "").rpartition("#")[2]
+    return key_of(model), stem, f"{stem}/{name or number}", f"{stem}/{number}"
+
+
+def _entry(row: Mapping[str, str], names: Collection[str]) -> Entry:
+    """The model of a row, its key apart.
+
+    Raises:
+      ValueError: it gives no model that can be read; the words go on after 'model 3'.
+    """
+    model = row.get("model", "").lstrip("/")
+    if not model.lower().endswith(".obj"):
+        raise ValueError(f"should name an .obj file, got {model!r}")
+    if model not in names:
+        raise ValueError(f"names {model!r}, which is not in the library")
+    width, depth, height = (_number(row, f) / 100.0 for f in ("width", "depth", "height"))
     if min(width, depth, height) <= 0:
-        raise PackError(f"{where} should have a positive size, got {width} x {depth} x {height} m")
+        raise ValueError(f"should have a positive size, got {width} x {depth} x {height} m")
     rotation: tuple[float, ...] = IDENTITY
-    if row.get("modelRotation"):
-        rotation = tuple(float(x) for x in row["modelRotation"].split())
+    if words := row.get("modelRotation"):
+        try:
+            rotation = tuple(float(x) for x in words.split())
+        except ValueError:
+            rotation = ()
         if len(rotation) != 9 or not all(math.isfinite(x) for x in rotation):
-            raise PackError(f"{where} should have a modelRotation of nine numbers, got {row['modelRotation']!r}")
-    return Entry(key_of(model), model, (width, depth, height), rotation)
+            raise ValueError(f"should have a modelRotation of nine numbers, got {words!r}")
+    return Entry("", model, (width, depth, height), rotation)
 
 
-def _number(where: str, row: Mapping[str, str], name: str) -> float:
+def _number(row: Mapping[str, str], name: str) -> float:
     text = row.get(name, "")
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise PackError(f"{where} should have a number for {name}, got {text!r}; the library is damaged")
+        raise ValueError(f"should have a number for {name}, got {text!r}")
     return value
