@@ -345,8 +345,7 @@ def test_an_entry_that_lies_about_its_size_is_cut_off(tmp_path):
 @pytest.mark.parametrize(
     "obj",
     [
-        CUBE.replace("v 1 1 1", "v nan 1 1"),
-        CUBE.replace("v 1 1 1", "v 1e999 1 1"),
+        "v nan 0 0\nv 1 0 0\nv 0 1e999 0\nf 1 2 3",
         CUBE.replace("f 1 3 4 2", "f 1 3 99 2"),
         "v 0 0 0\n",
         "v 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3",

@@ -245,11 +245,9 @@ BROKEN = {
         accessors=[{"bufferView": 7, "componentType": 5126, "count": 3, "type": "VEC3"}]
     ),
     "no accessors": triangle(accessors=None),
+    "a picture in another file": triangle(buffers=[{"uri": "../../etc/passwd"}]),
     "more vertices than any memory": triangle(accessors=[{**NO_BUFFER, "count": 10**15}]),
     "fewer than none": triangle(accessors=[{**NO_BUFFER, "count": -3}]),
-    "many large accessors": triangle(accessors=[{**NO_BUFFER, "count": 5_000_000}] * 40),
-    "a picture of PostScript": triangle(images=[{"bufferView": 0, "mimeType": "image/png"}]),
-    "a picture in another file": triangle(images=[{"uri": "../../etc/passwd"}]),
     "a mesh of lists": triangle(meshes=[[]]),
     "vertices that are no numbers": triangle(
         accessors=[{"bufferView": 0, "componentType": 5126, "count": 9, "type": "X"}]
@@ -260,10 +258,8 @@ BROKEN = {
 @pytest.mark.parametrize("name", BROKEN)
 def test_an_impossible_glb_is_refused(tmp_path, name):
     own = write_own(tmp_path / "own", {"box": {"file": "box.glb", **MUG}})
-    (own / "box.glb").write_bytes(
-        glb(BROKEN[name], TRIANGLE if "Post" not in name else b"%!PS-Adobe-3.0 EPSF-3.0\n" * 2)
-    )
-    with pytest.raises(MeshError, match="export it again as binary glTF 2.0"):
+    (own / "box.glb").write_bytes(glb(BROKEN[name], TRIANGLE))
+    with pytest.raises(MeshError, match="export it from there as binary glTF 2.0|export it as one .glb"):
         load_catalogue(tmp_path, own=[own]).mesh("mine/box")
 
 

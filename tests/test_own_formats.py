@@ -75,6 +75,14 @@ def model(
     return glb(header | more, body)
 
 
+def changed(data: bytes, change) -> bytes:
+    """A .glb after `change` of its header."""
+    length = struct.unpack_from("<I", data, 12)[0]
+    header = json.loads(data[20 : 20 + length])
+    change(header)
+    return glb(header, data[28 + length :])
+
+
 def pbr(**fields) -> dict:
     return {"name": "paint", "pbrMetallicRoughness": {"metallicFactor": 0.0, **fields}}
 
@@ -131,18 +139,11 @@ def test_colours_of_vertices_are_drawn_times_the_materials(tmp_path, kind):
         pbr(baseColorFactor=[0.5, 1, 1, 1]),
         arrays={"COLOR_0": np.pad(held, ((0, 0), (0, 1)), constant_values=held.max())},
     )
-    data = normalised(data, 2) if kind != "f4" else data
+    data = changed(data, lambda h: h["accessors"][2].update(normalized=kind != "f4"))
     (part,) = imported(tmp_path, data)
     first, second = seen(part)[np.argsort(-seen(part)[:, 0])]
     np.testing.assert_allclose(first, (0.735, 0, 0), atol=5e-3)  # 0.5 linear
     np.testing.assert_allclose(second, (0.612, 0, 0.612), atol=5e-3)  # thirds of it, linear
-
-
-def normalised(data: bytes, accessor: int) -> bytes:
-    length = struct.unpack_from("<I", data, 12)[0]
-    header = json.loads(data[20 : 20 + length])
-    header["accessors"][accessor]["normalized"] = True
-    return glb(header, data[28 + length :])
 
 
 def test_colours_of_vertices_without_a_material_are_drawn(tmp_path):
@@ -316,14 +317,99 @@ def test_strips_and_fans_are_filled_the_right_way_round(tmp_path, mode, order):
         assert (normals[:, 1] < 0).all(), "all of it faces the front"
 
 
-def test_lines_are_told_and_left_out(tmp_path, caplog):
-    lines = {"attributes": {"POSITION": 0}, "mode": 1}
+def primitive(mode=4, **attributes):
+    """A change that puts another part into the mesh."""
+    return lambda header: header["meshes"][0]["primitives"].append({"attributes": attributes, "mode": mode})
+
+
+def another(points, **node):
+    """A change that puts another mesh into the scene: what a triangle of `points` is, in a node of its own."""
+
+    def change(header: dict) -> None:
+        uri = "data:x;base64," + base64.b64encode(np.array(points, "<f4").tobytes()).decode()
+        header["buffers"].append({"byteLength": 36, "uri": uri})
+        header["bufferViews"].append({"buffer": 1, "byteLength": 36})
+        view, accessor = len(header["bufferViews"]) - 1, len(header["accessors"])
+        header["accessors"].append({"bufferView": view, "componentType": 5126, "type": "VEC3", "count": len(points)})
+        header["meshes"].append({"primitives": [{"attributes": {"POSITION": accessor}}] if points else []})
+        header["nodes"].append({"mesh": 1, "name": "other", **node})
+        header["scenes"][0]["nodes"].append(1)
+
+    return change
+
+
+CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (primitive(mode=1, POSITION=0), "points and lines are left out"),
+        (primitive(), "a part of mesh 0 is left out: it has no triangles"),
+        (another([]), "a part of 'other' is left out: it has no triangles"),
+        (another(CORNER[:2]), "a part of 'other' is left out: it has no triangles"),
+        (another(CORNER, scale=[0, 0, 0], translation=[9, 9, 9]), "a part of 'other' is left out: it has no area"),
+        (another([[0, 0, 0], [1, 0, 0], [9, 0, 0]]), "a part of 'other' is left out: it has no area"),
+        (another([[0, 0, 0], [0, 0, 1], [0, 1, 0]], scale=[0, 1, 1], translation=[0.5, 0, 0]), ""),
+        (another([[0, 0, 0], [1e-20, 0, 0], [0, 1e-20, 0]]), "are points or lines"),
+        (another([*CORNER[:2], [NAN, 0, 0]]), "1 of 1 triangles of a part of 'other' are left out"),
+        (lambda h: h.update(images=[{"uri": "lost.png"}]), "its pictures [0] are not drawn"),
+    ],
+    ids=range(10),
+)
+def test_a_part_with_nothing_to_draw_is_left_out_and_told(tmp_path, caplog, change, words):
+    parts = imported(tmp_path, changed(model(), change))
+    assert area(parts) == pytest.approx(1 if words else 1.5, abs=0.06) and words in caplog.text
+    assert bool(words) == bool(caplog.text)
+
+
+def test_a_model_with_nothing_to_draw_says_why(tmp_path):
+    with pytest.raises(MeshError, match="nothing to draw: a part of mesh 0 is left out: it has no area"):
+        imported(tmp_path, model(nodes=[{"mesh": 0, "scale": [0, 0, 0]}]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b'"asset"', b'"extras": {"a": NaN, "b": 1e999}, "asset"'),
+        (b'"asset"', b'"extras": ' + b"[" * 60 + b"]" * 60 + b', "asset"'),
+        (b'"asset"', b'"scene": 0, "scene": 0, "asset"'),
+        (b'{"asset"', b'\xef\xbb\xbf{"asset"'),
+        (b'"count": 6', b'"max": [NaN], "count": 6'),
+        (b"}]}", b"}]}\0\0\0\0\0"),
+    ],
+    ids=["nan", "deep", "twice", "mark", "most", "zeros"],
+)
+def test_a_header_is_read_as_leniently_as_by_viewers(tmp_path, old, new):
     data = model()
     length = struct.unpack_from("<I", data, 12)[0]
-    header = json.loads(data[20 : 20 + length])
-    header["meshes"][0]["primitives"].append(lines)
-    assert len(imported(tmp_path, glb(header, data[28 + length :]))) == 1
-    assert "lines are left out" in caplog.text
+    text = data[20 : 20 + length].rstrip()
+    text = (text + new[3:] if old == b"}]}" else text.replace(old, new, 1)) + b"\0\0\0\0"
+    text = text[: len(text) // 4 * 4]
+    file = data[:12] + struct.pack("<I", len(text)) + data[16:20] + text + data[20 + length :]
+    assert area(imported(tmp_path, file)) == pytest.approx(1)
+
+
+def test_numbers_that_are_none_are_replaced_and_told(tmp_path, caplog):
+    uv = UV.copy()
+    uv[2] = NAN
+    data = model(pbr(roughnessFactor=NAN, baseColorTexture={"index": 0}), [halves()], arrays={"TEXCOORD_0": uv})
+    (part,) = imported(tmp_path, data)
+    assert part.finish.roughness == 1.0 and np.isfinite(part.uv).all()
+    assert "roughnessFactor is not finite" in caplog.text and "TEXCOORD_0 are not finite" in caplog.text
+
+
+CLEAR = Image.new("RGBA", (8, 8), (128, 128, 128, 0))
+
+
+def test_a_texture_that_is_transparent_everywhere_is_told(tmp_path, caplog):
+    mtl = "newmtl paint\nKd 1 1 1\nd 1\nmap_Kd a.png\n"
+    (part,) = obj(tmp_path / "a", f"mtllib a.mtl\n{SQUARE}{FACE}", mtl, a__png=picture(CLEAR))
+    assert pixels(part)[4, 4].tolist() == [128, 128, 128, 255]
+    assert "alpha channel of texture 'a.png' is 0 everywhere; it is drawn opaque" in caplog.text
+    with pytest.raises(MeshError, match="material 'paint' is left out: its texture is transparent everywhere"):
+        imported(tmp_path / "b", model(pbr(baseColorTexture={"index": 0}) | {"alphaMode": "MASK"}, [CLEAR]))
 
 
 def test_sparse_accessors_move_the_vertices_they_name(tmp_path):
@@ -369,13 +455,11 @@ def test_a_skin_stands_in_the_pose_it_is_saved_in_and_says_so(tmp_path, caplog):
 
 
 def test_a_mirrored_node_is_not_turned_inside_out(tmp_path):
-    box = trimesh.creation.box().export(file_type="glb")
-    length = struct.unpack_from("<I", box, 12)[0]
-    header = json.loads(box[20 : 20 + length])
-    for node in header["nodes"]:
-        node.pop("matrix", None)
-    header["nodes"][-1]["scale"] = [-1, 1, 1]
-    (part,) = imported(tmp_path, glb(header, box[28 + length :]))
+    def mirror(header: dict) -> None:
+        header["nodes"][-1].pop("matrix", None)
+        header["nodes"][-1]["scale"] = [-1, 1, 1]
+
+    (part,) = imported(tmp_path, changed(trimesh.creation.box().export(file_type="glb"), mirror))
     outward = np.einsum(
         "ij,ij->i", face_normals(part.vertices, part.faces), part.vertices[part.faces].mean(1) - [0, 0, 0.5]
     )
@@ -399,10 +483,7 @@ def test_a_file_that_requires_what_is_not_read_is_refused_by_name(tmp_path, name
 
 
 def with_pictures(material, images, textures) -> bytes:
-    data = model(material)
-    length = struct.unpack_from("<I", data, 12)[0]
-    header = json.loads(data[20 : 20 + length])
-    return glb(header | {"images": images, "textures": textures}, data[28 + length :])
+    return changed(model(material), lambda header: header.update(images=images, textures=textures))
 
 
 def test_a_webp_picture_beside_a_png_does_no_harm_and_alone_is_refused_by_name(tmp_path):
@@ -419,11 +500,8 @@ def test_a_webp_picture_beside_a_png_does_no_harm_and_alone_is_refused_by_name(t
 
 def test_draco_that_nothing_is_told_of_is_refused_by_name_too(tmp_path):
     data = model(primitive={"extensions": {"KHR_draco_mesh_compression": {"bufferView": 0}}})
-    length = struct.unpack_from("<I", data, 12)[0]
-    header = json.loads(data[20 : 20 + length])
-    del header["accessors"][0]["bufferView"]
     with pytest.raises(MeshError, match="compression switched off"):
-        imported(tmp_path, glb(header, data[28 + length :]))
+        imported(tmp_path, changed(data, lambda header: header["accessors"][0].pop("bufferView")))
 
 
 @pytest.mark.parametrize(
@@ -583,15 +661,41 @@ def test_negative_indices_count_back_from_their_own_line(tmp_path):
     assert area(parts) == pytest.approx(1)
 
 
-@pytest.mark.parametrize("face", ["f 0 1 2", "f 1 2 9", "f -1 -2 -9", "f 1/0 2/1 3/2", "f 1 2 x"])
-def test_an_index_that_is_none_is_refused(tmp_path, face):
-    with pytest.raises(MeshError, match="bad index"):
-        obj(tmp_path, f"{SQUARE}{face}\nv 5 5 5\n", None)
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("f 0 1 2", "a bad index in 'f 0 1 2' (index 0 of 5)"),
+        ("f 1 2 9 # none", "a bad index in 'f 1 2 9 ' (index 9 of 5)"),
+        ("f -1 -2 -9", "a bad index in 'f -1 -2 -9' (index -9 of 5)"),
+        ("f 1/0 2/1 3/2", "a bad index in 'f 1/0 2/1 3/2' (index 0 of 4)"),
+        ("f 1 2 x", "a bad index in 'f 1 2 x'"),
+        ("v 1 2", "'v' should have 3 numbers, got '1 2'"),
+        ("v 1 2 three", "'v' should have 3 numbers, got '1 2 three'"),
+        ("vt a b", "'vt' should have 2 numbers, got 'a b'"),
+    ],
+)
+def test_a_line_that_cannot_be_read_is_named_with_what_to_do(tmp_path, line, words):
+    with pytest.raises(MeshError) as caught:
+        obj(tmp_path, f"# a comment \\\r\n of two lines\r\n{SQUARE}{line}\nv 5 5 5\n", None)
+    assert f"a.obj, line 11: {words}" in str(caught.value) and "correct that line" in str(caught.value)
 
 
-def test_curves_and_lines_are_told(tmp_path, caplog):
-    obj(tmp_path, SQUARE + FACE + "l 1 2\ncurv 0 1 1 2\n", None)
-    assert "lines are left out" in caplog.text and "curves are left out" in caplog.text
+def test_what_is_not_drawn_of_an_obj_file_is_told(tmp_path, caplog):
+    text = SQUARE + FACE + "l 1 2\ncurv 0 1 1 2\nv 0 0 nan\nvt nan 0\nf 1 2 5\nf 1 2\nf 1 1 1\nusemtl point\nf 1 1 1\n"
+    mtl = "newmtl paint\nKd red\nNs nan\nmap_Kd -s 1.2.3 a.png\n"
+    parts = obj(tmp_path, f"mtllib a.mtl\n{text}", mtl)
+    assert area(parts) == pytest.approx(1)
+    for words in (
+        "its lines are left out",
+        "its curves are left out",
+        "some faces are left out",
+        "the Kd of",
+        "the Ns of",
+    ):
+        assert words in caplog.text
+    assert "'point' is left out: its faces have no area" in caplog.text
+    with pytest.raises(MeshError, match=r"no faces that can be drawn \(some faces are left out: .* not finite\)"):
+        obj(tmp_path / "b", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3", None)
 
 
 def test_roughness_and_metal_of_an_mtl_are_taken(tmp_path):

@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import binascii
 import io
+import json
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,8 +25,7 @@ from embodied.assets.importing.meshing import face_normals
 from embodied.assets.importing.obj import FARTHEST, MAX_FACES, MeshError
 from embodied.assets.importing.sh3f import MAX_ENTRY
 from embodied.assets.importing.textures import mirrored, palette, sampled, shrunk, tinted, to_linear, to_srgb
-from embodied.assets.json_file import parse
-from embodied.assets.json_file import shown as short
+from embodied.assets.json_file import shown
 from embodied.assets.records import Finish
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
@@ -55,10 +55,12 @@ FADED = 0.1
 """Opacity below which blended texels are cut away."""
 METAL = 0.5
 """Metalness from which a face is drawn as metal."""
+ANEW = "copy the file again, or open it in Blender and export it from there as binary glTF 2.0"
+"""The remedy for a damaged file: whoever exports it again as before gets the same."""
 
 
 class RefusedError(ValueError):
-    """What a file asks for is not read; the message has the remedy."""
+    """A file is not read; the message has the remedy."""
 
 
 def read_glb(path: Path, tell: Tell) -> tuple[RawPart, ...]:
@@ -71,29 +73,31 @@ def read_glb(path: Path, tell: Tell) -> tuple[RawPart, ...]:
       MeshError: not a .glb file, empty, too large, damaged, not finite, or in need of an extension that is not read.
     """
     if path.stat().st_size > MAX_ENTRY:
-        raise MeshError(f"{path} is larger than {MAX_ENTRY} bytes; simplify the model")
-    data = path.read_bytes()
+        raise MeshError(f"{path} is larger than {MAX_ENTRY} bytes; give it fewer triangles or smaller textures")
     try:
-        parts = _Reader(*_chunks(data), tell).parts()
+        reader = _Reader(*_chunks(path.read_bytes()), tell)
+        parts = reader.parts()
     except RefusedError as e:
         raise MeshError(f"{path} cannot be read: {e}") from e
     except Exception as e:
         why = f"{e}" or type(e).__name__
-        raise MeshError(f"{path} cannot be read as .glb ({why[:200]}); export it again as binary glTF 2.0") from e
+        raise MeshError(f"{path} cannot be read as .glb ({why[:200]}); {ANEW}") from e
     if not parts:
-        raise MeshError(f"{path} has no triangles; the model is empty")
+        why = "; ".join(reader.left_out[:3]) or "its scene shows no mesh"
+        raise MeshError(f"{path} has nothing to draw: {why}")
     return parts
 
 
 def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """The JSON of a file and its binary chunk."""
-    magic, version, _ = struct.unpack_from("<4sII", data)
+    """The JSON of a file, as leniently as viewers read it, and its binary chunk."""
+    if data[:4] != b"glTF" or data[4:8] != struct.pack("<I", 2):
+        raise RefusedError(f"it begins with {data[:8]!r}, a .glb with b'glTF' and a 2; export it as binary glTF 2.0")
     length, kind = struct.unpack_from("<II", data, 12)
-    if magic != b"glTF" or version != 2 or kind != JSON_CHUNK or 20 + length > len(data):
-        raise ValueError("the file does not begin as glTF 2.0 does")
-    header = parse(data[20 : 20 + length], "a header")
+    if kind != JSON_CHUNK or 20 + length > len(data):
+        raise ValueError("its header is cut off, or no JSON")
+    header = json.loads(data[20 : 20 + length].rstrip(b"\0"))  # gltf-rs before 0.11.3 padded it with zeros
     if not isinstance(header, dict):
-        raise ValueError(f"its header should be an object, got {short(header)}")
+        raise ValueError(f"its header should be an object, got {shown(header)}")
     start = 20 + length + (-length) % 4
     if start + 8 > len(data):
         return header, b""
@@ -136,14 +140,15 @@ class _Reader:
 
     def __init__(self, header: dict[str, Any], body: bytes, tell: Tell) -> None:
         self.header, self.body, self.tell = header, body, tell
-        counts = [a["count"] for a in header.get("accessors", [])]
-        if not all(isinstance(n, int) and 0 <= n <= 3 * MAX_FACES for n in counts) or sum(counts) > 20 * MAX_FACES:
-            raise ValueError(f"an accessor's count is impossible, or the model has more than {MAX_FACES} triangles")
+        self.left_out: list[str] = []
+        """What of the scene is not drawn, in words."""
         self._check_extensions()
-        self._pictures = [
-            None if image.get("mimeType") in FOREIGN else self._picture(image) for image in header.get("images", [])
-        ]
+        self._pictures: dict[int, Image.Image] = {}
         self._surfaces: dict[int, _Surface] = {}
+
+    def _leave_out(self, words: str) -> None:
+        self.left_out.append(words)
+        self.tell(words)
 
     def _check_extensions(self) -> None:
         """Refuse what the file cannot be read without; tell what it can do without."""
@@ -159,16 +164,25 @@ class _Reader:
         if self.header.get("animations"):
             self.tell("its animations are not played: it stands as it is saved")
 
-    def _picture(self, image: dict[str, Any]) -> Image.Image:
+    def _picture(self, number: int) -> Image.Image:
+        """A picture of the file, opened when a surface that is drawn asks for it."""
+        if number not in self._pictures:
+            self._pictures[number] = self._opened(self.header["images"][number])
+        return self._pictures[number]
+
+    def _opened(self, image: dict[str, Any]) -> Image.Image:
         try:
             with Image.open(io.BytesIO(self._picture_bytes(image)), formats=PICTURES) as opened:
                 if opened.width * opened.height > MAX_PIXELS:
-                    raise ValueError(
-                        f"a picture has {opened.width} x {opened.height} pixels, at most {MAX_PIXELS} are read"
-                    )
+                    size = f"{opened.width} x {opened.height}"
+                    raise RefusedError(f"a picture has {size} pixels, at most {MAX_PIXELS} are read; make it smaller")
                 return shrunk(opened, MAX_TEXTURE)
         except (OSError, SyntaxError) as e:
-            raise ValueError(f"its pictures should be whole {' or '.join(PICTURES)} files stored in it") from e
+            name = shown(image.get("name") or image.get("mimeType") or "without a name")
+            raise RefusedError(
+                f"its pictures should be whole {' or '.join(PICTURES)} files stored in it, picture {name} is none; "
+                "save that texture again as PNG and export the model with it"
+            ) from e
 
     def _picture_bytes(self, image: dict[str, Any]) -> bytes:
         return self._view(image["bufferView"]).tobytes() if "bufferView" in image else _inline(image.get("uri", ""))
@@ -182,7 +196,7 @@ class _Reader:
         data = _inline(buffer["uri"]) if "uri" in buffer else self.body
         first, size = view.get("byteOffset", 0), view["byteLength"]
         if number < 0 or first < 0 or first + size > len(data):
-            raise ValueError(f"buffer view {number} lies outside the file")
+            raise ValueError(f"buffer view {number} lies outside the file, of which an end is missing")
         return memoryview(data)[first : first + size]
 
     def _accessor(self, number: int, width: int) -> np.ndarray:
@@ -191,18 +205,22 @@ class _Reader:
         kind, held = np.dtype(KINDS[accessor["componentType"]]), WIDTHS[accessor["type"]]
         if number < 0 or held != width:
             raise ValueError(f"accessor {number} should hold {width} numbers each")
-        count, sparse = accessor["count"], accessor.get("sparse")
+        count, sparse = self._count(accessor), accessor.get("sparse")
         if "bufferView" in accessor:
             out = self._numbers(accessor, kind, count, held).copy()
-        elif sparse:
-            out = np.zeros((count, held), kind)
         else:
-            raise ValueError(f"accessor {number} has no data")
+            out = np.zeros((count, held), kind)  # as section 3.6.2.3 asks
         if sparse:
             where = self._numbers(sparse["indices"], None, sparse["count"], 1)[:, 0]
             out[where] = self._numbers(sparse["values"], kind, sparse["count"], held)
         out = out.astype(np.float64)
         return np.maximum(out / np.iinfo(kind).max, -1.0) if accessor.get("normalized") and kind.kind in "iu" else out
+
+    def _count(self, accessor: dict[str, Any]) -> int:
+        count = accessor["count"]
+        if not isinstance(count, int) or not 0 <= count <= 3 * MAX_FACES:
+            raise ValueError(f"an accessor should count 0 to {3 * MAX_FACES} elements, got {shown(count)}")
+        return count
 
     def _numbers(self, where: dict[str, Any], kind: np.dtype | None, count: int, width: int) -> np.ndarray:
         kind = kind or np.dtype(KINDS[where["componentType"]])
@@ -216,13 +234,15 @@ class _Reader:
         gathered: dict[object, list[RawPart]] = {}
         faces = 0
         for number, (node, matrix) in enumerate(self._nodes()):
-            for primitive in self.header["meshes"][node["mesh"]]["primitives"]:
+            for primitive in self.header["meshes"][node["mesh"]].get("primitives") or [{"attributes": {}}]:
                 for part in self._primitive(node, primitive, matrix, number):
                     faces += len(part.faces)
                     if faces > MAX_FACES:
-                        raise ValueError(f"it has more than {MAX_FACES} triangles; simplify the model")
+                        raise RefusedError(f"it has more than {MAX_FACES} triangles; simplify the model")
                     key = (part.name, part.finish, id(part.image), part.two_sided, part.least, part.uv is None)
                     gathered.setdefault(key, []).append(part)
+        if unused := sorted(set(range(len(self.header.get("images", [])))) - self._pictures.keys()):
+            self.tell(f"its pictures {unused} are not drawn: no surface shows them")
         return tuple(_joined(parts) for parts in gathered.values())
 
     def _nodes(self) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
@@ -253,26 +273,38 @@ class _Reader:
         self, node: dict[str, Any], primitive: dict[str, Any], matrix: np.ndarray, number: int
     ) -> Iterator[RawPart]:
         attributes = primitive["attributes"]
-        faces = self._faces(primitive)
+        name = f"a part of {shown(node['name'])}" if "name" in node else f"a part of mesh {node['mesh']}"
+        faces = self._faces(primitive) if "POSITION" in attributes else np.empty((0, 3), np.int64)
         if not len(faces):
+            self._leave_out(f"{name} is left out: it has no triangles")
             return
         vertices = self._vertices(node, primitive)
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise ValueError(f"a face of node {number} names a vertex that is not there")
-        if "skin" in node and "JOINTS_0" in attributes:
-            vertices = self._skinned(node, attributes, vertices)
-            matrix = np.eye(4)
-        vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        if np.linalg.det(matrix[:3, :3]) < 0:
-            faces = faces[:, ::-1]
-        if not (np.abs(vertices) <= FARTHEST).all() or not np.abs(face_normals(vertices, faces)).max() > 0:
-            raise ValueError(f"mesh {number} has vertices that are not finite, or no area")
+        with np.errstate(over="ignore", invalid="ignore"):
+            if "skin" in node and "JOINTS_0" in attributes:
+                vertices = self._skinned(node, attributes, vertices)
+                matrix = np.eye(4)
+            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+            if np.linalg.det(matrix[:3, :3]) < 0:
+                faces = faces[:, ::-1]
+        there = (np.abs(vertices) <= FARTHEST).all(axis=1)
+        if not there.all():
+            faces, whole = faces[there[faces].all(axis=1)], len(faces)
+            vertices = np.where(there[:, None], vertices, 0.0)
+            if len(faces) < whole:
+                lost = f"{whole - len(faces)} of {whole} triangles"
+                self._leave_out(f"{lost} of {name} are left out: their vertices are not finite")
+        if not face_normals(vertices, faces).any():
+            if len(faces):
+                self._leave_out(f"{name} is left out: it has no area")
+            return
         surface = self._surface(primitive.get("material"), "COLOR_0" in attributes)
         colours = np.ones((len(vertices), 4))
         if "COLOR_0" in attributes:
             given = self.header["accessors"][attributes["COLOR_0"]]
             read = self._accessor(attributes["COLOR_0"], WIDTHS[given["type"]])
-            colours[:, : read.shape[1]] = read
+            colours[:, : read.shape[1]] = np.nan_to_num(read, nan=1.0)
         yield from self._dressed(surface, f"mesh_{number}", vertices, faces, attributes, colours)
 
     def _faces(self, primitive: dict[str, Any]) -> np.ndarray:
@@ -280,7 +312,7 @@ class _Reader:
         mode, positions = primitive.get("mode", 4), self.header["accessors"][primitive["attributes"]["POSITION"]]
         if "bufferView" not in positions and DRACO in primitive.get("extensions", {}):
             raise RefusedError(f"{REFUSED[DRACO]} ({DRACO})")
-        corners = np.arange(positions["count"])
+        corners = np.arange(self._count(positions))
         if "indices" in primitive:
             corners = self._accessor(primitive["indices"], 1)[:, 0].astype(np.int64)
         if mode == 4:
@@ -291,7 +323,7 @@ class _Reader:
         elif mode == 6:
             order = np.stack([steps * 0, steps + 1, steps + 2], axis=1)
         else:
-            self.tell("its points and lines are left out: they have no surface")
+            self._leave_out("its points and lines are left out: they have no surface")
             return np.empty((0, 3), np.int64)
         faces = corners[order]
         return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
@@ -336,52 +368,60 @@ class _Reader:
     def _read_surface(self, material: dict[str, Any]) -> _Surface:
         core, more = material.get("pbrMetallicRoughness", {}), material.get("extensions", {})
         factor, picture = core.get("baseColorFactor", [1, 1, 1, 1]), core.get("baseColorTexture")
-        roughness, metallic = core.get("roughnessFactor", 1.0), core.get("metallicFactor", 1.0)
+        roughness, metallic = self._share(core, "roughnessFactor", 1.0), self._share(core, "metallicFactor", 1.0)
         both = core.get("metallicRoughnessTexture")
         name = material.get("name") or None
         if older := more.get("KHR_materials_pbrSpecularGlossiness"):
             factor, picture = older.get("diffuseFactor", [1, 1, 1, 1]), older.get("diffuseTexture")
-            roughness, metallic, both = 1 - older.get("glossinessFactor", 1.0), 0.0, None
-        shown = f"material {name!r}"
+            roughness, metallic, both = 1 - self._share(older, "glossinessFactor", 1.0), 0.0, None
+        called = f"material {name!r}"
         if metallic == 1.0 and both is None and "metallicFactor" not in core:
-            self.tell(f"{shown} says nothing of metal, which makes it metal in glTF; give it a metallicFactor")
+            self.tell(f"{called} says nothing of metal, which makes it metal in glTF; give it a metallicFactor")
         for field in ("normalTexture", "emissiveTexture"):
             if field in material:
-                self.tell(f"the {field} of {shown} is not drawn")
+                self.tell(f"the {field} of {called} is not drawn")
         if any(material.get("emissiveFactor", ())):
-            self.tell(f"{shown} does not glow by its emissiveFactor; name it in 'glow', and its light in 'emits'")
+            self.tell(f"{called} does not glow by its emissiveFactor; name it in 'glow', and its light in 'emits'")
         factor = np.array([float(x) for x in factor])
         if factor.shape != (4,) or not (np.abs(factor) <= 1e6).all():
-            raise ValueError(f"{shown} should have a colour of four numbers")
+            raise ValueError(f"{called} should have a colour of four numbers")
         mode = material.get("alphaMode", "OPAQUE")
-        if clear := more.get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0):
-            factor[3] = min(factor[3] if mode == "BLEND" else 1.0, 1 - 0.9 * float(clear))
+        if clear := self._share(more.get("KHR_materials_transmission", {}), "transmissionFactor", 0.0):
+            factor[3] = min(factor[3] if mode == "BLEND" else 1.0, 1 - 0.9 * clear)
             mode = "BLEND"
-        least = {"MASK": float(material.get("alphaCutoff", 0.5)), "BLEND": FADED}.get(mode)
+        least = {"MASK": self._share(material, "alphaCutoff", 0.5), "BLEND": FADED}.get(mode)
         return _Surface(
             name,
             factor,
-            self._texture(picture, shown),
-            float(roughness),
-            float(metallic),
-            self._texture(both, shown),
+            self._texture(picture, called),
+            roughness,
+            metallic,
+            self._texture(both, called),
             bool(material.get("doubleSided", False)),
             least,
             mode == "BLEND",
         )
 
-    def _texture(self, info: dict[str, Any] | None, shown: str) -> _Texture | None:
+    def _share(self, fields: dict[str, Any], name: str, usual: float) -> float:
+        """A number from 0 to 1; `usual`, and told, where it is none."""
+        value = float(fields.get(name, usual))
+        if not np.isfinite(value):
+            self.tell(f"a {name} is not finite; {usual} is taken instead")
+            value = usual
+        return min(1.0, max(0.0, value))
+
+    def _texture(self, info: dict[str, Any] | None, called: str) -> _Texture | None:
         if info is None:
             return None
         texture = self.header["textures"][info["index"]]
         if "source" not in texture:
             known = (f"{REFUSED[n]} ({n})" for n in sorted(texture.get("extensions", ())) if n in REFUSED)
-            raise RefusedError(next(known, f"a texture of {shown} has no picture"))
+            raise RefusedError(next(known, f"a texture of {called} has no picture"))
         sampler = self.header["samplers"][texture["sampler"]] if "sampler" in texture else {}
         wraps = sampler.get("wrapS"), sampler.get("wrapT")
-        picture = self._pictures[texture["source"]]
-        if picture is None:
-            raise RefusedError(f"a texture of {shown} is neither PNG nor JPEG; export it again with such textures")
+        if self.header["images"][texture["source"]].get("mimeType") in FOREIGN:
+            raise RefusedError(f"a texture of {called} is neither PNG nor JPEG; export it again with such textures")
+        picture = self._picture(texture["source"])
         mirror = wraps[0] == MIRRORED, wraps[1] == MIRRORED
         change = info.get("extensions", {}).get("KHR_texture_transform", {})
         c, s = np.cos(float(change.get("rotation", 0.0))), np.sin(float(change.get("rotation", 0.0)))
@@ -401,8 +441,10 @@ class _Reader:
             self.tell(f"a mesh has a texture and no {name}; it is drawn in the texture's mean colour")
             return None
         uv = self._accessor(attributes[name], 2) @ texture.turn.T + texture.shift
-        if not (np.abs(uv) <= FARTHEST).all():
-            raise ValueError("texture coordinates are not finite")
+        lost = ~(np.abs(uv) <= FARTHEST).all(axis=1)
+        if lost[faces].any():
+            self.tell(f"some values of {name} are not finite; those corners show the texture's beginning")
+        uv[lost] = 0.0
         half = 0.5 / np.array(texture.picture.size)
         uv = np.where(texture.clamped, np.clip(uv, half, 1 - half), uv)
         return (uv * [1, -1] + [0, 1])[faces]
@@ -438,7 +480,10 @@ class _Reader:
             elif image.mode == "RGBA":
                 image = self._tinted(image.convert("RGB"), np.ones(3))
         elif surface.least is not None and not surface.blended and tint[:, 3].mean() < surface.least:
-            self.tell(f"{mesh} is left out: its opacity is below its alphaCutoff")
+            self._leave_out(f"{mesh} is left out: its opacity is below its alphaCutoff")
+            return
+        if surface.blended and not tint[:, 3].max() > 0:
+            self._leave_out(f"{mesh} is left out: its opacity is 0")
             return
         shades = to_srgb(tint[:, :3])
         flat = shades.mean(0)
@@ -481,11 +526,11 @@ def _inline(uri: str) -> bytes:
     """The bytes that a data: URI spells out in base64.
 
     Raises:
-      ValueError: it is none: nothing beside the file itself is opened.
+      RefusedError: it is none: nothing beside the file itself is opened.
     """
     _, comma, text = str(uri).partition("base64,")
     if not (comma and str(uri).startswith("data:")):
-        raise ValueError("its pictures should be whole PNG or JPEG files, and its buffers lie, stored in it")
+        raise RefusedError(f"it names the file {shown(uri)}; export it as one .glb that holds its buffers and pictures")
     try:
         return base64.b64decode(text, validate=True)
     except binascii.Error as e:

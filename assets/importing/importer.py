@@ -13,7 +13,7 @@ import logging
 import struct
 import warnings
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePosixPath
 
@@ -57,6 +57,7 @@ HOLES = 2
 """Times the budget that the triangles of one part may be after the holes of its texture are cut."""
 CLEAR = 0.3
 """What keeps texels fainter than this is blended, not masked: its opacity is the mean over them."""
+NO_AREA = "its faces have no area: they are points or lines, or flattened by a scale of 0"
 FOLDS = 9_000
 """Faces by which the bedding of a model may grow to hold its folds, each part by its area."""
 
@@ -144,8 +145,8 @@ def read_obj(
             say(f"its material library {statement!r} is not there; put it beside the model")
         for data in found:
             materials |= parse_mtl(decoded(data))
-    for what in obj.unread:
-        say(f"its {what} are left out; export them as triangles")
+    for words in obj.left_out:
+        say(words)
     pictures = _Pictures(read, folder, remedy, say)
     parts: list[RawPart] = []
     for group in obj.groups:
@@ -229,9 +230,12 @@ class _Pictures:
 
     def _open(self, name: str) -> Image.Image | None:
         if name not in self._held:
-            self._held[name] = _image(self._read, _texture_name(self._folder, name), self._remedy)
-            if self._held[name] is None:
+            self._held[name] = image = _image(self._read, _texture_name(self._folder, name), self._remedy)
+            if image is None:
                 self._say(f"its texture {name!r} is not there; put it beside the model")
+            elif image.mode == "RGBA" and not image.getchannel("A").getbbox():
+                self._say(f"the alpha channel of texture {name!r} is 0 everywhere; it is drawn opaque")
+                self._held[name] = image.convert("RGB")
         return self._held[name]
 
 
@@ -275,10 +279,10 @@ def finish_parts(
       MeshError: nothing is left, or numbers are not finite.
     """
     budget = recipe.faces or next(n for side, n in FACE_BUDGETS if max(recipe.size) <= side)
-    looking = (_looking(p, dict(recipe.looks)) for p in raw if p.name not in recipe.dropped)
-    raw = tuple(p for p in (_cut(p, HOLES * budget, tell) for p in looking) if len(p.faces))
+    left_out: list[str] = []
+    raw = tuple(_drawn(raw, recipe, HOLES * budget, tell, left_out))
     if not raw:
-        raise MeshError(f"{recipe.key} has no faces; the model is empty or damaged")
+        raise MeshError(f"{recipe.key} has nothing to draw: {'; '.join(left_out[:3]) or 'all of it is dropped'}")
     placed = _placed(raw, recipe)
     tolerance = 2e-5 * max(recipe.size)
     prepared = []
@@ -290,8 +294,10 @@ def finish_parts(
         keep = sound_faces(points, faces)
         if keep.any():
             prepared.append((part, points, faces[keep], None if uv is None else uv[keep]))
+        else:
+            tell(f"material {part.name!r} is left out: {NO_AREA}")
     if not prepared:
-        raise MeshError(f"{recipe.key} has only degenerate faces; the model is damaged")
+        raise MeshError(f"{recipe.key} has nothing to draw: {NO_AREA}")
     total = sum(len(f) for _, _, f, _ in prepared)
     bedding = sum(_area(v, f) for p, v, f, _ in prepared if p.cover == "bedding")
     out = []
@@ -316,6 +322,31 @@ def finish_parts(
             out.append(_part(part, points, behind, None if uv is None else uv[back][:, ::-1], recipe))
         out.append(_part(part, points, faces, uv, recipe))
     return _to_size(out, recipe.size)
+
+
+def _drawn(
+    raw: tuple[RawPart, ...], recipe: ImportRecipe, room: int, tell: Tell, left_out: list[str]
+) -> Iterator[RawPart]:
+    """The parts that have something to draw, looking as the recipe says; why others have nothing goes to `left_out`."""
+    for part in raw:
+        if part.name in recipe.dropped:
+            continue
+        why = NO_AREA
+        if _has_area(part):
+            part = _cut(_looking(part, dict(recipe.looks)), room, tell)
+            why = "its texture is transparent everywhere; correct its alpha channel or map_d"
+        if len(part.faces) and _has_area(part):
+            yield part
+        else:
+            left_out.append(f"material {part.name!r} is left out: {why}")
+            tell(left_out[-1])
+
+
+def _has_area(part: RawPart) -> bool:
+    """Whether any face is more than a point or a line."""
+    doubled = np.linalg.norm(face_normals(part.vertices, part.faces), axis=1)
+    sides = part.vertices[part.faces] - part.vertices[np.roll(part.faces, 1, axis=1)]
+    return bool((doubled > 1e-6 * np.square(sides).sum(axis=2).max(axis=1)).any())
 
 
 def _cut(part: RawPart, room: int, tell: Tell) -> RawPart:

@@ -22,9 +22,16 @@ MAX_CORNERS = 20_000
 """Of one polygon."""
 
 
-Polygon = tuple[list[str], int, int]
-"""The corners of a face as written, and how many vertices and texture coordinates stand above it."""
+Line = tuple[int, str]
+"""A line's number, from 1, and what follows its first word."""
+Polygon = tuple[Line, int, int]
+"""The line of a face, and how many vertices and texture coordinates stand above it."""
+CORRECT = "correct that line, or write the model with another program"
 UNREAD = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "curved surfaces"}
+COLOURS = {"Kd": "diffuse", "Ks": "specular", "Ke": "emission"}
+SHARES = {"d": "dissolve", "Tr": "transparency", "Pr": "roughness", "Pm": "metallic"}
+JOINED = "\x1f"
+"""A blank that no line begins or ends with: where lines were joined."""
 MAPS = {"map_kd": "texture", "map_d": "opacity_map"}
 OPTIONS = {"s": 3, "o": 3, "t": 3, "mm": 2}
 """Numbers that an option of a map may take; others take one or a word."""
@@ -66,7 +73,7 @@ class MtlMaterial:
     opacity_map: MtlMap | None = None
     """map_d."""
     unread: tuple[str, ...] = ()
-    """Statements about pictures that are not drawn, such as map_Bump."""
+    """Statements that are not drawn: pictures such as map_Bump, and numbers that are none."""
 
     @property
     def opacity(self) -> float:
@@ -98,8 +105,8 @@ class Obj:
     """What its mtllib statements say: the names of one or more MTL files each."""
     colours: np.ndarray | None = None
     """(n, 3) sRGB of the vertices, where the file gives them."""
-    unread: tuple[str, ...] = ()
-    """Statements of geometry that is left out: lines, points, curves, surfaces."""
+    left_out: tuple[str, ...] = ()
+    """What of its geometry is not drawn, in words."""
 
 
 def parse_obj(text: str, where: str) -> Obj:
@@ -108,39 +115,49 @@ def parse_obj(text: str, where: str) -> Obj:
     Raises:
       MeshError: no faces, too many, indices out of range, or numbers that are not finite.
     """
-    vertices: list[str] = []
-    uvs: list[str] = []
+    vertices: list[Line] = []
+    uvs: list[Line] = []
     faces: dict[str, list[Polygon]] = {}
-    libraries, unread = [], set()
+    libraries, left_out = [], set()
     current = faces.setdefault("", [])
-    for head, rest in _statements(text):
+    for number, head, rest in _statements(text):
         if head == "v":
-            vertices.append(rest.partition("#")[0])
+            vertices.append((number, rest.partition("#")[0]))
         elif head == "vt":
-            uvs.append(rest.partition("#")[0])
+            uvs.append((number, rest.partition("#")[0]))
         elif head == "f":
-            current.append((rest.partition("#")[0].split(), len(vertices), len(uvs)))
+            current.append(((number, rest.partition("#")[0]), len(vertices), len(uvs)))
         elif head == "usemtl":
             current = faces.setdefault(rest, [])
         elif head == "mtllib":
             libraries.append(rest)
         elif head in UNREAD:
-            unread.add(UNREAD[head])
-    points = _numbers(vertices, 3, where)
-    coords = _numbers([v if len(v.split()) > 1 else f"{v} 0" for v in uvs], 2, where)
-    groups = tuple(_group(name, polygons, points, len(coords), where) for name, polygons in faces.items() if polygons)
-    groups = tuple(g for g in groups if len(g.corners))
+            left_out.add(f"its {UNREAD[head]} are left out; export them as triangles")
+    points, lost_points = _finite_rows(_numbers(vertices, 3, where, "v"))
+    coords, lost_coords = _finite_rows(_numbers([_pair(line) for line in uvs], 2, where, "vt"))
+    groups = []
+    for name, polygons in faces.items():
+        rows = [_corners(polygon, len(points), len(coords), lost_coords, where) for polygon in polygons]
+        sound = [row for row in rows if len(row) > 4 and not lost_points.intersection(row[: len(row) // 2])]
+        if len(sound) < len(rows):
+            left_out.add("some faces are left out: they have under three corners, or vertices that are not finite")
+        group = _group(name, sound, points, where)
+        if len(group.corners):
+            groups.append(group)
+        elif sound:
+            left_out.add(f"faces of material {name!r} are left out: they have no area")
     if not groups:
-        raise MeshError(f"{where} has no faces; the model is empty or damaged")
+        why = f" ({'; '.join(sorted(left_out))})" if left_out else ""
+        raise MeshError(f"{where} has no faces that can be drawn{why}; export its surfaces as polygons")
     if (total := sum(len(g.corners) for g in groups)) > MAX_FACES:
         raise MeshError(f"{where} has {total} triangles, at most {MAX_FACES} are read; simplify the model")
     colours = _colours(vertices, where)
-    return Obj(points, coords, groups, tuple(dict.fromkeys(libraries)), colours, tuple(sorted(unread)))
+    return Obj(points, coords, tuple(groups), tuple(dict.fromkeys(libraries)), colours, tuple(sorted(left_out)))
 
 
 def libraries(text: str) -> tuple[str, ...]:
     """What the mtllib statements of an OBJ file say, without reading its mesh."""
-    return tuple(dict.fromkeys(rest for head, rest in _statements(text) if head == "mtllib"))
+    return tuple(dict.fromkeys(rest for _, head, rest in _statements(text) if head == "mtllib"))
 
 
 def decoded(data: bytes) -> str:
@@ -153,57 +170,70 @@ def decoded(data: bytes) -> str:
         return data.decode("latin-1")
 
 
-def _statements(text: str) -> Iterator[tuple[str, str]]:
-    """The first word and the rest of every line; a backslash at its end joins it with the next."""
-    for line in re.sub(r"\\[ \t]*\r?\n", " ", text).splitlines():
+def _statements(text: str) -> Iterator[tuple[int, str, str]]:
+    """The number, the first word and the rest of every line; a backslash at its end joins it with the next."""
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    number = 1
+    for line in re.sub(r"\\[ \t]*\n", JOINED, text).split("\n"):
         head, *rest = line.split(None, 1) or [""]
-        yield head, rest[0].strip() if rest else ""
+        yield number, head, rest[0].strip() if rest else ""
+        number += 1 + line.count(JOINED)
 
 
 def parse_mtl(text: str) -> dict[str, MtlMaterial]:
     """The materials of an MTL file by name; statements it does not know are ignored."""
     materials: dict[str, MtlMaterial] = {}
     name = None
-    for head, rest in _statements(text):
+    for _, head, rest in _statements(text):
         if head == "newmtl":
             name = rest
             materials[name] = MtlMaterial(name)
         elif name is not None and rest:
             old = materials[name]
-            if head.lower().startswith(("map_", "bump", "disp", "decal", "norm", "refl")):
-                change = {MAPS[head.lower()]: _map(rest)} if head.lower() in MAPS else {"unread": (*old.unread, head)}
-            else:
-                change = _material_field(head, rest.partition("#")[0].split())
+            try:
+                change = _material_field(head, rest)
+            except (ValueError, IndexError):
+                change = {"unread": (*old.unread, head)}
             materials[name] = dataclasses.replace(old, **change)
     return materials
 
 
-def _material_field(head: str, rest: list[str]) -> dict[str, Any]:
-    colors = {"Kd": "diffuse", "Ks": "specular", "Ke": "emission"}
-    shares = {"d": "dissolve", "Tr": "transparency", "Pr": "roughness", "Pm": "metallic"}
-    try:
-        if head in colors:
-            values = [min(1.0, max(0.0, float(x))) for x in rest[:3]]
-            return {colors[head]: tuple(values) if len(values) == 3 else (values[0],) * 3}
-        if head in shares:
-            return {shares[head]: min(1.0, max(0.0, float(rest[-1])))}
-        if head == "Ns":
-            return {"shininess": float(rest[0])}
-        if head == "illum":
-            return {"illum": int(float(rest[0]))}
-    except (ValueError, IndexError, OverflowError):
-        return {}
-    return {}
+def _material_field(head: str, rest: str) -> dict[str, Any]:
+    """The fields that a statement changes.
+
+    Raises:
+      ValueError, IndexError: it asks for a picture that is not drawn, or has no numbers where they belong.
+    """
+    if head.lower() in MAPS:
+        return {MAPS[head.lower()]: _map(rest)}
+    if head.lower().startswith(("map_", "bump", "disp", "decal", "norm", "refl")):
+        raise ValueError("not drawn")
+    words = rest.partition("#")[0].split()
+    if head in COLOURS:
+        values = [min(1.0, max(0.0, _finite(x))) for x in words[:3]]
+        return {COLOURS[head]: tuple(values) if len(values) == 3 else (values[0],) * 3}
+    if head in SHARES:
+        return {SHARES[head]: min(1.0, max(0.0, _finite(words[-1])))}
+    if head == "Ns":
+        return {"shininess": _finite(words[0])}
+    return {"illum": int(_finite(words[0]))} if head == "illum" else {}
+
+
+def _finite(word: str) -> float:
+    value = float(word)
+    if not abs(value) <= FARTHEST:
+        raise ValueError(f"{word} is not finite")
+    return value
 
 
 def _map(text: str) -> MtlMap:
     """A picture's options and its name, which may hold blanks."""
     found: dict[str, Any] = {}
     while option := re.match(r"-(\w+)\s+", text):
-        text, number = text[option.end() :], re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s+")
+        text, number = text[option.end() :], re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s+", re.ASCII)
         values: list[float] = []
         while len(values) < OPTIONS.get(option[1], 1) and (m := number.match(text)):
-            values.append(float(m[1]))
+            values.append(_finite(m[1]))
             text = text[m.end() :]
         if option[1] == "clamp":
             found["clamped"] = text.split(None, 1)[0] == "on"
@@ -215,50 +245,72 @@ def _map(text: str) -> MtlMap:
     return MtlMap(text.strip().strip('"'), **found)
 
 
-def _colours(lines: list[str], where: str) -> np.ndarray | None:
+def _colours(lines: list[Line], where: str) -> np.ndarray | None:
     """(n, 3) sRGB that follow the positions on the lines of vertices, from 0 to 1 or to 255; None for none."""
-    if not lines or any(len(line.split()) < 6 for line in lines):
+    if not lines or any(len(line.split()) < 6 for _, line in lines):
         return None
-    colours = _numbers([" ".join(line.split()[3:]) for line in lines], 3, where)
+    colours = _numbers([(n, " ".join(line.split()[3:])) for n, line in lines], 3, where, "v x y z")
+    colours = np.nan_to_num(colours, nan=1.0, posinf=1.0)
     return np.clip(colours / (255.0 if colours.max() > 1.0 else 1.0), 0, 1)
 
 
-def _numbers(lines: list[str], width: int, where: str) -> np.ndarray:
+def _numbers(lines: list[Line], width: int, where: str, head: str) -> np.ndarray:
+    """(n, width) float64 of lines that begin with `head`."""
     if not lines:
         return np.empty((0, width))
     try:
-        rows = [line.split()[:width] for line in lines]
-        out = np.array(rows, dtype=np.float64).reshape(len(rows), -1)
-        if out.shape[1] != width:
-            raise ValueError(f"{out.shape[1]} numbers")
-    except ValueError as e:
-        raise MeshError(f"{where} has a vertex that is not {width} numbers; the model is damaged") from e
-    if not (np.abs(out) <= FARTHEST).all():
-        raise MeshError(f"{where} has a vertex that is not finite, or beyond {FARTHEST:g}; the model is damaged")
-    return out
+        out = np.array([line.split()[:width] for _, line in lines], dtype=np.float64)
+        if out.shape[1:] == (width,):
+            return out
+    except ValueError:
+        pass
+    for number, line in lines:
+        try:
+            good = len([float(word) for word in line.split()[:width]]) == width
+        except ValueError:
+            good = False
+        if not good:
+            raise MeshError(f"{where}, line {number}: {head!r} should have {width} numbers, got {line!r}; {CORRECT}")
+    raise AssertionError("every line has its numbers, but they make no array")
 
 
-def _group(name: str, polygons: list[Polygon], points: np.ndarray, uv_count: int, where: str) -> Group:
-    by_size: dict[int, list[list[int]]] = {}
+def _pair(line: Line) -> Line:
+    """A line of texture coordinates, which may have one number only."""
+    return line if len(line[1].split()) > 1 else (line[0], f"{line[1]} 0")
+
+
+def _finite_rows(rows: np.ndarray) -> tuple[np.ndarray, frozenset[int]]:
+    """Rows of finite numbers; those that are not, or lie too far away, are zeros, and are named."""
+    good = (np.abs(rows) <= FARTHEST).all(axis=1)
+    return np.where(good[:, None], rows, 0.0), frozenset(np.flatnonzero(~good).tolist())
+
+
+def _corners(polygon: Polygon, points: int, uvs: int, lost_uvs: frozenset[int], where: str) -> list[int]:
+    """The n vertices of a face and behind them its n texture coordinates, -1 where not all of them are there."""
+    (number, text), points_above, uvs_above = polygon
+    parts = [word.split("/") for word in text.split()]
     try:
-        for words, vertices, uvs in polygons:
-            if len(words) > 2:
-                parts = [w.split("/") for w in words]
-                v = [_index(p[0], vertices, len(points)) for p in parts]
-                t = [_index(p[1], uvs, uv_count) if len(p) > 1 and p[1] else -1 for p in parts]
-                by_size.setdefault(len(words), []).append(v + (t if min(t) >= 0 else [-1] * len(t)))
+        v = [_index(p[0], points_above, points) for p in parts]
+        t = [_index(p[1], uvs_above, uvs) if len(p) > 1 and p[1] else -1 for p in parts]
     except (ValueError, IndexError) as e:
-        raise MeshError(f"{where} has a face with a bad index ({e}); the model is damaged") from e
+        raise MeshError(f"{where}, line {number}: a bad index in 'f {text}' ({e}); {CORRECT}") from e
+    return v + (t if min(t, default=0) >= 0 and not lost_uvs.intersection(t) else [-1] * len(t))
+
+
+def _group(name: str, rows: list[list[int]], points: np.ndarray, where: str) -> Group:
+    by_size: dict[int, list[list[int]]] = {}
+    for row in rows:
+        by_size.setdefault(len(row) // 2, []).append(row)
     corners, uv_corners = [np.empty((0, 3), np.int64)], [np.empty((0, 3), np.int64)]
     if max(by_size, default=0) > MAX_CORNERS:
         raise MeshError(
             f"{where} has a polygon of {max(by_size)} corners, at most {MAX_CORNERS} are read; simplify the model"
         )
     for n in sorted(by_size):
-        rows = np.array(by_size[n], dtype=np.int64)
-        polygon, order = _split(rows[:, :n], points)
-        corners.append(np.take_along_axis(rows[polygon, :n], order, axis=1))
-        uv_corners.append(np.take_along_axis(rows[polygon, n:], order, axis=1))
+        table = np.array(by_size[n], dtype=np.int64)
+        polygon, order = _split(table[:, :n], points)
+        corners.append(np.take_along_axis(table[polygon, :n], order, axis=1))
+        uv_corners.append(np.take_along_axis(table[polygon, n:], order, axis=1))
     return Group(name, np.concatenate(corners), np.concatenate(uv_corners))
 
 

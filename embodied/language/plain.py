@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -86,12 +87,21 @@ def turn_words(angle: float) -> str:
 
 MASSES = ("bread", "butter", "firewood", "tape")
 """Last words of nouns that are not counted."""
+SINGULARS = ("atlas", "canvas", "christmas", "cosmos", "gas", "lens", "thermos")
+PLURALS = ("bikinis", "chilis", "emus", "kiwis", "menus", "saris", "skis", "taxis", "zucchinis")
+"""Last words that end like the others do: in -s, not counted as one; in -us or -is, of more than one."""
+SILENT_H = ("heir", "honest", "hono", "hour")
+SPOKEN_YOU_OR_WON = re.compile(r"eu|ewe|one\b|once\b|u\b|u[bfkrv][aeiou]|us[aeu]|ut[eio]|uni(?!n|mp|d|r)|usb|uv")
+"""Beginnings in a vowel that are spoken with a consonant."""
+SPELLED = re.compile(r"[fhlmnrsx]([^aeiouy\s]*$|[^aeiouy]*[\s\d-])|led\b|hdmi\b")
+"""Beginnings that are spelled out, and whose first letter is spoken with a vowel: 'an lcd monitor', 'an x-ray'."""
 
 
 def with_article(noun: str) -> str:
     """'a mug', 'an armchair', 'a row of books'; nouns that are plural in form or not counted get 'some'."""
-    head = noun.split(" of ")[0]
-    if head.split()[-1] in MASSES or head.endswith("s") and not head.endswith(("ss", "us", "is")):
+    head, start = noun.split(" of ")[0].lower().split()[-1], noun.lower()
+    singular = head in SINGULARS or head.endswith(("ss", "us", "is")) and head not in PLURALS
+    if head in MASSES or head.endswith("s") and not singular:
         return f"some {noun}"
-    vowel = noun[0] in "aeiou" and not noun.startswith(("uten", "uni", "use"))
-    return f"an {noun}" if vowel else f"a {noun}"
+    vowel = start[0] in "aeiou" and not SPOKEN_YOU_OR_WON.match(start)
+    return f"an {noun}" if vowel or start.startswith(SILENT_H) or SPELLED.match(start) else f"a {noun}"
