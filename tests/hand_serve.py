@@ -115,7 +115,7 @@ class Human:
         self.socket.send(json.dumps({"token": self.token} if self.token else self.hello))
         self.read(lambda m: m.get("screen"))
 
-    def read(self, wanted, timeout: float = 20) -> dict:
+    def read(self, wanted, timeout: float = 600) -> dict:
         """Read until a message of which `wanted` is true; screens are remembered."""
         end = time.monotonic() + timeout
         while time.monotonic() < end:

@@ -11,6 +11,7 @@ found no difference from a build with one process (digest 4b6783e58d002317).
 
 from __future__ import annotations
 
+import functools
 import sys
 import threading
 import time
@@ -64,9 +65,10 @@ def test_without_ray_the_error_says_what_to_install(monkeypatch):
         list(run_on_ray(str, ["a"], (), "local"))
 
 
-def slow_house(*arguments):
-    """A small house that somebody takes some seconds to make."""
-    time.sleep(4.0)
+def patient_house(houses: Path, killed: Path, *arguments):
+    """A small house that, once another is whole, is not begun before a node was killed."""
+    while list(houses.glob("*/unit.json")) and not killed.exists():
+        time.sleep(0.05)
     return small_house(*arguments)
 
 
@@ -79,7 +81,7 @@ def test_a_node_that_is_killed_in_the_middle_changes_nothing(tmp_path, monkeypat
     monkeypatch.setenv("PYTHONPATH", f"{here.parent}:{here}:{':'.join(p for p in sys.path if p)}")
     whole = build(tmp_path / "whole", tmp_path / "cache", "find", make_house=small_house)
     config = DatasetConfig("find", "tiny", seed=4, language="plain")
-    houses = tmp_path / "ray" / "houses"
+    houses, killed = tmp_path / "ray" / "houses", tmp_path / "killed"
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     doomed, drafts = cluster.add_node(num_cpus=1), []
 
@@ -89,11 +91,13 @@ def test_a_node_that_is_killed_in_the_middle_changes_nothing(tmp_path, monkeypat
             time.sleep(0.05)
         drafts.extend(found)
         cluster.remove_node(doomed, allow_graceful=False)
+        killed.touch()
 
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
     try:
-        build_dataset(config, tmp_path / "ray", tmp_path / "cache", make_house=slow_house, ray_address=cluster.address)
+        make = functools.partial(patient_house, houses, killed)
+        build_dataset(config, tmp_path / "ray", tmp_path / "cache", make_house=make, ray_address=cluster.address)
     finally:
         cluster.shutdown()
     assert len(drafts) == 2, "both nodes were at work when one was killed"

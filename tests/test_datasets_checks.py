@@ -209,7 +209,7 @@ def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(w
         assert first.stdout.readline() == "building\n"
         with pytest.raises(LockedError, match=f"being written by process {first.pid}"):
             build(tmp_path / "data", tmp_path / "cache")
-        assert first.wait(timeout=120) == 0
+        assert first.wait(timeout=600) == 0
     finally:
         first.kill()
     assert content(tmp_path / "data") == content(whole["hanna"])

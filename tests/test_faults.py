@@ -430,7 +430,7 @@ def test_a_cache_that_cannot_be_written_is_told_with_the_remedy():
 
 def test_viewers_that_we_start_send_no_statistics():
     config = [sinks.viewer_program(), "analytics", "config"]
-    said = subprocess.run(config, capture_output=True, text=True, env=sinks.viewer_environment(), timeout=60)
+    said = subprocess.run(config, capture_output=True, text=True, env=sinks.viewer_environment(), timeout=600)
     assert re.search(r'"analytics_enabled": false', said.stdout), said
 
 

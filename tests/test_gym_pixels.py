@@ -157,7 +157,7 @@ def test_pixels_of_a_place_that_nobody_can_draw_are_refused(tmp_path):
 
 def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monkeypatch):
     space = gym.spaces.Dict({"rgb": gym.spaces.Box(0, 255, (1024, 1024, 3), np.uint8)})
-    assert free_memory() == pytest.approx(psutil.virtual_memory().available, rel=0.1)
+    assert 0 < free_memory() < psutil.virtual_memory().total
     monkeypatch.setattr("embodied.gym.in_step.free_memory", lambda: 2**30)
     refuse_too_many(8, space)
     with pytest.raises(ValueError, match=r"1000 environments hold about 5\.9 GiB .* 1\.0 GiB are free"):

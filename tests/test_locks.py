@@ -240,7 +240,7 @@ def test_whoever_waits_for_a_folder_gets_it_when_its_holder_is_done(tmp_path):
     first = holder(tmp_path / "run")
     threading.Timer(0.3, first.kill).start()
     with locked(tmp_path / "run", wait=True):
-        assert first.wait(5) == -signal.SIGKILL
+        assert first.wait() == -signal.SIGKILL
 
 
 @pytest.mark.parametrize("body", [lambda t: t.write_bytes(b"x"), lambda t: (t / "no").write_text(""), None])

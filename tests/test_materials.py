@@ -117,7 +117,7 @@ def test_another_process_makes_the_same_maps():
         "print(hashlib.sha256((m.color * 255).round().astype('uint8').tobytes()).hexdigest(), fingerprint('linen/3'))"
     )
     other = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600
     ).stdout.split()
     mine = hashlib.sha256((make_maps("linen/3").color * 255).round().astype("uint8").tobytes()).hexdigest()
     assert other == [mine, fingerprint("linen/3")]

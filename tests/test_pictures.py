@@ -86,7 +86,7 @@ def test_a_program_that_drew_its_pictures_may_load_them_with_workers(tmp_path, m
     building.draw_unit(unit, data.folder, tmp_path / "cache", PictureSettings(64), ())
     view = ViewSettings("view", 24, 32)
     pictures = ViewpointPictures(data, "train", view=view, channels=("rgb", "depth"))
-    loader = torch.utils.data.DataLoader(pictures, batch_size=64, num_workers=2, timeout=240)
+    loader = torch.utils.data.DataLoader(pictures, batch_size=64, num_workers=2, timeout=600)
     assert sum(len(batch["node"]) for batch in loader) == 16 * 36
 
 

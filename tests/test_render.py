@@ -320,8 +320,8 @@ def test_a_spawned_worker_draws_the_same(house):
     worker.start()
     with Renderer(house, HandCatalogue(), size=32) as r:
         expected = int(r.panorama(EYE).rgb.astype(np.int64).sum())
-    assert queue.get(timeout=60) == expected
-    worker.join(timeout=60)
+    assert queue.get(timeout=600) == expected
+    worker.join(timeout=600)
 
 
 def _try(queue) -> None:
@@ -338,8 +338,8 @@ def test_a_forked_worker_is_told_to_spawn(renderer):
     queue = context.Queue()
     worker = context.Process(target=_try, args=(queue,))
     worker.start()
-    assert "spawn" in queue.get(timeout=30)
-    worker.join(timeout=30)
+    assert "spawn" in queue.get(timeout=600)
+    worker.join(timeout=600)
 
 
 def test_a_screen_backend_is_refused(monkeypatch):

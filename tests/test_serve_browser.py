@@ -68,7 +68,7 @@ class Someone:
     def __init__(self, browser, server, **options):
         self.context = browser.new_context(**{"viewport": {"width": 1280, "height": 800}, **options})
         self.page, self.problems = self.context.new_page(), []
-        self.page.set_default_timeout(20_000)
+        self.page.set_default_timeout(600_000)
         self.page.on("pageerror", lambda e: self.problems.append(str(e)))
         self.page.on("dialog", lambda d: d.accept())
         self.page.goto(server.links["join"][0])
@@ -79,7 +79,7 @@ class Someone:
         self.page.get_by_role("button", name=name, exact=True).click()
 
     def sees(self, text):
-        playwright.expect(self.page.get_by_text(text).first).to_be_visible(timeout=20_000)
+        playwright.expect(self.page.get_by_text(text).first).to_be_visible(timeout=600_000)
 
     def write(self, label, text, button):
         self.page.get_by_label(label).fill(text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,23 +27,23 @@ def test_unwrapping_keeps_every_face_and_its_proportions():
         assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
 
 
-def test_an_atlas_is_freed_only_after_its_threads_had_time_to_fall_asleep():
+def test_an_atlas_is_freed_only_after_its_threads_had_time_to_fall_asleep(monkeypatch):
     """xatlas waits for ever where it ends a thread that is about to sleep."""
-    freed: dict[int, float] = {}
+    clock, freed = [0.0], {}
 
     class Atlas:
         def __init__(self, number: int) -> None:
             self.number = number
 
         def __del__(self) -> None:
-            freed[self.number] = time.monotonic()
+            freed[self.number] = clock[0]
 
-    retired = {}
+    monkeypatch.setattr(unwrap, "_retired", [])
+    monkeypatch.setattr(unwrap.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(unwrap.time, "sleep", lambda seconds: clock.__setitem__(0, clock[0] + seconds))
     for number in range(3):
         unwrap._retire(Atlas(number))
-        retired[number] = time.monotonic()
-    assert {0, 1} == set(freed), "the last one rests"
-    assert all(freed[n] - retired[n] > 0.9 * unwrap.REST for n in freed)
+    assert freed == {0: unwrap.REST, 1: 2 * unwrap.REST}, "the last one rests"
 
 
 def test_inside_out_things_are_turned_and_sheets_are_seen_from_both_sides():

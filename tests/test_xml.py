@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from pathlib import Path
 
 import pytest
@@ -45,9 +44,8 @@ def test_entities_of_a_page_of_help_are_not_followed(tmp_path, name):
         f"<!DOCTYPE html [{dtd.format(secret=(tmp_path / 'secret.txt').as_uri())}]>"
         f'<html><body><p id="par_id1234567">before {used} after</p></body></html>'
     )
-    began = time.perf_counter()
     text = str(_blocks(page))
-    assert "before" in text and "secret" not in text and len(text) < 1000 and time.perf_counter() - began < 5
+    assert "before" in text and "secret" not in text and len(text) < 1000
 
 
 @pytest.mark.parametrize("owner", ['a"><b>/c', "Stühle_1/leaf", "../x", "1", "a b", "椅子_1", "</Mesh>", "{}\n", ""])
