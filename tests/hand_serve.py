@@ -23,7 +23,7 @@ from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import PictureSettings
 
 ROOT = Path(__file__).resolve().parent.parent
-HEAD = 'title = "Finding things"\ndata = "data"\nconsent = "I agree."\npractice = false\npace = 0.02\n'
+HEAD = 'title = "Finding things"\ndata = "data"\nconsent = "I agree."\npractice = false\npace = 0.02\nsize = 64\n'
 TOGETHER = '[[parts]]\nname = "together"\ntasks = 3\nper_person = 3\n'
 
 

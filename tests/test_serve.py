@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import dataclasses
 import json
 import math
@@ -21,6 +22,7 @@ from embodied.agents.iliad.nav.stages import NavAbout
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.agents.vnla.run import vocabulary_of
 from embodied.cli import main as start
+from embodied.cli.serve import drawn
 from embodied.envs.base import ActionError
 from embodied.errors import UnableError
 from embodied.geometry import wrap
@@ -407,8 +409,8 @@ async def fetched(app, path):
 
 
 def test_live_pictures_are_of_this_moment_and_for_whoever_drives(data, tmp_path, monkeypatch):
-    drawn = []
-    picture = lambda camera, size: drawn.append(camera) or np.full((*size, 3), 100, np.uint8)
+    shots = []
+    picture = lambda camera, size: shots.append(camera) or np.full((*size, 3), 100, np.uint8)
     world = SimpleNamespace(renderer=SimpleNamespace(rgb=picture))
     study = write_study(data.folder.parent, TOGETHER + 'moves = "drive"\n', name="live")
     panoramas = lambda data, name: data.folder / "houses" / name / "panoramas.pano"
@@ -425,13 +427,13 @@ def test_live_pictures_are_of_this_moment_and_for_whoever_drives(data, tmp_path,
         return await fetched(app, f"/live/{name}.jpg")
 
     async def look():
-        first, before = live(), len(drawn)
+        first, before = live(), len(shots)
         for _ in range(2):
             status, body = await get(first)
             assert status == 200 and body[:2] == b"\xff\xd8"
-        assert len(drawn) == before + 1, "asked for twice, drawn once"
+        assert len(shots) == before + 1, "asked for twice, drawn once"
         play.play("ann", "moved", candidate=1)
-        assert (await get(live()))[0] == 200 and drawn[-1] != drawn[-2]
+        assert (await get(live()))[0] == 200 and shots[-1] != shots[-2]
         for gone in (first, f"{play.game('ann').id}/{'0' * 24}", "nobody/nothing"):
             assert (await get(gone))[0] == 404
 
@@ -439,6 +441,25 @@ def test_live_pictures_are_of_this_moment_and_for_whoever_drives(data, tmp_path,
     monkeypatch.setattr("embodied.serve.driving.SLOWEST", 0.0)
     with pytest.raises(UnableError, match="too slow to drive"):
         open_study(study, tmp_path / "slow", panoramas, open_world=lambda data, name: world)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "can_draw", "size", "said"),
+    [(64, True, None, ""), (96, True, 96, "blurred"), (96, False, None, "no library of OpenGL")],
+)
+def test_panoramas_too_small_for_a_page_are_drawn_larger(data, monkeypatch, capsys, wanted, can_draw, size, said):
+    @contextlib.contextmanager
+    def world_of(data, name, pictures, args):
+        if not can_draw:
+            raise UnableError("no library of OpenGL")
+        yield SimpleNamespace(render_all=lambda progress: pictures)
+
+    monkeypatch.setattr("embodied.cli.serve.world_of", world_of)
+    study = dataclasses.replace(load_study(write_study(data.folder.parent)), size=wanted)
+    name = data.names("val_seen")[0]
+    drawn_as = dataclasses.replace(data.drawn_pictures(name), size=size) if size else data.panoramas(name)
+    assert drawn(data, name, study, None) == drawn_as
+    assert said in (text := capsys.readouterr().err) and bool(text) == bool(said)
 
 
 def test_typed_questions_have_prices_that_are_written_down(data):

@@ -134,6 +134,19 @@ def test_two_browsers_play_to_the_end_through_a_reload_and_a_dead_server(two, se
     assert [r.text for r in replies] == ["The left one, please"] and replies[0].image.node == 5
 
 
+def test_whoever_sees_no_way_is_shown_where_ways_are_and_told_the_keys(two):
+    agent, _ = two
+    seen = """[...document.querySelectorAll('.mark span')].filter(mark => {
+      const [m, s] = [mark, document.querySelector('.stage')].map(e => e.getBoundingClientRect());
+      return m.left < s.right && m.right > s.left && m.top < s.bottom && m.bottom > s.top; }).length"""
+    agent.sees("to look around")
+    for _ in range(6):
+        agent.page.keyboard.press("ArrowUp")  # nothing was clicked before
+    assert agent.page.evaluate(seen) == 0
+    agent.page.locator(".edge:visible").first.click()
+    assert agent.page.evaluate(seen) > 0
+
+
 def test_what_people_write_never_becomes_markup(two, server):
     agent, helper = two
     evil = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>'
@@ -149,12 +162,16 @@ def test_what_people_write_never_becomes_markup(two, server):
 
 def test_on_a_slow_phone_everything_fits_and_works(browser, server):
     slow = {"offline": False, "latency": 300, "downloadThroughput": 60_000, "uploadThroughput": 30_000}
-    phones = [Someone(browser, server, viewport={"width": 390, "height": 844}, has_touch=True) for _ in range(2)]
+    phones = [
+        Someone(browser, server, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+        for _ in range(2)
+    ]
     agent, helper = phones
     for phone in phones:
         phone.context.new_cdp_session(phone.page).send("Network.emulateNetworkConditions", slow)
         phone.sees("Stop taking part")
     agent.sees("Your task")
+    agent.sees("Tap a ring on the floor")
     assert agent.page.evaluate("document.documentElement.scrollWidth") <= 390
     agent.write("Ask in your own words", "Where?", "Ask")
     helper.sees("The agent asks you something.")
@@ -216,7 +233,7 @@ def test_the_page_shows_what_the_panorama_shows(two, server, without_webgl):
         agent.page.reload()
         agent.sees("Your task")
     agent.page.evaluate(
-        "document.querySelectorAll('.marks, .corner, .banner').forEach(e => { e.style.display = 'none' })"
+        "document.querySelectorAll('.marks, .edge, .panorama ~ *').forEach(e => { e.style.display = 'none' })"
     )
     view = agent.page.locator(".panorama")
     view.focus()

@@ -15,7 +15,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -107,12 +107,26 @@ def run(args: Options) -> None:
 
 
 def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
-    """The panoramas of a house: the data set's, else drawn into the cache."""
-    if data.drawn_pictures(name) is not None:
+    """The panoramas of a house: the data set's where they are sharp enough for the study, else drawn into the cache."""
+    stored = data.drawn_pictures(name)
+    if stored is not None and stored.size >= study.size:
         return data.panoramas(name)
-    with world_of(data, name, PictureSettings(study.size, study.pictures), args) as world:
-        note(f"panoramas of {name}: {study.pictures}, faces of {study.size} pixels")
-        return world.render_all(progress=True)
+    blurred = f"those of the data set have faces of {stored.size if stored else 0} pixels, which a page shows blurred"
+    if stored is not None and stored.traced:
+        note(
+            f"panoramas of {name}: {blurred}; for sharper ones, `embodied dataset` traces them with --size {study.size}"
+        )
+        return data.panoramas(name)
+    pictures = PictureSettings(study.size, study.pictures) if stored is None else replace(stored, size=study.size)
+    note(f"panoramas of {name}: drawn with faces of {study.size} pixels" + (f"; {blurred}" if stored else ""))
+    try:
+        with world_of(data, name, pictures, args) as world:
+            return world.render_all(progress=True)
+    except UnableError as e:
+        if stored is None:
+            raise
+        note(f"panoramas of {name}: {blurred}; this machine draws no others: {e}")
+        return data.panoramas(name)
 
 
 def live_world(data: Dataset, name: str, study: Study, args: Options) -> World:

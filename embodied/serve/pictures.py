@@ -17,7 +17,7 @@ SIZES = {"small": 128, "large": 768}
 """Name to the largest side of a face, pixels."""
 QUALITY = {"small": 60, "large": 82}
 KEPT = 600
-"""Encoded panoramas held in memory: some 60 MB."""
+"""Encoded panoramas held in memory: some 100 MB."""
 
 
 class Pictures:

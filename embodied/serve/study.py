@@ -119,8 +119,9 @@ class Study:
     """Seconds between the steps of a machine that a person watches."""
     pictures: str = "unlit"
     """How panoramas are drawn that the data set does not hold: unlit, fast, normal, ..."""
-    size: int = 512
-    """Their faces' side, pixels."""
+    size: int = 768
+    """Side of a panorama's face, pixels. Where the data set's are smaller, a page would show them blurred, and sharper
+    ones are drawn."""
 
     def __post_init__(self) -> None:
         names = [p.name for p in self.parts]

@@ -5,6 +5,8 @@ import { painter, type Painter } from "./paint";
 import type { Way } from "./types";
 
 const DEGREES = 180 / Math.PI;
+/** A little below the horizon, where the ways are; radians. */
+export const LEVEL = -0.12;
 
 /** The address of a panorama, relative to the page's. */
 export const address = (pano: string, size: "small" | "large"): string => `pano/${pano}/${size}.jpg`;
@@ -40,6 +42,10 @@ export function side(bearing: number): string {
   return `${Math.abs(d)}° to the ${d > 0 ? "left" : "right"}`;
 }
 
+type Edge = "left" | "right" | "up" | "down";
+const ARROWS: Record<Edge, string> = { left: "‹", right: "›", up: "‹", down: "›" };
+const MARGIN = 26; // pixels from an edge within which a way is not seen well enough
+
 export class Panorama {
   readonly root: HTMLElement;
   yaw = 0;
@@ -49,18 +55,28 @@ export class Panorama {
   private readonly paint: Painter = painter(this.canvas);
   private readonly marks = h("div", { class: "marks" });
   private ways: { way: Way; mark: HTMLButtonElement }[] = [];
+  private readonly edges = {} as Record<Edge, HTMLButtonElement>;
+  private readonly beyond: Record<Edge, Way[]> = { left: [], right: [], up: [], down: [] };
   private fov = 80 / DEGREES;
   private frame = 0;
 
   /** `turned` is called whenever somebody looks elsewhere. */
   constructor(private readonly turned: () => void = () => undefined) {
+    for (const edge of Object.keys(ARROWS) as Edge[]) {
+      const turn = (): void => this.look(this.beyond[edge][0]!.yaw, LEVEL);
+      // Tab reaches the ways themselves, so the arrows are for the eye and the hand
+      this.edges[edge] = h("button", { type: "button", class: `edge ${edge}`, tabindex: -1, "aria-hidden": "true", click: turn });
+    }
     this.root = h(
       "div",
       { class: "panorama", tabindex: 0, role: "application", "aria-label": "Panorama. Arrow keys turn, Enter goes on." },
       this.canvas,
       this.marks,
+      ...Object.values(this.edges),
     );
-    this.root.addEventListener("keydown", (e) => this.key(e));
+    document.addEventListener("keydown", (e) => {
+      if (this.root.isConnected && (e.target === document.body || this.root.contains(e.target as Node))) this.key(e);
+    });
     this.drag();
     new ResizeObserver(() => this.draw()).observe(this.root);
   }
@@ -113,23 +129,32 @@ export class Panorama {
     const eye = Math.max(w, tall) / 2 / Math.tan(this.fov / 2);
     cancelAnimationFrame(this.frame);
     this.frame = requestAnimationFrame(() => this.paint.draw(this.yaw, this.pitch, w / 2 / eye, tall / 2 / eye));
+    for (const edge of Object.values(this.beyond)) edge.length = 0;
     for (const { way, mark } of this.ways) {
       const pitch = Math.max(-0.5, way.pitch - Math.atan(1.1 / Math.max(way.distance, 0.5)));
       const [a, cp, sp] = [wrap(way.yaw - this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
       const [x, y, z] = [-Math.sin(a) * Math.cos(pitch), Math.sin(pitch), Math.cos(a) * Math.cos(pitch)];
       const [up, deep] = [y * cp - z * sp, y * sp + z * cp];
-      const visible = deep > 0.15;
-      mark.classList.toggle("behind", !visible);
+      const [across, down] = [w / 2 + (eye * x) / deep, tall / 2 - (eye * up) / deep];
+      const aside = deep <= 0.15 || across < MARGIN || across > w - MARGIN;
+      const visible = !aside && down > MARGIN && down < tall - MARGIN;
+      if (!visible) this.beyond[aside ? (a > 0 ? "left" : "right") : down < tall / 2 ? "up" : "down"].push(way);
       mark.setAttribute("aria-label", `Go ${side(way.yaw - this.yaw)}`);
       const scale = Math.max(0.55, Math.min(1.15, 2.6 / (way.distance + 0.6)));
       mark.style.transform = visible
-        ? `translate(${w / 2 + (eye * x) / deep}px, ${tall / 2 - (eye * up) / deep}px) scale(${scale})`
+        ? `translate(${across}px, ${down}px) scale(${scale})`
         : "translate(-200px, -200px)";
+    }
+    for (const [edge, button] of Object.entries(this.edges) as [Edge, HTMLButtonElement][]) {
+      const some = this.beyond[edge].sort((a, b) => this.off(a) - this.off(b));
+      button.hidden = !some.length;
+      button.replaceChildren(h("i", {}, ARROWS[edge]), `${some.length} ${some.length > 1 ? "ways" : "way"}`);
     }
     this.turned();
   }
 
   private key(e: KeyboardEvent): void {
+    if (e.ctrlKey || e.metaKey || e.altKey) return;
     const step = 15 / DEGREES;
     const turn: Record<string, [number, number]> = {
       ArrowLeft: [step, 0],
@@ -138,7 +163,7 @@ export class Panorama {
       ArrowDown: [0, -step],
     };
     if (turn[e.key]) this.look(this.yaw + turn[e.key]![0], this.pitch + turn[e.key]![1]);
-    else if ((e.key === "Enter" || e.key === " ") && e.target === this.root) {
+    else if ((e.key === "Enter" || e.key === " ") && !(e.target as Element).closest("button")) {
       const ahead = [...this.ways].sort((a, b) => this.off(a.way) - this.off(b.way))[0];
       if (ahead && this.off(ahead.way) < 40 / DEGREES) this.go(ahead.way);
     } else return;

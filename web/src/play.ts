@@ -2,14 +2,21 @@
 
 import { button, h, s, say, stored } from "./dom";
 import type { Connection } from "./socket";
-import { address, Panorama, prefetch } from "./panorama";
+import { address, LEVEL, Panorama, prefetch } from "./panorama";
 import { Plan } from "./plan";
 import type { AgentScreen, AssistantScreen, House, Said, Way } from "./types";
 
 const LONGEST = 2000;
-const LEVEL = -0.12; // a little below the horizon, where the ways are
 const SLOW = 1000; // milliseconds for a live picture, from which on the page says so
+const LOOK = touched() ? "Swipe to look around." : "Drag, or press ← → ↑ ↓, to look around.";
+const GO = touched() ? "Tap a ring on the floor to go there." : "Click a ring on the floor to go there; Enter takes the one ahead.";
+const DRIVE = touched() ? "Tap a button to move." : "Press ↑ to go ahead, ← → to turn; or W, A, D.";
 const DRIVING: Record<string, number> = { ArrowUp: 0, ArrowLeft: 1, ArrowRight: 2, w: 0, a: 1, d: 2 };
+
+/** Tells whether people here point with fingers, and have no keys. */
+function touched(): boolean {
+  return matchMedia("(hover: none)").matches;
+}
 
 /** What stays on the page while an episode goes on. */
 export interface View<S> {
@@ -100,6 +107,7 @@ export class AgentView implements View<AgentScreen> {
   private readonly live = h("img", { class: "live", alt: "What you see", hidden: true });
   private readonly corner = h("div", { class: "corner top" });
   private readonly banner = h("div", { class: "banner", role: "status" });
+  private readonly keys = h("p", { class: "keys-hint" });
   private readonly talk = h("ol", { class: "talk", "aria-live": "polite", "aria-label": "Conversation" });
   private readonly request = h("p", { class: "request" });
   private readonly told = h("div", {});
@@ -111,7 +119,7 @@ export class AgentView implements View<AgentScreen> {
     this.root = h(
       "div",
       { class: "play" },
-      h("div", { class: "stage" }, this.view.root, this.live, this.banner, this.corner),
+      h("div", { class: "stage" }, this.view.root, this.live, this.banner, this.corner, this.keys),
       h(
         "div",
         { class: "side" },
@@ -150,6 +158,7 @@ export class AgentView implements View<AgentScreen> {
         : "";
     this.questions(screen);
     this.moves(screen, waiting);
+    this.keys.textContent = this.elsewhere ? LOOK : screen.live ? DRIVE : screen.words.length ? "" : `${LOOK} ${GO}`;
     const left = screen.horizon - screen.time;
     const stop = button(screen.subtask ? "I have followed this advice" : "I am there: stop here", () => this.stop(), "primary stop");
     stop.disabled = waiting;
@@ -272,7 +281,7 @@ export class AssistantView implements View<AssistantScreen> {
     this.root = h(
       "div",
       { class: "play assist" },
-      h("div", { class: "stage" }, this.view.root, this.banner, this.corner),
+      h("div", { class: "stage" }, this.view.root, this.banner, this.corner, h("p", { class: "keys-hint" }, LOOK)),
       h(
         "div",
         { class: "side" },
