@@ -182,12 +182,15 @@ FAILURES = {
     "a stream of events": (sent('data: {"choices": []}\n\ndata: [DONE]', "text/event-stream"), 1, "stream of events"),
     "half of an answer": (sent(said(GOOD)[2][:90]), 3, "no chat completion"),
     "a moved server": ((307, {"Location": "https://new.example/v1"}, b""), 1, "https://new.example"),
+    "an error that repeats the key": (sent('{"error": "no key sk-secret"}'), 3, r"no key \*\*\*"),
+    "a form that is unknown": ((400, {}, b'{"error": "no json_schema"}'), 1, "another form \\(--form\\) may suit"),
     "an unknown model": ((404, {}, b'{"detail": "no model m"}'), 1, "status 404: no model m; check model"),
 }
 
 
 @pytest.mark.parametrize(("reply", "tries", "words"), FAILURES.values(), ids=FAILURES)
-def test_a_failure_of_the_server_is_no_answer_and_the_run_goes_on_from_it(reply, tries, words, answers):
+def test_a_failure_of_the_server_is_no_answer_and_the_run_goes_on_from_it(reply, tries, words, answers, monkeypatch):
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-secret")
     with ChatServer(lambda r: reply) as server:
         client = client_of(server, answers)
         with pytest.raises(UnableError, match=rf"{words}.*0 answers are kept"):
@@ -292,6 +295,7 @@ def test_no_proxy_is_read_as_it_is_written(no_proxy, host, direct, no_proxies):
     ("variable", "value", "problem"),
     [
         ("ALL_PROXY", "socks5://127.0.0.1:9", "ALL_PROXY names the proxy 'socks5://127.0.0.1:9', which cannot be used"),
+        ("all_proxy", "https://h:1", "a proxy is written http://HOST:PORT; unset all_proxy"),
         ("http_proxy", "http://me:secret@h:x", r"http_proxy names the proxy 'http://\*\*\*@h:x'"),
         ("HTTP_PROXY", "127.0.0.1:9", r"nobody listens there.*the proxy http://127.0.0.1:9 of HTTP_PROXY"),
         ("HTTP_PROXY", "PROXY", r"status 503: no such luck \(.*of HTTP_PROXY; .*add models.example to NO_PROXY"),

@@ -230,11 +230,11 @@ class Client:
                 last = e
                 if not e.passing:
                     break
-                self._warn(f"{s.base_url}: {e}; it is tried again")
+                self._warn(f"{s.base_url}: {self._endpoint.hidden(e)}; it is tried again")
         tries = f" after {s.tries} tries" if last.passing else ""
         raise UnableError(
-            f"no answer from {s.base_url}{tries}: {last}. Run the same command again: {len(self.cache)} answers are "
-            f"kept in {self.cache.path}, it goes on from there"
+            f"no answer from {s.base_url}{tries}: {self._endpoint.hidden(last)}. Run the same command again: "
+            f"{len(self.cache)} answers are kept in {self.cache.path}, it goes on from there"
         )
 
     def _posted(self, request: Mapping[str, Any]) -> bytes:

@@ -30,6 +30,7 @@ MOST_BYTES = 1_000_000
 PASSING = (408, 409, 425, 429)
 """Status codes beside those from 500 on after which the same request is sent again."""
 ENDING = "/chat/completions"
+PORTS = {"http": 80, "https": 443}
 
 Response = tuple[int, Mapping[str, str], bytes]
 """Status, headers and content."""
@@ -78,10 +79,15 @@ class Endpoint:
         wait = headers.get("retry-after") or ""
         raise failure(
             status,
-            self._hidden(server_words(content)),
-            f"{self._advice(status, headers)}{_through(proxy, self._host)}",
+            words := server_words(content),
+            f"{self._advice(status, headers, words)}{_through(proxy, self._host)}",
             float(wait) if wait.isdigit() and len(wait) < 6 else 0.0,
         )
+
+    def hidden(self, text: object) -> str:
+        """A text without the key, however the server repeats it."""
+        key = os.environ.get(self.key_variable, "").strip()
+        return str(text).replace(key, "***") if len(key) > 4 else str(text)
 
     @property
     def _host(self) -> str:
@@ -93,20 +99,19 @@ class Endpoint:
             raise ServerError(f"{self.key_variable} holds characters that no key has; copy the key into it again")
         return key
 
-    def _hidden(self, text: str) -> str:
-        """A text without the key, however the server repeats it."""
-        key = os.environ.get(self.key_variable, "").strip()
-        return text.replace(key, "***") if key else text
-
     def _exchange(self, body: Mapping[str, Any], key: str, proxy: Proxy | None) -> Response:
         deadline = time.monotonic() + self.timeout
         headers = {"Content-Type": "application/json", "Accept": "application/json", "User-Agent": "embodied"}
         if key:
             headers["Authorization"] = f"Bearer {key}"
         request = urllib.request.Request(self.url, json.dumps(body).encode(), headers)
-        address = {} if proxy is None else {"http": proxy.address, "https": proxy.address}
-        secure = [urllib.request.HTTPSHandler(context=_certificates())] if self.url.startswith("https:") else []
-        opener = urllib.request.build_opener(urllib.request.ProxyHandler(address), _AsItIs, *secure)
+        opener = urllib.request.OpenerDirector()
+        opener.add_handler(urllib.request.ProxyHandler({} if proxy is None else dict.fromkeys(PORTS, proxy.address)))
+        opener.add_handler(
+            urllib.request.HTTPSHandler(context=_certificates())
+            if self.url.startswith("https:")
+            else urllib.request.HTTPHandler()
+        )
         with opener.open(request, timeout=self.timeout) as response:
             parts, size = [], 0
             while part := response.read1(1 << 16):
@@ -121,7 +126,7 @@ class Endpoint:
     def _unreachable(self, error: Exception, proxy: Proxy | None) -> ServerError:
         """The cause of an error of the network, in words."""
         cause = error.reason if isinstance(error, urllib.error.URLError) else error
-        if isinstance(cause, TimeoutError):
+        if isinstance(error, TimeoutError):
             problem = f"no whole answer within {self.timeout:g} s; for a slow model raise timeout (--timeout)"
         elif isinstance(cause, ssl.SSLCertVerificationError):
             return ServerError(
@@ -132,10 +137,10 @@ class Endpoint:
         elif isinstance(cause, ConnectionRefusedError):
             problem = "nobody listens there; start the server, or correct base_url (--base-url)"
         else:
-            problem = f"{cause or type(cause).__name__}; check base_url (--base-url) and the network"
+            problem = f"{cause or type(cause).__name__}; check base_url (--base-url; http or https?) and the network"
         return ServerError(problem + _through(proxy, self._host), passing=True)
 
-    def _advice(self, status: int, headers: Mapping[str, str]) -> str:
+    def _advice(self, status: int, headers: Mapping[str, str], words: str) -> str:
         """How a status may be mended."""
         if status in (401, 403):
             known = "" if os.environ.get(self.key_variable) else ", which is not set"
@@ -144,6 +149,8 @@ class Endpoint:
             return "; check model (--model) and base_url (--base-url), which often ends in /v1"
         if 300 <= status < 400:
             return f"; it sends on to {str(headers.get('location'))[:200]!r}: give base_url (--base-url) accordingly"
+        if any(word in words for word in ("response_format", "json_schema", "tool", "grammar")):
+            return "; another form (--form) may suit this server"
         return ""
 
 
@@ -162,21 +169,14 @@ def completions_url(base_url: str) -> str:
       ValueError: no address; says how one is written.
     """
     text = base_url.strip()
-    try:
+    with contextlib.suppress(ValueError):  # of the host or the port
         parts = urlsplit(text)
-        _ = parts.port, (parts.hostname or "").encode("idna")
-        sound = parts.scheme in ("http", "https") and parts.hostname and "@" not in parts.netloc
-        sound = sound and text.isascii() and text.isprintable() and " " not in text
-        fault = ""
-    except ValueError as e:
-        sound, fault = False, f" ({e})"
-    if not sound:
-        example = (
-            f"http://{text}" if text and ":/" not in text and not text.startswith("/") else "http://127.0.0.1:8000/v1"
-        )
-        raise ValueError(f"base_url should be an address such as {example}, got {base_url!r}{fault}")
-    path = parts.path.rstrip("/").removesuffix(ENDING)
-    return urlunsplit((parts.scheme, parts.netloc, path + ENDING, parts.query, ""))
+        host, _ = (parts.hostname or "").encode("idna"), parts.port
+        if host and parts.scheme in PORTS and "@" not in parts.netloc and re.fullmatch("[!-~]+", text):
+            path = parts.path.rstrip("/").removesuffix(ENDING) + ENDING
+            return urlunsplit((parts.scheme, parts.netloc, path, parts.query, ""))
+    example = f"http://{text}" if re.match(r"[\w.-]+(:\d+)?(/|$)", text) else "http://127.0.0.1:8000/v1"
+    raise ValueError(f"base_url should be an address such as {example}, got {base_url!r}")
 
 
 def proxy_of(url: str) -> Proxy | None:
@@ -186,7 +186,7 @@ def proxy_of(url: str) -> Proxy | None:
       ServerError: a proxy that cannot be used; names the variable.
     """
     parts = urlsplit(url)
-    host, port = parts.hostname or "", parts.port or {"http": 80, "https": 443}[parts.scheme]
+    host, port = parts.hostname or "", parts.port or PORTS[parts.scheme]
     if _is_local(host) or any(_exempts(entry, host, port) for entry in _setting("no_proxy")[1].split(",")):
         return None
     variable, value = _setting(f"{parts.scheme}_proxy", "all_proxy")
@@ -198,7 +198,7 @@ def proxy_of(url: str) -> Proxy | None:
     proxy = Proxy(variable, address)
     with contextlib.suppress(ValueError):
         wanted = urlsplit(address)
-        if wanted.scheme in ("http", "https") and wanted.hostname and wanted.port != 0:
+        if wanted.scheme == "http" and wanted.hostname and wanted.port != 0:
             return proxy
     raise ServerError(
         f"{variable} names the proxy {_without_password(proxy)!r}, which cannot be used: a proxy is written "
@@ -228,15 +228,6 @@ def server_words(content: bytes) -> str:
             value = value[name]
     text = value if isinstance(value, str) else json.dumps(value)
     return " ".join(text.split())[:300]
-
-
-class _AsItIs(urllib.request.HTTPErrorProcessor):
-    """Gives every response as it is: follows no redirection, raises for no status."""
-
-    def http_response(self, request: urllib.request.Request, response: Any) -> Any:
-        return response
-
-    https_response = http_response
 
 
 @functools.cache
