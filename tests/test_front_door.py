@@ -9,11 +9,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import shapely
 from hand_data import built, small_house
 
 import embodied
+from embodied.assets.built import BASICS
+from embodied.generate import HouseConfig, stages
+from embodied.generate.config import DeadEndError
 from embodied.generate.plan_file import house_of_plan, load_plan
 from embodied.house.house import HouseError
 
@@ -74,7 +78,52 @@ def test_a_floor_plan_from_a_file_becomes_a_furnished_house_with_these_very_room
     made = {room.kind: shapely.Polygon(room.polygon) for room in house.rooms}
     assert all(made[room["kind"]].equals(shapely.Polygon(room["polygon"])) for room in ROOMS)
     assert {p.room.rsplit("_", 1)[0] for p in house.placements} == set(made)
+    assert not {p.asset for p in house.placements} & BASICS, "installed furniture stands in for simple one"
     assert len(repr(house)) < 100
+
+
+def test_a_room_that_stays_closed_has_doors_and_furniture_drawn_anew(tmp_path, monkeypatch):
+    plan, asked = load_plan(written(tmp_path, ROOMS)), []
+
+    def closed_at_first(house):
+        asked.append(house)
+        if len(asked) == 1:
+            raise DeadEndError("room 'kitchen_1' cannot be entered on foot")
+        return house
+
+    monkeypatch.setattr(stages, "cleared", closed_at_first)
+    house = house_of_plan(plan, seed=0)
+    assert house.placements and house.openings != asked[0].openings
+    assert [r.polygon for r in house.rooms] == [r.polygon for r in asked[0].rooms]
+
+
+@pytest.mark.parametrize("setting", [{"area": (40, 60)}, {"rooms": 3}, {"shape": "L"}])
+def test_settings_that_a_plan_decides_are_refused(tmp_path, setting):
+    with pytest.raises(HouseError, match=f"leave out {next(iter(setting))}"):
+        house_of_plan(load_plan(written(tmp_path, ROOMS)), 0, HouseConfig(**setting))
+
+
+def on_corners(change):
+    return [dict(room, polygon=change([list(map(float, c)) for c in room["polygon"]])) for room in ROOMS]
+
+
+def scaled(times, shift=0.0):
+    return on_corners(lambda corners: [[x * times + shift, y * times] for x, y in corners])
+
+
+@pytest.mark.parametrize(
+    "rooms",
+    [
+        on_corners(lambda c: [*c, c[0]]),
+        on_corners(lambda c: [c[0], *c]),
+        on_corners(lambda c: [c[0], [(c[0][0] + c[1][0]) / 2, (c[0][1] + c[1][1]) / 2], *c[1:]]),
+        on_corners(lambda c: [[float(np.float32(x)) + 1e-7, y] for x, y in c]),
+        on_corners(lambda c: c[::-1]),
+    ],
+    ids=["closed", "corner_twice", "point_on_an_edge", "noise", "clockwise"],
+)
+def test_a_plan_may_be_written_as_other_programs_write_it(tmp_path, rooms):
+    assert load_plan(written(tmp_path, rooms)) == load_plan(written(tmp_path, ROOMS))
 
 
 @pytest.mark.parametrize(
@@ -86,7 +135,14 @@ def test_a_floor_plan_from_a_file_becomes_a_furnished_house_with_these_very_room
         ([{"kind": "hall", "polygon": [[0, 0], [3, 0], [0, 3]]}], "room 0 .hall. should be a rectangle"),
         ([{"kind": "hall", "polygon": [[0, 0], [3.05, 0], [3.05, 3], [0, 3]]}], "grid of 0.1 m"),
         ([{"kind": "hll", "polygon": []}], "has the kind 'hll'; use one of living_room"),
-        ([{"kind": "hall"}], "plan.json should hold"),
+        ([{"kind": "hall"}], "missing fields .*a plan is"),
+        ([{**ROOMS[0], "name": "x"}], "unknown fields .'name'"),
+        ([{"kind": "stairwell", "polygon": []}], "has the kind 'stairwell'"),
+        (scaled(100), "look like centimetres: multiply all numbers by 0.01"),
+        (scaled(1000), "look like millimetres"),
+        (scaled(1 / 0.3048), "look like feet"),
+        (scaled(1, 5e5), "within 1000 m"),
+        ([*ROOMS, {"kind": "garage", "polygon": [[20, 0], [60, 0], [60, 40], [20, 40]]}], "may have 1500 m2"),
     ],
 )
 def test_a_plan_that_cannot_be_built_is_refused_with_what_to_do(tmp_path, rooms, complaint):

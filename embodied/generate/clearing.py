@@ -9,8 +9,8 @@ import shapely
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from embodied.generate.config import RETRIES
-from embodied.house.house import House, HouseError
+from embodied.generate.config import RETRIES, DeadEndError
+from embodied.house.house import House
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import HEAD, LOW
 from embodied.navigation.graph import CELL, RADIUS, closed_rooms, reachable
@@ -23,7 +23,7 @@ def cleared(house: House) -> House:
     """`house` without the things that keep a body of the agent's radius out of some room.
 
     Raises:
-      HouseError: a room stays closed although nothing stands in the way.
+      DeadEndError: a room stays closed although nothing stands in the way.
     """
     for storey in range(len(house.storeys)):
         for _ in range(RETRIES.clearing):
@@ -34,14 +34,14 @@ def cleared(house: House) -> House:
                 break
             blocking = _blocking(house, storey, closed, grid.xy[reach])
             if not blocking:
-                raise HouseError(
+                raise DeadEndError(
                     f"room {rooms[closed[0]].id!r} cannot be entered on foot although no object is in the "
                     "way; its door or corridor is too narrow"
                 )
             house = without(house, blocking)
         else:
             names = [rooms[k].id for k in closed]
-            raise HouseError(f"rooms {names} stay closed after {RETRIES.clearing} rounds of clearing")
+            raise DeadEndError(f"rooms {names} stay closed after {RETRIES.clearing} rounds of clearing")
     return house
 
 

@@ -26,12 +26,17 @@ OTHERS = 14
 """How many main rooms besides bedrooms a house may have."""
 
 
+class DeadEndError(HouseError):
+    """A stage found no way on; another house of the same seed may have one."""
+
+
 @dataclass(frozen=True)
 class Retries:
     """How often each step of generation is drawn anew at most; nothing else in it is tried again."""
 
     house: int = 16
-    """Plans: while none is walkable, no doors leave every room open, or a room lacks what it must have."""
+    """Plans: while none is walkable, no doors leave every room open, a room stays closed, or one lacks what it must
+    have."""
     doors: int = 8
     """Doors and windows of one plan: while a leaf shuts a room off."""
     room: int = 6

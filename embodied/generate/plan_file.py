@@ -10,44 +10,106 @@ room is two rectangles of its kind. A house has exactly one storey and at least 
 from __future__ import annotations
 
 import itertools
+import math
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from embodied.assets.catalogue import Catalogue
-from embodied.assets.json_file import read_json
-from embodied.assets.records import ROOM_KINDS
+from embodied.assets.json_file import RecordError, load_json
 from embodied.generate.access import connect, has_outer_doors, walls_between
 from embodied.generate.config import HouseConfig
 from embodied.generate.footprint import Rect
+from embodied.generate.kinds import KINDS
 from embodied.generate.layout import Plan
 from embodied.generate.modules import Cell
-from embodied.generate.program import WantedRoom
-from embodied.generate.stages import DEFAULT, STAGES, Draft, with_plan
+from embodied.generate.stages import DEFAULT, STAGES, generate_house, with_plan
 from embodied.house.house import House, HouseError
 
 GRID = 10
 """Steps of the grid in a metre."""
+NOISE = 1e-3
+"""How far a corner may lie from the grid, metres."""
 MOST_ROOMS = 200
+MOST_FLOOR, WIDEST_PLAN, FARTHEST_CORNER = 1500.0, 120.0, 1000.0
+"""Largest plan: square metres, metres across, and metres from the origin."""
+UNITS = {"feet": 0.3048, "centimetres": 0.01, "inches": 0.0254, "millimetres": 0.001}
+"""Units that other programs write plans in, metres."""
+OVERSIZE, USUAL = 3.0, 0.6
+"""Times the largest usual area of its kind that the median room may have, and has."""
+DECIDED = ("area", "rooms", "bedrooms", "shape")
+"""Fields of HouseConfig that a plan leaves no choice of."""
+Corners = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class PlannedRoom:
+    kind: str
+    polygon: Corners
+    """Metres, along the middle of the walls; the first corner may be repeated at the end."""
+
+
+@dataclass(frozen=True)
+class PlanFile:
+    rooms: tuple[PlannedRoom, ...]
 
 
 def load_plan(path: Path) -> Plan:
     """Read a plan; doors are placed as in generated houses.
 
     Raises:
-      HouseError: not such a file, rooms that overlap, or one that cannot be entered; says which.
+      HouseError: not such a file, a plan that is not in metres, rooms that overlap, or one that cannot be entered; says
+        which.
 
     Examples:
       >>> plan = embodied.load_plan(Path('plan.json'))
     """
     try:
-        body = read_json(path)
-        rooms = [(str(room["kind"]), room["polygon"]) for room in body["rooms"]]
-    except (ValueError, KeyError, TypeError) as e:
-        raise HouseError(
-            f'{path} should hold {{"rooms": [{{"kind": ..., "polygon": [[x, y], ...]}}, ...]}}; {type(e).__name__}: {e}'
-        ) from e
+        rooms = load_json(path, PlanFile).rooms
+    except RecordError as e:
+        raise HouseError(f'{e}; a plan is {{"rooms": [{{"kind": ..., "polygon": [[x, y], ...]}}, ...]}}') from e
     if len(rooms) > MOST_ROOMS:
         raise HouseError(f"{path} has {len(rooms)} rooms, a plan may have {MOST_ROOMS}")
-    return plan_of([_cell(number, kind, polygon) for number, (kind, polygon) in enumerate(rooms)])
+    if unknown := [(n, r.kind) for n, r in enumerate(rooms) if r.kind not in KINDS]:
+        number, kind = unknown[0]
+        raise HouseError(f"room {number} has the kind {kind!r}; use one of {', '.join(KINDS)}")
+    _check_size(rooms)
+    return plan_of([_cell(number, room) for number, room in enumerate(rooms)])
+
+
+def _check_size(rooms: Sequence[PlannedRoom]) -> None:
+    """Refuse plans in another unit than metres, and those that no house has."""
+    boxes = [(r, _box(r.polygon)) for r in rooms if r.polygon]
+    if not boxes:
+        return
+    sides = [(x1 - x0, y1 - y0) for _, (x0, y0, x1, y1) in boxes]
+    ratio = statistics.median(w * h / KINDS[r.kind].area[1] for (r, _), (w, h) in zip(boxes, sides, strict=True))
+    if ratio > OVERSIZE:
+        (room, _), (w, h) = boxes[0], sides[0]
+        unit = min(UNITS, key=lambda u: abs(math.log(ratio * UNITS[u] ** 2 / USUAL)))
+        raise HouseError(
+            f"polygons are in metres, but most rooms are over {OVERSIZE:.0f} times as large as usual (room 0, "
+            f"{room.kind}: {w:g} x {h:g}); these look like {unit}: multiply all numbers by {UNITS[unit]}"
+        )
+    x0, y0, x1, y1 = _box([corner for _, (a, b, c, d) in boxes for corner in ((a, b), (c, d))])
+    area = sum(w * h for w, h in sides)
+    if area > MOST_FLOOR or max(x1 - x0, y1 - y0) > WIDEST_PLAN:
+        raise HouseError(
+            f"a plan may have {MOST_FLOOR:.0f} m2 and be {WIDEST_PLAN:.0f} m across, got {area:.0f} m2 on "
+            f"{x1 - x0:.1f} x {y1 - y0:.1f} m; take rooms away"
+        )
+    if max(abs(v) for v in (x0, y0, x1, y1)) > FARTHEST_CORNER:
+        raise HouseError(
+            f"a plan should lie within {FARTHEST_CORNER:.0f} m of (0, 0), it begins at ({x0:.1f}, {y0:.1f}); subtract "
+            "these from all corners"
+        )
+
+
+def _box(corners: Sequence[tuple[float, float]]) -> tuple[float, float, float, float]:
+    """Smallest x and y, largest x and y."""
+    xs, ys = zip(*corners, strict=True)
+    return min(xs), min(ys), max(xs), max(ys)
 
 
 def plan_of(cells: list[Cell]) -> Plan:
@@ -81,51 +143,42 @@ def house_of_plan(
     """A furnished house on a plan of your own; the seed draws doors, windows, materials and furniture.
 
     Raises:
-      HouseError: no doors leave every room open.
+      HouseError: no doors leave every room open, or `config` sets what the plan decides.
 
     Examples:
       >>> mine = embodied.house_of_plan(plan, seed=3)
     """
-    area = sum(c.area for c in plan.cells)
-    spaces = tuple(WantedRoom(c.kind, c.area) for c in plan.cells)
-    stages = {
-        "rooms": with_plan(plan),
-        **{name: s for name, s in STAGES.items() if name not in ("footprint", "program", "rooms")},
-    }
-    draft = Draft(seed, config, catalogue, area=area, spaces=spaces)
-    for stage in stages.values():
-        draft = stage(draft)
-    assert draft.house is not None, "the openings stage makes it"
-    return draft.house
+    if given := [name for name in DECIDED if getattr(config, name) is not None]:
+        raise HouseError(f"a floor plan decides {', '.join(DECIDED)}; leave out {', '.join(given)}")
+    return generate_house(seed, config, catalogue, {**STAGES, "rooms": with_plan(plan)})
 
 
-def _cell(number: int, kind: str, polygon: object) -> Cell:
-    if kind not in ROOM_KINDS:
-        raise HouseError(f"room {number} has the kind {kind!r}; use one of {', '.join(ROOM_KINDS)}")
-    rect = _rectangle(polygon)
+def _cell(number: int, room: PlannedRoom) -> Cell:
+    rect = _rectangle(room.polygon)
     if rect is None:
         raise HouseError(
-            f"room {number} ({kind}) should be a rectangle along x and y with corners on a grid of 0.1 m, at least "
-            f"0.8 m wide, got {polygon}; cut other shapes into rectangles"
+            f"room {number} ({room.kind}) should be a rectangle along x and y with corners on a grid of 0.1 m, at "
+            f"least 0.8 m wide, got {[list(corner) for corner in room.polygon]}; cut other shapes into rectangles"
         )
-    return Cell(kind, rect, (rect[2] - rect[0]) * (rect[3] - rect[1]) / GRID**2)
+    return Cell(room.kind, rect, (rect[2] - rect[0]) * (rect[3] - rect[1]) / GRID**2)
 
 
-def _rectangle(polygon: object) -> Rect | None:
+def _rectangle(polygon: Corners) -> Rect | None:
     """(x0, y0, x1, y1) in decimetres; None where it is no such rectangle."""
-    try:
-        corners = [(float(x), float(y)) for x, y in polygon]  # type: ignore[attr-defined]  # whatever JSON holds
-    except (TypeError, ValueError):
+    corners = [(round(x * GRID), round(y * GRID)) for x, y in polygon]
+    if any(math.dist(p, (x / GRID, y / GRID)) > NOISE for p, (x, y) in zip(polygon, corners, strict=True)):
         return None
-    steps = [(round(x * GRID), round(y * GRID)) for x, y in corners if abs(x) < 1e4 and abs(y) < 1e4]
-    on_grid = len(steps) == len(corners) and all(
-        abs(v * GRID - s) < 1e-6
-        for corner, step in zip(corners, steps, strict=True)
-        for v, s in zip(corner, step, strict=True)
-    )
-    xs, ys = sorted({x for x, _ in steps}), sorted({y for _, y in steps})
-    if not on_grid or len(xs) != 2 or len(ys) != 2 or len(steps) != 4 or len(set(steps)) != 4:
+    corners = [c for c, before in zip(corners, corners[-1:] + corners) if c != before]
+    corners = [c for k, c in enumerate(corners) if not _between(corners[k - 1], c, corners[(k + 1) % len(corners)])]
+    xs, ys = sorted({x for x, _ in corners}), sorted({y for _, y in corners})
+    if len(xs) != 2 or len(ys) != 2 or len(corners) != 4 or len(set(corners)) != 4:
         return None
     if min(xs[1] - xs[0], ys[1] - ys[0]) < 8:
         return None
     return xs[0], ys[0], xs[1], ys[1]
+
+
+def _between(a: tuple[int, int], b: tuple[int, int], c: tuple[int, int]) -> bool:
+    """Whether b lies on the way straight from a to c."""
+    (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
+    return ux * vy == uy * vx and ux * vx + uy * vy > 0

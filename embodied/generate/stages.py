@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.generate.clearing import cleared
-from embodied.generate.config import RETRIES, HouseConfig
+from embodied.generate.config import RETRIES, DeadEndError, HouseConfig
 from embodied.generate.finishes import Palette, draw_palette, dressed
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
@@ -51,10 +51,8 @@ class Draft:
     house: House | None = None
     attempt: int = 0
     """How many houses of this seed were drawn before: no doors or no furniture fitted their rooms."""
-
-
-class DeadEndError(HouseError):
-    """A stage found no way on; another house of the same seed may have one."""
+    redraws: int = 0
+    """How many of these had this very plan, so that doors and furniture are drawn anew."""
 
 
 Stage = Callable[[Draft], Draft]
@@ -108,8 +106,12 @@ def rooms(draft: Draft) -> Draft:
 
 
 def with_plan(plan: Plan) -> Stage:
-    """A stage that takes the place of `rooms`: the plan as it is."""
-    return lambda draft: dataclasses.replace(draft, plan=plan)
+    """A stage that takes the place of `rooms`: this plan in every attempt."""
+    spaces = tuple(WantedRoom(c.kind, c.area) for c in plan.cells)
+    area = sum(s.area for s in spaces)
+    return lambda draft: dataclasses.replace(
+        draft, redraws=draft.attempt, plan=plan, spaces=spaces, area=area, shape="rectangle"
+    )
 
 
 def openings(draft: Draft) -> Draft:
@@ -117,7 +119,8 @@ def openings(draft: Draft) -> Draft:
     config = draft.config
     palette = draw_palette(config.style, config.novelty, rng=stream(draft.seed, "house", "palette"))
     for attempt in range(RETRIES.doors):
-        house = _bare_house(draft, palette, stream(draft.seed, "house", "openings", attempt))
+        number = draft.redraws * RETRIES.doors + attempt
+        house = _bare_house(draft, palette, stream(draft.seed, "house", "openings", number))
         if not unreachable_rooms(house):
             return dataclasses.replace(draft, palette=palette, house=house)
     raise DeadEndError(f"no doors of seed {draft.seed} leave every room open; widen HouseConfig.area")
@@ -197,7 +200,10 @@ def furnishing(draft: Draft) -> Draft:
     """Furniture, wall and ceiling things, small things and lights."""
     catalogue = draft.catalogue if draft.catalogue is not None else load_catalogue()
     stock = furnishable(catalogue, draft.config.novelty)
-    house = furnish(_made(draft.house, "openings"), stock, seed=draft.seed)
+    seed = draft.seed
+    if draft.redraws:
+        seed = int(stream(seed, "house", "furniture", draft.redraws).integers(2**31))
+    house = furnish(_made(draft.house, "openings"), stock, seed=seed)
     return dataclasses.replace(draft, house=house)
 
 
@@ -233,7 +239,7 @@ def generate_house(
     """The house that belongs to `seed`: the same in every process and on every machine.
 
     Of up to `RETRIES.house` houses, the first that lacks nothing that makes its rooms what they are (lacking.py), or
-    the one that lacks least.
+    the one that lacks least. A plan that lacks the same twice is not tried again.
 
     Args:
       seed: any integer.
@@ -251,6 +257,7 @@ def generate_house(
     """
     seed, catalogue = checked_seed(seed), (catalogue or load_catalogue()).furnishing
     best: tuple[int, House] | None = None
+    tried: set[object] = set()
     for attempt in range(RETRIES.house):
         draft = Draft(seed, config, catalogue, attempt=attempt)
         try:
@@ -260,11 +267,12 @@ def generate_house(
             dead_end = e
             continue
         house = _made(draft.house, "openings")
-        short = len(lacking(house, catalogue))
-        if best is None or short < best[0]:
-            best = short, house
-        if not short or not house.placements:
+        short = lacking(house, catalogue)
+        if best is None or len(short) < best[0]:
+            best = len(short), house
+        if not short or not house.placements or (draft.plan, short) in tried:
             break
+        tried.add((draft.plan, short))
     if best is None:
         raise dead_end
     return best[1]
@@ -274,4 +282,4 @@ def _title(draft: Draft) -> str:
     beds = sum(s.kind in ("main_bedroom", "bedroom", "kids_room", "guest_room") for s in draft.spaces)
     shape = "" if draft.shape == "rectangle" else f"{draft.shape}-shaped "
     what = "flat" if draft.area < 75 else "house"
-    return f"{shape}{what} with {beds} bedroom{'s' if beds > 1 else ''}, {draft.area:.0f} m2"
+    return f"{shape}{what} with {beds} bedroom{'s' if beds != 1 else ''}, {draft.area:.0f} m2"
