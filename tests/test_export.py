@@ -91,6 +91,36 @@ def test_a_free_export_has_joints_and_settles(house, tmp_path):
     assert {model.joint(j).name for j in range(model.njnt)} == free
 
 
+OWN = """<mujoco>{}<option timestep="0.001" integrator="RK4" cone="pyramidal"/>
+  <default><default class="mine"><geom density="7"/></default></default>
+  <asset><mesh name="ball" file="ball.obj"/></asset>
+  <worldbody><body name="bot" pos="1 1 1"><joint type="hinge" range="-90 90"/>
+    <geom size=".1" mass="1" group="2"/><geom size=".02" mass=".1" group="3"/>
+    <geom size=".1" pos="1 0 0" class="mine"/><geom type="mesh" mesh="ball" pos="2 0 0" density="1"/></body></worldbody>
+</mujoco>"""
+BALL = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.filterwarnings("ignore:Attach conflict")  # of options, of which MuJoCo keeps the parent's
+@pytest.mark.parametrize("free", [False, True])
+def test_what_a_user_adds_to_an_exported_house_keeps_its_own_masses_angles_options_and_files(house, tmp_path, free):
+    path = export_mjcf(house, HandCatalogue(), tmp_path, free=loose(house, HandCatalogue()) if free else frozenset())
+    (tmp_path / "ball.obj").write_text(BALL)
+    (tmp_path / "own.xml").write_text(OWN.format(""))
+    (tmp_path / "beside.xml").write_text(OWN.format('<include file="house.xml"/>'))
+    own, beside = (mujoco.MjModel.from_xml_path(str(tmp_path / name)) for name in ("own.xml", "beside.xml"))
+    assert (beside.opt.timestep, beside.opt.integrator, beside.opt.cone) == (0.001, own.opt.integrator, own.opt.cone)
+    attached = mujoco.MjSpec.from_file(str(path))
+    robot = mujoco.MjSpec.from_file(str(tmp_path / "own.xml"))
+    attached.attach(robot, frame=attached.worldbody.add_frame(), prefix="my/")
+    attached.worldbody.add_body(name="added").add_geom(size=[0.1, 0, 0], mass=1.0)
+    attached = attached.compile()
+    assert attached.body("added").mass == 1.0
+    for body, model in ((beside.body("bot"), beside), (attached.body("my/bot"), attached)):
+        assert np.allclose(body.mass, own.body("bot").mass) and np.allclose(body.inertia, own.body("bot").inertia)
+        assert np.allclose(model.jnt_range[model.body_jntadr[body.id]], [-np.pi / 2, np.pi / 2])
+
+
 def test_textures_travel_with_the_folder(house, tmp_path):
     page = np.random.default_rng(0).integers(0, 255, (16, 32, 3), dtype=np.uint8)
     corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1]], np.float32)

@@ -33,7 +33,9 @@ def export_mjcf(
     """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer and in dm_control as it is.
 
     Names have dots where owners have slashes, which dm_control keeps for itself. Every room has a camera of its name,
-    at eye height where most floor is free.
+    at eye height where most floor is free. What is added by <include>, MjSpec.attach or body by body keeps its own
+    masses, angles and files; options of physics are written only where something is free, and yield to those that
+    come after.
 
     Args:
       free: placements that physics may move, see embodied.scene.model.loose.
@@ -51,8 +53,9 @@ def export_mjcf(
     (folder / "house.xml").unlink(missing_ok=True)  # written last: where it is, its files are whole
     for name in (MESHES, TEXTURES):
         (folder / name).mkdir(parents=True, exist_ok=True)
-    for name, data in spec.assets.items():
-        (folder / MESHES / name).write_bytes(data)
+    for mesh in spec.meshes:
+        (folder / MESHES / mesh.file).write_bytes(spec.assets[mesh.file])
+        mesh.file = f"{MESHES}/{mesh.file}"
     for texture in spec.textures:
         if texture.data:
             size = texture.height, texture.width, texture.nchannel
@@ -60,10 +63,11 @@ def export_mjcf(
             image = cv2.cvtColor(np.frombuffer(bytes(texture.data), np.uint8).reshape(size), order)
             (folder / TEXTURES / f"{texture.name}.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
             texture.data = b""
-            texture.file = f"{texture.name}.png"
-    spec.modelfiledir, spec.meshdir, spec.texturedir = str(folder), MESHES, TEXTURES
+            texture.file = f"{TEXTURES}/{texture.name}.png"
+    spec.modelfiledir = str(folder)
     # MuJoCo writes this one as a word, which dm_control takes for a number.
     xml = re.sub(r'(<headlight[^>]* active=)"(true|false)"', lambda m: f'{m[1]}"{int(m[2] == "true")}"', spec.to_xml())
+    xml = re.sub(r"  <compiler[^>]*/>\n\n?", "", xml)  # it would hold for all that is added, and here are no angles
     write_bytes(folder / "house.xml", xml.encode())
     return folder / "house.xml"
 

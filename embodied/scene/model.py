@@ -169,6 +169,8 @@ def build_spec(
     if lit is not None and lit.owners and lit.owners != owners(house):
         raise ValueError(f"this light was baked for another house than {house.name!r}; bake it again (embodied light)")
     spec = _empty_spec(house)
+    if free:
+        _let_move(spec)
     bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
     if lit is None:
         _light(spec)
@@ -187,12 +189,7 @@ def build_spec(
 def _empty_spec(house: House) -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.modelname = re.sub(r"\W+", "_", house.name) or "house"
-    spec.compiler.degree = False
     spec.compiler.usethread = True
-    spec.compiler.inertiagrouprange = [COLLISION, COLLISION]
-    spec.option.timestep = 0.004
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     low, high = bounds_of(house)
     spec.stat.center = [*(low + high) / 2, 1.0]
     spec.stat.extent = float(np.linalg.norm(high - low))
@@ -202,6 +199,13 @@ def _empty_spec(house: House) -> mujoco.MjSpec:
     view.quality.offsamples = 4
     view.map.znear, view.map.zfar = 0.02 / spec.stat.extent, 200.0 / spec.stat.extent
     return spec
+
+
+def _let_move(spec: mujoco.MjSpec) -> None:
+    """Options under which furniture stands still. A house in which nothing moves leaves them to whoever adds to it."""
+    spec.option.timestep = 0.004
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
 
 
 def _light(spec: mujoco.MjSpec) -> None:
