@@ -25,7 +25,7 @@ DAMAGED = (
     ValueError, KeyError, EOFError, RuntimeError, MemoryError, SyntaxError, tokenize.TokenError, zipfile.BadZipFile,
     zlib.error,
 )  # fmt: skip
-"""What reading a damaged .npz archive may raise, besides errors of the operating system: cut short, flipped in its
+"""Errors in reading a damaged .npz archive, besides errors of the operating system: cut short, flipped in its
 directory (another compression, encrypted, another name), in its content, or in the size that an array says to have."""
 
 
@@ -156,12 +156,12 @@ def drafts(folder: Path) -> Iterator[Path]:
 
 
 def _mark_of(handle: int) -> bytes:
-    """What stands in the mark: words, and the number of the file itself, so that a copy is none."""
+    """The content of the mark: words, and the number of the file itself, so that a copy is none."""
     return f"unfinished files of the program embodied, {os.fstat(handle).st_ino}\n".encode()
 
 
 def abandoned(private: Path) -> bool:
-    """Whether `private` is a folder of `drafts` whose maker is no more."""
+    """True where `private` is a folder of `drafts` whose maker is no more."""
     if private.is_symlink() or not private.is_dir():
         return False
     try:

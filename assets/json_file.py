@@ -1,7 +1,7 @@
 """The one place where JSON and TOML that come from a file are read: strictly, and as the records they should hold.
 
 What is read has the types of its fields, finite numbers, no unknown, missing or repeated fields, and keeps the ranges
-of RULES. Every failure is a RecordError, which names the file.
+of RECORD_RULES. Every failure is a RecordError, which names the file.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from pathlib import Path
 import numpy as np
 
 T = typing.TypeVar("T")
-DEEPEST = 40
+MOST_NESTED = 40
 """Most lists and objects inside each other; nothing here needs ten."""
-LARGEST = 1e12
+LARGEST_NUMBER = 1e12
 """No measure of anything here is beyond this; whole numbers, such as seeds, may be."""
-LONGEST = 40
+MOST_DIGITS = 40
 """Most digits of a whole number."""
-WORDS = {float: "a number", int: "an integer", str: "a text", bool: "true or false"}
+TYPE_WORDS = {float: "a number", int: "an integer", str: "a text", bool: "true or false"}
 """Types as people call them."""
-RULES: dict[type, Callable[[typing.Any], str | None]] = {}
-"""What is wrong with a record whose fields have the right types, in words; None for nothing. Whoever defines records
-adds theirs."""
+RECORD_RULES: dict[type, Callable[[typing.Any], str | None]] = {}
+"""Functions that say in words what is wrong with a record whose fields have the right types; None for nothing. Whoever
+defines records adds theirs."""
 
 
 class RecordError(ValueError):
@@ -57,7 +57,7 @@ def parse(text: str | bytes, what: str = "a record") -> object:
 
 
 def parse_file(path: Path, what: str = "a file") -> object:
-    """What a JSON file holds, whatever it is; raises RecordError with the file's name."""
+    """The content of a JSON file, whatever it is; raises RecordError with the file's name."""
     try:
         return parse(Path(path).read_bytes(), what)
     except RecordError as e:
@@ -160,20 +160,20 @@ def _finite(text: str) -> float:
 
 
 def _whole(text: str) -> int:
-    if len(text) > LONGEST:
+    if len(text) > MOST_DIGITS:
         raise ValueError(f"a number of {len(text)} digits")
     return int(text)
 
 
 def _refuse_deep(value: object) -> None:
     level = [value]
-    for _ in range(DEEPEST):
+    for _ in range(MOST_NESTED):
         level = [
             child for v in level if isinstance(v, (dict, list)) for child in (v.values() if isinstance(v, dict) else v)
         ]
         if not level:
             return
-    raise ValueError(f"lists and objects are nested more than {DEEPEST} deep")
+    raise ValueError(f"lists and objects are nested more than {MOST_NESTED} deep")
 
 
 @functools.cache
@@ -203,11 +203,11 @@ def _build(kind: typing.Any, value: object, where: str) -> typing.Any:
     if dataclasses.is_dataclass(kind):
         return _build_record(typing.cast(type, kind), value, where)
     if kind in (int, float) and isinstance(value, (int, float)) and not isinstance(value, bool):
-        if kind is float and not abs(value) <= LARGEST:  # NaN too
-            raise RecordError(f"{where} should be a finite number of at most {LARGEST:g}, got {shown(value)}")
+        if kind is float and not abs(value) <= LARGEST_NUMBER:  # NaN too
+            raise RecordError(f"{where} should be a finite number of at most {LARGEST_NUMBER:g}, got {shown(value)}")
         value = float(value) if kind is float else value
     if not isinstance(kind, type) or type(value) is not kind:
-        raise RecordError(f"{where} should be {WORDS.get(kind) or _name(kind)}, got {shown(value)}")
+        raise RecordError(f"{where} should be {TYPE_WORDS.get(kind) or _name(kind)}, got {shown(value)}")
     return value
 
 
@@ -258,8 +258,8 @@ def _build_record(kind: type, value: object, where: str) -> typing.Any:
         if n not in value and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
     )
     if unknown or missing:
-        wrong = [f"lacks the fields {missing}"] * bool(missing) + [f"has the unknown fields {unknown}"] * bool(unknown)
-        raise RecordError(f"{where} {' and '.join(wrong)}; it may hold {list(names)}")
+        faults = [f"lacks the fields {missing}"] * bool(missing) + [f"has the unknown fields {unknown}"] * bool(unknown)
+        raise RecordError(f"{where} {' and '.join(faults)}; it may hold {list(names)}")
     if "is" in value and value["is"] != kind.__name__:
         raise RecordError(f"{where} should be a {kind.__name__}, it says that it is {shown(value['is'])}")
     hints = _hints(kind)
@@ -269,6 +269,6 @@ def _build_record(kind: type, value: object, where: str) -> typing.Any:
         raise
     except ValueError as e:  # of a record that checks itself
         raise RecordError(f"{where}: {e}") from e
-    if kind in RULES and (wrong := RULES[kind](record)):
+    if kind in RECORD_RULES and (wrong := RECORD_RULES[kind](record)):
         raise RecordError(f"{where}: {wrong}")
     return record

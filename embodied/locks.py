@@ -20,10 +20,10 @@ from embodied.errors import UnableError
 
 LOCK = ".embodied.lock"
 """Name of the file in a folder that somebody writes to."""
-FIELDS = {"pid", "host", "since", "command"}
-"""What stands in it."""
+LOCK_FIELDS = {"pid", "host", "since", "command"}
+"""Keys of its content."""
 CANNOT = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
-"""What disks say that know no locks."""
+"""Errors of disks that know no locks."""
 log = logging.getLogger(__name__)
 
 
@@ -87,13 +87,13 @@ def _open(path: Path) -> int:
 
 
 def _is_ours(handle: int) -> bool:
-    """Whether the open file is a lock: a file of one name, empty or with what `_myself` writes."""
+    """True where the open file is a lock: a file of one name, empty or with what `_myself` writes."""
     facts = os.fstat(handle)
     if not stat.S_ISREG(facts.st_mode) or facts.st_nlink > 1 or facts.st_size > 4096:
         return False
     content = os.pread(handle, 4096, 0)
     try:
-        return not content or set(json.loads(content)) == FIELDS
+        return not content or set(json.loads(content)) == LOCK_FIELDS
     except (ValueError, TypeError, RecursionError):
         return False
 

@@ -21,7 +21,7 @@ import numpy as np
 from embodied import interface
 from embodied.assets.cache import write_bytes
 from embodied.assets.json_file import (
-    RULES,
+    RECORD_RULES,
     RecordError,
     T,
     from_json,
@@ -75,7 +75,7 @@ def episodes_file(split: str, agent: str) -> str:
 
 
 def fingerprint(**facts: object) -> dict[str, object]:
-    """What a run depends on: versions of Python and of the libraries that compute, the machine, and `facts`."""
+    """All that a run depends on: versions of Python and of the libraries that compute, the machine, and `facts`."""
     versions = {"embodied": importlib.metadata.version(DISTRIBUTION)}
     versions |= {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "shapely", "mujoco-core")}
     machine = f"{platform.machine()} {platform.system()}"
@@ -156,7 +156,7 @@ def _episode(e: interface.Episode) -> str | None:
     return None if e.budget is None or e.budget >= 0 else f"budget should be at least 0, got {e.budget}"
 
 
-RULES |= {
+RECORD_RULES |= {
     interface.Pose: lambda p: _angles(p.turn, p.tilt) or _nodes(p.node),
     interface.Viewpoint: lambda v: _nodes(v.node),
     interface.FollowRoute: lambda g: _nodes(*g.path) if g.path else "path should hold at least one node",
