@@ -11,6 +11,7 @@ horizon. View k of the 36 views looks along turn k % 12 and tilt k // 12 - 1.
 
 from __future__ import annotations
 
+import dataclasses
 import enum
 import math
 from collections.abc import Mapping, Sequence
@@ -243,7 +244,7 @@ class Task:
     id: str
     """Unique in a data set: '<world>/<kind>/<number>'."""
     kind: str
-    """'find', 'vln', 'vnla', 'hanna', 'hari' or 'ask'."""
+    """Name of its TaskKind: 'find', 'vln', 'vnla', 'hanna', 'hari', 'ask', or 'module:NAME' of a kind of your own."""
     world: str
     """Name of the house (House.name)."""
     start: Pose
@@ -464,7 +465,7 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """Ask-v0: something that looks like what was asked for, as a simulated detector reports it."""
+    """Something that looks like what was asked for, as a simulated detector reports it."""
 
     bearing: float
     """Radians in [-pi, pi), relative to the agent's yaw, left positive."""
@@ -472,6 +473,18 @@ class Detection:
     """Metres."""
     score: float
     """0..1: how well it fits all that was said, to two digits."""
+
+
+class Extras:
+    """What a kind of task adds to an observation; each kind derives a frozen record from it."""
+
+    def lines(self, turn: int) -> tuple[str, ...]:
+        """It in words, for language models and people; directions as seen along `turn` (Observation.turn)."""
+        return ()
+
+    def as_json(self) -> dict[str, Any]:
+        """It for agents that are asked over HTTP."""
+        return dataclasses.asdict(self)  # type: ignore[call-overload, no-any-return]  # a record
 
 
 @dataclass(frozen=True, slots=True)
@@ -504,16 +517,10 @@ class Observation:
     """Steps since the episode began."""
     time_on_task: int
     """Steps since the instruction last changed; 0 tells a policy that it just did."""
-    state_description: Description = ()
-    """HARI: d^s."""
-    goal_descriptions: tuple[Description, ...] = ()
-    """HARI: the goal-description stack G^d, top last."""
-    detections: tuple[Detection, ...] = ()
-    """Ask-v0: the best first."""
-    advised: Move | Stop | None = None
-    """Ask-v0: what the route that was told says to do next; None where none is being followed."""
     moved: bool = False
-    """Whether the last step led to another place, as wheels know."""
+    """The last step led to another place, as wheels know."""
+    extras: Any = None
+    """The kind's own part, an `Extras`: what HARI's and Ask's agents are told besides (embodied/envs)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -542,12 +549,10 @@ class Situation:
     """Remaining request budget; None without a budget."""
     trail: tuple[int, ...] = ()
     """Node at the beginning of every navigation step so far, the current one last."""
-    goals: tuple[int, ...] = ()
-    """HARI: the true goal nodes on the stack, top last."""
     question: str = ""
     """Of a free question that is being answered: its words."""
-    possible: tuple[str, ...] = ()
-    """Ask-v0: placements that fit all that was said so far."""
+    extras: Any = None
+    """The kind's own part: a record of what else its assistant knows (embodied/envs)."""
 
 
 # What is written down ---------------------------------------------------------------------------

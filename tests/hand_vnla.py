@@ -10,8 +10,9 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Split
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
-from embodied.envs.make import environment_maker, tasks_under
+from embodied.kinds.vnla import VNLA
 from embodied.language.plain import PlainLanguage
+from embodied.task_kind import EnvInputs
 from embodied.tasks.vnla import vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
 
@@ -43,8 +44,8 @@ def split_under(rules: str, count=24) -> Split:
     rng = np.random.default_rng(0)
     bank = FeatureBank({"grid": rng.standard_normal((len(world.graph.ids), 36, 16)).astype(np.float16)}, "hand")
     worlds = {"grid": world}
-    tasks = tasks_under("vnla", tasks_of(world, count), worlds, rules)
-    return Split(worlds, tasks, environment_maker("vnla", worlds, vnla=rules), bank)
+    tasks = VNLA.tasks_under(tasks_of(world, count), worlds, rules)
+    return Split(worlds, tasks, VNLA.environments(EnvInputs(worlds, rules=rules)), bank)
 
 
 def lesson(config: VnlaSettings = TINY):

@@ -24,18 +24,19 @@ from embodied.agents.studies.engine import run_study
 from embodied.assistants.ask import in_view
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
-from embodied.envs.make import ask_environment_maker, look_of
 from embodied.evaluation import tables
 from embodied.evaluation.ask import acted, observed, read_seeds, submitted
-from embodied.evaluation.metrics import price, success, success_progress, weighted_success
 from embodied.evaluation.rollout import play
-from embodied.gym.env import HelpGymEnv, layout_of
+from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import SensorSuite
+from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Ask, Intention, Move, Pose, Stop
+from embodied.kinds.ask import ASK, ask_environments, price, success_progress, weighted_success
 from embodied.language.questions import intention_of
-from embodied.policies.ask import RULES, Asker, Mind, baselines, reached
+from embodied.metrics import success
+from embodied.policies.ask import RULES, Asker, Mind, reached
 from embodied.records import from_json, to_json
-from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks
+from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks, look_of
 
 LITTLE = AskerConfig(hidden_size=16, passes=300)
 TYPED = (Intention.CONFIRM, Intention.APPEARANCE, Intention.REGION, Intention.ROUTE, Intention.DISAMBIGUATE)
@@ -76,7 +77,7 @@ def tasks(world):
 
 @pytest.fixture
 def make_env(world):
-    return ask_environment_maker({"grid": world}, look)
+    return ask_environments({"grid": world}, look)
 
 
 def at_target(task, world) -> Pose:
@@ -90,7 +91,7 @@ def test_the_stated_share_of_requests_is_ambiguous_and_all_can_be_solved(world, 
         assert all(word in t.request for word in (*t.goal.words, t.goal.object_class))
         for node in t.goal_nodes:
             assert in_view(world, node, t.goal)[0][0] == t.goal.placement, "what is nearest there is what is meant"
-    episodes = play(make_env, baselines()["oracle"], tasks, seed=0)
+    episodes = play(make_env, ASK.agent("oracle"), tasks, seed=0)
     assert all(success(e, world.graph) == 1 for e in episodes)
     assert [from_json(type(t), to_json(t)) for t in tasks] == tasks
 
@@ -112,7 +113,7 @@ def test_every_answer_is_true_and_costs_its_price_and_a_step(world, tasks, make_
         kind = world.house.room_by_id[world.house.placement_by_id[t.goal.placement].room].kind
         region = env._steps[0].reply.text
         assert kind.replace("_", " ") in region
-        assert o.advised is not None
+        assert o.extras.advised is not None
 
 
 def test_confirm_says_yes_at_the_thing_that_is_meant_and_no_elsewhere(world, tasks, make_env):
@@ -122,11 +123,11 @@ def test_confirm_says_yes_at_the_thing_that_is_meant_and_no_elsewhere(world, tas
             node = next(n for n in range(36) if (v := in_view(world, n, t.goal)) and v[0][0] == goal and v[0][2] <= 2.0)
             o = env.reset(dataclasses.replace(t, start=dataclasses.replace(t.start, node=node)))
             assert Intention.CONFIRM in o.can_ask
-            nearest = min(o.detections, key=lambda d: d.distance)
+            nearest = min(o.extras.detections, key=lambda d: d.distance)
             o = env.step(Ask(Intention.CONFIRM))
             yes = goal == t.goal.placement
             assert env.last_step.reply.text.startswith("Yes" if yes else "No")
-            now = min(o.detections, key=lambda d: d.distance)
+            now = min(o.extras.detections, key=lambda d: d.distance)
             assert now.score == nearest.score if yes else now.score < nearest.score
 
 
@@ -154,11 +155,11 @@ def test_nothing_of_the_goal_is_seen_before_it_is_asked_for(world, tasks, make_e
 
 
 def test_without_grounding_answers_come_in_words_alone(world, tasks):
-    env = ask_environment_maker({"grid": world}, look, AskSettings(grounded=False))()
+    env = ask_environments({"grid": world}, look, AskSettings(grounded=False))()
     for t in tasks[:6]:
         first = env.reset(t)
         o = env.step(Ask(Intention.ROUTE))
-        assert o.advised is None and o.detections == first.detections
+        assert o.extras.advised is None and o.extras.detections == first.extras.detections
         assert o.instruction != first.instruction
 
 
@@ -225,7 +226,7 @@ def test_measures_by_hand(world, tasks, make_env):
 def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        env = HelpGymEnv(make_env, tasks, SensorSuite(), layout=layout_of("ask"), render_mode="rgb_array")
+        env = HelpGymEnv(make_env, tasks, SensorSuite(), layout=SpaceLayout.of(ASK), render_mode="rgb_array")
         check_env(env, skip_render_check=True)
     assert env.render().ndim == 3
     assert gym.spec("embodied/Ask-v0").kwargs == {"kind": "ask"}

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from hand_data import build, built, content, hand_house, small_house
 
+from embodied import metrics
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
 from embodied.datasets.parts import object_part, room_part
-from embodied.datasets.scale import PAPER, own_size, quota, scale
+from embodied.datasets.scale import quota, scale
 from embodied.datasets.store import Dataset, DatasetError
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
@@ -26,6 +26,8 @@ from embodied.records import RecordError
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import PictureSettings
+from embodied.splits import DatasetSize
+from embodied.task_kind import kind_named
 from embodied.teachers.vnla import VnlaTeacher
 from embodied.world import differing
 
@@ -33,15 +35,15 @@ pytestmark = pytest.mark.slow
 
 
 def test_paper_sizes_are_those_of_tables_4_2_and_e_1_and_of_room_to_room():
-    assert [s.tasks for s in PAPER["hanna"][1]] == [82_484, 5_001, 5_017, 5_004, 5_012]
-    assert [s.tasks for s in PAPER["vln"][1]] == [14_025, 1_020, 2_349, 1_020, 4_173]
-    assert sum(PAPER["hanna"][0].values()) == 68
-    assert sum(PAPER["hari"][0].values()) == 72
-    assert {s.name: s.tasks for s in PAPER["hari"][1]}["test_unseen_object"] == 1_913
+    assert [s.tasks for s in kind_named("hanna").paper[1]] == [82_484, 5_001, 5_017, 5_004, 5_012]
+    assert [s.tasks for s in kind_named("vln").paper[1]] == [14_025, 1_020, 2_349, 1_020, 4_173]
+    assert sum(kind_named("hanna").paper[0].values()) == 68
+    assert sum(kind_named("hari").paper[0].values()) == 72
+    assert {s.name: s.tasks for s in kind_named("hari").paper[1]}["test_unseen_object"] == 1_913
 
 
 def test_shares_add_up_to_the_split():
-    for kind in PAPER:
+    for kind in ("find", "vln", "vnla", "hanna", "hari"):
         config = DatasetConfig(kind, "paper")
         wanted = scale("paper", kind)
         sums = dict.fromkeys((s.name for s in wanted.splits), 0)
@@ -77,13 +79,13 @@ def test_tasks_without_rooms_are_a_data_set_of_their_own_and_the_others_do_not_c
 
 def test_tasks_of_vnla_get_the_time_that_their_rules_take(tmp_path):
     data = built(tmp_path / "data", "vnla")
-    usual, longer = (data.split("val_unseen", vnla=rules).tasks for rules in ("direct", "algorithm-6"))
+    usual, longer = (data.split("val_unseen", rules=rules).tasks for rules in ("direct", "algorithm-6"))
     assert usual == data.tasks("val_unseen")
     assert [b.horizon - a.horizon for a, b in zip(usual, longer, strict=True)] == [
         2 * int(np.ceil(t.budget)) for t in usual
     ]
     with pytest.raises(ValueError, match="are VNLA's"):
-        built(tmp_path / "find", "find").split("train", vnla="direct")
+        built(tmp_path / "find", "find").split("train", rules="direct")
 
 
 def test_seen_splits_share_houses_but_no_tasks(tmp_path):
@@ -231,21 +233,28 @@ def test_a_house_that_cannot_be_made_is_an_error_after_a_bounded_number_of_seeds
 
 
 def test_a_size_of_ones_own_is_a_scale():
-    assert own_size(40, 4000) == "40x4000"
-    final = scale(own_size(1, 25, 60), "hanna")
+    for size in (
+        DatasetSize(40, 4000),
+        DatasetSize(40, 4000, 60),
+        DatasetSize(40, 4000, None, 9),
+        DatasetSize(1, 2, 3, 4),
+    ):
+        assert DatasetConfig("hanna", str(size)).scale == size, "as files have it"
+    final = scale(DatasetSize(1, 25, 60), "hanna")
     assert final.houses == {"train": 1, "val": 1, "test": 60}
     assert {s.name: s.tasks for s in final.splits}["test_unseen"] == 1500
-    wanted = scale("40x4000", "hanna")
+    wanted = scale(DatasetSize(40, 4000), "hanna")
     assert dict(wanted.houses) == {"train": 40, "val": 4, "test": 8}
     assert {s.name: s.tasks for s in wanted.splits}["test_unseen"] == 800
     for kind in ("hanna", "hari"):
-        splits = {s.name: s.tasks for s in scale(own_size(2, 50, 3, 7), kind).splits}
+        splits = {s.name: s.tasks for s in scale(DatasetSize(2, 50, 3, 7), kind).splits}
         assert {n for s, n in splits.items() if s.startswith(("val_", "test_"))} == {7} and splits["train"] == 50
-    assert dict(scale("1x5", "hari").houses) == {"train": 1, "extra": 1, "val": 1, "test": 1}
+    assert dict(scale(DatasetSize(1, 5), "hari").houses) == {"train": 1, "extra": 1, "val": 1, "test": 1}
     with pytest.raises(ValueError, match="at least one house"):
-        own_size(0, 10)
-    with pytest.raises(ValueError, match="40x4000"):
-        scale("0x5", "hanna")
+        DatasetSize(0, 10)
+    for wrong in ("0x5", "5", "5x5x5x5", "huge"):
+        with pytest.raises(ValueError, match="use one of"):
+            DatasetConfig("hanna", wrong)
 
 
 def test_a_data_set_knows_how_the_panoramas_that_it_holds_were_drawn(tmp_path):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
+from embodied import metrics
 from embodied.action_spaces import MonocularMoves, PanoramicMoves, nearest_views
 from embodied.envs.base import ActionError, HelpEnv, TaskError
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Pose, Stop
 from embodied.language.plain import PlainLanguage

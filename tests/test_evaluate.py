@@ -11,7 +11,8 @@ from hand_data import built
 
 from embodied.cli import main
 from embodied.evaluation import tables
-from embodied.evaluation.evaluate import AGENTS, agent, evaluate, spread
+from embodied.evaluation.evaluate import agent, evaluate, spread
+from embodied.task_kind import kind_named
 
 
 def test_the_interval_of_independent_values_is_the_textbook_one():
@@ -101,7 +102,8 @@ def test_every_house_gives_its_share_of_a_limited_evaluation(tmp_path):
 def test_the_rows_come_out_as_they_should(kind, tmp_path):
     data = built(tmp_path / "d", kind)
     split = "test_unseen_env" if kind == "hari" else "test_unseen"
-    rows = {r.agent: r.values for r in evaluate(data.split(split), {n: agent(kind, n) for n in AGENTS[kind]}, limit=8)}
+    agents = {name: make() for name, make in kind_named(kind).baselines.items()}
+    rows = {r.agent: r.values for r in evaluate(data.split(split), agents, limit=8)}
     assert rows["shortest"]["success"].mean == 1
     assert rows["random walk"]["success"].mean < 0.5
     if kind == "hanna":

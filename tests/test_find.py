@@ -9,6 +9,7 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
+from embodied import metrics
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
@@ -17,10 +18,10 @@ from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, n
 from embodied.agents.find.way_map import WayMap
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Split
-from embodied.envs.make import environment_maker
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Move, Sight
+from embodied.kinds.find import FIND
+from embodied.task_kind import EnvInputs
 
 torch.set_num_threads(1)
 SIZE = 24
@@ -35,7 +36,7 @@ def split_of(world, marked: bool = True) -> Split:
     for t in tasks:
         features[list(t.goal_nodes), :, requests.index(t.request)] = 5.0 * marked
     bank = FeatureBank({world.house.name: features}, "hand")
-    return Split({world.house.name: world}, tasks, environment_maker("find", {world.house.name: world}), bank)
+    return Split({world.house.name: world}, tasks, FIND.environments(EnvInputs({world.house.name: world})), bank)
 
 
 def finder_for(split: Split, **settings) -> Finder:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hand_data import built, read_features
 
-from embodied import mattersim
+from embodied import mattersim, metrics
 from embodied.datasets.folders import (
     PROGRAMS,
     action_space,
@@ -30,7 +30,6 @@ from embodied.datasets.folders import (
 )
 from embodied.datasets.matterport import in_matterport_order, scan_name
 from embodied.datasets.skyboxes import write_skybox
-from embodied.evaluation import metrics
 from embodied.evaluation.evaluate import agent
 from embodied.evaluation.rollout import play
 from embodied.render.panorama import Panorama

@@ -16,11 +16,12 @@ from gymnasium.utils.env_checker import check_env
 from hand_worlds import grid_world
 
 import embodied.gym.env
+from embodied.assistants.description_arrays import word_number, words
 from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariRules
-from embodied.gym.registration import IDS
-from embodied.gym.spaces import SpaceLayout, decode, number, text_of, word_number, words
+from embodied.gym.spaces import SpaceLayout, decode, number, text_of
 from embodied.interface import Ask, Intention, Move, Reply, Stop, Subtask
+from embodied.plugins import shipped_kinds
 from embodied.teachers.shortest import shortest_action
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari")
@@ -40,7 +41,7 @@ def tmp(tmp_path) -> str:
 def test_the_environment_checker_has_nothing_to_say(kind, tmp):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        name, worlds = f"embodied/{IDS[kind]}-v0", {"grid": grid_world()}
+        name, worlds = f"embodied/{shipped_kinds()[kind]}-v0", {"grid": grid_world()}
         env = gym.make(name, cache=tmp, worlds=worlds, sees="oracle", render_mode="rgb_array")
         check_env(env.unwrapped, skip_render_check=False)
 
@@ -208,14 +209,14 @@ def test_the_expert_earns_one_minus_its_steps_and_shaping_telescopes(tmp):
 
 
 def test_haris_variants_are_chosen_by_name(tmp):
-    cheap, dear = (make("hari", tmp, hari=HariRules(Costs.alike(c), stack=1, horizon=4)) for c in (0.0, 0.5))
+    cheap, dear = (make("hari", tmp, rules=HariRules(Costs.alike(c), stack=1, horizon=4)) for c in (0.0, 0.5))
     for env in (cheap, dear):
         env.reset(seed=0)
     ask = number(Ask(Intention.CUR), SpaceLayout())
     assert [env.step(ask)[1] for env in (cheap, dear)] == [0.0, -0.5]
     assert [dear.step(ask)[3] for _ in range(3)] == [False, False, True], "the horizon is 4"
     with pytest.raises(ValueError, match="HARI's"):
-        make("find", tmp, hari=HariRules(stack=1))
+        make("find", tmp, rules=HariRules(stack=1))
 
 
 def test_haris_reward_is_minus_its_cost(tmp):
@@ -253,7 +254,7 @@ def test_a_learner_off_the_shelf_trains_on_it(tmp):
 @pytest.mark.slow
 def test_words_of_descriptions_have_the_numbers_of_the_catalogue_in_every_process():
     code = (
-        "from embodied.gym.spaces import word_number, words\n"
+        "from embodied.assistants.description_arrays import word_number, words\n"
         "print([word_number(w) for w in ('mug', 'kitchen', 'go', 'rug', 'my own thing')], len(words()))"
     )
     seed = "1" if os.environ.get("PYTHONHASHSEED") != "1" else "2"

@@ -12,13 +12,14 @@ import pytest
 from hand_hanna import LINE_ROUTES, LINE_TASK, grid_setup, line_env
 from hand_worlds import grid_world, line_world
 
+from embodied import metrics
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna, AssistantError
 from embodied.assistants.route_system import ancestors, build_routes, sampled_paths, spanning_parents, spanning_paths
 from embodied.envs.base import ActionError
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
+from embodied.kinds.hanna import subtask_success
 from embodied.language.plain import PlainLanguage
 from embodied.language.prose import prose
 from embodied.navigation.graph import count_hops
@@ -112,7 +113,7 @@ def test_an_episode_follows_algorithm_7_line_by_line():
     e = env.episode()
     assert (e.ended, e.requests, e.nodes) == ("stop", 1, (0, 1, 2, 2, 3, 3))
     assert metrics.success(e, line_world().graph) == 1 and metrics.spl(e, line_world().graph) == 1
-    assert metrics.subtask_success(e, line_world().graph) == 1, "left within 2 m of the target"
+    assert subtask_success(e, line_world().graph) == 1, "left within 2 m of the target"
 
 
 def test_asking_again_on_a_route_replaces_the_message():

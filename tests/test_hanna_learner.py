@@ -19,6 +19,7 @@ import torch.distributed as dist
 from hand_data import metrics_of
 from hand_worlds import grid_world
 
+from embodied import metrics
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.checkpoint import CheckpointError, restore
@@ -52,7 +53,6 @@ from embodied.agents.vision.lessons import Split
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
 from embodied.envs.hanna import HannaEnv
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import identity_of
 from embodied.interface import Ask, Move, Observation, Sight, Stop, Task

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world, room, thing
 
+from embodied import metrics
 from embodied.assistants.descriptions import Describer, dropped, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
 from embodied.envs.base import ActionError
-from embodied.envs.hari import Costs, HariEnv, shaped_costs
-from embodied.evaluation import metrics
+from embodied.envs.hari import Costs, HariEnv, HariExtras, shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.language.plain import PlainLanguage
@@ -82,23 +82,23 @@ def test_pre_training_drops_features_and_varies_goals_as_appendix_e_says():
 def test_the_stack_pushes_describes_pops_and_ends():
     env = line_env()
     o = env.reset(TASK)
-    assert (o.mode, o.goal_descriptions, o.state_description) == (Mode.MAIN, ((Feature("room", "hall"),),), ())
+    assert (o.mode, o.extras) == (Mode.MAIN, HariExtras((), ((Feature("room", "hall"),),)))
     assert o.can_ask == (CUR, GOAL, SUB)
     o = env.step(Ask(CUR))
-    assert o.state_description == (Feature("room", "hall"),)
+    assert o.extras.state_description == (Feature("room", "hall"),)
     o = env.step(Ask(GOAL))
-    assert len(o.goal_descriptions) == 1 and len(o.goal_descriptions[0]) == 2
+    assert len(o.extras.goal_descriptions) == 1 and len(o.extras.goal_descriptions[0]) == 2
     o = env.step(Ask(SUB))
     assert (env.situation.goals, o.mode, o.can_ask) == ((3, 2), Mode.SUB, (CUR, GOAL)), "the stack is full"
     with pytest.raises(ActionError, match="sub"):
         env.step(Ask(SUB))
     for node in (1, 2):
         o = env.step(Move(env.situation.candidate_nodes.index(node)))
-        assert o.state_description == (), "after moving, perception is sparse again"
+        assert o.extras.state_description == (), "after moving, perception is sparse again"
     o = env.step(Stop())
     assert (env.situation.goals, o.mode) == ((3,), Mode.MAIN)
     o = env.step(Ask(SUB))
-    assert o.goal_descriptions[1] == (Feature("action", "go", 0, 0, 2),), "one step away: the action itself"
+    assert o.extras.goal_descriptions[1] == (Feature("action", "go", 0, 0, 2),), "one step away: the action itself"
     env.step(Move(env.situation.candidate_nodes.index(3)))
     env.step(Stop())
     assert env.step(Stop()) is None

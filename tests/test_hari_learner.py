@@ -459,7 +459,7 @@ def best_costs() -> float:
                 elif (
                     name == "do"
                 ):  # a perfect listener: it knows the goal once it was described, else it goes to node 1
-                    told = any(len(d) > 1 or d[0].kind == "action" for d in observation.goal_descriptions)
+                    told = any(len(d) > 1 or d[0].kind == "action" for d in observation.extras.goal_descriptions)
                     target = goal if told else 1
                     column = [p.node for p in env._reach[1]].index(target) if env.pose.node == 0 else 0
                     observation = env.step(Move(column))

@@ -8,16 +8,17 @@ import pytest
 import torch
 from hand_worlds import grid_world
 
+from embodied import metrics
 from embodied.agents.common.shipped import SHIPPED_HARI, WEIGHTS
 from embodied.agents.common.weights import origin_of
 from embodied.agents.hari.agent import HariAgent, load_agent
 from embodied.agents.hari.policy import policy_of
 from embodied.envs.hari import HariRules
-from embodied.envs.make import environment_maker
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
+from embodied.kinds.hari import HARI
 from embodied.language.plain import PlainLanguage
+from embodied.task_kind import EnvInputs
 from embodied.tasks.hari import hari_pool, hari_task
 
 
@@ -44,7 +45,7 @@ def test_it_is_small_and_says_what_it_was_trained_as(agent):
 def played(agent: HariAgent, **rules: int) -> list[Episode]:
     world, pool = grid_world(), hari_pool(grid_world(), seed=0)
     tasks = [hari_task(pool, i, seed=0, language=PlainLanguage()) for i in range(min(16, len(pool)))]
-    make = environment_maker("hari", {"grid": world}, hari=HariRules(**rules))
+    make = HARI.environments(EnvInputs({"grid": world}, rules=HariRules(**rules)))
     with torch.inference_mode():
         return play(make, policy_of(agent), tasks, seed=0, batch=8)
 

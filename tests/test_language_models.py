@@ -24,6 +24,7 @@ from hand_chat import ChatServer, Parrot, first_allowed, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
+from embodied import metrics
 from embodied.agents.language_models.agent import LanguageModelAgent, Messages
 from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
@@ -35,17 +36,19 @@ from embodied.agents.language_models.words import SeenNames
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant
 from embodied.envs.base import HelpEnv
-from embodied.envs.make import ask_environment_maker, environment_maker, look_of
 from embodied.errors import UnableError
-from embodied.evaluation import metrics, tables
+from embodied.evaluation import tables
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import SensorSuite
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Sighting, Step, Subtask, Usage
+from embodied.kinds.ask import ask_environments
+from embodied.kinds.find import FIND
 from embodied.language import PlainLanguage
 from embodied.records import from_json, to_json
 from embodied.render.panorama import Panorama
-from embodied.tasks.ask import ask_pool, ask_tasks
+from embodied.task_kind import EnvInputs
+from embodied.tasks.ask import ask_pool, ask_tasks, look_of
 from embodied.tasks.find import find_pool, find_task
 
 ONE = object_schema(word={"type": "string", "enum": ["yes", "no"]})
@@ -69,7 +72,7 @@ def find_tasks(n: int) -> list:
 
 
 def find_env() -> HelpEnv:
-    return environment_maker("find", {"grid": grid_world()})()
+    return FIND.environments(EnvInputs({"grid": grid_world()}))()
 
 
 # The client -------------------------------------------------------------------------------------
@@ -506,7 +509,7 @@ def test_a_model_is_told_the_names_of_what_is_seen_and_where():
 def ask_stage() -> tuple:
     world = grid_world()
     tasks = ask_tasks(ask_pool(world, look_of(None), seed=0), 4, seed=0)
-    return world, tasks, ask_environment_maker({"grid": world}, look_of(None))
+    return world, tasks, ask_environments({"grid": world}, look_of(None))
 
 
 def test_template_model_and_person_answer_through_one_interface(answers):

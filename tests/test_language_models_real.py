@@ -17,13 +17,15 @@ from embodied.agents.language_models.agent import LanguageModelAgent
 from embodied.agents.language_models.assistant import ModelAssistant
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.cli.llm import SMOLLM, serving
-from embodied.envs.make import ask_environment_maker, environment_maker, look_of
-from embodied.evaluation.metrics import usage
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Intention
+from embodied.kinds.ask import ask_environments
+from embodied.kinds.find import FIND
 from embodied.language import PlainLanguage
+from embodied.metrics import usage
 from embodied.records import to_json
-from embodied.tasks.ask import ask_pool, ask_tasks
+from embodied.task_kind import EnvInputs
+from embodied.tasks.ask import ask_pool, ask_tasks, look_of
 from embodied.tasks.find import find_pool, find_task
 
 pytestmark = pytest.mark.slow
@@ -50,7 +52,7 @@ def served():
 
 def test_a_real_model_acts_and_answers_and_replays_without_its_server(served, tmp_path):
     world = grid_world()
-    find = environment_maker("find", {"grid": world})
+    find = FIND.environments(EnvInputs({"grid": world}))
     task = find_task(find_pool(world, seed=0), 0, seed=0, language=PlainLanguage())
     tasks = [dataclasses.replace(task, horizon=1)]
     settings = ServerSettings(SMOLLM, served, form="object", most_tokens=60, together=1, timeout=300.0)
@@ -58,7 +60,7 @@ def test_a_real_model_acts_and_answers_and_replays_without_its_server(served, tm
     (first,) = play(find, LanguageModelAgent(client), tasks, seed=0)
     used = usage(first)
     assert used is not None and used.tokens_in > 50 and used.calls == len(first.steps) == 1
-    env = ask_environment_maker({"grid": world}, look_of(None))()
+    env = ask_environments({"grid": world}, look_of(None))()
     env.assistant = ModelAssistant(env.assistant, client)
     env.reset(ask_tasks(ask_pool(world, look_of(None), seed=0), 1, seed=0)[0])
     env.step(Ask(Intention.REGION))

@@ -25,8 +25,8 @@ from embodied.datasets.lerobot import (
     seen,
     seen_depth,
 )
-from embodied.evaluation.metrics import success
 from embodied.evaluation.rollout import play
+from embodied.metrics import success
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import save_lines
 from embodied.render.panorama_file import PanoramaFile

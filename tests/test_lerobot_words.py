@@ -9,7 +9,6 @@ import pytest
 from hand_data import built, paint, small_house
 
 from embodied.cli import main
-from embodied.evaluation.evaluate import EXPERTS
 from embodied.render.pictures import PictureSettings
 
 
@@ -25,7 +24,7 @@ def exported(kind, folder, *options) -> list[dict]:
     return [row | {"words": heard[row["task_index"]]} for row in rows]
 
 
-@pytest.mark.parametrize("kind", sorted(EXPERTS))
+@pytest.mark.parametrize("kind", ("hanna", "hari", "vnla"))
 def test_what_an_assistant_says_is_what_the_expert_is_to_do_next(kind, tmp_path):
     rows = exported(kind, tmp_path)
     answered = [(a, b) for a, b in pairwise(rows) if a["language_events"] and not a["next.done"]]

@@ -22,12 +22,12 @@ from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
 from embodied.cli import demo, main
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.metrics import spl, success
 from embodied.evaluation.rollout import play, rollout
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.interface import Pose
 from embodied.language import People
+from embodied.metrics import spl, success
 from embodied.policies.baselines import RandomWalk, Shortest
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings

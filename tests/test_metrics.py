@@ -7,8 +7,8 @@ import math
 import pytest
 from hand_worlds import line_world
 
+from embodied import metrics
 from embodied.envs.base import HelpEnv
-from embodied.evaluation import metrics
 from embodied.interface import FindObject, FollowRoute, Move, Pose, Stop, Task
 
 

@@ -13,6 +13,7 @@ from hand_vnla import TINY as VNLA
 from hand_vnla import lesson
 from test_hanna_learner import agent_for, setting
 
+from embodied import metrics
 from embodied.agents.hanna.evaluation import sight_policies
 from embodied.agents.hanna.places import Query, auc, measured, precision_recall, threshold
 from embodied.agents.vision.bank import FeatureBank
@@ -20,7 +21,6 @@ from embodied.agents.vision.capture import strip_around
 from embodied.agents.vision.features import VIEW_SIZE, strip_of
 from embodied.agents.vision.lessons import Split
 from embodied.agents.vision.strip import VFOV
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import interval
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint

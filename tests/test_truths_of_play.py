@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world
 
+from embodied import metrics
 from embodied.assistants.route_system import build_routes
-from embodied.datasets.parts import part_tasks
-from embodied.envs.make import environment_maker
-from embodied.evaluation import metrics
-from embodied.evaluation.evaluate import AGENTS, agent
+from embodied.evaluation.evaluate import agent
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Observation, Task
 from embodied.language.plain import PlainLanguage
+from embodied.task_kind import EnvInputs, TaskInputs, kind_named
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari")
 
@@ -23,9 +22,9 @@ KINDS = ("find", "vln", "vnla", "hanna", "hari")
 def setting(kind: str, n: int = 24):
     world, language = grid_world(7), PlainLanguage()
     routes = build_routes(world, seed=2, language=language, house_split="test")
-    part = "main_unseen" if kind == "hari" else "main"
-    tasks = part_tasks(kind, world, routes, [(part, n)], seed=2, language=language)[part]
-    return world, tasks, environment_maker(kind, {"grid": world}, routes={"grid": routes})
+    known = kind_named(kind)
+    tasks = known.tasks(TaskInputs(world, routes, 2, language), [(known.unseen_part, n)])[known.unseen_part]
+    return world, tasks, known.environments(EnvInputs({"grid": world}, lambda _: routes))
 
 
 def same_but_for_the_goal(tasks: list[Task]) -> tuple[Task, Task]:
@@ -38,7 +37,8 @@ def same_but_for_the_goal(tasks: list[Task]) -> tuple[Task, Task]:
 
 def without_descriptions(o: Observation) -> Observation:
     """HARI speaks of the goal from the first moment, in the goal's description (4.3.2)."""
-    return dataclasses.replace(o, goal_descriptions=())
+    extras = o.extras and dataclasses.replace(o.extras, goal_descriptions=())
+    return dataclasses.replace(o, extras=extras)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -78,7 +78,7 @@ def test_the_expert_solves_every_task(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_agents_episode_depends_on_order_or_batch(kind):
     _, tasks, make = setting(kind)
-    for name in AGENTS[kind]:
+    for name in kind_named(kind).baselines:
         alone = play(make, agent(kind, name), tasks, seed=3)
         assert alone == play(make, agent(kind, name), tasks, seed=3, batch=32), name
         assert alone == play(make, agent(kind, name), tasks[::-1], seed=3, batch=5)[::-1], name

@@ -25,11 +25,12 @@ from embodied.agents.vln.run import VlnLearner, losses_of, mixed, teacher_share
 from embodied.agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import SplitData, dataset_of
-from embodied.envs.make import environment_maker
 from embodied.evaluation.rollout import play
 from embodied.interface import Move
+from embodied.kinds.vln import VLN
 from embodied.language.plain import PlainLanguage
 from embodied.policies.baselines import Forward10
+from embodied.task_kind import EnvInputs
 from embodied.tasks.vln import vln_task
 
 TINY = FollowerSettings(hidden_size=32, dropout=0.0, iterations=40, batch=12, learning_rate=5e-3, instruction_length=30)
@@ -41,7 +42,7 @@ def split() -> Split:
     bank = FeatureBank({"grid": np.random.default_rng(0).standard_normal((36, 36, 16)).astype(np.float16)}, "hand")
     routes = build_routes(world, seed=0, language=PlainLanguage(), house_split="train")
     tasks = [vln_task("grid", r) for r in routes][:12]
-    return Split({"grid": world}, tasks, environment_maker("vln", {"grid": world}), bank)
+    return Split({"grid": world}, tasks, VLN.environments(EnvInputs({"grid": world})), bank)
 
 
 def new(split: Split, **changes):

@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
+from embodied import metrics
 from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError
-from embodied.envs.make import environment_maker, tasks_under
 from embodied.envs.vnla import RULES, Algorithm6Env, DirectVnlaEnv, MuteDirectVnlaEnv, VnlaEnv, fitted
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
+from embodied.kinds.find import FIND
+from embodied.kinds.vnla import VNLA
 from embodied.language.plain import PlainLanguage, heard_subgoal
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
+from embodied.task_kind import EnvInputs
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 
@@ -198,8 +200,8 @@ def test_direct_intervention_may_be_silent():
 def test_every_rule_is_chosen_by_name_and_the_teacher_wins_in_time(rules):
     world = grid_world()
     tasks = grid_setup()[2][:8]
-    make = environment_maker("vnla", {"grid": world}, vnla=rules)
-    tasks = tasks_under("vnla", tasks, {"grid": world}, rules)
+    make = VNLA.environments(EnvInputs({"grid": world}, rules=rules))
+    tasks = VNLA.tasks_under(tasks, {"grid": world}, rules)
     assert type(make()) is RULES[rules]
     episodes = play(make, Shortest(VnlaTeacher()), tasks, seed=0)
     assert all(metrics.success(e, world.graph) and e.ended == "stop" for e in episodes)
@@ -207,9 +209,9 @@ def test_every_rule_is_chosen_by_name_and_the_teacher_wins_in_time(rules):
 
 def test_rules_that_are_none_are_refused_with_those_that_are():
     with pytest.raises(ValueError, match="use one of .*algorithm-6"):
-        environment_maker("vnla", {}, vnla="algorithm 7")
-    with pytest.raises(ValueError, match="'direct' are VNLA's, these tasks are of kind 'find'"):
-        environment_maker("find", {}, vnla="direct")
+        VNLA.environments(EnvInputs({}, rules="algorithm 7"))
+    with pytest.raises(ValueError, match="'find' have no rules to choose, got 'direct'"):
+        FIND.environments(EnvInputs({}, rules="direct"))
 
 
 @pytest.mark.slow

@@ -12,9 +12,10 @@ from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vnla.agent import VnlaAgent
-from embodied.envs.make import environment_maker
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
+from embodied.kinds.vnla import VNLA
+from embodied.task_kind import EnvInputs
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def played(agent: VnlaAgent, asker: str | None = None) -> list[Episode]:
     """Sixteen tasks of a house by hand, whose pictures tell nothing: all it knows it was told."""
     world = grid_world()
     blank = FeatureBank({"grid": np.zeros((len(world.graph.ids), 36, agent.about.feature_size))}, agent.about.encoder)
-    make = environment_maker("vnla", {"grid": world})
+    make = VNLA.environments(EnvInputs({"grid": world}))
     with torch.inference_mode():
         return play(make, agent.player(blank, asker), tasks_of(world, 16), seed=0, batch=8)
 

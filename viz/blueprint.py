@@ -9,6 +9,7 @@ from rerun.blueprint.encodings import TextLogColumn
 from embodied.house.house import House
 from embodied.interface import Ask, Episode
 from embodied.render.pictures import PictureSettings
+from embodied.task_kind import kind_named
 
 LIGHT = {"unlit": "without light", "fast": "lit, fast", "normal": "lit", "traced": "lit, ray-traced"}
 """How a house is drawn, for people."""
@@ -32,11 +33,11 @@ def blueprint_of(
       seen: how the pictures are drawn that the agent looks at; None if it looks at none.
       shown: the recording also holds pictures for people.
     """
-    kind, steps = episode.task.kind, episode.steps
-    dialogue = kind != "find" or any(isinstance(s.action, Ask) for s in steps)
+    kind, steps = kind_named(episode.task.kind), episode.steps
+    dialogue = kind.story.dialogue or any(isinstance(s.action, Ask) for s in steps)
     target = any(s.reply is not None and s.reply.image is not None for s in steps)
     thought = any(s.action.thought is not None and s.action.thought.asks for s in steps)
-    stack, monocular = kind == "hari", kind == "vnla"  # goals and costs; one view only, and requests are counted
+    stack, monocular = kind.story.goal_stack, kind.monocular
     world = _house_view(house)
     ahead = rrb.Spatial2DView(origin="/agent/camera/image", name=sees_title(seen))
     around = "Around it, which it does not see" if monocular else "Panorama, gaze in the middle"
@@ -52,7 +53,7 @@ def blueprint_of(
             rrb.TextDocumentView(origin="/text/instruction", name="Doing now"),
             rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
         ]
-    plots = _plots(thought, stack, monocular)
+    plots = _plots(thought, stack, budget=episode.budget is not None)
     said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
         rrb.Horizontal(ahead, *(for_people or sent)),
@@ -92,7 +93,7 @@ def _house_view(house: House) -> rrb.Spatial3DView:
     )
 
 
-def _plots(probabilities: bool, cost: bool, budget: bool) -> list[rrb.View]:
+def _plots(probabilities: bool, cost: bool, *, budget: bool) -> list[rrb.View]:
     """Distance and mode over time, how likely asking was, and what it has cost so far."""
     plots: list[rrb.View] = [
         rrb.TimeSeriesView(

@@ -27,6 +27,7 @@ from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
+from embodied.task_kind import kind_named
 from embodied.viz.blueprint import blueprint_of
 from embodied.viz.described import boxes, log_described, log_recognised
 from embodied.viz.house3d import light_meshes, lit_meshes, log_house
@@ -118,7 +119,7 @@ def record(
     log_world(recording, world)
     log_task(recording, world, task)
     state, views = Story(task, budget), dataclasses.replace(views_of(world, eyes, pictures), recognise=recognise)
-    if task.kind == "vnla":
+    if kind_named(task.kind).monocular:
         views = dataclasses.replace(views, vfov=ONE_VIEW)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
@@ -233,7 +234,7 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     recording.log("mode", rr.StateChange(state=mode))
     told = instruction_text(step, state.left)
     recording.log("text/instruction", markdown(told))
-    if task.kind == "hari":
+    if kind_named(task.kind).story.goal_stack:
         recording.log("text/goals", markdown(state.stack(world, step)))
         recording.log("plot/cost", rr.Scalars(state.cost + step.cost))
         log_described(recording, world, step, views.sizes.panorama)

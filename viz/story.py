@@ -5,6 +5,7 @@ from __future__ import annotations
 from embodied.assistants.words import described
 from embodied.interface import Ask, Intention, Mode, Place, Pose, Reply, Step, Task, Viewpoint
 from embodied.language.prose import prose
+from embodied.task_kind import kind_named
 
 QUESTIONS = {
     Intention.HELP: "Can you help me?",
@@ -55,9 +56,10 @@ class Story:
         while len(self.goals) > 1 and (step.mode is Mode.MAIN or self.goals[-1] not in step.targets):
             self.goals.pop()
         left = self.last is not None and self.last.mode is Mode.SUB and step.mode is Mode.MAIN
-        if left and self.task.kind == "hanna":
+        leaving = kind_named(self.task.kind).story.leaving
+        if left and leaving:
             self.image = Viewpoint(self.task.world, step.targets[0])
-            self.dialogue.append(f"**Agent** (step {self.count}): *leaves the route and goes on by itself*")
+            self.dialogue.append(f"**Agent** (step {self.count}): *{leaving}*")
 
     def after(self, step: Step) -> None:
         """Take in the action of `step` and the reply to it."""
@@ -70,6 +72,9 @@ class Story:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)
             self.dialogue.append(f"**Teacher:** {prose(step.reply.text or '')}")
+        remark = kind_named(self.task.kind).story.remark
+        if remark and (line := remark(self.task, self.nodes, step)):
+            self.dialogue.append(f"*{line}*")
         if step.next_pose.node != self.nodes[-1]:
             self.nodes.append(step.next_pose.node)
         self.last = step

@@ -17,7 +17,6 @@ import numpy as np
 from embodied.assistants.ask import NEAR, in_view
 from embodied.envs.ask import AskEnv
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.metrics import price, success
 from embodied.interface import (
     Action,
     Actions,
@@ -30,6 +29,8 @@ from embodied.interface import (
     Situations,
     Stop,
 )
+from embodied.kinds.ask import price
+from embodied.metrics import success
 from embodied.policies.ask import Asker, Mind, confirm_on_sight, onward, reached
 
 EVERY = 4
@@ -68,7 +69,7 @@ def possible(o: Observation, trail: Mind) -> list[Choice]:
 
 def thinks(o: Observation, trail: Mind) -> bool:
     """Whether this is a moment to decide; between them, and on a route, one goes on."""
-    return o.advised is None and (reached(o) is not None or o.time % EVERY == 0)
+    return o.extras.advised is None and (reached(o) is not None or o.time % EVERY == 0)
 
 
 class Foresight:
@@ -138,7 +139,7 @@ def imagined(env: HelpEnv, rng: np.random.Generator) -> list[HelpEnv]:
     """The same moment in tasks in which other things that fit what was said are meant; at most IMAGINED of them."""
     task, world = env.task, env.world
     assert isinstance(task.goal, FindDescribed), "Ask-v0"
-    possible = sorted(env.situation.possible)
+    possible = sorted(env.situation.extras.possible)
     chosen = copy.deepcopy(rng).permutation(len(possible))[:IMAGINED]
     minds = []
     for placement in (possible[i] for i in sorted(chosen)):

@@ -39,7 +39,7 @@ REMEDY = "train it again: embodied study ask"
 
 def facts(o: Observation, trail: Mind) -> np.ndarray:
     """(37,) float32: time, the way so far, what is seen and reached, and what was asked. Nothing names a place."""
-    seen, thing = o.detections, reached(o)
+    seen, thing = o.extras.detections, reached(o)
     far = [d for d in seen if d.distance > REACH]
     visits, score = list(trail.visits.values()), thing.score if thing else 0.0
     confirmed = thing is not None and trail.asked_at.get(Intention.CONFIRM) == trail.moment

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from embodied import metrics
 from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.foresight import Foresight
 from embodied.agents.ask.learned import Decisions, LearnedAsker, load_asker, shown, train
@@ -20,17 +21,17 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
-from embodied.envs.make import ask_environment_maker, look_of
-from embodied.evaluation import metrics
-from embodied.evaluation.ask import COLUMNS, ask_split
+from embodied.evaluation.ask import ask_split
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import measured
 from embodied.generate import HouseConfig
 from embodied.identity import Identity, identity_of
 from embodied.interface import Action, Agent, Ask, Detection, Intention, Observation, Task
-from embodied.policies.ask import Asker, AskRule, Mind, baselines, between, first
+from embodied.kinds.ask import ASK, ask_environments
+from embodied.policies.ask import Asker, AskRule, Mind, between, first
 from embodied.records import save_lines
+from embodied.tasks.ask import look_of
 
 AREA = (90.0, 140.0)
 """Square metres of the houses."""
@@ -41,7 +42,6 @@ TEST = 1000
 evaluated in any more."""
 SPLITS = ("unseen houses", "unseen houses and classes")
 MODEL, FORESIGHT = "language model", "oracle of asking"
-KINDS = tuple(metrics.PER_KIND["ask"])
 Places = Mapping[str, StoredPlace]
 ModelMaker = Callable[[Places], Agent]
 
@@ -51,7 +51,7 @@ def after(steps: int) -> AskRule:
     rule = between(0.55, 0.75)
 
     def late(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
-        return Ask(Intention.ROUTE) if o.advised is None and o.time >= steps else rule(o, thing, trail)
+        return Ask(Intention.ROUTE) if o.extras.advised is None and o.time >= steps else rule(o, thing, trail)
 
     return late
 
@@ -100,12 +100,12 @@ class AskStudy(StudyLearner):
     judges = ("embodied.agents.ask.foresight", "embodied.agents.ask.study", "embodied.evaluation.ask")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        model, columns = (_rule(MODEL),) if self.model else (), (*COLUMNS, *KINDS, *metrics.USAGE)
+        model, columns = (_rule(MODEL),) if self.model else (), (*ASK.columns, *ASK.metrics, *metrics.USAGE)
         differences = (
             StudyRow(f"learned asker minus {other}", {}, minus=_rule(other))
             for other in ("confirm on sight", "always route")
         )
-        rows = (*map(_rule, baselines()), StudyRow("learned asker", {}), _rule(FORESIGHT), *model, *differences)
+        rows = (*map(_rule, ASK.baselines), StudyRow("learned asker", {}), _rule(FORESIGHT), *model, *differences)
         figure = Figure(
             ("success_",), "mean price of an episode's questions", "success (%)", against="price_unseen_houses"
         )
@@ -153,7 +153,7 @@ class AskStudy(StudyLearner):
         if rule == MODEL:
             assert self.model is not None, "the row is there where a model is"
             return self.model(places)
-        return Foresight(make_env) if rule == FORESIGHT else baselines()[rule]
+        return Foresight(make_env) if rule == FORESIGHT else ASK.agent(rule)
 
     def about(self) -> str:
         c, e = self.config, self.evaluation
@@ -172,7 +172,7 @@ def houses(name: str, seed: int, count: int, cache: Path) -> tuple[dict[str, Sto
     made = (make_dataset_house(seed + k, f"{name}_{k}", HouseConfig(area=AREA), catalogue) for k in range(count))
     places = {house.name: StoredPlace(house, graph) for house, graph in made}
     look = look_of(catalogue)
-    return places, ask_environment_maker(places, look), look
+    return places, ask_environments(places, look), look
 
 
 @functools.cache

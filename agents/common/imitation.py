@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Unpack
 import torch
 from torch import Tensor
 
+from embodied import metrics
 from embodied.agents.common import parallel
 from embodied.agents.common.playing import TaskSet, play_with_memory
 from embodied.agents.common.session import (
@@ -30,7 +31,6 @@ from embodied.agents.common.session import (
 )
 from embodied.agents.common.settings import MAY_CHANGE
 from embodied.errors import UnableError
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
 from embodied.interface import Agent, Ask, Episode, Place, Task

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
+from embodied import metrics
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
@@ -35,13 +36,13 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.lessons import Lessons, Split
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
-from embodied.envs.make import environment_maker
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity, identity_of
 from embodied.interface import STEP, TURNS, VIEWS, FindObject, Place, Pose, Sight, Task
+from embodied.kinds.find import FIND
 from embodied.language.plain import PlainLanguage
 from embodied.seeds import stream
+from embodied.task_kind import EnvInputs
 from embodied.tasks.find import find_pool, find_task
 
 SINGLE_VIEWS = 0.75
@@ -72,7 +73,7 @@ def find_split(lessons: Lessons, name: str, per_house: int, houses: int | None =
     """Find tasks in the houses of a split."""
     split = lessons.split(name, limit=1, houses=houses)
     tasks = tasks_in(split.worlds, per_house)
-    return dataclasses.replace(split, tasks=tasks, make_env=environment_maker("find", split.worlds))
+    return dataclasses.replace(split, tasks=tasks, make_env=FIND.environments(EnvInputs(split.worlds)))
 
 
 @dataclass(frozen=True, kw_only=True)

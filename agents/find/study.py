@@ -17,7 +17,8 @@ from embodied.agents.vision.lessons import Lessons
 from embodied.agents.vision.run import encoder_of
 from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.datasets.store import Dataset, SplitData
-from embodied.envs.make import environment_maker
+from embodied.kinds.find import FIND
+from embodied.task_kind import EnvInputs
 
 SEEING, MAP, BLIND = (
     StudyRow("Seeing"),
@@ -67,7 +68,9 @@ class FindStudy(SightedStudy):
 
     def where(self, agent: Any, judge: Mapping[str, Any], split: str) -> SplitData:
         places = self.judged_in(judge).places(split)
-        return SplitData(split, places, tuple(tasks_in(places, self.judged_tasks)), environment_maker("find", places))
+        return SplitData(
+            split, places, tuple(tasks_in(places, self.judged_tasks)), FIND.environments(EnvInputs(places))
+        )
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split), "house tasks": self.judged_tasks}

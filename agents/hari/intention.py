@@ -18,6 +18,7 @@ from typing import Any, Unpack
 import torch
 from torch import Tensor
 
+from embodied import metrics
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.playing import TaskSet
@@ -26,7 +27,6 @@ from embodied.agents.hari.agent import HariAgent, save_agent
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead
 from embodied.agents.hari.policy import Choice, policy_of
 from embodied.envs.hari import shaped_costs
-from embodied.evaluation import metrics
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
 from embodied.interface import Ask, Episode, Move, Place

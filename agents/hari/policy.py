@@ -104,14 +104,14 @@ class Considered:
 def consider(reader: Reader, observations: Observations, memory: Belief | None) -> tuple[Considered, Belief]:
     """Run the execution policy, which learns no more, on every agent that has not ended."""
     network, words = reader.executor.network, reader.executor.words
-    depths = tuple(len(o.goal_descriptions) if o is not None else 0 for o in observations)
+    depths = tuple(len(o.extras.goal_descriptions) if o is not None else 0 for o in observations)
     memory = memory or Belief(network.begin(len(observations)).clone(), depths)
     if reader.executor.config.afresh:
         memory = _afresh(memory, depths, network.begin(1)[0])
     rows = [i for i, o in enumerate(observations) if o is not None]
     seen = [o for o in observations if o is not None]
-    states = [reader("state", o.state_description) for o in seen]
-    goals = [reader("goal", o.goal_descriptions[-1]) for o in seen]
+    states = [reader("state", o.extras.state_description) for o in seen]
+    goals = [reader("goal", o.extras.goal_descriptions[-1]) for o in seen]
     together = zip(states, goals, seen, strict=True)
     inputs = collate([percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn) for s, g, o in together])
     state, goal = (Encoded.together([r.encoded for r in some]) for some in (states, goals))
@@ -206,7 +206,7 @@ class HariPolicy:
         )
         rows = considered.rows
         seen = [observations[i] for i in rows]
-        depth = torch.tensor([len(o.goal_descriptions) for o in seen if o is not None])
+        depth = torch.tensor([len(o.extras.goal_descriptions) for o in seen if o is not None])
         shown = shown_probabilities(considered.log_moves).clone()
         inputs = considered.belief.clone(), shown, mind.last[rows], depth
         possible = torch.from_numpy(np.stack([available(o) for o in seen if o is not None]))
@@ -246,7 +246,7 @@ class PerfectOnSubgoals(HariPolicy):
         led: dict[int, int | None] = {}
         for k, i in enumerate(considered.rows):
             s = situations[i]
-            if s is not None and len(s.goals) > 1:
+            if s is not None and len(s.extras.goals) > 1:
                 action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)
                 led[k] = action.candidate if isinstance(action, Move) else None
         return self._choose(observations, considered, led, belief, memory, rngs)

@@ -15,6 +15,7 @@ from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.intention import train
 from embodied.agents.hari.pretraining import PretrainingData, pretrain
 from embodied.agents.hari.words import feature_words
+from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
@@ -34,7 +35,7 @@ def rules_of(config: IntentionConfig) -> HariRules:
 
 def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> TaskSet:
     """Some splits as one place to learn or to be validated in; at most `limit` tasks, from all splits alike."""
-    parts = [data.split(s, hari=rules_of(config)) for s in splits]
+    parts = [data.split(s, rules=rules_of(config)) for s in splits]
     each = None if limit is None else -(-limit // len(splits))
     tasks = [t for part in parts for t in spread(part.tasks, each)]
     places: Mapping[str, Place] = {name: place for part in parts for name, place in part.worlds.items()}
@@ -62,7 +63,8 @@ def train_execution(
     """
     where: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
     validation = spread(data.tasks("pretrain_val"), None)
-    lessons = PretrainingData(where, data.describer(config.kept), data.tasks("pretrain"), validation)
+    describer = Describer(frequent_classes(data.places("train").values(), config.kept))
+    lessons = PretrainingData(where, describer, data.tasks("pretrain"), validation)
     describe = lessons.describer.dense
     houses = {t.world for t in lessons.training}
     places = [lessons.places[name] for name in sorted(houses)]

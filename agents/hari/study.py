@@ -142,7 +142,7 @@ class HariStudy(EpisodeStudy):
         return policies(agent, means)[judge["played"]]
 
     def where(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> SplitData:
-        return self.judged_in(judge).split(split, hari=rules_of(agent.config))
+        return self.judged_in(judge).split(split, rules=rules_of(agent.config))
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
         return dataset_of(self.elsewhere or self.data, "hari")

@@ -15,9 +15,9 @@ from embodied.agents.language_models.client import Client
 from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.assistants.ask import AskAssistant
-from embodied.envs.make import assistant_of
 from embodied.interface import Assistant, Intention, Reply, Situation
 from embodied.language import PlainLanguage
+from embodied.plugins import assistant_of
 
 ASSISTANT_ANSWER = object_schema(answer={"type": "string", "maxLength": 600})
 QUESTION_WORDS = {

@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
+from embodied.assistants.words import side
 from embodied.geometry import wrap
-from embodied.interface import STEP, Action, Ask, Description, Move, Observation, SeenPlace, Sight, Stop, viewpoint
+from embodied.interface import STEP, Action, Ask, Move, Observation, SeenPlace, Sight, Stop, viewpoint
 
 MOST_NAMES = 12
 """Things that are named of one place."""
@@ -43,16 +44,6 @@ def actions_of(o: Observation) -> dict[str, Action]:
     return {**moves, **{f"ask {i.value}": Ask(i) for i in o.can_ask}, "stop": Stop()}
 
 
-def side(bearing: float) -> str:
-    """A direction relative to the gaze (radians, left positive) in words, to 30 degrees."""
-    steps = round(float(wrap(bearing)) / STEP)
-    if steps == 0:
-        return "straight ahead"
-    if abs(steps) >= 6:
-        return "behind you"
-    return f"{30 * abs(steps)} degrees to the {'left' if steps > 0 else 'right'}"
-
-
 def ways(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
     """The candidates: 'go 0: straight ahead, towards the sofa; go 1: ...'."""
     if o.candidates.words:
@@ -68,30 +59,9 @@ def ways(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
 
 
 def sees(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
-    """What the observation tells of the place: names, descriptions (HARI, Ask-v0) and detections (Ask-v0)."""
+    """What the observation tells of the place: names, and what its kind of task adds."""
     yaw = o.turn * STEP
     parts = [f"{name} ({side(y - yaw)}, {d:.0f} m)" for name, y, d in names]
-    if o.state_description:
-        parts.append(f"here: {described(o.state_description, o.turn)}")
-    for d in o.detections:
-        parts.append(f"perhaps it: {side(d.bearing)}, {d.distance:.1f} m, score {d.score:.2f}")
-    if o.advised is not None:
-        told = "stop here" if isinstance(o.advised, Stop) else f"go {o.advised.candidate}"
-        parts.append(f"the route that you were told says: {told}")
-    if o.goal_descriptions:
-        parts.append(f"where to go: {described(o.goal_descriptions[-1], o.turn)}")
+    if o.extras is not None:
+        parts += o.extras.lines(o.turn)
     return "; ".join(parts) or "nothing that has a name"
-
-
-def described(description: Description, turn: int) -> str:
-    """A bag of features in words, directions relative to the gaze."""
-    said = []
-    for f in description:
-        if f.kind == "room":
-            said.append(f.name.replace("_", " "))
-        elif f.name == "stop":
-            said.append("you are there")
-        else:
-            where = side((f.horizontal - turn) * STEP)
-            said.append(f"go {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
-    return ", ".join(said)

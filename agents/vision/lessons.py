@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from embodied.agents.common.more_paths import SaidBy
 from embodied.agents.common.paraphrases import varied
@@ -23,7 +23,6 @@ from embodied.agents.vision.features import feature_path, load_bank
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
-from embodied.envs.make import AS_PUBLISHED
 from embodied.evaluation.evaluate import spread
 
 A = TypeVar("A", bound=About)
@@ -50,10 +49,8 @@ class Lessons:
     cache: Path = field(default_factory=default_cache)
     """Where the furniture is, for other pictures than the agent sees."""
 
-    def split(
-        self, name: str, *, limit: int | None = None, houses: int | None = None, vnla: str = AS_PUBLISHED
-    ) -> Split:
-        """At most `limit` tasks of a split, from its first `houses` houses; `vnla` as in Dataset.split.
+    def split(self, name: str, *, limit: int | None = None, houses: int | None = None, rules: Any = None) -> Split:
+        """At most `limit` tasks of a split, from its first `houses` houses; `rules` as in Dataset.split.
 
         Raises:
           ValueError: more houses than there are.
@@ -62,7 +59,7 @@ class Lessons:
         data, encoder, kind = self.data, self.encoder.digest, self.picture_kind
         if houses is not None and houses > (there := len(data.names(name))):
             raise ValueError(f"{houses} houses of {name!r} are wanted, {data.folder} has {there}; ask for fewer")
-        split = data.split(name, houses=houses, vnla=vnla)
+        split = data.split(name, houses=houses, rules=rules)
         pictures = {n: pictures_of(data, n, kind) for n in split.worlds}
         paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
         tasks = split.tasks if limit is None else spread(split.tasks, limit)

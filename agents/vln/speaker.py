@@ -34,10 +34,10 @@ from embodied.agents.vln.network import COPIES
 from embodied.agents.vln.policy import SPOKEN, channels_of
 from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.store import SplitData
-from embodied.evaluation.metrics import without_repeats
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity, identity_of
 from embodied.interface import TURNS, Episode, FollowRoute, Place, Route, Task
+from embodied.metrics import without_repeats
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task
 

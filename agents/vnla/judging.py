@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.agent import VnlaAgent
-from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
+from embodied.kinds.vnla import VNLA
 
 COLUMNS = ("success", "strict success", "room success", "navigation error", "requests", "oracle success", "steps")
 """Those of the first paper, and how far the agents came."""
@@ -37,5 +37,5 @@ def rules_of_row(agent: VnlaAgent, name: str) -> str:
 def player(agent: VnlaAgent, bank: FeatureBank, name: str) -> Agent:
     """Who plays the row `name`."""
     if name in WITHOUT_LEARNING:
-        return agent_without_learning("vnla", name, rules=agent.config.rules)
+        return VNLA.agent(name)
     return agent.player(bank, ASKED.get(name))

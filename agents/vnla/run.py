@@ -93,8 +93,8 @@ def train_agent(
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
     houses = config.training_houses or None
-    training = lessons.split("train", houses=houses, vnla=TRAINED_UNDER[config.rules])
-    validation = lessons.split("val_unseen", limit=config.validation_tasks, vnla=config.rules)
+    training = lessons.split("train", houses=houses, rules=TRAINED_UNDER[config.rules])
+    validation = lessons.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
     words = vocabulary_of(lessons.data, houses, lessons.rewording(config))
     agent = VnlaAgent.new(lessons.about(VnlaAbout, config, evaluation, words), words.reword)
     agent.network.to(lessons.device)

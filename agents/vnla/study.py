@@ -130,7 +130,7 @@ class VnlaStudy(SightedStudy):
     def where(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         if agent is None:
             return super().where(agent, judge, split)
-        return self.judged_in(judge).split(split, vnla=rules_of_row(agent, judge["played"]))
+        return self.judged_in(judge).split(split, rules=rules_of_row(agent, judge["played"]))
 
     def lessons(self, how: Mapping[str, Any] = NOTHING) -> Lessons:
         """

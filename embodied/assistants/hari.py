@@ -40,7 +40,7 @@ class HariAssistant:
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         some = (Intention.CUR, Intention.GOAL)
-        return (*some, Intention.SUB) if len(situation.goals) < self._stack else some
+        return (*some, Intention.SUB) if len(situation.extras.goals) < self._stack else some
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
         """A dense description, or the next action when asked for a sub-goal one step away.
@@ -49,7 +49,7 @@ class HariAssistant:
           ValueError: a question HARI does not know.
         """
         s, say = situation, self._describer
-        here, goal = s.pose.node, s.goals[-1]
+        here, goal = s.pose.node, s.extras.goals[-1]
         if question is Intention.CUR:
             return Reply(description=say.dense(s.world, here), intention=question)
         if question is Intention.GOAL:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from embodied.interface import TURNS, Description, Feature, Pose
+from embodied.geometry import wrap
+from embodied.interface import STEP, TURNS, Description, Feature, Pose
 
 SIDES = (
     "ahead",
@@ -48,3 +49,27 @@ def _thing(feature: Feature, pose: Pose | None) -> str:
 
 def _listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
+
+
+def side(bearing: float) -> str:
+    """A direction relative to the gaze (radians, left positive) in words, to 30 degrees."""
+    steps = round(float(wrap(bearing)) / STEP)
+    if steps == 0:
+        return "straight ahead"
+    if abs(steps) >= 6:
+        return "behind you"
+    return f"{30 * abs(steps)} degrees to the {'left' if steps > 0 else 'right'}"
+
+
+def features_in_words(description: Description, turn: int) -> str:
+    """A bag of features in words, directions relative to the gaze."""
+    said = []
+    for f in description:
+        if f.kind == "room":
+            said.append(f.name.replace("_", " "))
+        elif f.name == "stop":
+            said.append("you are there")
+        else:
+            where = side((f.horizontal - turn) * STEP)
+            said.append(f"go {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
+    return ", ".join(said)

@@ -9,13 +9,12 @@ from embodied.assets.catalogue import Catalogue
 from embodied.assistants.route_system import build_routes
 from embodied.bench.timing import Measure, measure
 from embodied.datasets.build import DatasetConfig, make_dataset_house
-from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
-from embodied.envs.make import environment_maker
 from embodied.generate import HouseConfig
 from embodied.interface import Ask, Intention, Move, Observation, Task
 from embodied.language.plain import PlainLanguage
+from embodied.task_kind import EnvInputs, TaskInputs, kind_named
 
 AIMS = {"find": 20_000.0, "hanna": 10_000.0, "vnla": None, "hari": None}
 """Steps per second that the project promises; HANNA's include the assistant's replies."""
@@ -26,12 +25,12 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     """Environment steps per second of every kind of task, with caches warm, no pixels."""
     language = PlainLanguage()
     for kind, aim in AIMS.items():
+        known = kind_named(kind)
         house, graph = make_dataset_house(seed, "bench", HouseConfig(area=DatasetConfig(kind).area), catalogue)
         place = StoredPlace(house, graph)
-        routes = build_routes(place, seed=seed, language=language, house_split="test") if kind == "hanna" else ()
-        part = "main_unseen" if kind == "hari" else "main"
-        tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language)[part]
-        env = environment_maker(kind, {"bench": place}, routes={"bench": routes})()
+        routes = build_routes(place, seed=seed, language=language, house_split="test") if known.routes else ()
+        tasks = known.tasks(TaskInputs(place, routes, seed, language), [(known.unseen_part, TASKS)])[known.unseen_part]
+        env = known.environments(EnvInputs({"bench": place}, lambda _, routes=routes: routes))()
         counts = walk(env, tasks)
         asked = counts[1] / counts[0]
         yield measure(

@@ -23,9 +23,9 @@ import psutil
 
 from embodied.bench.timing import Report
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
-from embodied.datasets.scale import own_size
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
+from embodied.splits import DatasetSize
 
 THINKING = 1.0
 """Mean seconds that somebody looks before the next step; people take longer."""
@@ -158,7 +158,7 @@ def measure(
 ) -> Report:
     """Build a small study in `out`, serve it, and let people take part."""
     folder = out / "serve"
-    config = DatasetConfig("hanna", own_size(1, 40), seed, (80.0, 110.0), people=False)
+    config = DatasetConfig("hanna", DatasetSize(1, 40), seed, (80.0, 110.0), people=False)
     progress("a data set of three small houses")
     build_dataset(config, folder / "data", cache, workers=1)
     draw_panoramas(config, folder / "data", cache, pictures=PictureSettings(512, "unlit"), workers=1)

@@ -17,28 +17,23 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
-from embodied.datasets.scale import KINDS, SCALES, described, own_size
 from embodied.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import KINDS as PICTURE_KINDS
 from embodied.render.pictures import PictureSettings
+from embodied.splits import SCALES, DatasetSize, described
 
 FROM_PEOPLE = "from-people"
-WORDS_ONLY = ("hari",)
-"""Kinds that are not drawn unless asked: all that HARI's agent perceives are words, its learner and its tables (4.7
-and 4.8) need no pictures, and lighting the houses would be most of the work."""
-
-
 SIZES = {name: described(name) for name in SCALES}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Furnished, Printed):
-    kind: Annotated[str, Option(words=(*KINDS, FROM_PEOPLE), name="kind")]
-    """The kind of task."""
+    kind: Annotated[str, Option(metavar="KIND", name="kind")]
+    """The kind of task: find, vln, vnla, hanna, hari, MODULE:NAME of your own, or from-people."""
     out: OutputFolder
     """Folder of the data set."""
     scale: Annotated[str | None, Option(words=tuple(SCALES), helps=SIZES)] = None
-    """Size of the data set: houses to train + validate + test in, and training tasks (HANNA's; default: mini)."""
+    """Size of the data set: houses to train + validate + test in, and training tasks (default: mini)."""
     houses: Annotated[int | None, Option(whole(1, HOUSES), "N")] = None
     """Instead of --scale: N houses to train in, a tenth to validate and a fifth to test in."""
     tasks: Count | None = None
@@ -157,12 +152,16 @@ def chosen_pictures(kind: str, pictures: str | None, size: int | None, held: Pic
       held: how those that the data set holds were drawn, None where it holds none. They are gone on with rather than
         drawn again in another way that nobody asked for.
     """
+    from embodied.task_kind import kind_named
+
     if pictures is None and held is not None:
         return dataclasses.replace(held, size=size or held.size)
-    return PictureSettings(size or PictureSettings().size, pictures or ("none" if kind in WORDS_ONLY else "fast"))
+    return PictureSettings(
+        size or PictureSettings().size, pictures or ("fast" if kind_named(kind).pictures else "none")
+    )
 
 
-def chosen_scale(args: Options) -> str:
+def chosen_scale(args: Options) -> str | DatasetSize:
     """The scale that --scale, or --houses and --tasks, name.
 
     Raises:
@@ -177,4 +176,4 @@ def chosen_scale(args: Options) -> str:
         return args.scale or "mini"
     if args.scale:
         raise ValueError("--scale and --houses say the same thing twice; leave one out")
-    return own_size(args.houses, args.tasks or 100 * args.houses, *sizes[1:])
+    return DatasetSize(args.houses, args.tasks or 100 * args.houses, args.test_houses, args.evaluation_tasks)

@@ -149,14 +149,15 @@ def inhabited(house: House, catalogue: Catalogue, args: Options) -> tuple[House,
 
 def find_something(args: Options, world: World, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
-    from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
+    from embodied.kinds.find import FIND
     from embodied.language import People
     from embodied.policies.baselines import Shortest
+    from embodied.task_kind import EnvInputs
     from embodied.tasks.find import find_pool, find_task
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
-    make = environment_maker("find", {world.name: world})
+    make = FIND.environments(EnvInputs({world.name: world}))
     episode = play(make, Shortest(), [task], seed=args.seed, agent="shortest path")[0]
     return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
 
@@ -171,9 +172,10 @@ def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: 
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.features import encode_panoramas
     from embodied.agents.vision.recognise import Recogniser
-    from embodied.envs.make import environment_maker
     from embodied.evaluation.rollout import play
+    from embodied.kinds.hanna import HANNA
     from embodied.language import People
+    from embodied.task_kind import EnvInputs
     from embodied.tasks.hanna import hanna_pool, hanna_task
 
     agent, encoder = HannaAgent.load(SHIPPED_AGENT), load_encoder()
@@ -182,7 +184,7 @@ def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: 
     bank = FeatureBank({world.name: features}, encoder.digest)
     pool = hanna_pool(world, seed=args.seed)
     task = hanna_task(pool, args.task % len(pool), seed=args.seed, language=People())
-    make = environment_maker("hanna", {world.name: world}, routes={world.name: routes})
+    make = HANNA.environments(EnvInputs({world.name: world}, lambda _: routes))
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
     if args.video:
         film(world, episode, args.video, args.video_size)
@@ -205,7 +207,7 @@ def recorded(
       eyes: the world whose panoramas the agent looked at; None where it looks at none.
       recognise: names what the agent recognises there.
     """
-    from embodied.evaluation.metrics import navigation_error, spl, success
+    from embodied.metrics import navigation_error, spl, success
     from embodied.viz.recording import record_episode
     from embodied.viz.sinks import Sinks
 

@@ -17,7 +17,6 @@ import contextlib
 import dataclasses
 import functools
 import json
-import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,26 +31,17 @@ if TYPE_CHECKING:
     from embodied.evaluation.tables import Row
     from embodied.interface import Agent, Assistant, Episode, Place, SeenPlace
 
-HARI_SPLITS = ("test_unseen_start", "test_unseen_object", "test_unseen_env")
 LLM = "llm"
 FEW_TASKS = 20
 """How many tasks a language model plays, or anybody in a generated house, unless --tasks says otherwise."""
 AREA = (90.0, 140.0)
 """Size of Ask-v0's houses, square metres."""
-COLUMNS = {
-    "vln": ("success", "strict success", "spl", "navigation error", "nDTW", "SDTW"),
-    "hanna": ("success", "strict success", "spl", "navigation error", "requests"),
-    "vnla": (
-        "success", "strict success", "oracle success", "room success", "navigation error", "path length", "requests",
-    ),
-    "hari": ("success", "navigation error", "requests", "steps"),
-}  # fmt: skip
-"""Of agents without training; "strict success" wants a stop, as HARI's success does."""
 
 
 def run(args: Options) -> None:
     from embodied.datasets.store import dataset_of
     from embodied.locks import locked
+    from embodied.task_kind import kind_named
 
     if args.rrd and not args.out:
         raise ValueError("--rrd wants --out DIR beside it: recordings go to DIR/recordings")
@@ -59,7 +49,7 @@ def run(args: Options) -> None:
     names, files = _agents(args)
     if files and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
-    splits = args.split or (HARI_SPLITS if args.kind == "hari" else ("test_unseen",))
+    splits = args.split or kind_named(args.kind).test_splits
     if data is not None:
         for split in splits:
             data.names(split)  # refuses unknown ones
@@ -74,10 +64,9 @@ def _agents(args: Options) -> tuple[list[str], list[Path]]:
       ValueError: an unknown agent, or several trained ones.
     """
     from embodied.agents.common.shipped import SHIPPED
-    from embodied.evaluation.evaluate import agent_names
-    from embodied.policies.ask import baselines
+    from embodied.task_kind import kind_named
 
-    known = [*baselines()] if args.kind == "ask" else agent_names(args.kind)
+    known = kind_named(args.kind).agent_names
     names, files = [], []
     for name in args.agent or (["shipped"] if args.kind in SHIPPED and args.data else known):
         path = Path(name)
@@ -136,17 +125,14 @@ def _evaluate(
 
 
 def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
-    from embodied.evaluation import metrics
-    from embodied.evaluation.ask import COLUMNS as ASK_COLUMNS
+    from embodied import metrics
+    from embodied.task_kind import kind_named
 
     if files:
         from embodied.cli.evaluate_trained import columns_of
 
         return columns_of(kind)
-    if kind == "ask":
-        return [*ASK_COLUMNS, *metrics.USAGE]
-    usual = ("success", "strict success", "spl", "navigation error", "requests", "steps")
-    return [*COLUMNS.get(kind, usual), *metrics.USAGE]
+    return [*kind_named(kind).columns, *metrics.USAGE]
 
 
 class _Changes:
@@ -154,14 +140,13 @@ class _Changes:
 
     def __init__(self, args: Options, client: Callable[[], Any]) -> None:
         from embodied.agents.language_models.assistant import assistant_maker
-        from embodied.envs.make import assistant_of
+        from embodied.plugins import assistant_of
 
         self.own: Assistant | None = None
         """An assistant of the user's."""
         self._reword = None
         self._steps: int | None = args.steps
         if ":" in args.assistant:
-            sys.path.insert(0, "")  # a module in the current folder
             self.own = assistant_of(args.assistant)
         elif args.assistant != TEMPLATE:
             self._reword = assistant_maker(args.assistant, client, args.prompts)
@@ -192,9 +177,10 @@ def _play(
 ) -> tuple[list[Row], dict[str, tuple[int, int]]]:
     """The rows of agents without training, and what a scripted listener makes of the routes that each was told."""
     from embodied.agents.language_models.routes import followed_replies
-    from embodied.evaluation.evaluate import LOOKING, evaluate
+    from embodied.evaluation.evaluate import evaluate
+    from embodied.task_kind import kind_named
 
-    looks = bool({LLM, *LOOKING.get(args.kind, {})} & set(names)) or args.kind == "ask" or args.assistant != TEMPLATE
+    looks = bool({LLM, *kind_named(args.kind).looking} & set(names)) or args.kind == "ask" or args.assistant != TEMPLATE
     limit = args.tasks or (FEW_TASKS if LLM in names or data is None else None)
     watch = functools.partial(bar, name="agents", unit="agent")
     rows: list[Row] = []
@@ -239,16 +225,17 @@ def _stages(
             worlds = None
             if catalogue is not None:
                 worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
-            yield data.split(split, worlds=worlds, vnla=args.rules, assistant=assistant)
+            yield data.split(split, worlds=worlds, rules=args.rules, assistant=assistant)
 
 
 def _hidden_houses(args: Options, file: Path, limit: int) -> SplitData:
     """Ask-v0 in the houses of a list of seeds. What is written down names houses by their place in the list alone."""
     from embodied.datasets.build import make_dataset_house
     from embodied.datasets.store import SplitData
-    from embodied.envs.make import ask_environment_maker, look_of
     from embodied.evaluation.ask import ask_split, read_seeds
     from embodied.generate import HouseConfig
+    from embodied.kinds.ask import ask_environments
+    from embodied.tasks.ask import look_of
     from embodied.world import open_world
 
     seeds, catalogue = read_seeds(file), catalogue_of(args)
@@ -259,22 +246,19 @@ def _hidden_houses(args: Options, file: Path, limit: int) -> SplitData:
     look, unseen = look_of(catalogue), args.unseen_classes or None
     tasks = ask_split(worlds, look, -(-limit // len(seeds)), seed=seeds[0], unseen=unseen)
     name = "unseen classes" if unseen else "hidden"
-    return SplitData(name, worlds, tuple(tasks), ask_environment_maker(worlds, look))
+    return SplitData(name, worlds, tuple(tasks), ask_environments(worlds, look))
 
 
 def _agent(
     args: Options, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None, client: Callable[[], Any]
 ) -> Agent:
     from embodied.evaluation.ask import submitted
-    from embodied.evaluation.evaluate import agent
-    from embodied.policies.ask import baselines
+    from embodied.task_kind import kind_named
 
     if name == LLM:
         return _model_agent(args, split, client())
-    if args.kind != "ask":
-        return agent(args.kind, name, worlds, args.rules)
-    known = baselines()
-    return known[name] if name in known else submitted(name)
+    kind = kind_named(args.kind)
+    return kind.agent(name, worlds) if name in kind.agent_names else submitted(name)
 
 
 def _model_agent(args: Options, split: SplitData, client: Any) -> Agent:

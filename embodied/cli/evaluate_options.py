@@ -10,9 +10,6 @@ from embodied.cli.learning import GOAL_IMAGES, Encoded, Threaded
 from embodied.cli.model import WithModel
 from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
-KINDS = ("find", "vln", "vnla", "hanna", "hari", "ask")
-VNLA_RULES = ("indirect", "direct", "direct-mute", "algorithm-6")
-"""As in embodied.envs.vnla, which --help should not import."""
 SEES = ("names", "strip", "panorama", "nothing")
 TEMPLATE = "template"
 
@@ -36,9 +33,9 @@ class TaskOptions:
     """Who answers requests: template (the kind's own assistant), llm, person, or MODULE:CLASS of your own."""
     batch: Count | None = None
     """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
-    rules: Annotated[str, Option(words=VNLA_RULES)] = VNLA_RULES[0]
-    """VNLA's rule of play: help in words (indirect), the advisor acts and says it (direct) or does not (direct-mute),
-    Algorithm 6 as printed."""
+    rules: Annotated[str | None, Option(metavar="WORD")] = None
+    """Rules of play of the kind of task. vnla: help in words (indirect, the default), the advisor acts and says it
+    (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
     seeds: InputPath | None = None
     """ask: seeds of the houses, one per line."""
     unseen_classes: bool = False
@@ -70,8 +67,8 @@ class OfTrained:
 
 @dataclass(frozen=True, kw_only=True)
 class Options(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
-    kind: Annotated[str, Option(words=KINDS, name="kind")]
-    """The kind of task."""
+    kind: Annotated[str, Option(metavar="KIND", name="kind")]
+    """The kind of task: find, vln, vnla, hanna, hari, ask, or MODULE:NAME of your own."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
     """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', or for ask a
     folder with an agent.py or the http:// address of an agent (default: shipped, else all baselines)."""

@@ -114,7 +114,7 @@ def _vnla(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 
     def known(split: str) -> Known:
         bank, names = lessons.split(split).bank, row_names(agent)
-        under = functools.cache(lambda rules: data.split(split, vnla=rules))
+        under = functools.cache(lambda rules: data.split(split, rules=rules))
         players = {name: (under(rules_of_row(agent, name)), player(agent, bank, name)) for name in names}
         return Known(players, names, WITHOUT_LEARNING)
 
@@ -124,15 +124,15 @@ def _vnla(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
 def _vln(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     """The follower beside agents without learning."""
     from embodied.agents.vln.agent import VlnAgent
-    from embodied.evaluation.evaluate import PLAIN
+    from embodied.task_kind import PLAIN_AGENTS
 
     lessons, agent = _lessons(args, data), VlnAgent.load(file)
     note(f"trained on pictures {agent.about.pictures}")
 
     def known(split: str) -> Known:
         whole, learned = data.split(split), agent.policy(lessons.split(split).bank)
-        players = {"learned": (whole, learned), **{name: (whole, make()) for name, make in PLAIN.items()}}
-        return Known(players, list(players), PLAIN)
+        players = {"learned": (whole, learned), **{name: (whole, make()) for name, make in PLAIN_AGENTS.items()}}
+        return Known(players, list(players), PLAIN_AGENTS)
 
     return known
 
@@ -148,7 +148,7 @@ def _hari(args: Options, data: Dataset, file: Path) -> Callable[[str], Known]:
     players = policies(agent, means)
 
     def known(split: str) -> Known:
-        one = data.split(split, hari=rules_of(agent.config))
+        one = data.split(split, rules=rules_of(agent.config))
         return Known({name: (one, player) for name, player in players.items()}, list(players), players)
 
     return known

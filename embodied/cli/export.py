@@ -238,20 +238,20 @@ def run_parquet(args: ParquetOptions) -> None:
 def run_lerobot(args: LeRobotOptions) -> None:
     from embodied.datasets.lerobot import RecordedCamera, export_lerobot
     from embodied.datasets.store import Dataset
-    from embodied.evaluation.evaluate import AGENTS, EXPERTS, agent
-    from embodied.evaluation.metrics import success
     from embodied.evaluation.rollout import play
     from embodied.interface import Episode
+    from embodied.metrics import success
     from embodied.records import load_lines
 
     data = Dataset(args.data)
-    name = args.agent or EXPERTS.get(data.kind, "shortest")
+    name = args.agent or data.task_kind.expert
     chosen = {"--agent": args.agent, "--split": args.split, "--tasks": args.tasks}
     if args.episodes and (twice := [option for option, value in chosen.items() if value is not None]):
         raise ValueError(f"--episodes says who played which tasks; leave {' and '.join(twice)} out")
-    if name not in AGENTS[data.kind]:
+    known = [*data.task_kind.baselines]
+    if name not in known:
         raise ValueError(
-            f"--agent is {name!r}; of {data.kind!r} use one of {[*AGENTS[data.kind]]}, or export the --episodes that "
+            f"--agent is {name!r}; of {data.kind!r} use one of {known}, or export the --episodes that "
             "`embodied evaluate --out` wrote of any other"
         )
     if args.episodes:
@@ -261,7 +261,7 @@ def run_lerobot(args: LeRobotOptions) -> None:
     else:
         whole_split = data.split(args.split or "train")
         tasks = whole_split.tasks[: args.tasks]
-        episodes = play(whole_split.make_env, agent(data.kind, name), tasks, seed=data.config.seed, agent=name)
+        episodes = play(whole_split.make_env, data.task_kind.agent(name), tasks, seed=data.config.seed, agent=name)
 
     succeeded = lambda episode: success(episode, data.place(episode.task.world).graph) > 0
     watched, camera = bar(episodes, "episodes", "episode"), RecordedCamera(args.size, args.size)

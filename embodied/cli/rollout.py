@@ -51,9 +51,9 @@ def run(args: Options) -> None:
 def roll_out(args: Options, viewers: tuple[str, ...]) -> None:
     """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
-    from embodied.evaluation.metrics import PER_EPISODE
     from embodied.evaluation.rollout import play
     from embodied.language import People
+    from embodied.metrics import PER_EPISODE
     from embodied.policies.baselines import WITHOUT_LEARNING
     from embodied.render.photograph import PhotoCamera
     from embodied.tasks.find import find_pool, find_task

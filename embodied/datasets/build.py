@@ -18,8 +18,7 @@ from embodied.assets.cache import digest, drafts, sweep, write_bytes, write_json
 from embodied.assets.catalogue import GROUPS, Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assistants.route_system import WORDINGS, route_paths, spanning_paths, worded
-from embodied.datasets.parts import part_tasks
-from embodied.datasets.scale import Scale, SplitPlan, quota, scale
+from embodied.datasets.scale import Scale, quota, scale
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish.tables import tables_of
 from embodied.generate.novelty import furnishable
@@ -33,6 +32,8 @@ from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import load_json, read_json, save_lines
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import stream
+from embodied.splits import SCALES, DatasetSize, SplitPlan
+from embodied.task_kind import TaskInputs, TaskKind, kind_named
 from embodied.world import World, open_world
 
 W = TypeVar("W")
@@ -60,9 +61,9 @@ class DatasetConfig:
     """
 
     kind: str
-    """'find', 'vln', 'vnla', 'hanna' or 'hari'."""
-    scale: str = "mini"
-    """One of embodied.datasets.scale.SCALES, or a size of one's own, '40x4000' (houses x tasks)."""
+    """Kind of task: 'find', 'vln', 'vnla', 'hanna', 'hari', or 'module:NAME' of your own."""
+    scale: DatasetSize | str = "mini"
+    """One of embodied.splits.SCALES, or a size of one's own."""
     seed: int = 0
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""
@@ -85,9 +86,18 @@ class DatasetConfig:
             raise ValueError(f"routes should be 'sampled' or 'spanning', got {self.routes!r}")
         if self.language not in VOICES:
             raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
-        if not self.rooms and self.kind != "vnla":
-            raise ValueError(f"tasks without rooms are VNLA's, these are of kind {self.kind!r}; leave rooms as it is")
+        if isinstance(self.scale, str) and self.scale not in SCALES:  # as files have it
+            try:
+                object.__setattr__(self, "scale", DatasetSize.of(self.scale))
+            except (TypeError, ValueError) as e:
+                raise ValueError(f"unknown scale {self.scale!r}; use one of {SCALES}, or a DatasetSize") from e
+        if not self.rooms and not self.task_kind.roomless:
+            raise ValueError(f"requests of kind {self.kind!r} always name what they name; leave rooms as it is")
         scale(self.scale, self.kind, self.ood)
+
+    @property
+    def task_kind(self) -> TaskKind:
+        return kind_named(self.kind)
 
     @property
     def plan(self) -> Scale:
@@ -101,7 +111,7 @@ class DatasetConfig:
     def facts(self) -> dict[str, object]:
         """The settings as they are written; what came later and is at its default is left out, so that data sets
         without it keep their digests."""
-        facts = dataclasses.asdict(self)
+        facts = {**dataclasses.asdict(self), "scale": str(self.scale)}
         return {k: v for k, v in facts.items() if k not in LATER or v != LATER[k]}
 
 
@@ -320,9 +330,10 @@ def _write_unit(
     house_split = {"extra": "train", "ood": "test"}.get(unit.group, unit.group)
     wording = WORDINGS[house_split]
     paths: list[tuple[int, ...]] = []
-    if config.kind in ("hanna", "vln"):
+    kind = config.task_kind
+    if kind.routes:
         figures = furnishable(catalogue, novelty)
-        met = meet(house, graph, figures, seed=config.seed) if config.kind == "hanna" and config.people else None
+        met = meet(house, graph, figures, seed=config.seed) if kind.people and config.people else None
         if config.routes == "spanning":
             paths, wording = spanning_paths(graph), tuple(dict.fromkeys(wording))
         else:
@@ -330,22 +341,12 @@ def _write_unit(
         house = house if met is None else add_people(house, met, (p[0] for p in paths))
     with open_world(house, catalogue, cache, graph=graph) as world:
         routes = worded(world, paths, wording, seed=config.seed, language=language)
-        tasks = part_tasks(
-            config.kind,
-            world,
-            routes,
-            [(_part(s, unit, config.kind), n) for s, n in shares(unit, config)],
-            seed=config.seed,
-            language=language,
-            rooms=config.rooms,
-        )
+        inputs = TaskInputs(world, routes, config.seed, language, config.rooms)
+        tasks = kind.tasks(inputs, [(s.part, n) for s, n in shares(unit, config)])
     house.save(home / "house.json")
     to_matterport(graph, house, home / "connectivity.json")
     save_lines(home / "routes.jsonl", routes)
-    counts = {
-        s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[_part(s, unit, config.kind)])
-        for s, _ in shares(unit, config)
-    }
+    counts = {s.name: save_lines(home / f"tasks_{s.name}.jsonl", tasks[s.part]) for s, _ in shares(unit, config)}
     facts = UnitFacts(
         VERSION, config, unit.group, unit.index, house.digest, nodes=len(graph.ids), routes=len(routes), tasks=counts
     )
@@ -368,11 +369,6 @@ def shares(unit: Unit, config: DatasetConfig) -> list[tuple[SplitPlan, int]]:
         houses = [u for u in units(wanted) if u.group in split.all_groups]
         served.append((split, quota(split.tasks, len(houses), houses.index(unit))))
     return served
-
-
-def _part(split: SplitPlan, unit: Unit, kind: str) -> str:
-    """Nothing is held out in unseen houses."""
-    return "main_unseen" if kind == "hari" and unit.group in ("val", "test", "ood") else split.part
 
 
 def _claim(folder: Path, config: DatasetConfig) -> None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.datasets.build import missing_units, units
 from embodied.datasets.checks import (
     DatasetError,
@@ -21,19 +19,16 @@ from embodied.datasets.checks import (
     read_config,
     read_index,
 )
-from embodied.datasets.parts import part_tasks
-from embodied.datasets.scale import OOD, Scale, SplitPlan, quota, scale
-from embodied.envs.base import HelpEnv
-from embodied.envs.hari import AS_PRINTED, HariRules
-from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
+from embodied.datasets.scale import OOD, Scale, quota, scale
 from embodied.house.house import House
-from embodied.interface import Assistant, Episode, FindObject, Place, Route, Task
+from embodied.interface import Assistant, Episode, Place, Route, Task
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import PeoplesWords, Said
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import read_lines
 from embodied.render.pictures import PictureSettings
-from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits
+from embodied.splits import SplitPlan
+from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
@@ -74,7 +69,7 @@ class SplitData:
     """By house name, in the data set's order."""
     tasks: tuple[Task, ...]
     """House by house."""
-    make_env: Callable[[], HelpEnv]
+    make_env: EnvMaker
     """All that it makes share assistants and caches."""
 
 
@@ -107,6 +102,10 @@ class Dataset:
     @property
     def kind(self) -> str:
         return self.config.kind
+
+    @property
+    def task_kind(self) -> TaskKind:
+        return kind_named(self.kind)
 
     @property
     def digest(self) -> str:
@@ -244,8 +243,8 @@ class Dataset:
             mine = self._lines(name, file, Task)
             check_tasks(self._path(name, file), mine, self.kind, place.house, place.graph)
             tasks += mine
-        if self.kind == "vnla" and split != "train":
-            tasks = [self._with_limit(t) for t in tasks]
+        if (limits := self.task_kind.time_limits) and split != "train":
+            tasks = [limits.apply(t, self.place(t.world), self._time_limits) for t in tasks]
         return tuple(tasks)
 
     def split(
@@ -254,8 +253,7 @@ class Dataset:
         *,
         houses: int | None = None,
         worlds: Mapping[str, Place] | None = None,
-        hari: HariRules = AS_PRINTED,
-        vnla: str = AS_PUBLISHED,
+        rules: Any = None,
         assistant: Assistant | None = None,
     ) -> SplitData:
         """Everything that playing a split needs.
@@ -263,8 +261,7 @@ class Dataset:
         Args:
           houses: only its first so many houses; all if None.
           worlds: worlds with pictures by house name; without, the tasks play in houses and graphs alone.
-          hari: variants of HARI.
-          vnla: one of embodied.envs.vnla.RULES; tasks get the time that it takes.
+          rules: of play, of the type of TaskKind.rules; tasks get the time that they take. The usual ones if None.
           assistant: who answers, instead of the kind's own assistant.
 
         Raises:
@@ -273,28 +270,22 @@ class Dataset:
         names = self.names(name)[:houses]
         said = self.said(names)
         places = {n: self.place(n) if worlds is None else worlds[n] for n in names}
-        make_env = environment_maker(
-            self.kind,
+        inputs = EnvInputs(
             places,
-            wording=ANNA_SPLIT.get(name, ""),
-            language=PeoplesWords(said, PlainLanguage()) if said else None,
-            routes={n: self.routes(n) for n in names} if self.kind == "hanna" else None,
-            describer=self.describer(hari.kept) if self.kind == "hari" else None,
-            hari=hari,
-            vnla=vnla,
-            assistant=assistant,
+            self.routes,
+            ANNA_SPLIT.get(name, ""),
+            PeoplesWords(said, PlainLanguage()) if said else None,
+            lambda: self.places("train").values(),
+            rules,
+            assistant,
         )
-        tasks = [t for t in self.tasks(name) if t.world in places]
-        return SplitData(name, places, tasks_under(self.kind, tasks, places, vnla, hari), make_env)
+        tasks = self.task_kind.tasks_under((t for t in self.tasks(name) if t.world in places), places, rules)
+        return SplitData(name, places, tasks, self.task_kind.environments(inputs))
 
     def said(self, names: Iterable[str]) -> tuple[Said, ...]:
         """Sub-goals in the words of people who spoke of these houses."""
         spoken = [n for n in names if f"{n}/{SUBGOALS}" in self.index.files]
         return tuple(s for n in spoken for s in self._lines(n, SUBGOALS, Said))
-
-    def describer(self, kept: float = AS_PRINTED.kept) -> Describer:
-        """HARI's descriptions; the share of frequent classes is counted over the training houses."""
-        return Describer(frequent_classes([self.place(n) for n in self.names("train")], kept))
 
     def table(self) -> str:
         """The table of the splits, as Markdown."""
@@ -311,52 +302,43 @@ class Dataset:
         raise DatasetError(f"unknown split {name!r}; {self.folder} has {list(self.splits)}")
 
     @functools.cached_property
-    def _vnla_limits(self) -> dict[tuple[str, str], int]:
-        lengths = [
-            (*limit_key(self.place(t.world), t.start.node, t.goal), t.horizon)
-            for t in self.tasks("train")
-            if isinstance(t.goal, FindObject)  # as all of VNLA's are
-        ]
-        return time_limits(lengths, VnlaConfig().most_actions)
-
-    def _with_limit(self, task: Task) -> Task:
-        assert isinstance(task.goal, FindObject), "VNLA tasks look for objects"
-        config = VnlaConfig()
-        key = limit_key(self.place(task.world), task.start.node, task.goal)
-        horizon = max(task.horizon, self._vnla_limits.get(key, config.most_actions))
-        return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
+    def _time_limits(self) -> Any:
+        limits = self.task_kind.time_limits
+        return limits and limits.learn(self.tasks("train"), self.place)
 
 
 class RouteDataset(Dataset):
-    """A data set of `hanna` as one of `vln`: its tasks are to follow the routes that its assistants know."""
+    """A data set with routes as one of a kind whose tasks are to follow routes."""
+
+    def __init__(self, folder: Path, kind: str) -> None:
+        super().__init__(folder)
+        self._kind = kind
 
     @property
     def kind(self) -> str:
-        return "vln"
+        return self._kind
 
     def tasks(self, split: str) -> tuple[Task, ...]:
-        """As many of a house as a data set of `vln` of this scale has."""
-        (plan,) = (s for s in scale(self.config.scale, "vln", self.config.ood).splits if s.name == split)
+        """As many of a house as a data set of the kind has at this scale."""
+        (plan,) = (s for s in scale(self.config.scale, self.kind, self.config.ood).splits if s.name == split)
         names, tasks = self.names(split), list[Task]()
-        for k, name in enumerate(names):
-            wanted = [(plan.part, quota(plan.tasks, len(names), k))]
-            routes, language = self.routes(name), PlainLanguage()  # routes have their words already
-            found = part_tasks("vln", self.place(name), routes, wanted, seed=self.config.seed, language=language)
-            tasks += found[plan.part]
+        for k, name in enumerate(names):  # routes have their words already
+            inputs = TaskInputs(self.place(name), self.routes(name), self.config.seed, PlainLanguage())
+            tasks += self.task_kind.tasks(inputs, [(plan.part, quota(plan.tasks, len(names), k))])[plan.part]
         return tuple(tasks)
 
 
 def dataset_of(folder: Path, kind: str, *others: str) -> Dataset:
     """The data set in `folder`, for a learner of one kind of task, or of some others that hold what it needs.
 
-    A data set of `hanna` serves as one of `vln`.
+    A data set with routes, such as `hanna`, serves as one of a kind whose tasks are routes, such as `vln`.
 
     Raises:
       DatasetError: it is of another kind, or as Dataset.
     """
     data = Dataset(folder)
-    if (data.kind, kind) == ("hanna", "vln") and not others:
-        return RouteDataset(folder)
+    if data.kind != kind and data.task_kind.routes and kind_named(kind).from_routes and not others:
+        return RouteDataset(folder, kind)
     if data.kind not in (kind, *others):
         raise DatasetError(
             f"{folder} is a data set of {data.kind!r}, a learner of {kind!r} needs its own: "

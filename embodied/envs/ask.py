@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from embodied.action_spaces import Moves
 from embodied.assistants.ask import in_view
 from embodied.assistants.descriptions import Describer
+from embodied.assistants.words import features_in_words, side
 from embodied.envs.base import HelpEnv
 from embodied.geometry import wrap
 from embodied.interface import (
@@ -16,6 +19,7 @@ from embodied.interface import (
     Assistant,
     Description,
     Detection,
+    Extras,
     FindDescribed,
     Intention,
     Move,
@@ -60,6 +64,45 @@ class AskSettings:
     """Mean score of a thing of which was said that it is not it."""
     noise: float = 0.15
     """Standard deviation of a score."""
+
+
+@dataclass(frozen=True)
+class AskExtras(Extras):
+    """What the agent is told besides."""
+
+    state_description: Description
+    """The room and what is near."""
+    detections: tuple[Detection, ...]
+    """The best first."""
+    advised: Move | Stop | None
+    """What the route that was told says to do next; None where none is being followed."""
+
+    def lines(self, turn: int) -> tuple[str, ...]:
+        parts = [f"here: {features_in_words(self.state_description, turn)}"] if self.state_description else []
+        for d in self.detections:
+            parts.append(f"perhaps it: {side(d.bearing)}, {d.distance:.1f} m, score {d.score:.2f}")
+        if self.advised is not None:
+            advice = "stop here" if isinstance(self.advised, Stop) else f"go {self.advised.candidate}"
+            parts.append(f"the route that you were told says: {advice}")
+        return tuple(parts)
+
+    def as_json(self) -> dict[str, Any]:
+        go = self.advised
+        return {
+            "detections": [
+                {"bearing": round(d.bearing, 4), "distance": d.distance, "score": d.score} for d in self.detections
+            ],
+            "here": [dataclasses.asdict(f) for f in self.state_description],
+            "advised": "stop" if isinstance(go, Stop) else f"go {go.candidate}" if go else None,
+        }
+
+
+@dataclass(frozen=True)
+class AskTruth:
+    """What the assistant knows besides."""
+
+    possible: tuple[str, ...]
+    """Placements that fit all that was said so far."""
 
 
 class AskEnv(HelpEnv):
@@ -111,12 +154,12 @@ class AskEnv(HelpEnv):
     def _cost(self, action: Action) -> float:
         return self.rules.prices.of(action.intention) if isinstance(action, Ask) else 0.0
 
-    def _possible(self) -> tuple[str, ...]:
-        return self._fitting
+    def _truth(self) -> AskTruth:
+        return AskTruth(self._fitting)
 
-    def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
-        """The room and what is near."""
-        return self._describer.dense(self.world, self.pose.node), ()
+    def _extras(self) -> AskExtras:
+        here = self._describer.dense(self.world, self.pose.node)
+        return AskExtras(here, self._detections(), self._advised())
 
     def _advised(self) -> Move | Stop | None:
         if not self.rules.grounded or not self._way:

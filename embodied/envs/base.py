@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from embodied.action_spaces import Moves, PanoramicMoves, Reach
+from embodied.action_spaces import Moves, PanoramicMoves
 from embodied.interface import (
     Action,
     Ask,
     Assistant,
-    Description,
-    Detection,
     Episode,
+    Extras,
     FindDescribed,
     FindObject,
     Intention,
@@ -38,6 +37,8 @@ from embodied.interface import (
 from embodied.seeds import checked_seed, stream
 
 T = TypeVar("T")
+STEP_COST = 0.01
+"""Of a step, in the reward of Gymnasium."""
 
 
 class TaskError(ValueError):
@@ -123,7 +124,6 @@ class HelpEnv:
             self.time += 1
         if self.ended is None and self.time >= self.task.horizon:
             self.ended = "limit"
-            cost += self._cost_of_limit()
         self._steps.append(
             Step(
                 pose=situation.pose,
@@ -148,6 +148,15 @@ class HelpEnv:
     def facts(self) -> dict[str, float]:
         """Numbers about the episode so far that its record does not hold."""
         return {}
+
+    def reward(self, success: float) -> float:
+        """Gymnasium's reward of the last step: success, at the end, less STEP_COST and what the step cost."""
+        return success - STEP_COST - self.last_step.cost
+
+    def potential(self) -> float:
+        """How far the goal is, for a shaped reward: metres to the nearest goal / 10."""
+        distance = self.world.graph.distance
+        return min(float(distance[self.pose.node, g]) for g in self.task.goal_nodes) / 10.0
 
     @property
     def last_step(self) -> Step:
@@ -180,8 +189,7 @@ class HelpEnv:
     def _replied(self, reply: Reply) -> None:
         """Take in what the assistant said; set time_on_task to 0 when it changes the instruction."""
         raise TypeError(
-            f"{type(self).__name__} does not say what a reply does; play with HannaEnv, VnlaEnv or HariEnv, "
-            "or override _replied"
+            f"{type(self).__name__} does not say what a reply does; override _replied, or play by a rule with help"
         )
 
     def _stopped(self) -> None:
@@ -196,29 +204,15 @@ class HelpEnv:
             return ()
         return self.assistant.intentions(situation)
 
-    def _reachable(self) -> Reach:
-        """What the next move can reach from here."""
-        return self.moves.at(self.world, self.pose)
-
     def _cost(self, action: Action) -> float:
         return 0.0
 
-    def _cost_of_limit(self) -> float:
-        return 0.0
+    def _extras(self) -> Extras | None:
+        """Observation.extras: what the agent is told besides."""
+        return None
 
-    def _stack(self) -> tuple[int, ...]:
-        return ()
-
-    def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
-        return (), ()
-
-    def _possible(self) -> tuple[str, ...]:
-        return ()
-
-    def _detections(self) -> tuple[Detection, ...]:
-        return ()
-
-    def _advised(self) -> Move | Stop | None:
+    def _truth(self) -> Any:
+        """Situation.extras: what the assistant knows besides."""
         return None
 
     # Looking -------------------------------------------------------------------------------------
@@ -234,7 +228,7 @@ class HelpEnv:
         return whole
 
     def _look(self) -> Observation:
-        self._reach = self._reachable()
+        self._reach = self.moves.at(self.world, self.pose)
         candidates, poses = self._reach
         if len(self._trail) <= self.time:
             self._trail.append(self.pose.node)
@@ -252,10 +246,8 @@ class HelpEnv:
             requests=self.requests,
             requests_left=left,
             trail=tuple(self._trail),
-            goals=self._stack(),
-            possible=self._possible(),
+            extras=self._truth(),
         )
-        state, goals = self._descriptions()
         self.observation = Observation(
             sight=Sight(self.task.world, self.pose.node),
             turn=self.pose.turn,
@@ -268,11 +260,8 @@ class HelpEnv:
             requests_left=left,
             time=self.time,
             time_on_task=self.time_on_task,
-            state_description=state,
-            goal_descriptions=goals,
-            detections=self._detections(),
-            advised=self._advised(),
             moved=bool(self._steps) and self._steps[-1].pose.node != self.pose.node,
+            extras=self._extras(),
         )
         return self.observation
 

@@ -13,8 +13,23 @@ from typing import TYPE_CHECKING
 
 from embodied.action_spaces import Moves
 from embodied.assistants.descriptions import KEPT, Describer
+from embodied.assistants.words import features_in_words
 from embodied.envs.base import HelpEnv, required
-from embodied.interface import Action, Ask, Assistant, Description, Episode, Intention, Mode, Move, Place, Reply, Stop
+from embodied.interface import (
+    Action,
+    Ask,
+    Assistant,
+    Description,
+    Episode,
+    Extras,
+    Intention,
+    Mode,
+    Move,
+    Observation,
+    Place,
+    Reply,
+    Stop,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -71,6 +86,28 @@ class HariRules:
 
 
 AS_PRINTED = HariRules()
+
+
+@dataclass(frozen=True)
+class HariExtras(Extras):
+    """What the agent is told without asking, and what it was told."""
+
+    state_description: Description
+    """d^s."""
+    goal_descriptions: tuple[Description, ...]
+    """The stack G^d, top last."""
+
+    def lines(self, turn: int) -> tuple[str, ...]:
+        here = (f"here: {features_in_words(self.state_description, turn)}",) if self.state_description else ()
+        return (*here, f"where to go: {features_in_words(self.goal_descriptions[-1], turn)}")
+
+
+@dataclass(frozen=True)
+class HariTruth:
+    """What the assistant knows besides."""
+
+    goals: tuple[int, ...]
+    """The goal nodes on the stack, top last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,14 +195,25 @@ class HariEnv(HelpEnv):
             return self.task_error(self.pose.node, self._goals[0].node)
         return self._costs.of(action)
 
-    def _cost_of_limit(self) -> float:
-        return self.task_error(self.task.start.node, self.task.goal_nodes[0])
+    def step(self, action: Action) -> Observation | None:
+        observation = super().step(action)
+        if self.ended == "limit":
+            error = self.task_error(self.task.start.node, self.task.goal_nodes[0])
+            self._steps[-1] = dataclasses.replace(self.last_step, cost=self.last_step.cost + error)
+        return observation
 
-    def _stack(self) -> tuple[int, ...]:
-        return tuple(g.node for g in self._goals)
+    def reward(self, success: float) -> float:
+        return -self.last_step.cost
 
-    def _descriptions(self) -> tuple[Description, tuple[Description, ...]]:
-        return self._state, tuple(g.description for g in self._goals)
+    def potential(self) -> float:
+        """Edges to the goal of the moment; 0 after the end (4.20)."""
+        return 0.0 if self.ended else self.task_error(self.pose.node, self.targets[0])
+
+    def _truth(self) -> HariTruth:
+        return HariTruth(tuple(g.node for g in self._goals))
+
+    def _extras(self) -> HariExtras:
+        return HariExtras(self._state, tuple(g.description for g in self._goals))
 
 
 def shaped_costs(episode: Episode, hops: np.ndarray) -> list[float]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from embodied.action_spaces import WORDS
 from embodied.envs.base import HelpEnv, required
-from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Reply, Situation, Stop, Task
+from embodied.interface import Action, Ask, Intention, Mode, Move, Observation, Place, Reply, Situation, Stop, Task
 
 
 class VnlaEnv(HelpEnv):
@@ -100,8 +100,9 @@ def check_rules(rules: str) -> None:
         raise ValueError(f"unknown rules {rules!r} of VNLA; use one of {sorted(RULES)}")
 
 
-def fitted(task: Task, rules: str) -> Task:
+def fitted(task: Task, world: Place, rules: str) -> Task:
     """The task with time enough under a rule of play: Algorithm 6 takes a step for every request and one to come back
     from every sub-task (docs/sources.md, S111)."""
+    check_rules(rules)
     more = 2 * math.ceil(task.budget or 0) if rules == "algorithm-6" else 0
     return dataclasses.replace(task, horizon=task.horizon + more)

@@ -26,14 +26,13 @@ from embodied.interface import (
     Stop,
     Task,
 )
-from embodied.records import RecordError, parse, to_json
+from embodied.records import RecordError, parse
 from embodied.tasks.ask import Look, ask_pool, ask_tasks
 
 MOST_BYTES = 100_000
 """Of an answer over HTTP; more is not read."""
 SECONDS = 60.0
 """Time for an answer over HTTP."""
-COLUMNS = ("success", "spl", "weighted success", "success progress", "price", "price per success", "requests")
 
 
 def read_seeds(path: Path) -> list[int]:
@@ -145,11 +144,7 @@ def observed(o: Observation) -> dict[str, object]:
             for b, s in zip(c.bearing, c.slope, strict=True)
         ],
         "can_ask": [i.value for i in o.can_ask],
-        "detections": [
-            {"bearing": round(d.bearing, 4), "distance": d.distance, "score": d.score} for d in o.detections
-        ],
-        "here": json.loads(to_json(o.state_description)),
-        "advised": "stop" if isinstance(o.advised, Stop) else f"go {o.advised.candidate}" if o.advised else None,
+        **({} if o.extras is None else o.extras.as_json()),
     }
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from embodied.envs.continuous import Excursion, Move, Walk
-from embodied.evaluation.metrics import warping
+from embodied.metrics import warping
 
 WARPING = 3.0
 """Metres that nDTW is normalised by (Magalhaes et al. 2019)."""

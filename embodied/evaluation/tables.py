@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
+from embodied import metrics
 from embodied.assets.cache import write_bytes
-from embodied.evaluation import metrics
 from embodied.interface import Episode
+from embodied.task_kind import kind_named, known_kinds
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -26,10 +27,6 @@ PERCENT = (
     "strict success",
     "spl",
     "oracle success",
-    "room success",
-    "subtask success",
-    "weighted success",
-    "success progress",
     "mistake repeat",
     "request repeat",
     "target success (HANNA)",
@@ -40,8 +37,8 @@ PERCENT = (
     "precision",
     "recall",
 )
-"""Columns shown in per cent."""
-SHARES = ("success", "strict success", "oracle success", "room success")
+"""Columns of all kinds and of learners shown in per cent; those of one kind of task say so (Metric)."""
+SHARES = ("success", "strict success", "oracle success")
 """Those that are 0 or 1 of an episode."""
 
 
@@ -185,21 +182,17 @@ def _t(freedom: float) -> float:
 
 def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dict[str, Samples]:
     """Every metric of the kind of task and the repeat rates, one value per episode."""
-    houses, kind = tuple(e.task.world for e in episodes), episodes[0].task.kind
-    of = lambda f: [f(e, graphs[e.task.world]) for e in episodes]
-    found = {
-        name: Samples(tuple(of(f)), houses, share=name in SHARES)
-        for name, f in {**metrics.PER_EPISODE, **metrics.PER_KIND.get(kind, {})}.items()
-    }
-    if kind == "ask":
-        prices, arrived = tuple(of(metrics.price)), tuple(of(metrics.success))
-        found["price per success"] = Samples(prices, houses, arrived)
+    houses, kind = tuple(e.task.world for e in episodes), kind_named(episodes[0].task.kind)
+    of = lambda f: tuple(f(e, graphs[e.task.world]) for e in episodes)
+    found = {name: Samples(of(f), houses, share=name in SHARES) for name, f in metrics.PER_EPISODE.items()}
+    for name, metric in kind.metrics.items():
+        found[name] = Samples(of(metric.of), houses, of(metric.per) if metric.per else (), metric.share)
     used = [metrics.usage(e) for e in episodes]
     if any(used):
         for name, count in metrics.USAGE.items():
             found[name] = Samples(tuple(float(count(u)) if u else 0.0 for u in used), houses)
     repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
-    if kind == "vnla":  # where turning on the spot is no mistake
+    if kind.monocular:  # turning on the spot is no mistake
         del repeats["mistake repeat"]
     for name, f in repeats.items():
         again, total = zip(*of(f), strict=True)
@@ -219,18 +212,22 @@ def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str
     return Row(agent, split, seed, len(episodes), len({e.task.world for e in episodes}), values)
 
 
+def in_percent(name: str) -> bool:
+    """Whether a column is shown in per cent."""
+    return name in PERCENT or any(name in k.metrics and k.metrics[name].percent for k in known_kinds())
+
+
 def shown(name: str, value: Estimate) -> str:
     """'45.4 ± 1.2', in per cent where the column is one; '–' where nothing counts."""
     if value.n == 0 or math.isnan(value.mean):
         return "–"
-    k = 100.0 if name in PERCENT else 1.0
-    digits = 1 if name in PERCENT else 2
+    k, digits = (100.0, 1) if in_percent(name) else (1.0, 2)
     mean = f"{k * value.mean:.{digits}f}"
     return mean if math.isnan(value.half) else f"{mean} ± {k * value.half:.{digits}f}"
 
 
 def heading(name: str) -> str:
-    return f"{name} (%)" if name in PERCENT else name
+    return f"{name} (%)" if in_percent(name) else name
 
 
 def markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:

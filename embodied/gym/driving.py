@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from embodied.assistants.description_arrays import word_number
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
 from embodied.gym.eyes import PIXELS, check_live, live_pixels
-from embodied.gym.spaces import codes_of, word_number
+from embodied.gym.spaces import codes_of
 from embodied.language.plain import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE

@@ -27,11 +27,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageOps
 
 from embodied.assets.cache import default_cache
-from embodied.assistants.ask import QUESTIONS
-from embodied.envs.base import ActionError, HelpEnv
-from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
-from embodied.envs.make import AS_PUBLISHED, assistant_of
-from embodied.evaluation.metrics import PER_EPISODE
+from embodied.envs.base import STEP_COST, ActionError, HelpEnv
 from embodied.gym.eyes import (
     PIXELS,
     CameraSensor,
@@ -50,14 +46,14 @@ from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
 from embodied.interface import Assistant, FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.language.prose import prose
+from embodied.metrics import PER_EPISODE
+from embodied.plugins import assistant_of
 from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import instance_classes
 from embodied.seeds import checked_seed
+from embodied.task_kind import kind_named
 from embodied.world import World
 
-STEP_COST = 0.01
-DETECTIONS = 16
-"""Most detections that Ask-v0 shows; the best."""
 LAYOUT = SpaceLayout()
 OWN = ("shaping", "strict", "patience", "needs_stop")
 """Options of HelpGymEnv that `make` and `make_vec` hand on."""
@@ -173,7 +169,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
                 raise
 
     def step(self, action: int) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        before = self._potential() if self._shaping else 0.0
+        before = self._env.potential() if self._shaping else 0.0
         try:
             o = self._env.step(decode(action, self._layout))
         except ActionError as e:
@@ -187,10 +183,9 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
             return self._encoded(self._o), -STEP_COST, False, over, info
         ended = self._env.ended
         info = {} if ended is None else self._judged()
-        hari = self._env.task.kind == "hari"
-        reward = -self._env.last_step.cost if hari else info.get("success", 0.0) - STEP_COST - self._env.last_step.cost
+        reward = self._env.reward(info.get("success", 0.0))
         if self._shaping:
-            reward += before - (0.0 if ended is not None and hari else self._potential())
+            reward += before - self._env.potential()
         self._o = o if o is not None else self._o
         info |= self._env.facts() | self._words()
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
@@ -261,12 +256,6 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
 
     def _encoded(self, o: Observation) -> dict[str, Any]:
         return encode(o, self._sensor, self._layout)
-
-    def _potential(self) -> float:
-        e = self._env
-        if isinstance(e, HariEnv):
-            return e.task_error(e.pose.node, e.targets[0])
-        return min(float(e.world.graph.distance[e.pose.node, g]) for g in e.task.goal_nodes) / 10.0
 
     def _judged(self) -> dict[str, Any]:
         episode, graph = self._env.episode(), self._env.world.graph
@@ -388,12 +377,11 @@ class EnvironmentSettings:
     worlds: Mapping[str, SeenPlace] | None = None
     """Worlds to play in; otherwise opened from `data`."""
     layout: SpaceLayout | None = None
-    rules: str = AS_PUBLISHED
-    """VNLA's rule of play, one of embodied.envs.vnla.RULES."""
+    rules: Any = None
+    """Rules of play, of the type of TaskKind.rules; the usual ones if None. VNLA: one of embodied.envs.vnla.RULES.
+    HARI: HariRules (costs, stack, sub-goals' length, horizon, a willing assistant). Ask: AskSettings."""
     rooms: bool = True
-    """Whether VNLA's requests in a generated flat name the room; those of a data set are as it was built."""
-    hari: HariRules = AS_PRINTED
-    """Variants of HARI: costs, stack, sub-goals' length, horizon, a willing assistant, what is told unasked."""
+    """False: requests in a generated flat name no room (VNLA); those of a data set are as it was built."""
     assistant: Assistant | str | None = None
     """Who answers requests instead of the kind's own assistant: an Assistant, or 'module:Class' to import one."""
     wheels: bool = False
@@ -416,7 +404,6 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
         sees=seen,
         rules=wanted.rules,
         rooms=wanted.rooms,
-        hari=wanted.hari,
         assistant=assistant_of(wanted.assistant),
     )
     if wanted.data:
@@ -424,16 +411,9 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     else:
         play = flat_playground(kind, wanted.seed, asked)
     make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
-    layout = wanted.layout or layout_of(kind, max(SpaceLayout.stack, wanted.hari.stack))
+    layout = wanted.layout or SpaceLayout.of(kind_named(kind), wanted.rules)
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
     return SharedResources(make_env, play.tasks, _sensor_of(play, seen, wanted), layout, opened)
-
-
-def layout_of(kind: str, stack: int = SpaceLayout.stack) -> SpaceLayout:
-    """The sizes of a kind of task's spaces."""
-    if kind == "ask":
-        return SpaceLayout(descriptions=True, intentions=QUESTIONS, detections=DETECTIONS)
-    return SpaceLayout(descriptions=kind == "hari", stack=stack)
 
 
 def _sensor_of(play: Playground, seen: Sequence[str], wanted: EnvironmentSettings) -> Sensor:

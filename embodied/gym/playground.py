@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,17 +16,14 @@ from embodied.assets.closure import code_digest
 from embodied.assets.records import ROOM_KINDS
 from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.build import make_dataset_house
-from embodied.datasets.parts import part_tasks
 from embodied.datasets.store import Dataset
-from embodied.envs.base import HelpEnv
-from embodied.envs.hari import AS_PRINTED, HariRules
-from embodied.envs.make import AS_PUBLISHED, environment_maker, tasks_under
 from embodied.generate import HouseConfig
 from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings
+from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, kind_named
 from embodied.world import makers, open_world
 
 if TYPE_CHECKING:
@@ -42,7 +39,7 @@ AREA = (70.0, 110.0)
 class Playground:
     worlds: Mapping[str, SeenPlace]
     tasks: tuple[Task, ...]
-    make_env: Callable[[], HelpEnv]
+    make_env: EnvMaker
     features: Mapping[str, np.ndarray]
     """(nodes, 36, D) float32 by world; empty when not asked for."""
 
@@ -58,11 +55,10 @@ class Asked:
     """How the houses are drawn; by default as a data set's pictures are, and 'fast' for a flat."""
     sees: Sequence[str] = ("oracle",)
     """Some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only."""
-    rules: str = AS_PUBLISHED
-    """VNLA's rule of play."""
+    rules: Any = None
+    """Rules of play, of the type of TaskKind.rules; the usual ones if None."""
     rooms: bool = True
-    """Whether VNLA's requests in a generated flat name the room."""
-    hari: HariRules = AS_PRINTED
+    """False: requests name no room, where the kind can do without."""
     assistant: Assistant | None = None
     """Who answers, instead of the kind's own assistant."""
 
@@ -85,7 +81,7 @@ def split_playground(kind: str, data: Path, split: str, asked: Asked) -> Playgro
         names = whole.names(split)
         drawn = asked.pictures or pictures_of(whole, names, wanted=bool(set(asked.sees) - {"oracle"}))
         worlds = {n: whole.open_world(n, catalogue, asked.cache, drawn) for n in names}
-    chosen = whole.split(split, worlds=worlds, vnla=asked.rules, hari=asked.hari, assistant=asked.assistant)
+    chosen = whole.split(split, worlds=worlds, rules=asked.rules, assistant=asked.assistant)
     return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, asked))
 
 
@@ -94,13 +90,13 @@ def flat_playground(kind: str, seed: int, asked: Asked) -> Playground:
 
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
     """
-    catalogue, worlds = load_catalogue(asked.cache), asked.worlds
+    catalogue, worlds, known = load_catalogue(asked.cache), asked.worlds, kind_named(kind)
     language: Language = PlainLanguage() if worlds is not None else People(tries=1)
     paths = None
     if worlds is None:
         name = f"flat_{seed}"
         house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
-        if kind == "hanna":
+        if known.people:
             met = meet(house, graph, catalogue, seed=seed)
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
@@ -111,15 +107,16 @@ def flat_playground(kind: str, seed: int, asked: Asked) -> Playground:
         worlds = {name: world}
     name, place = next(iter(worlds.items()))
     routes: tuple[Route, ...] = ()
-    if kind in ("hanna", "vln"):
+    if known.routes:
         paths = paths or route_paths(place.graph, place.house.name, seed=seed, house_split="test")
         routes = worded(place, paths, WORDINGS["test"], seed=seed, language=language)
-    part = "main_unseen" if kind == "hari" else "main"
-    tasks = part_tasks(kind, place, routes, [(part, TASKS)], seed=seed, language=language, rooms=asked.rooms)[part]
-    how: dict[str, Any] = {"vnla": asked.rules, "hari": asked.hari}
-    make_env = environment_maker(kind, worlds, routes={name: routes}, assistant=asked.assistant, **how)
-    played = tasks_under(kind, tasks, worlds, **how)
-    return Playground(worlds, played, make_env, _oracle(worlds, catalogue, asked))
+    inputs = TaskInputs(place, routes, seed, language, asked.rooms)
+    tasks = known.tasks(inputs, [(known.unseen_part, TASKS)])[known.unseen_part]
+    routes_of = lambda world: routes if world == name else ()
+    make_env = known.environments(EnvInputs(worlds, routes_of, rules=asked.rules, assistant=asked.assistant))
+    return Playground(
+        worlds, known.tasks_under(tasks, worlds, asked.rules), make_env, _oracle(worlds, catalogue, asked)
+    )
 
 
 def _oracle(worlds: Mapping[str, SeenPlace], catalogue: Catalogue, asked: Asked) -> Mapping[str, np.ndarray]:

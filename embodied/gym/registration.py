@@ -9,8 +9,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-IDS = {"find": "Find", "vln": "VLN", "vnla": "VNLA", "hanna": "HANNA", "hari": "HARI", "ask": "Ask"}
-"""Kind of task to the name of its environment: embodied/HANNA-v0."""
+from embodied.plugins import for_each_kind
 
 CONTINUOUS = {"vlnce": "VLNCE", "objectnav": "ObjectNav"}
 """The same, of continuous navigation (embodied.gym.continuous)."""
@@ -26,13 +25,20 @@ def register_with_gymnasium() -> None:
 
 def register(gymnasium: ModuleType) -> None:
     """Environments by the name of their maker, which is imported when the first is made."""
-    for kind, name in (IDS | CONTINUOUS).items():
-        one, many = ("env", "in_step") if kind in IDS else ("continuous", "continuous")
-        makers = {"entry_point": f"embodied.gym.{one}:make", "vector_entry_point": f"embodied.gym.{many}:make_vec"}
-        if f"embodied/{name}-v0" not in gymnasium.registry:
-            gymnasium.register(f"embodied/{name}-v0", **makers, kwargs={"kind": kind})
+    for_each_kind(lambda name, title: register_environment(gymnasium, title, name))
+    for kind, title in CONTINUOUS.items():
+        register_environment(gymnasium, title, kind, "embodied.gym.continuous", "embodied.gym.continuous")
     if "embodied/Drive-v0" not in gymnasium.registry:
         gymnasium.register("embodied/Drive-v0", entry_point="embodied.gym.drive:make")
+
+
+def register_environment(
+    gymnasium: ModuleType, title: str, kind: str, one: str = "embodied.gym.env", many: str = "embodied.gym.in_step"
+) -> None:
+    """Register embodied/TITLE-v0, unless there is one: `one` has its `make`, `many` its `make_vec`."""
+    if f"embodied/{title}-v0" not in gymnasium.registry:
+        entries = {"entry_point": f"{one}:make", "vector_entry_point": f"{many}:make_vec"}
+        gymnasium.register(f"embodied/{title}-v0", **entries, kwargs={"kind": kind})
 
 
 class WhenImported(MetaPathFinder):

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import bisect
 import functools
 import operator
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from embodied.assets.catalogue import load_catalogue
-from embodied.assets.records import ROOM_KINDS
 from embodied.envs.base import ActionError
 from embodied.gym.eyes import LARGE, Sensor
-from embodied.interface import TURNS, VIEWS, Action, Ask, Description, Intention, Mode, Move, Observation, Stop
+from embodied.interface import TURNS, VIEWS, Action, Ask, Intention, Mode, Move, Observation, Stop
+from embodied.task_kind import INTENTIONS, ArraySpec, TaskKind
 
-INTENTIONS = (Intention.HELP, Intention.CUR, Intention.GOAL, Intention.SUB)
-"""What may be asked where the layout does not say otherwise."""
-KINDS = ("object", "room", "action")
-ACTION_WORDS = ("go", "stop")
-"""Names of HARI's features of kind 'action'."""
-OWN_WORDS = 4096
-"""Numbers for object classes of people's own."""
 LONG, MANY = 100.0, 10.0
 """Steps and requests that are 1 in 'clock'."""
 
@@ -36,16 +28,20 @@ class SpaceLayout:
     """Most moves at one pose; real and generated graphs stay below 14."""
     text: int = 1000
     """Most characters of an instruction; longer ones are cut."""
-    features: int = 21
-    """HARI: most feature sets of a description (a room and 20 objects)."""
-    stack: int = 3
-    """HARI: most goals on the stack."""
-    descriptions: bool = False
-    """HARI and Ask-v0: whether descriptions are part of the observation."""
     intentions: tuple[Intention, ...] = INTENTIONS
     """What may be asked, in the order of the actions."""
-    detections: int = 0
-    """Ask-v0: most detections of an observation; 0 leaves them out."""
+    extras: Mapping[str, ArraySpec] = field(default_factory=dict)
+    """Arrays of the kind's own part of the observation, by name."""
+    encode_extras: Callable[[Observation, Mapping[str, ArraySpec]], Mapping[str, Any]] | None = None
+    """What fills them (TaskKind.extras)."""
+
+    @classmethod
+    def of(cls, kind: TaskKind, rules: Any = None, *, candidates: int = 16) -> SpaceLayout:
+        """The layout of a kind of task under its rules of play."""
+        if kind.extras is None:
+            return cls(candidates, intentions=kind.intentions)
+        specs = kind.extras.specs(candidates, kind.checked_rules(rules))
+        return cls(candidates, intentions=kind.intentions, extras=specs, encode_extras=kind.extras.encode)
 
     @property
     def actions(self) -> int:
@@ -70,13 +66,14 @@ def observation_space(layout: SpaceLayout, sensor: Sensor) -> spaces.Dict:
         "mode": spaces.Discrete(2),
         "clock": spaces.Box(-1.0, LARGE, (3,), np.float32),
     }
-    if layout.detections:
-        whole["detections"] = spaces.Box(-1.0, LARGE, (layout.detections, 4), np.float32)
-        whole["advised"] = spaces.Discrete(layout.candidates + 2)
-    if layout.descriptions:
-        whole["state"] = spaces.Box(0, LARGE, (layout.features, 5), np.float32)
-        whole["goals"] = spaces.Box(0, LARGE, (layout.stack, layout.features, 5), np.float32)
+    whole |= {name: _space(spec) for name, spec in layout.extras.items()}
     return spaces.Dict(whole)
+
+
+def _space(spec: ArraySpec) -> spaces.Space[Any]:
+    if spec.shape == () and np.issubdtype(spec.dtype, np.integer):
+        return spaces.Discrete(int(spec.high) + 1)
+    return spaces.Box(spec.low, spec.high, spec.shape, np.dtype(spec.dtype).type)
 
 
 def encode(o: Observation, sensor: Sensor, layout: SpaceLayout) -> dict[str, Any]:
@@ -84,8 +81,7 @@ def encode(o: Observation, sensor: Sensor, layout: SpaceLayout) -> dict[str, Any
 
     'candidates' holds sin and cos of bearing and of slope; 'candidate_views' the view of each plus
     one (0 is padding); 'clock' is time and time on task in hundreds of steps, and requests left in tens (-1 when
-    there is no budget); 'detections' sin and cos of bearing, metres and score; 'advised' the number of an action
-    plus one, 0 for none. Words of descriptions are numbered by `word_number`.
+    there is no budget). What a kind of task adds is said where it is defined.
 
     Raises:
       ValueError: more candidates than the layout has room for.
@@ -113,18 +109,8 @@ def encode(o: Observation, sensor: Sensor, layout: SpaceLayout) -> dict[str, Any
         "mode": np.int64(o.mode is Mode.SUB),
         "clock": np.array([o.time / LONG, o.time_on_task / LONG, left], dtype=np.float32),
     }
-    if layout.detections:
-        rows = np.zeros((layout.detections, 4), dtype=np.float32)
-        for i, seen in enumerate(o.detections[: layout.detections]):
-            rows[i] = np.sin(seen.bearing), np.cos(seen.bearing), seen.distance, seen.score
-        whole["detections"] = rows
-        whole["advised"] = np.int64(0 if o.advised is None else 1 + number(o.advised, layout))
-    if layout.descriptions:
-        whole["state"] = _description(o.state_description, layout)
-        goals = np.zeros((layout.stack, layout.features, 5), dtype=np.float32)
-        for i, d in enumerate(o.goal_descriptions):
-            goals[i] = _description(d, layout)
-        whole["goals"] = goals
+    if layout.encode_extras is not None:
+        whole |= layout.encode_extras(o, layout.extras)
     return whole
 
 
@@ -186,38 +172,3 @@ def number(action: Action, layout: SpaceLayout) -> int:
     if isinstance(action, Stop):
         return layout.candidates
     return layout.candidates + 1 + layout.intentions.index(action.intention)
-
-
-def _stable(word: str) -> int:
-    total = 0
-    for c in word:
-        total = (total * 131 + ord(c)) % 2_147_483_647
-    return total
-
-
-@functools.cache
-def words() -> tuple[str, ...]:
-    """The words of HARI's descriptions, sorted: actions, room kinds and the catalogue's object classes."""
-    return tuple(sorted({*ACTION_WORDS, *ROOM_KINDS, *load_catalogue().classes}))
-
-
-@functools.cache
-def word_number(word: str) -> int:
-    """The number of a word, from 1, the same in every process.
-
-    Object classes of people's own models are not in the catalogue; they get a number above all
-    others, which two of them may share.
-    """
-    known = words()
-    place = bisect.bisect_left(known, word)
-    if place < len(known) and known[place] == word:
-        return place + 1
-    return len(known) + 1 + _stable(word) % OWN_WORDS
-
-
-def _description(description: Description, layout: SpaceLayout) -> np.ndarray:
-    """(features, 5): kind + 1 (0 is padding), name, horizontal, vertical + 1, distance."""
-    rows = np.zeros((layout.features, 5), dtype=np.float32)
-    for i, f in enumerate(description[: layout.features]):
-        rows[i] = KINDS.index(f.kind) + 1, word_number(f.name), f.horizontal, f.vertical + 1, f.distance
-    return rows

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from embodied.geometry import wrap
-from embodied.interface import Action, Agent, Ask, Detection, Intention, Move, Observation, Situation, Stop
-from embodied.policies.baselines import OneByOne, Shortest
+from embodied.interface import Action, Ask, Detection, Intention, Move, Observation, Situation, Stop
+from embodied.policies.baselines import OneByOne
 
 REACH = 2.0
 """Metres within which a thing has been reached."""
@@ -73,19 +73,19 @@ class Asker(OneByOne):
 
 def reached(o: Observation) -> Detection | None:
     """The nearest thing of the class within reach."""
-    near = [d for d in o.detections if d.distance <= REACH]
+    near = [d for d in o.extras.detections if d.distance <= REACH]
     return min(near, key=lambda d: d.distance) if near else None
 
 
 def onward(o: Observation, s: Situation, trail: Mind, rng: np.random.Generator) -> Action:
     """Along the route that is shown, else towards what looks like the thing, else where it has been least."""
-    if o.advised is not None:
-        return o.advised
+    if o.extras.advised is not None:
+        return o.extras.advised
     visits = np.array([trail.visits.get(v, 0) for v in s.candidate_nodes])
     if not len(visits):
         return Stop()
     bearing = o.candidates.bearing
-    likely = [d for d in o.detections if d.score >= LIKELY and d.distance > REACH]
+    likely = [d for d in o.extras.detections if d.score >= LIKELY and d.distance > REACH]
     if likely and visits.min() < 2:
         off = np.abs(wrap(bearing - likely[0].bearing)) + 2.0 * visits
         return Move(int(np.argmin(off)))
@@ -136,10 +136,5 @@ RULES: Mapping[str, AskRule] = {
     "appearance first": first(Intention.APPEARANCE, never),
     "region first": first(Intention.REGION, never),
     "appearance, then confirm": first(Intention.APPEARANCE, between(0.5, 0.95)),
-    "always route": lambda o, thing, trail: None if o.advised else Ask(Intention.ROUTE),
+    "always route": lambda o, thing, trail: None if o.extras.advised else Ask(Intention.ROUTE),
 }
-
-
-def baselines() -> dict[str, Agent]:
-    """All agents that do not learn, by name; the oracle last."""
-    return {**{name: Asker(rule) for name, rule in RULES.items()}, "oracle": Shortest()}

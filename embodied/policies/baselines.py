@@ -263,7 +263,7 @@ class HalfwaySkyline(OneByOne):
     """
 
     def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
-        if len(s.goals) == 1 and s.pose.node != s.goals[0] and Intention.SUB in o.can_ask:
+        if len(s.extras.goals) == 1 and s.pose.node != s.extras.goals[0] and Intention.SUB in o.can_ask:
             return Ask(Intention.SUB)
         return shortest_of(s)
 

@@ -13,9 +13,6 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.continuous import Grounds
-from embodied.envs.hanna import HannaEnv
-from embodied.envs.make import made_by_name
-from embodied.envs.vnla import VnlaEnv
 from embodied.interface import (
     Action,
     Agent,
@@ -34,6 +31,7 @@ from embodied.interface import (
     Thought,
     act,
 )
+from embodied.plugins import made_by_name
 from embodied.policies.baselines import WITHOUT_LEARNING
 from embodied.records import from_plain, parse, to_json
 from embodied.seeds import stream
@@ -41,7 +39,6 @@ from embodied.serve.driving import ACTIONS, Drive
 from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, PERSON, Part
 from embodied.serve.talk import Follower, Overheard, PathSpeaker, Relay, TalkEnv
-from embodied.teachers.vnla import VnlaTeacher
 
 AgentMaker = Callable[[Mapping[str, Place]], Agent]
 AssistantMaker = Callable[[Assistant], Assistant]
@@ -49,8 +46,6 @@ AssistantMaker = Callable[[Assistant], Assistant]
 POLICIES: Mapping[str, AgentMaker] = {
     name: functools.partial(lambda make, places: make(), make) for name, make in WITHOUT_LEARNING.items()
 }
-OWN_RULES = {"hanna": HannaEnv, "vnla": VnlaEnv}
-"""Kinds of task with a rule of play that their learned agents know."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +79,9 @@ def set_table(
     Raises:
       ValueError: an unknown agent or assistant, or tasks of HARI, which is not played in free words.
     """
-    if data.kind == "hari":
-        raise ValueError(f"{data.folder} is a data set of HARI, whose help is not put into words; take another kind")
+    kind = data.task_kind
+    if kind.help == "descriptions":
+        raise ValueError(f"{data.folder} is of kind {kind.title}, whose help is not put into words; take another kind")
     split = data.split(part.split)
     tasks = [t if part.budget is None else dataclasses.replace(t, budget=part.budget) for t in split.tasks]
     if not tasks:
@@ -94,7 +90,6 @@ def set_table(
     if part.agent != PERSON:
         agent = agents[part.agent](split.worlds) if part.agent in agents else made_by_name(part.agent)
     moves, prices = PanoramicMoves(), {q.text: q.price for q in part.questions}
-    own = OWN_RULES.get(data.kind)
     assistant: Any = None
     if part.assistant == "simulated" or part.assistant in assistants:
         simulated = split.make_env().assistant or PathSpeaker()
@@ -102,7 +97,7 @@ def set_table(
     elif part.assistant not in (PERSON, "none"):
         assistant = made_by_name(part.assistant)
     simulated_help = part.assistant in ("simulated", *assistants)
-    by_own_rule = own is not None and (simulated_help or part.agent not in (PERSON, *POLICIES))
+    by_own_rule = kind.help == "words" and (simulated_help or part.agent not in (PERSON, *POLICIES))
     if by_own_rule and part.moves == "drive":
         raise ValueError(
             f"part {part.name!r}: nobody drives by the rules of {data.kind!r}; let a person assist, or use viewpoints"
@@ -110,8 +105,10 @@ def set_table(
 
     def make_env() -> tuple[HelpEnv, Relay]:
         relay = Relay() if assistant is None else Overheard(assistant)
-        if by_own_rule and own is not None:
-            return own(split.worlds, relay, VnlaTeacher().moves if own is VnlaEnv else moves), relay
+        if by_own_rule:
+            env = split.make_env()
+            env.assistant = relay
+            return env, relay
         return TalkEnv(split.worlds, None if part.assistant == "none" else relay, moves, prices), relay
 
     known = {t.id: t for t in tasks[: part.tasks]}

@@ -19,10 +19,10 @@ from embodied.assistants.route_system import WORDINGS
 from embodied.datasets.build import UnitFacts, save_facts, share, write_index
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import SUBGOALS, Dataset
-from embodied.evaluation.metrics import sdtw, without_repeats
 from embodied.interface import STEP, Episode, Pose, Route, Task
 from embodied.language.plain import PlainLanguage
 from embodied.language.said import Said
+from embodied.metrics import sdtw, without_repeats
 from embodied.navigation.graph import nearest
 from embodied.records import load_json, load_lines, save_lines
 from embodied.seeds import stream
@@ -92,9 +92,10 @@ def write_people_dataset(source: Dataset, words: Sequence[Worded], out: Path, *,
         raise DatasetError(
             f"people spoke of {strange[:3]}, which {source.folder} has not; name the data set of the study"
         )
-    if source.kind not in ("hanna", "vln", "vnla"):
+    if not source.task_kind.routes and source.task_kind.help != "words":
         raise DatasetError(
-            f"{source.folder} is of kind {source.kind!r}; words of people are of use in hanna, vln and vnla"
+            f"{source.folder} is of kind {source.kind!r}; words of people are of use where there are routes or advice, "
+            "as in hanna, vln and vnla"
         )
     if not words:
         raise DatasetError("nobody has said or described anything yet")
@@ -122,7 +123,7 @@ def _write_house(source: Dataset, name: str, words: Sequence[Worded], home: Path
             shutil.copyfile(path, home / path.name)
     share(old / "panoramas.pano", home / "panoramas.pano")
     facts = load_json(home / "unit.json", UnitFacts)
-    if source.kind == "vnla":
+    if not source.task_kind.routes:
         said = list(_subgoals(source, words))
         if said:
             save_lines(home / SUBGOALS, said)
@@ -132,7 +133,7 @@ def _write_house(source: Dataset, name: str, words: Sequence[Worded], home: Path
     kept = [] if only else list(source.routes(name))
     save_lines(home / "routes.jsonl", [*kept, *mine])
     tasks = dict(facts.tasks)
-    if source.kind == "vln":
+    if source.task_kind.from_routes:
         for part in tasks:
             heard = held_out if part != "train" and facts.group == "train" else split
             file = home / f"tasks_{part}.jsonl"

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from embodied.envs.base import ActionError
-from embodied.evaluation.metrics import strict_success
 from embodied.interface import Episode
+from embodied.metrics import strict_success
 from embodied.serve.game import Game, Table
 from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, Part, Study

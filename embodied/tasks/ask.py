@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from embodied.house.house import Placement
 from embodied.interface import TURNS, FindDescribed, Place, Pose, Task
 from embodied.seeds import stream
 from embodied.tasks.goals import Instance, find_instances, footprint_distance
+
+if TYPE_CHECKING:
+    from embodied.assets.catalogue import Catalogue
 
 Look = Callable[[Placement], tuple[str, ...]]
 """The words of colour and material of a placement."""
@@ -36,6 +40,17 @@ class AskPool:
     ambiguous: np.ndarray
     clear: np.ndarray
     """(m, 2) int64 each: index into `goals`, start node."""
+
+
+def look_of(catalogue: Catalogue | None) -> Look:
+    """The first word of colour and of material that a catalogue has for a thing; none without a catalogue."""
+    assets = {} if catalogue is None else catalogue.assets
+
+    def look(p: Placement) -> tuple[str, ...]:
+        asset = assets.get(p.asset)
+        return () if asset is None else (*asset.colours[:1], *asset.materials[:1])
+
+    return look
 
 
 def is_unseen(object_class: str) -> bool:

@@ -7,14 +7,13 @@ its world; tables over many episodes are in embodied.evaluation.tables.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.assistants.ask import QUESTIONS
-from embodied.interface import Ask, Episode, FollowRoute, Intention, Mode, Move, Stop, Usage
+from embodied.interface import Ask, Episode, Intention, Move, Usage
+from embodied.task_kind import Measure, kind_named
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
@@ -25,14 +24,28 @@ def navigation_error(episode: Episode, graph: NavGraph) -> float:
     return float(min(graph.distance[episode.nodes[-1], g] for g in episode.task.goal_nodes))
 
 
-def success(episode: Episode, graph: NavGraph) -> float:
-    """1 if the episode ended within the radius of a goal, inclusive (docs/sources.md, S3); else 0.
+def within(distance: float, radius: float, *, strict: bool = False) -> bool:
+    """Whether an end is near enough: at most `radius` metres away (docs/sources.md, S3), or less where `strict`."""
+    return distance < radius if strict else distance <= radius + 1e-9
 
-    In HARI the agent must have said DONE, too: a task is complete by a_done (4.3.2).
+
+def weighted_by_path(success: float, shortest: float, travelled: float) -> float:
+    """SPL of one episode: its success times the shortest way over the longer of the two, metres (Anderson et al. 2018).
+
+    Where the shortest way is 0, who did not move scores its success and who moved 0.
     """
-    if episode.task.kind == "hari" and episode.ended != "stop":
+    longest = max(shortest, travelled)
+    return success * (shortest / longest if longest > 0 else 1.0)
+
+
+def success(episode: Episode, graph: NavGraph) -> float:
+    """1 if the episode ended within the radius of a goal, or did what its kind of task calls a success; else 0."""
+    kind = kind_named(episode.task.kind)
+    if kind.needs_stop and episode.ended != "stop":
         return 0.0
-    return float(navigation_error(episode, graph) <= episode.task.radius + 1e-9)
+    if kind.success is not None:
+        return kind.success(episode, graph)
+    return float(within(navigation_error(episode, graph), episode.task.radius))
 
 
 def strict_success(episode: Episode, graph: NavGraph) -> float:
@@ -43,7 +56,7 @@ def strict_success(episode: Episode, graph: NavGraph) -> float:
 def oracle_success(episode: Episode, graph: NavGraph) -> float:
     """1 if any visited node lies within the radius of a goal."""
     nearest = min(graph.distance[v, g] for v in episode.nodes for g in episode.task.goal_nodes)
-    return float(nearest <= episode.task.radius + 1e-9)
+    return float(within(nearest, episode.task.radius))
 
 
 def path_length(episode: Episode, graph: NavGraph) -> float:
@@ -60,10 +73,8 @@ def spl(episode: Episode, graph: NavGraph) -> float:
     """
     goals = episode.task.goal_nodes
     goal = min(goals, key=lambda g: (graph.distance[episode.nodes[-1], g], g))
-    shortest, walked = float(graph.distance[episode.nodes[0], goal]), path_length(episode, graph)
-    if max(walked, shortest) == 0.0:
-        return success(episode, graph)
-    return success(episode, graph) * shortest / max(walked, shortest)
+    shortest = float(graph.distance[episode.nodes[0], goal])
+    return weighted_by_path(success(episode, graph), shortest, path_length(episode, graph))
 
 
 def requests(episode: Episode, graph: NavGraph) -> float:
@@ -73,28 +84,6 @@ def requests(episode: Episode, graph: NavGraph) -> float:
 
 def steps(episode: Episode, graph: NavGraph) -> float:
     return float(len(episode.steps))
-
-
-def room_success(episode: Episode, graph: NavGraph) -> float:
-    """1 if the agent ended in a room that holds a goal (VNLA; docs/sources.md, S5)."""
-    rooms = graph.room_of_node
-    return float(rooms[episode.nodes[-1]] in {rooms[g] for g in episode.task.goal_nodes})
-
-
-def subtask_success(episode: Episode, graph: NavGraph) -> float:
-    """Share of sub-tasks that were left (departed, asked anew, or cut short) within 2 m of their target.
-
-    NaN without any (HANNA; docs/sources.md, S6).
-    """
-    outcomes = []
-    for i, step in enumerate(episode.steps):
-        if step.mode is not Mode.SUB:
-            continue
-        last = i + 1 == len(episode.steps)
-        if isinstance(step.action, (Ask, Stop)) or last:
-            node = step.next_pose.node if isinstance(step.action, Move) else step.pose.node
-            outcomes.append(graph.distance[node, step.targets[0]] <= 2.0 + 1e-9)
-    return float(np.mean(outcomes)) if outcomes else float("nan")
 
 
 def mistake_repeats(episode: Episode, graph: NavGraph) -> tuple[int, int]:
@@ -158,17 +147,7 @@ def without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(v for i, v in enumerate(nodes) if i == 0 or v != nodes[i - 1])
 
 
-def on_route(measure: Callable[..., float]) -> Callable[[Episode, NavGraph], float]:
-    """nDTW or SDTW of a walk against the route that was described; NaN for other tasks."""
-
-    def judged(episode: Episode, graph: NavGraph) -> float:
-        goal = episode.task.goal
-        return measure(without_repeats(episode.nodes), goal.path, graph) if isinstance(goal, FollowRoute) else math.nan
-
-    return judged
-
-
-def asked(intention: Intention) -> Callable[[Episode, NavGraph], float]:
+def asked(intention: Intention) -> Measure:
     """How often an episode asked with an intention (Table 4.7)."""
 
     def count(episode: Episode, graph: NavGraph) -> float:
@@ -182,30 +161,7 @@ def moves(episode: Episode, graph: NavGraph) -> float:
     return float(sum(isinstance(s.action, Move) for s in episode.steps))
 
 
-def price(episode: Episode, graph: NavGraph) -> float:
-    """Ask-v0: what the questions cost."""
-    return float(sum(s.cost for s in episode.steps))
-
-
-def weighted_success(episode: Episode, graph: NavGraph) -> float:
-    """Ask-v0: success less the price of the questions, never below 0."""
-    return success(episode, graph) * max(0.0, 1.0 - price(episode, graph))
-
-
-QUESTION_LIMITS = range(1, 6)
-
-
-def success_progress(episode: Episode, graph: NavGraph) -> float:
-    """Ask-v0: mean over the limits of 1 to 5 questions of succeeding within the limit.
-
-    After the Mean Success Progress of VL-LN Bench, which runs every limit by itself; here the questions that were
-    asked are counted.
-    """
-    kept = sum(episode.requests <= limit for limit in QUESTION_LIMITS)
-    return success(episode, graph) * kept / len(QUESTION_LIMITS)
-
-
-PER_EPISODE: dict[str, Callable[[Episode, NavGraph], float]] = {
+PER_EPISODE: dict[str, Measure] = {
     "success": success,
     "strict success": strict_success,
     "spl": spl,
@@ -232,18 +188,3 @@ def usage(episode: Episode) -> Usage | None:
     asked = [s.action.thought.usage for s in episode.steps if s.action.thought and s.action.thought.usage]
     asked += [s.reply.usage for s in episode.steps if s.reply and s.reply.usage]
     return sum(asked, Usage()) if asked else None
-
-
-PER_KIND: dict[str, dict[str, Callable[[Episode, NavGraph], float]]] = {
-    "hanna": {"subtask success": subtask_success},
-    "vnla": {"room success": room_success},
-    "vln": {"nDTW": on_route(ndtw), "SDTW": on_route(sdtw)},
-    "hari": {"CUR": asked(Intention.CUR), "GOAL": asked(Intention.GOAL), "SUB": asked(Intention.SUB), "DO": moves},
-    "ask": {
-        "weighted success": weighted_success,
-        "success progress": success_progress,
-        "price": price,
-        **{f"asks {q.value}": asked(q) for q in QUESTIONS},
-    },
-}
-"""What only some kinds of task report."""

@@ -1,0 +1,151 @@
+"""Ask: find one described object among its like; questions have prices (Ask-v0, docs/ask.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from embodied.action_spaces import PanoramicMoves
+from embodied.assistants.ask import QUESTIONS, AskAssistant
+from embodied.assistants.description_arrays import ROWS, description_rows
+from embodied.assistants.descriptions import Describer
+from embodied.envs.ask import AskEnv, AskSettings
+from embodied.interface import Assistant, Episode, Observation, Place, Stop
+from embodied.metrics import asked, success
+from embodied.navigation.graph import NavGraph
+from embodied.policies.ask import RULES, Asker
+from embodied.policies.baselines import Shortest
+from embodied.task_kind import (
+    UNBOUNDED,
+    ArraySpec,
+    EnvInputs,
+    EnvMaker,
+    ExtraArrays,
+    Metric,
+    Parts,
+    PartTasks,
+    TaskInputs,
+    TaskKind,
+    register_kind,
+)
+from embodied.tasks.ask import Look, ask_pool, ask_tasks, look_of
+
+AS_USUAL = AskSettings()
+UNSEEN_CLASSES = "unseen_classes"
+"""Tasks of the classes that are kept from training."""
+QUESTION_LIMITS = range(1, 6)
+
+
+def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+    """The same of all parts, but for the classes that are kept from training."""
+    look = look_of(getattr(inputs.world, "catalogue", None))
+    return {
+        part: ask_tasks(
+            ask_pool(inputs.world, look, seed=inputs.seed, unseen=True if part == UNSEEN_CLASSES else None),
+            n,
+            seed=inputs.seed,
+        )
+        for part, n in parts
+    }
+
+
+def environments(inputs: EnvInputs) -> EnvMaker:
+    catalogues = (getattr(w, "catalogue", None) for w in inputs.worlds.values())
+    return ask_environments(inputs.worlds, look_of(next(catalogues, None)), inputs.rules, inputs.assistant)
+
+
+def ask_environments(
+    worlds: Mapping[str, Place], look: Look, rules: AskSettings = AS_USUAL, assistant: Assistant | None = None
+) -> EnvMaker:
+    """A maker of environments.
+
+    Args:
+      look: words of colour and material of things.
+      assistant: who answers, instead of AskAssistant.
+    """
+    answering, moves, describer = assistant or AskAssistant(look), PanoramicMoves(), Describer(())
+    return lambda: AskEnv(worlds, answering, moves, rules, describer)
+
+
+# Metrics ----------------------------------------------------------------------------------------
+
+
+def price(episode: Episode, graph: NavGraph) -> float:
+    """What the questions cost."""
+    return float(sum(s.cost for s in episode.steps))
+
+
+def weighted_success(episode: Episode, graph: NavGraph) -> float:
+    """Success less the price of the questions, never below 0."""
+    return success(episode, graph) * max(0.0, 1.0 - price(episode, graph))
+
+
+def success_progress(episode: Episode, graph: NavGraph) -> float:
+    """Mean over the limits of 1 to 5 questions of succeeding within the limit.
+
+    After the Mean Success Progress of VL-LN Bench, which runs every limit by itself; here the questions that were
+    asked are counted.
+    """
+    kept = sum(episode.requests <= limit for limit in QUESTION_LIMITS)
+    return success(episode, graph) * kept / len(QUESTION_LIMITS)
+
+
+# Its part of an observation ---------------------------------------------------------------------
+
+DETECTIONS = 16
+"""Most detections that are shown; the best."""
+NO_GOALS = 3
+"""Empty rows for goals, which this kind has none of."""
+
+
+def specs(candidates: int, rules: AskSettings) -> dict[str, ArraySpec]:
+    """'detections' hold sin and cos of bearing, metres and score; 'advised' is the number of an action plus one, 0 for
+    none; 'state' has feature sets as rows (assistants.description_arrays); 'goals' is empty."""
+    return {
+        "detections": ArraySpec((DETECTIONS, 4), -1.0, UNBOUNDED),
+        "advised": ArraySpec((), 0, candidates + 1, "int64"),
+        "state": ArraySpec((ROWS, 5), 0, UNBOUNDED),
+        "goals": ArraySpec((NO_GOALS, ROWS, 5), 0, UNBOUNDED),
+    }
+
+
+def encode(o: Observation, specs: Mapping[str, ArraySpec]) -> dict[str, Any]:
+    rows, go = np.zeros(specs["detections"].shape, dtype=np.float32), o.extras.advised
+    for i, seen in enumerate(o.extras.detections[:DETECTIONS]):
+        rows[i] = np.sin(seen.bearing), np.cos(seen.bearing), seen.distance, seen.score
+    advised = 0 if go is None else int(specs["advised"].high) if isinstance(go, Stop) else 1 + go.candidate
+    return {
+        "detections": rows,
+        "advised": np.int64(advised),
+        "state": description_rows(o.extras.state_description),
+        "goals": np.zeros(specs["goals"].shape, dtype=np.float32),
+    }
+
+
+ASK = register_kind(
+    TaskKind(
+        name="ask",
+        title="Ask",
+        tasks=tasks,
+        environment=environments,
+        rules=AS_USUAL,
+        help="words",
+        baselines={**{name: lambda rule=rule: Asker(rule) for name, rule in RULES.items()}, "oracle": Shortest},
+        metrics={
+            "weighted success": Metric(weighted_success, percent=True),
+            "success progress": Metric(success_progress, percent=True),
+            "price": Metric(price),
+            **{f"asks {q.value}": Metric(asked(q)) for q in QUESTIONS},
+            "price per success": Metric(price, per=success),
+        },
+        columns=(
+            *("success", "spl", "weighted success", "success progress"),
+            *("price", "price per success", "requests"),
+        ),
+        splits=None,
+        intentions=QUESTIONS,
+        extras=ExtraArrays(specs, encode),
+    )
+)

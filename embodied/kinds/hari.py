@@ -1,0 +1,191 @@
+"""HARI: reach the one place somebody had in mind, by descriptions and sub-goals (dissertation 4.3)."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+from collections.abc import Mapping
+
+import numpy as np
+
+from embodied.action_spaces import PanoramicMoves
+from embodied.assistants.description_arrays import ROWS, description_rows
+from embodied.assistants.descriptions import Describer, frequent_classes
+from embodied.assistants.hari import HariAssistant, Uncooperative
+from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
+from embodied.interface import Intention, Observation, Place, Task
+from embodied.metrics import asked, moves
+from embodied.policies.baselines import HalfwaySkyline, RandomWalk, Shortest
+from embodied.seeds import stream
+from embodied.splits import SplitPlan, Splits, SplitSizes
+from embodied.task_kind import (
+    UNBOUNDED,
+    ArraySpec,
+    EnvInputs,
+    EnvMaker,
+    ExtraArrays,
+    Metric,
+    Parts,
+    PartTasks,
+    StoryStyle,
+    TaskInputs,
+    TaskKind,
+    register_kind,
+)
+from embodied.tasks.find import Pool
+from embodied.tasks.hari import HARI as LIMITS
+from embodied.tasks.hari import PRETRAINING, hari_pool, hari_task
+
+HELD_OBJECTS = 0.15
+"""Share of object classes that training never asks for, for validation and for test each."""
+UNSEEN = "main_unseen"
+"""The whole pool, of a house where nothing is held out."""
+
+
+# Tasks ------------------------------------------------------------------------------------------
+
+
+def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
+    """The conditions of 4.3.5: unseen start room, unseen object class, unseen environment."""
+    return {part: _part(inputs, part, n) for part, n in parts}
+
+
+def _part(inputs: TaskInputs, part: str, n: int) -> list[Task]:
+    world, seed = inputs.world, inputs.seed
+    pool = hari_pool(world, seed=seed, config=PRETRAINING if part.startswith("pretrain") else LIMITS)
+    chosen = itertools.islice((i for i in range(len(pool)) if _belongs(pool, i, part, world, seed)), n)
+    return [hari_task(pool, i, seed=seed, language=inputs.language) for i in chosen]
+
+
+def _belongs(pool: Pool, i: int, part: str, world: Place, seed: int) -> bool:
+    if part == UNSEEN:
+        return True
+    goal, start = pool.classes[int(pool.pairs[i, 0])], int(pool.pairs[i, 1])
+    held_object = object_part(goal.object_class, seed=seed)
+    held_room = room_part(world, str(world.graph.room_of_node[start]), seed=seed)
+    if part.startswith("start_"):
+        return held_object is None and held_room == part.removeprefix("start_")
+    if part.startswith("object_"):
+        return held_room is None and held_object == part.removeprefix("object_")
+    if held_object is not None or held_room is not None:
+        return False
+    return part == "main" or (i % 32 == 31) == (part == "pretrain_val")
+
+
+@functools.cache
+def object_part(object_class: str, *, seed: int) -> str | None:
+    """'val' or 'test' for object classes that training never asks for, the same in all houses; else None."""
+    draw = stream(seed, "held object", object_class).random()
+    return "val" if draw < HELD_OBJECTS else "test" if draw < 2 * HELD_OBJECTS else None
+
+
+def room_part(world: Place, room: str, *, seed: int) -> str | None:
+    """'val' or 'test' for the one room each of a house in which training never starts; else None."""
+    rooms = sorted({str(r) for r in world.graph.room_of_node})
+    if len(rooms) < 4:
+        return None
+    order = stream(seed, "held room", world.house.name).permutation(len(rooms))
+    return {rooms[order[0]]: "val", rooms[order[1]]: "test"}.get(room)
+
+
+# Data sets --------------------------------------------------------------------------------------
+
+
+def splits(sizes: SplitSizes) -> Splits:
+    third = sizes.each or max(1, sizes.unseen // 3)
+    unseen = sizes.each or sizes.unseen
+    plan = _split_plans(sizes.tasks, max(1, sizes.tasks // 10), sizes.tasks, (third,) * 3, (third, third, unseen))
+    return sizes.houses, plan
+
+
+def _split_plans(
+    pretrain: int, pretrain_val: int, train: int, val: tuple[int, int, int], test: tuple[int, int, int]
+) -> tuple[SplitPlan, ...]:
+    plans = [
+        SplitPlan("pretrain", "train", pretrain, "pretrain"),
+        SplitPlan("pretrain_val", "train", pretrain_val, "pretrain_val"),
+        SplitPlan("train", "train", train, groups=("extra",)),
+    ]
+    for when, (start, other, env) in (("val", val), ("test", test)):
+        plans += [
+            SplitPlan(f"{when}_unseen_start", "train", start, f"start_{when}", ("extra",)),
+            SplitPlan(f"{when}_unseen_object", "train", other, f"object_{when}", ("extra",)),
+            SplitPlan(f"{when}_unseen_env", when, env, UNSEEN),
+        ]
+    return tuple(plans)
+
+
+TABLE_E_1 = (
+    {"train": 36, "extra": 18, "val": 7, "test": 11},
+    _split_plans(82_104, 3_000, 65_133, (1_901, 1_912, 1_967), (1_653, 1_913, 1_777)),
+)
+"""Dissertation Table E.1. It names 36 houses for pre-training and 18 more for training; the
+seen conditions draw from all 54."""
+
+
+# Play -------------------------------------------------------------------------------------------
+
+
+def environments(inputs: EnvInputs) -> EnvMaker:
+    rules: HariRules = inputs.rules
+    houses = inputs.worlds.values() if inputs.training is None else inputs.training()
+    describer = Describer(frequent_classes(houses, rules.kept))
+    willing = HariAssistant(describer, stack=rules.stack, longest=rules.longest)
+    assistant = inputs.assistant or (willing if rules.cooperative else Uncooperative(willing))
+    ways = PanoramicMoves()
+    return lambda: HariEnv(inputs.worlds, assistant, describer, costs=rules.costs, moves=ways)
+
+
+def fitted(task: Task, world: Place, rules: HariRules) -> Task:
+    """The task with the horizon of the rules."""
+    return task if rules.horizon is None else dataclasses.replace(task, horizon=rules.horizon)
+
+
+# Its part of an observation ---------------------------------------------------------------------
+
+FEWEST_GOALS = 3
+"""Rows for goals, or more where the rules stack more."""
+
+
+def specs(candidates: int, rules: HariRules) -> dict[str, ArraySpec]:
+    """'state' and 'goals': feature sets as rows (assistants.description_arrays), the goals top last."""
+    goals = max(FEWEST_GOALS, rules.stack)
+    return {"state": ArraySpec((ROWS, 5), 0, UNBOUNDED), "goals": ArraySpec((goals, ROWS, 5), 0, UNBOUNDED)}
+
+
+def encode(o: Observation, specs: Mapping[str, ArraySpec]) -> dict[str, np.ndarray]:
+    goals = np.zeros(specs["goals"].shape, dtype=np.float32)
+    for i, description in enumerate(o.extras.goal_descriptions):
+        goals[i] = description_rows(description)
+    return {"state": description_rows(o.extras.state_description), "goals": goals}
+
+
+HARI = register_kind(
+    TaskKind(
+        name="hari",
+        title="HARI",
+        tasks=tasks,
+        environment=environments,
+        rules=AS_PRINTED,
+        fitted=fitted,
+        help="descriptions",
+        baselines={"random walk": RandomWalk, "shortest": Shortest, "half-way sub-goals": HalfwaySkyline},
+        expert="half-way sub-goals",
+        needs_stop=True,  # a task is complete by a_done (4.3.2)
+        metrics={
+            "CUR": Metric(asked(Intention.CUR)),
+            "GOAL": Metric(asked(Intention.GOAL)),
+            "SUB": Metric(asked(Intention.SUB)),
+            "DO": Metric(moves),
+        },
+        columns=("success", "navigation error", "requests", "steps"),
+        test_splits=("test_unseen_start", "test_unseen_object", "test_unseen_env"),
+        splits=splits,
+        paper=TABLE_E_1,
+        unseen_part=UNSEEN,
+        extras=ExtraArrays(specs, encode),
+        pictures=False,  # all that its agent perceives are words
+        story=StoryStyle(goal_stack=True),
+    )
+)

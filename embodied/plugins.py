@@ -1,0 +1,95 @@
+"""Names of what need not be part of the program: kinds of tasks by file, and a user's own things by 'module:NAME'."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from embodied.interface import Assistant
+
+
+@functools.cache
+def shipped_kinds() -> dict[str, str]:
+    """Names and titles of the kinds of tasks that come with the program, without importing them.
+
+    They are the files of embodied/kinds, each of which begins with its title and a colon: 'hanna' is 'HANNA'.
+    """
+    files = sorted((Path(__file__).parent / "kinds").glob("[!_]*.py"))
+    return {f.stem: f.read_text(encoding="utf-8").partition(":")[0].strip('"') for f in files}
+
+
+_OWN_KINDS: dict[str, str] = {}
+_LISTENERS: list[Callable[[str, str], None]] = []
+
+
+def announce_kind(name: str, title: str) -> None:
+    """Tell who waits for kinds of tasks (`for_each_kind`) that there is one of a user's own.
+
+    Raises:
+      ValueError: its name does not say where it is found, or its title is another kind's.
+    """
+    if ":" not in name and name not in shipped_kinds():
+        raise ValueError(f"a kind of your own is named 'module:NAME', so that commands find it; got {name!r}")
+    if others := [n for n, t in {**shipped_kinds(), **_OWN_KINDS}.items() if t == title and n != name]:
+        raise ValueError(f"the title {title!r} is that of the kind {others[0]!r}; choose another")
+    if name not in shipped_kinds() and name not in _OWN_KINDS:
+        _OWN_KINDS[name] = title
+        for listener in _LISTENERS:
+            listener(name, title)
+
+
+def for_each_kind(listener: Callable[[str, str], None]) -> None:
+    """Call `listener` with name and title of every kind of task: at once with those that are known, later with new
+    ones."""
+    for name, title in {**shipped_kinds(), **_OWN_KINDS}.items():
+        listener(name, title)
+    _LISTENERS.append(listener)
+
+
+def named_object(name: str) -> Any:
+    """The object that 'module:NAME' names; the module may lie in the current folder.
+
+    Raises:
+      ValueError: no such module or name; an error inside the module is told as it is.
+    """
+    module, colon, attribute = name.partition(":")
+    if "" not in sys.path:
+        sys.path.insert(0, "")  # console commands have their own folder there
+    try:
+        if not (module and colon and attribute):
+            raise ValueError("no colon between two words")
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError, TypeError, ValueError) as e:
+        raise ValueError(f"expected 'module:NAME' with an importable module, got {name!r} ({e})") from e
+
+
+def made_by_name(name: str) -> Any:
+    """What the class or function that 'module:NAME' names makes, without arguments.
+
+    Raises:
+      ValueError: no such module or name, or it cannot be made.
+    """
+    maker = named_object(name)
+    try:
+        return maker()
+    except (AttributeError, TypeError, ValueError) as e:
+        raise ValueError(f"{name!r} should make something without arguments ({e})") from e
+
+
+def assistant_of(named: Assistant | str | None) -> Assistant | None:
+    """An assistant as it is, or made by what 'module:Class' names, without arguments.
+
+    Raises:
+      ValueError: no such class, or what it makes is no Assistant.
+    """
+    if not isinstance(named, str):
+        return named
+    made = made_by_name(named)
+    if not (hasattr(made, "intentions") and hasattr(made, "answer")):
+        raise ValueError(f"{named!r} is no Assistant; it needs intentions() and answer() (embodied/interface.py)")
+    return made
