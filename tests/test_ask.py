@@ -19,7 +19,7 @@ from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.foresight import CHOICES, Foresight
 from embodied.agents.ask.learned import LearnedAsker, facts, fit
 from embodied.agents.ask.study import AskStudy
-from embodied.agents.language_models.assistant import QUESTIONS
+from embodied.agents.language_models.assistant import QUESTION_WORDS
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.ask import in_view
 from embodied.cli import main as start
@@ -181,7 +181,7 @@ def test_questions_as_people_type_them_are_understood(kind):
 
 
 def test_the_questions_that_agents_word_are_understood_as_they_are_meant():
-    assert all(intention_of(QUESTIONS[i]) is i for i in TYPED)
+    assert all(intention_of(QUESTION_WORDS[i]) is i for i in TYPED)
 
 
 def test_following_told_routes_always_arrives(world, tasks, make_env):

@@ -15,12 +15,12 @@ from hand_data import build, built, content, hand_house, small_house
 
 from embodied import metrics
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
-from embodied.datasets.parts import object_part, room_part
 from embodied.datasets.scale import quota, scale
 from embodied.datasets.store import Dataset, DatasetError
 from embodied.evaluation.rollout import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
+from embodied.kinds.hari import object_part, room_part
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import RecordError
 from embodied.render.panorama import Panorama
