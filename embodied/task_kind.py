@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -83,8 +82,8 @@ def parts_of_pool(size: int, task: Callable[[int], Task], parts: Parts) -> PartT
       size: how many tasks the pool has.
       task: task i of the pool, a pure function of i.
     """
-    wanted = {part: (i for i in range(size) if i % 16 in SIXTEENTHS[part]) for part, _ in parts}
-    return {part: [task(i) for i in itertools.islice(wanted[part], n)] for part, n in parts}
+    places = {part: [i for i in range(size) if i % 16 in SIXTEENTHS[part]] for part, _ in parts}
+    return {part: [task(i) for i in places[part][:n]] for part, n in parts}
 
 
 @dataclass(frozen=True)

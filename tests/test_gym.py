@@ -215,7 +215,7 @@ def test_haris_variants_are_chosen_by_name(tmp):
     ask = number(Ask(Intention.CUR), SpaceLayout())
     assert [env.step(ask)[1] for env in (cheap, dear)] == [0.0, -0.5]
     assert [dear.step(ask)[3] for _ in range(3)] == [False, False, True], "the horizon is 4"
-    with pytest.raises(ValueError, match="HARI's"):
+    with pytest.raises(ValueError, match="have no rules to choose"):
         make("find", tmp, rules=HariRules(stack=1))
 
 

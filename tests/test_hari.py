@@ -89,14 +89,14 @@ def test_the_stack_pushes_describes_pops_and_ends():
     o = env.step(Ask(GOAL))
     assert len(o.extras.goal_descriptions) == 1 and len(o.extras.goal_descriptions[0]) == 2
     o = env.step(Ask(SUB))
-    assert (env.situation.goals, o.mode, o.can_ask) == ((3, 2), Mode.SUB, (CUR, GOAL)), "the stack is full"
+    assert (env.situation.extras.goals, o.mode, o.can_ask) == ((3, 2), Mode.SUB, (CUR, GOAL)), "the stack is full"
     with pytest.raises(ActionError, match="sub"):
         env.step(Ask(SUB))
     for node in (1, 2):
         o = env.step(Move(env.situation.candidate_nodes.index(node)))
         assert o.extras.state_description == (), "after moving, perception is sparse again"
     o = env.step(Stop())
-    assert (env.situation.goals, o.mode) == ((3,), Mode.MAIN)
+    assert (env.situation.extras.goals, o.mode) == ((3,), Mode.MAIN)
     o = env.step(Ask(SUB))
     assert o.extras.goal_descriptions[1] == (Feature("action", "go", 0, 0, 2),), "one step away: the action itself"
     env.step(Move(env.situation.candidate_nodes.index(3)))
@@ -119,9 +119,9 @@ def test_a_sub_goal_is_given_up_after_three_times_its_distance():
     env.reset(TASK)
     env.step(Ask(SUB))
     for i in range(6):
-        assert len(env.situation.goals) == 2
+        assert len(env.situation.extras.goals) == 2
         env.step(Move(env.situation.candidate_nodes.index(1 - env.pose.node)) if i % 2 else Ask(CUR))
-    assert env.situation.goals == (3,), "time steps count, not moves (Table E.2)"
+    assert env.situation.extras.goals == (3,), "time steps count, not moves (Table E.2)"
 
 
 def test_an_agent_that_stands_on_its_goal_at_the_horizon_without_done_has_not_succeeded():

@@ -147,7 +147,7 @@ def test_off_the_described_way_the_teacher_of_algorithm_6_leads_to_where_it_ends
 def test_asking_first_and_obeying_the_teacher_of_algorithm_6_arrives_in_the_time_it_is_given():
     world, teacher, tasks, make = grid_setup(Algorithm6Env)
     for task in tasks:
-        task, env = fitted(dataclasses.replace(task, budget=2), "algorithm-6"), make()
+        task, env = fitted(dataclasses.replace(task, budget=2), world, "algorithm-6"), make()
         env.reset(task)
         while env.ended is None:
             ask = env.observation.mode is Mode.MAIN and env.observation.can_ask
@@ -160,7 +160,7 @@ def test_asking_first_and_obeying_the_teacher_of_algorithm_6_arrives_in_the_time
 
 def test_a_listener_comes_back_from_what_it_was_told_under_algorithm_6():
     world, teacher, tasks, make = grid_setup(Algorithm6Env)
-    given = [fitted(dataclasses.replace(t, budget=30), "algorithm-6") for t in tasks]
+    given = [fitted(dataclasses.replace(t, budget=30), world, "algorithm-6") for t in tasks]
     episodes = [listened(make(), t) for t in given]
     assert all(metrics.success(e, world.graph) and e.ended == "stop" for e in episodes)
 

@@ -57,7 +57,7 @@ class AskAssistant:
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
         """Confirm at a thing of the class, disambiguate where several are seen that may be it, all others always."""
         seen = in_view(situation.world, situation.pose.node, _goal(situation))
-        possible = [name for name, _, _ in seen if name in situation.possible]
+        possible = [name for name, _, _ in seen if name in situation.extras.possible]
         cannot = set()
         if not seen or seen[0][2] > NEAR:
             cannot.add(Intention.CONFIRM)
