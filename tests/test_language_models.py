@@ -534,7 +534,7 @@ def test_template_model_and_person_answer_through_one_interface(answers):
     assert {r.ruled_out for r in said_by.values()} == {said_by["template"].ruled_out}, "the facts are the same"
     assert said_by["template"].text in request["messages"][1]["content"] and said_by["template"].text in told[0]
     assert said_by["llm"].usage.calls == 1 and isinstance(makers["own"](AskAssistant(look_of(None))), Parrot)
-    with pytest.raises(ValueError, match="module:Class"):
+    with pytest.raises(ValueError, match="module:NAME"):
         assistant_maker("nobody", lambda: None, None)
 
 

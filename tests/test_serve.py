@@ -314,7 +314,7 @@ def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
     kind, body = game.think()
     play.do(kind, None, game=game.id, **body)
     assert play.screen("ann")["said"][-1]["text"] == "you asked 'Where is it?'"
-    with pytest.raises(ValueError, match="module:Class"):
+    with pytest.raises(ValueError, match="module:NAME"):
         set_table(Part("p", assistant="nowhere:Nobody"), data)
 
 
