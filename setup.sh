@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Prepares everything that `make demo` and `make test` need; safe to run again and again.
-#   1. system packages by apt: EGL and Mesa's software GL, Vulkan, LLVM (for the path tracer), the furniture pack
+#   1. system packages by apt: EGL and Mesa's software GL, LLVM (for the path tracer), the furniture pack
 #   2. a virtual environment in .venv with the pinned Python packages and this project
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -12,7 +12,7 @@ as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi; }
 can_root() { [ "$(id -u)" = 0 ] || { command -v sudo >/dev/null && sudo -n true 2>/dev/null; }; }
 
 # --- 1. system packages ------------------------------------------------------------------------
-packages=(libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libosmesa6 libvulkan1 mesa-vulkan-drivers sweethome3d-furniture)
+packages=(libegl1 libegl-mesa0 libgl1 libgl1-mesa-dri libosmesa6 sweethome3d-furniture)
 installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'ok installed'; }
 
 if command -v dpkg-query >/dev/null; then
@@ -38,7 +38,7 @@ if command -v dpkg-query >/dev/null; then
     fi
   fi
 else
-  echo "note: this is not Debian or Ubuntu; install EGL, Mesa, Vulkan and the Sweet Home 3D furniture libraries yourself"
+  echo "note: this is not Debian or Ubuntu; install EGL, Mesa and the Sweet Home 3D furniture libraries yourself"
 fi
 
 # --- 2. virtual environment --------------------------------------------------------------------

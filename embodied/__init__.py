@@ -15,7 +15,7 @@ Houses
     Catalogue, load_catalogue      the furniture and materials, your own models included
 Pictures
     open_world, open_folder, World a house with its navigation graph, light, cameras and panoramas
-    PictureSettings, ViewSettings  how houses are drawn; how an agent's views are framed
+    Unlit, Baked, Traced, ViewSettings  how houses are drawn; how an agent's views are framed
     NavGraph, Panorama             viewpoints and ways between them; what is seen around one
 Tasks
     make_env                       a Gymnasium environment, as gymnasium.make("embodied/HANNA-v0")
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph, build_graph
     from embodied.render.classic import Renderer
     from embodied.render.panorama import Panorama
-    from embodied.render.pictures import PictureSettings
+    from embodied.render.pictures import Baked, Traced, Unlit
     from embodied.seeds import stream
     from embodied.world import World, open_folder, open_world
 
@@ -86,7 +86,7 @@ _HOMES = {
     "embodied.navigation.graph": ("NavGraph", "build_graph"),
     "embodied.render.classic": ("Renderer",),
     "embodied.render.panorama": ("Panorama",),
-    "embodied.render.pictures": ("PictureSettings",),
+    "embodied.render.pictures": ("Baked", "Traced", "Unlit"),
     "embodied.seeds": ("stream",),
     "embodied.world": ("World", "open_folder", "open_world"),
 }
@@ -99,6 +99,7 @@ _FOUND = {name: (module, name) for module, names in _HOMES.items() for name in n
 __all__ = [
     "__version__",
     "Ask",
+    "Baked",
     "Catalogue",
     "Dataset",
     "DatasetConfig",
@@ -110,13 +111,14 @@ __all__ = [
     "NavGraph",
     "Observation",
     "Panorama",
-    "PictureSettings",
     "Renderer",
     "Reply",
     "Situation",
     "Stop",
     "Subtask",
     "Task",
+    "Traced",
+    "Unlit",
     "ViewSettings",
     "World",
     "baseline",

@@ -159,8 +159,6 @@ PICTURE_HELP = {
     "normal": "finer global illumination",
     "fast-matte": "without reflections, two to three times faster to draw",
     "normal-matte": "likewise",
-    "fast-filament": "drawn by MuJoCo's Filament through Vulkan",
-    "normal-filament": "likewise",
     "traced": "rays are traced into the baked light",
     "reference": "path tracing, slow",
 }

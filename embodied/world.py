@@ -7,7 +7,7 @@ import functools
 import logging
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from tqdm import tqdm
@@ -25,7 +25,7 @@ from embodied.render.camera import View
 from embodied.render.classic import Renderer
 from embodied.render.panorama import VFOV36, Panorama
 from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, parse_pictures, recorded
 from embodied.render.sightings import FACE, SightingTable, load_table, save_table, sightings_table
 from embodied.scene.house_meshes import Part, house_parts, instance_classes, owners
 from embodied.scene.lit_pages import LitPages
@@ -57,7 +57,7 @@ class World:
         catalogue: Catalogue,
         graph: NavGraph,
         cache: Path,
-        pictures: PictureSettings = PictureSettings(),
+        pictures: PictureSettings = Unlit(),
         *,
         file: Path | None = None,
         may_differ: Collection[str] = (),
@@ -124,7 +124,7 @@ class World:
     @functools.cached_property
     def _made_of(self) -> dict[str, object]:
         """All that the panoramas depend on but what draws them."""
-        return self._origin | self.pictures.stored() | {"code": code_digest(*makers(self.pictures))}
+        return self._origin | recorded(self.pictures) | {"code": code_digest(*makers(self.pictures))}
 
     @functools.cached_property
     def fingerprint(self) -> dict[str, object]:
@@ -146,34 +146,22 @@ class World:
     @property
     def lit(self) -> LitPages | None:
         """The house with its baked light painted on; None where it is not lit. Bakes on first use."""
-        return self.baked().lit if self.pictures.lit else None
+        return self.baked().lit if self.pictures.quality else None
 
     def darkness(self, position: Sequence[float] | np.ndarray) -> float:
         """How much darker than one where white paper has 100 cd/m2 the room at `position` is, by its exposure; 1 where
         the house is not lit."""
-        if not self.pictures.lit:
+        if self.pictures.quality is None:
             return 1.0
         return float(self.baked().exposure.at(np.asarray(position, float)[None]).mean())
 
     @property
     def renderer(self) -> Renderer:
-        """The renderer of this world, for pictures from anywhere; opened on first use.
-
-        Raises:
-          ValueError: the world was opened without pictures.
-        """
+        """The renderer of this world, for pictures from anywhere; opened on first use."""
         if self._renderer is None:
-            if self.pictures.kind == "none":
-                raise ValueError(f"world {self.name!r} was opened without pictures; open it with pictures='unlit'")
-            painter = overlay = None
-            if self.pictures.gloss:
-                overlay = gloss_of(self.baked())
-            if self.lit is not None and self.pictures.filament:
-                from embodied.render.filament import FilamentPainter  # late: loads Vulkan
-
-                painter = FilamentPainter(self.house, self.catalogue, self.lit)
+            overlay = gloss_of(self.baked()) if _reflects(self.pictures) else None
             self._renderer = Renderer(
-                self.house, self.catalogue, size=self.pictures.size, lit=self.lit, painter=painter, overlay=overlay
+                self.house, self.catalogue, size=self.pictures.size, lit=self.lit, overlay=overlay
             )
         return self._renderer
 
@@ -186,7 +174,7 @@ class World:
         if self._bake is None:
             from embodied import light  # late: loads the path tracer
 
-            name = self.pictures.lit_by or "normal"
+            name = self.pictures.quality or "normal"
             told: list[str] = []
             with light.progress_bar(shown=progress) as show:
 
@@ -201,15 +189,15 @@ class World:
 
     def _source(self, progress: bool = False) -> Renderer | Tracer:
         """What draws the panoramas; what it needs is made first, with progress bars if wanted."""
-        if self.pictures.lit:
+        p = self.pictures
+        if p.quality is not None:
             self.baked(progress)
-        if not self.pictures.traced:
+        if not isinstance(p, Traced):
             return self.renderer
         if self._tracer is None:
             from embodied.light.tracing.reference import Tracer  # late: loads the path tracer
 
-            p = self.pictures
-            quality = "glossy" if p.kind == "traced" else p.kind
+            quality = "reference" if p.reference else "glossy"
             self._tracer = Tracer(self.baked(), self.house, quality=quality, size=p.size, rays=p.rays)
         return self._tracer
 
@@ -302,7 +290,7 @@ class World:
 
     @functools.cached_property
     def _sightings(self) -> SightingTable:
-        code = code_digest(*makers(PictureSettings()), "embodied.render.sightings")
+        code = code_digest(*makers(Unlit()), "embodied.render.sightings")
         path = self.cache / "sightings" / f"{digest(self._origin, code)[:32]}.npz"
         table = load_table(path)
         if table is None:
@@ -318,10 +306,10 @@ def open_world(
     house: House,
     catalogue: Catalogue | None = None,
     cache: Path | None = None,
-    pictures: PictureSettings | str = PictureSettings(),
+    pictures: PictureSettings | str = Unlit(),
     *,
     graph: NavGraph | None = None,
-    **changes: Any,
+    size: int | None = None,
 ) -> World:
     """A world over `house`; nothing is drawn until asked for.
 
@@ -329,9 +317,9 @@ def open_world(
       catalogue: where meshes and materials come from; the shipped one where not given.
       cache: folder for what is expensive, which may be deleted at any time; the user's cache folder where not given.
       pictures: how the house is drawn: "unlit", "fast", "normal", "fast-matte", ..., one of
-        embodied.render.pictures.KINDS, or settings.
+        embodied.render.pictures.PICTURES, or Unlit, Baked or Traced.
       graph: the navigation graph; built when not given.
-      changes: fields of PictureSettings, instead of those of `pictures`: size=512.
+      size: side of a cube face, pixels, instead of that of `pictures`.
 
     Examples:
       >>> world = embodied.open_world(house, size=64)  # pictures='fast' lights it first
@@ -339,21 +327,22 @@ def open_world(
       (6, 64, 64, 3)
     """
     graph, cache = graph or build_graph(house), cache or default_cache()
-    return World(house, catalogue or load_catalogue(cache), graph, cache, PictureSettings.of(pictures, **changes))
+    return World(house, catalogue or load_catalogue(cache), graph, cache, parse_pictures(pictures, size))
 
 
 def open_folder(
     folder: Path,
     catalogue: Catalogue | None = None,
     cache: Path | None = None,
-    pictures: PictureSettings | str = PictureSettings(),
-    **changes: Any,
+    pictures: PictureSettings | str = Unlit(),
+    *,
+    size: int | None = None,
 ) -> World:
     """The world of a folder that `embodied house` wrote, as `embodied light` lit it; its panoramas go to panoramas.pano
     there.
 
     Args:
-      catalogue, cache, pictures, changes: as in `open_world`.
+      catalogue, cache, pictures, size: as in `open_world`.
 
     Examples:
       >>> with embodied.open_folder(Path('.')) as stored:  # where house.json is
@@ -363,7 +352,7 @@ def open_folder(
     folder, cache = Path(folder), cache or default_cache()
     catalogue = catalogue or load_catalogue(cache)
     house = load_lit_house(folder, catalogue)
-    graph, pictures = build_graph(house), PictureSettings.of(pictures, **changes)
+    graph, pictures = build_graph(house), parse_pictures(pictures, size)
     file = folder / "panoramas.pano"
     return World(house, catalogue, graph, cache, pictures, file=file, may_differ=("renderer",))
 
@@ -393,12 +382,14 @@ def gloss_of(bake: Bake, *, detail: bool = True) -> Gloss:
 def makers(pictures: PictureSettings) -> tuple[str, ...]:
     """Modules that draw and keep such pictures; cached pictures made by other code than theirs are not used."""
     modules = ["embodied.assets.catalogue", "embodied.render.classic", "embodied.render.panorama_file"]
-    if pictures.lit:
+    if pictures.quality is not None:
         modules.append("embodied.light.baking.house")
-    if pictures.gloss:
+    if _reflects(pictures):
         modules += ["embodied.render.gloss", "embodied.light.tracing.rays"]
-    if pictures.filament:
-        modules.append("embodied.render.filament")
-    if pictures.traced:
+    if isinstance(pictures, Traced):
         modules.append("embodied.light.tracing.reference")
     return tuple(modules)
+
+
+def _reflects(pictures: PictureSettings) -> bool:
+    return isinstance(pictures, Baked) and pictures.gloss

@@ -21,7 +21,7 @@ from embodied.assets.cache import default_cache
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
 from embodied.datasets.store import Dataset
 from embodied.gym.eyes import ViewSettings
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import parse_pictures
 
 VIEW = ViewSettings("view", 24, 32)
 
@@ -32,7 +32,7 @@ def flats(folder: Path, kind: str) -> Dataset:
         build_dataset(DatasetConfig("find", "tiny", area=(45.0, 60.0)), folder, default_cache())
     data = Dataset(folder)
     if data.pictures is None:
-        draw_panoramas(data.config, folder, default_cache(), pictures=PictureSettings(64, kind))
+        draw_panoramas(data.config, folder, default_cache(), pictures=parse_pictures(kind, 64))
     return data
 
 

@@ -20,7 +20,7 @@ import torch
 import embodied  # noqa: F401 - registers the environments
 from embodied.agents.vision.encoder import load_encoder
 from embodied.gym.eyes import ViewSettings
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import parse_pictures
 
 MEAN, DEVIATION = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])
 """What torchvision's networks were trained with."""
@@ -74,7 +74,7 @@ def main() -> None:
         seed=args.seed,
         sees="rgb",
         view=ViewSettings("view", 128, 128),
-        pictures=PictureSettings(128, args.pictures),
+        pictures=parse_pictures(args.pictures, 128),
     )
     rng, features, rooms = np.random.default_rng(args.seed), [], []
     observation, _ = env.reset(seed=args.seed)

@@ -57,7 +57,7 @@ from embodied.gym.eyes import CameraSensor, FeatureSensor, PanoramaStore, ViewSe
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import TURNS, FeatureSource, FollowRoute, Pose, Sight, Task, Viewpoint, viewpoint
 from embodied.language.plain import PlainLanguage
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import parse_pictures
 from embodied.seeds import stream
 from embodied.tasks.find import FindConfig, find_pool, find_task
 from embodied.world import World, open_world
@@ -263,7 +263,7 @@ def arena(args: argparse.Namespace, numbers: Sequence[int]) -> Arena:
     catalogue, worlds, tasks = load_catalogue(default_cache()), {}, []
     for n in numbers:
         house, graph = make_dataset_house(args.house_seed, f"flat_{n}", HouseConfig(area=AREA), catalogue)
-        drawn = PictureSettings(128, args.pictures)
+        drawn = parse_pictures(args.pictures, 128)
         world = worlds[house.name] = open_world(house, catalogue, default_cache(), drawn, graph=graph)
         world.render_all()
         world.close()  # the pictures are on disk; forty renderers would fill the memory

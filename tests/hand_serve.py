@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Unlit
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAD = 'title = "Finding things"\ndata = "data"\nconsent = "I agree."\npractice = false\npace = 0.02\nsize = 64\n'
@@ -30,7 +30,7 @@ TOGETHER = '[[parts]]\nname = "together"\ntasks = 3\nper_person = 3\n'
 def make_data(folder: Path, kind: str = "hanna"):
     """A data set with small painted panoramas in folder/data."""
     data = built(folder / "data", kind, make_house=small_house)
-    pictures = PictureSettings(size=64)
+    pictures = Unlit(size=64)
     for name in sorted({n for s in data.splits for n in data.names(s)}):
         place = data.place(name)
         meta = {"house": place.house.digest, **pictures.stored()}

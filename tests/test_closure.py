@@ -14,7 +14,7 @@ from embodied.assets.importing import importer
 from embodied.datasets.build import program
 from embodied.light import settings
 from embodied.light.pages import colours, unwrap
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, Traced, Unlit
 from embodied.scene import collision
 from embodied.world import makers
 
@@ -44,13 +44,13 @@ def key(root: Path, *modules: str, without: tuple[str, ...] = ()) -> str:
 
 @pytest.mark.slow
 def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
-    lit = makers(PictureSettings(kind="normal-filament"))
+    lit = makers(Baked())
     before = key(tree, *lit)
     edit(tree / "embodied/cli/demo.py", "import contextlib", "import contextlib\nEXTRA = 1")
-    edit(tree / "embodied/render/filament.py", "PROBE = 64", "PROBE = 64  # texels")
-    edit(tree / "embodied/render/filament.py", '"""Colours by Filament', '"""Colors by Filament')
+    edit(tree / "embodied/render/gloss.py", "MATTE = 0.7", "MATTE = 0.7  # as measured")
+    edit(tree / "embodied/render/gloss.py", '"""Gloss: reflections', '"""Gloss, or reflections')
     assert key(tree, *lit) == before, "code that draws nothing, comments and docstrings"
-    edit(tree / "embodied/render/filament.py", "PROBE = 64", "PROBE = 65")
+    edit(tree / "embodied/render/gloss.py", "MATTE = 0.7", "MATTE = 0.8")
     assert key(tree, *lit) != before
 
 
@@ -99,7 +99,7 @@ def test_a_table_that_a_docstring_mentions_is_in_no_key(tmp_path):
 )
 def test_what_a_picture_shows_is_in_its_key(tree, file, old, new):
     """The house's record, and what is built by name inside a function (embodied.assets.built), count."""
-    unlit = makers(PictureSettings())
+    unlit = makers(Unlit())
     before = key(tree, *unlit)
     edit(tree / file, old, new)
     assert key(tree, *unlit) != before
@@ -184,10 +184,10 @@ def test_data_beside_the_code_is_in_the_key(tree):
 
 
 def test_pictures_depend_on_what_draws_them():
-    unlit, lit = (set(closure(*makers(PictureSettings(kind=q))).modules) for q in ("unlit", "normal"))
+    unlit, lit = (set(closure(*makers(p)).modules) for p in (Unlit(), Baked()))
     assert "embodied.light.baking.house" in lit and not any(m.startswith("embodied.light") for m in unlit)
     assert "embodied.house.house" in unlit and not any(m.startswith("embodied.generate") for m in lit)
-    assert "embodied.light.tracing.reference" in closure(*makers(PictureSettings(kind="traced"))).modules
+    assert "embodied.light.tracing.reference" in closure(*makers(Traced())).modules
 
 
 def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):
@@ -210,10 +210,10 @@ def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):
 
 
 def test_versions_of_libraries_are_in_the_key(monkeypatch):
-    assert "mujoco" in closure(*makers(PictureSettings())).libraries
-    before = key(ROOT, *makers(PictureSettings()))
+    assert "mujoco" in closure(*makers(Unlit())).libraries
+    before = key(ROOT, *makers(Unlit()))
     monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == "mujoco" else "")
-    assert key(ROOT, *makers(PictureSettings())) != before
+    assert key(ROOT, *makers(Unlit())) != before
     code_digest.cache_clear()
 
 

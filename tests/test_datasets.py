@@ -25,7 +25,7 @@ from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import RecordError
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, Unlit
 from embodied.splits import DatasetSize
 from embodied.task_kind import kind_named
 from embodied.teachers.vnla import VnlaTeacher
@@ -266,13 +266,13 @@ def test_a_data_set_knows_how_the_panoramas_that_it_holds_were_drawn(tmp_path):
     made_of = {"size": 8, "quality": "normal", "backend": "classic", "light": "normal", "code": "x"}
     path = data.folder / "houses" / name / "panoramas.pano"
     write_panoramas(path, [empty], {**made_of, "house": data.place(name).house.digest})
-    matte = PictureSettings(8, "normal-matte")
+    matte = Baked(gloss=False, size=8)
     assert data.drawn_pictures(name) == matte, "a file that names no look is older than gloss"
     write_panoramas(path, [empty], {**made_of, "look": "gloss", "house": data.place(name).house.digest})
-    assert data.drawn_pictures(name) == PictureSettings(8, "normal")
+    assert data.drawn_pictures(name) == Baked(size=8)
     unlit = {**made_of, "quality": "unlit", "light": None, "house": data.place(name).house.digest}
     write_panoramas(path, [empty], unlit)
-    assert data.drawn_pictures(name) == PictureSettings(8)
+    assert data.drawn_pictures(name) == Unlit(size=8)
     write_panoramas(path, [empty], {**made_of, "house": "another"})
     assert data.drawn_pictures(name) is None
 

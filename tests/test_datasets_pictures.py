@@ -28,22 +28,22 @@ from embodied.datasets import build as building
 from embodied.datasets.store import Dataset
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, PictureSettings, Unlit
 from embodied.world import World
 
-SMALL = PictureSettings(size=16)
+SMALL = Unlit(size=16)
 
 
 def test_houses_are_drawn_lit_unless_the_kind_needs_words_only_or_pictures_are_there():
-    assert chosen_pictures("hanna", None, None, None) == PictureSettings(256, "fast")
-    assert chosen_pictures("find", None, 128, None) == PictureSettings(128, "fast")
-    assert chosen_pictures("hari", None, None, None).kind == "none"
-    assert chosen_pictures("hari", "unlit", None, None).kind == "unlit"
-    held = PictureSettings(192, "normal")
+    assert chosen_pictures("hanna", None, None, None) == Baked("fast")
+    assert chosen_pictures("find", None, 128, None) == Baked("fast", size=128)
+    assert chosen_pictures("hari", None, None, None) is None
+    assert chosen_pictures("hari", "unlit", None, None) == Unlit()
+    held = Baked(size=192)
     assert chosen_pictures("hanna", None, None, held) == held, "not drawn again in another way that nobody asked for"
-    assert chosen_pictures("hanna", None, 64, held) == PictureSettings(64, "normal")
-    assert chosen_pictures("hanna", "fast", None, held) == PictureSettings(256, "fast")
-    assert chosen_pictures("hanna", "none", None, held).kind == "none"
+    assert chosen_pictures("hanna", None, 64, held) == Baked(size=64)
+    assert chosen_pictures("hanna", "fast", None, held) == Baked("fast")
+    assert chosen_pictures("hanna", "none", None, held) is None
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_drawing_goes_on_where_it_was_stopped(data, caplog):
     again = files(data)
     assert {n for n in names if again[n] != first[n]} == set(names[:2])
     assert all(data.drawn_pictures(n) == SMALL for n in names)
-    draw(data, PictureSettings(size=8))
+    draw(data, Unlit(size=8))
     assert all(data.drawn_pictures(n).size == 8 for n in names), "another size is drawn anew"
 
 
@@ -119,7 +119,7 @@ def test_data_sets_over_the_same_houses_share_their_pictures(data, tmp_path):
     pano(other, names[0]).write_bytes(b"damaged")  # wherever it lies, nobody believes it
     building.draw_panoramas(other.config, other.folder, tmp_path / "shared", pictures=SMALL)
     assert other.drawn_pictures(names[0]) == SMALL and kept.exists()
-    building.draw_panoramas(data.config, data.folder, tmp_path / "shared", pictures=PictureSettings(size=8))
+    building.draw_panoramas(data.config, data.folder, tmp_path / "shared", pictures=Unlit(size=8))
     assert not any(pano(data, name).samefile(pano(other, name)) for name in names), "another size is another file"
 
 
@@ -149,7 +149,7 @@ def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
     encoder = random_encoder(seed=0)
     names = [u.name for u in building.units(data.scale)]
-    lit = PictureSettings(16, "fast")
+    lit = Baked("fast", size=16)
 
     lines: list[str] = []
 

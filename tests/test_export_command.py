@@ -17,7 +17,7 @@ from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import feature_path, save_features
 from embodied.datasets.folders import names_of
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Unlit
 from embodied.world import open_world
 
 
@@ -74,7 +74,7 @@ def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
     from embodied.gym import drive
 
     data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=small_house)
-    unlit = PictureSettings(64, "unlit")
+    unlit = Unlit(size=64)
     found = drive.data_worlds
     monkeypatch.setattr(drive, "load_catalogue", lambda _: HandCatalogue())
     monkeypatch.setattr(drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, unlit))

@@ -42,7 +42,7 @@ from embodied.policies.baselines import Shortest
 from embodied.records import RecordError, from_json, save_lines
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import PanoramaFile, write_panoramas
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked
 from embodied.seeds import stream
 from embodied.viz import sinks
 
@@ -52,7 +52,7 @@ def here(tmp_path_factory) -> Dataset:
     """A data set whose houses have painted pictures."""
     folder = tmp_path_factory.mktemp("here")
     data = build(folder / "data", folder / "cache", "vln", size="1x4", make_house=small_house)
-    paint(data, PictureSettings(16, "fast"))
+    paint(data, Baked("fast", size=16))
     return data
 
 

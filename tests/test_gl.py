@@ -18,7 +18,7 @@ from handmade import HandCatalogue, furnished
 from embodied import gl
 from embodied.navigation.graph import graph_of
 from embodied.render.classic import Renderer
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Unlit
 from embodied.world import World
 
 pytestmark = pytest.mark.gl
@@ -32,7 +32,7 @@ def house():
 
 def world_of(house, tmp_path, **more) -> World:
     graph = graph_of(np.array([EYE]), np.empty((0, 2), int), ("a",), ("living_room_1",))
-    pictures = PictureSettings(size=32)
+    pictures = Unlit(size=32)
     return World(house, HandCatalogue(), graph, tmp_path, pictures, file=tmp_path / "a.pano", **more)
 
 

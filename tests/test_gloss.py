@@ -18,7 +18,7 @@ from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
 from embodied.render.gloss import Gloss, Shine, interleaved, schlick
 from embodied.render.mirrored import Mirrored
-from embodied.render.pictures import KINDS, PictureSettings
+from embodied.render.pictures import Baked, matte, parse_pictures
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.world import open_world
 
@@ -221,12 +221,8 @@ def test_rays_meet_what_geometry_says(among):
 
 
 def test_gloss_is_laid_over_baked_light_unless_pictures_are_matte():
-    assert [k for k in KINDS if PictureSettings(64, k).gloss] == ["fast", "normal"]
-    assert (
-        PictureSettings(64, "fast").matte
-        == PictureSettings(64, "fast-matte")
-        == PictureSettings(64, "fast-matte").matte
-    )
+    assert parse_pictures("fast", 64) == Baked("fast", size=64)
+    assert matte(Baked("fast")) == parse_pictures("fast-matte") == matte(parse_pictures("fast-matte"))
 
 
 class Polished(HandCatalogue):

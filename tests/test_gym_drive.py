@@ -102,7 +102,7 @@ def test_live_pictures_are_without_reflections_unless_they_are_named(named, tmp_
     monkeypatch.setattr(drive, "make_dataset_house", lambda *_: (house, None))
     monkeypatch.setattr(drive, "load_catalogue", lambda *_: HandCatalogue())
     (flat,) = drive.flat_worlds(0, tmp_path, named).values()
-    assert flat.pictures.kind == (named or "fast-matte")
+    assert flat.pictures.word == (named or "fast-matte")
 
 
 def test_wishes_that_cannot_be_had_are_refused(world):

@@ -30,7 +30,7 @@ from embodied.metrics import success
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import save_lines
 from embodied.render.panorama_file import PanoramaFile
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked
 
 pytestmark = pytest.mark.slow
 
@@ -41,7 +41,7 @@ SMALL = RecordedCamera(32, 48)
 def data(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lerobot")
     data = build(folder / "data", folder / "cache", "hanna", size="1x4")
-    paint(data, PictureSettings(16, "fast"), ["train_0000"])
+    paint(data, Baked("fast", size=16), ["train_0000"])
     return data
 
 

@@ -9,13 +9,13 @@ import pytest
 from hand_data import built, paint, small_house
 
 from embodied.cli import main
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked
 
 
 def exported(kind, folder, *options) -> list[dict]:
     """Steps of every training task of four by four nodes, with the instruction in words."""
     data = built(folder / "data", kind, size="1x4", make_house=small_house)
-    paint(data, PictureSettings(16, "fast"), data.names("train"))
+    paint(data, Baked("fast", size=16), data.names("train"))
     order = ["export", "lerobot", "--data", str(data.folder), "--out", str(folder / "out"), "--size", "16", *options]
     assert main(order) == 0
     words = pq.read_table(folder / "out" / "meta" / "tasks.parquet").to_pydict()

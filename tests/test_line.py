@@ -30,7 +30,7 @@ from embodied.language import People
 from embodied.metrics import spl, success
 from embodied.policies.baselines import RandomWalk, Shortest
 from embodied.render.panorama import Panorama
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked
 from embodied.tasks.find import find_pool, find_task
 from embodied.viz import recording
 from embodied.viz.blueprint import blueprint_of, sees_title
@@ -143,7 +143,7 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
 
 def test_the_picture_says_how_it_was_drawn_or_that_nobody_looks_at_it():
     assert sees_title(PLAIN) == "What the agent sees: without light"
-    assert sees_title(PictureSettings(kind="normal")) == "What the agent sees: lit"
+    assert sees_title(Baked("normal")) == "What the agent sees: lit"
     assert "looks at no pictures" in sees_title(None)
 
 

@@ -129,4 +129,4 @@ def test_a_shell_completes_commands_options_and_their_words(tmp_path, capsys):
     script.write_text(capsys.readouterr().out)
     asked = f'. {script}; COMP_WORDS=(embodied render home --pictures nor); COMP_CWORD=4; _shtab_embodied "" nor; '
     said = subprocess.run(["bash", "-c", asked + "echo ${COMPREPLY[@]}"], capture_output=True, text=True, check=True)
-    assert said.stdout.split() == ["normal", "normal-matte", "normal-filament"]
+    assert said.stdout.split() == ["normal", "normal-matte"]

@@ -18,7 +18,7 @@ from embodied.datasets.build import Unit
 from embodied.gym.eyes import ViewSettings
 from embodied.gym.playground import pictures_of
 from embodied.render.panorama_file import PanoramaFileError
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, Unlit
 from embodied.scene.house_meshes import owners
 
 
@@ -27,13 +27,13 @@ def data(tmp_path_factory):
     """Three houses of sixteen viewpoints with faces of eight pixels."""
     folder = tmp_path_factory.mktemp("torch")
     data = build(folder / "data", folder / "cache", "find", size="1x4", make_house=small_house)
-    paint(data, PictureSettings(8, "fast"))
+    paint(data, Baked("fast", size=8))
     return data
 
 
 def test_an_item_tells_what_is_seen_from_where(data):
     pictures = ViewpointPictures(data, "train")
-    assert len(pictures) == 16 and pictures.pictures == PictureSettings(8, "fast")
+    assert len(pictures) == 16 and pictures.pictures == Baked("fast", size=8)
     item, place = pictures[5], data.place("train_0000")
     wanted = painted_panorama(5, len(owners(place.house)))
     assert item["rgb"].shape == (6, 3, 8, 8)
@@ -83,7 +83,7 @@ def test_a_program_that_drew_its_pictures_may_load_them_with_workers(tmp_path, m
     monkeypatch.setattr(building, "load_catalogue", lambda *_: HandCatalogue())
     data = build(tmp_path / "data", tmp_path / "cache", "find", size="1x4", make_house=small_house)
     unit = Unit("train", 0)
-    building.draw_unit(unit, data.folder, tmp_path / "cache", PictureSettings(64), ())
+    building.draw_unit(unit, data.folder, tmp_path / "cache", Unlit(size=64), ())
     view = ViewSettings("view", 24, 32)
     pictures = ViewpointPictures(data, "train", view=view, channels=("rgb", "depth"))
     loader = torch.utils.data.DataLoader(pictures, batch_size=64, num_workers=2, timeout=600)
@@ -110,7 +110,7 @@ def test_what_is_missing_mixed_or_damaged_is_said(data):
     path.unlink()
     with pytest.raises(ValueError, match=r"pictures of 0 of its 1 houses.*embodied dataset find"):
         ViewpointPictures(data, "val_unseen")
-    paint(data, PictureSettings(16, "fast"), ["val_0000"])
+    paint(data, Baked("fast", size=16), ["val_0000"])
     with pytest.raises(ValueError, match=r"several kinds .*\('fast', 8\), \('fast', 16\)"):
         pictures_of(data, ["train_0000", "val_0000"], wanted=True)
     path.write_bytes(whole)

@@ -14,12 +14,24 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied import gl
+from embodied.light.settings import QUALITIES
 from embodied.render import visibility
 from embodied.render.camera import FAR, NEAR, camera_at, face_cameras
 from embodied.render.classic import Renderer
 from embodied.render.geoms import depth_of_reversed_z
 from embodied.render.panorama import face_rays, ray_stretch
-from embodied.render.pictures import KINDS, PictureSettings
+from embodied.render.pictures import (
+    BAKED_QUALITIES,
+    WORDS_FOR_PICTURES,
+    Baked,
+    Traced,
+    Unlit,
+    from_recorded,
+    from_words,
+    in_words,
+    parse_pictures,
+    recorded,
+)
 from embodied.render.supersampling import averaged, drawn_size, nearest, step_of
 from embodied.scene.house_meshes import owners
 from embodied.scene.model import VISUAL, compile_scene
@@ -267,19 +279,18 @@ def test_two_houses_can_be_open_at_once_and_a_closed_one_says_so(house):
 
 
 @pytest.mark.parametrize(
-    ("wrong", "match"),
+    ("make", "match"),
     [
-        ({"kind": "photo"}, "photo"),
-        ({"kind": "unlit-filament"}, "use one of .*fast-filament"),
-        ({"size": 0}, "size"),
-        ({"size": -5}, "size"),
-        ({"light": "high"}, "unlit"),
-        ({"kind": "fast", "rays": 4}, "traced or reference"),
+        (lambda: parse_pictures("photo"), "photo.*use one of unlit, fast"),
+        (lambda: parse_pictures("fast", 0), "size"),
+        (lambda: Unlit(size=-5), "size"),
+        (lambda: Baked("pretty"), "pretty.*use one of fast, normal, high"),
+        (lambda: Traced(0), "rays=0"),
     ],
 )
-def test_bad_settings_are_refused(wrong, match):
+def test_bad_settings_are_refused(make, match):
     with pytest.raises(ValueError, match=match):
-        PictureSettings(**wrong)
+        make()
 
 
 def test_a_renderer_refuses_impossible_sizes(house):
@@ -287,24 +298,23 @@ def test_a_renderer_refuses_impossible_sizes(house):
         Renderer(house, HandCatalogue(), size=0)
 
 
-def test_a_kind_of_pictures_says_by_which_light():
-    lights = {k: PictureSettings(kind=k).lit_by for k in KINDS}
-    assert all(
-        light == (None if k in ("none", "unlit") else "fast" if "fast" in k else "normal")
-        for k, light in lights.items()
-    )
-    assert PictureSettings(kind="normal", light="high").lit_by == "high"
+def test_light_is_named_as_on_the_command_line():
+    assert tuple(QUALITIES) == BAKED_QUALITIES
 
 
 def test_pictures_are_known_again_from_what_files_record_of_them():
-    rays = [PictureSettings(96, k, light="fast", rays=4) for k in ("traced", "reference")]
-    for pictures in [*(PictureSettings(64, k) for k in KINDS), PictureSettings(64, "normal", light="high"), *rays]:
-        assert PictureSettings.from_stored(pictures.stored()) == pictures
-    assert PictureSettings(8, "fast").stored() == {
+    traced = [Traced(4, "fast", reference=reference, size=96) for reference in (False, True)]
+    for pictures in [*(parse_pictures(word, 64) for word in WORDS_FOR_PICTURES), *traced]:
+        assert from_recorded(recorded(pictures)) == pictures == from_words(in_words(pictures))
+    assert recorded(Baked("fast", size=8)) == {
         "size": 8, "quality": "fast", "backend": "classic", "light": "fast", "look": "gloss"
     }  # fmt: skip
+    assert recorded(Traced(4, "fast")) == {
+        "size": 256, "quality": "glossy", "backend": "classic", "light": "fast", "rays": 4
+    }  # fmt: skip
+    assert from_words({"kind": "traced", "size": 192, "light": None, "rays": None}) == Traced(size=192)
     with pytest.raises(ValueError, match="unknown; draw them again"):
-        PictureSettings.from_stored({"size": 8, "quality": "fast", "backend": "metal"})
+        from_recorded({"size": 8, "quality": "fast", "backend": "filament", "light": "fast"})
 
 
 def _draw(queue) -> None:

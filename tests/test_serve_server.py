@@ -26,7 +26,7 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
 from embodied.records import load_lines
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Unlit
 
 ROOT = Path(__file__).resolve().parent.parent
 pytestmark = pytest.mark.slow
@@ -246,7 +246,7 @@ def test_the_shipped_agent_takes_part_with_what_embodied_features_left(folder):
     data = Dataset(folder / "data")
     encoder, places = load_encoder(SHIPPED_ENCODER), data.split("val_seen").worlds
     for name, place in places.items():
-        blank, pictures = np.zeros((len(place.graph.ids), 36, encoder.size)), PictureSettings(64)
+        blank, pictures = np.zeros((len(place.graph.ids), 36, encoder.size)), Unlit(size=64)
         path = feature_path(data.folder / "features", encoder.digest, name, pictures)
         save_features(path, blank, encoder, place.house.digest, pictures)
     agent = agents_of(data.folder, lambda: None)["shipped"](places)

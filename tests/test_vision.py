@@ -36,7 +36,7 @@ from embodied.assets.cache import write_json
 from embodied.errors import UnableError
 from embodied.interface import Sight
 from embodied.records import read_json
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, Unlit, parse_pictures
 from embodied.seeds import stream
 
 
@@ -377,7 +377,7 @@ def test_features_name_their_encoder_and_their_house(tmp_path):
     with pytest.raises(FileNotFoundError, match="embodied features"):
         load_features(tmp_path / "nothing.safetensors")
     with pytest.raises(ValueError, match="made from drawing unlit_192, expected normal_gloss; .*--pictures normal"):
-        load_features(path, pictures=PictureSettings(192, "normal"))
+        load_features(path, pictures=Baked(size=192))
     body = bytearray(path.read_bytes())
     body[-9] ^= 0x10
     (tmp_path / "flipped.safetensors").write_bytes(body)
@@ -412,12 +412,12 @@ def test_encoder_moves_between_settings_without_changing_features():
 
 
 def test_every_way_of_drawing_has_its_own_features():
-    ways = [("unlit",), ("fast",), ("fast-matte",), ("normal",), ("normal", "fast"), ("traced",), ("normal-filament",)]
-    paths = {feature_path(Path("f"), "d" * 64, "house", PictureSettings(192, *way)) for way in ways}
+    ways = ["unlit", "fast", "fast-matte", "normal", "high", "traced", "reference"]
+    paths = {feature_path(Path("f"), "d" * 64, "house", parse_pictures(way, 192)) for way in ways}
     assert len(paths) == len(ways) and feature_path(Path("f"), "d" * 64, "house", PLAIN) in paths
-    assert drawing(PLAIN) == "unlit_192" != drawing(PictureSettings(256, "unlit"))
+    assert drawing(PLAIN) == "unlit_192" != drawing(Unlit())
     assert len({drawing(p) for p in RENDER_PRESETS.values()}) == len(RENDER_PRESETS) and all(
-        p.kind == k for k, p in RENDER_PRESETS.items()
+        p.word == k for k, p in RENDER_PRESETS.items()
     )
     assert drawing(RENDER_PRESETS["reference"]) == "reference_fast_96_8rays"
 

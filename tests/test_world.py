@@ -159,13 +159,6 @@ def test_unknown_nodes_and_folders_are_refused(world, tmp_path):
         open_folder(tmp_path, HandCatalogue(), tmp_path)
 
 
-def test_a_world_without_pictures_says_so(house, tmp_path):
-    with make(house, tmp_path, pictures="none") as w:
-        assert w.sightings(0), "what can be seen is known without pictures"
-        with pytest.raises(ValueError, match="without pictures"):
-            w.panorama(0)
-
-
 def test_a_misspelt_setting_is_refused(house, tmp_path):
     with pytest.raises(TypeError, match="qualitty"):
         make(house, tmp_path, qualitty="unlit")

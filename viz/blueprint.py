@@ -19,7 +19,7 @@ def sees_title(seen: PictureSettings | None) -> str:
     """Name of the picture along the agent's gaze: how it is drawn, or that the agent looks at none."""
     if seen is None:
         return "Ahead of the agent, which looks at no pictures"
-    return f"What the agent sees: {LIGHT.get(seen.kind, seen.kind)}"
+    return f"What the agent sees: {LIGHT.get(seen.word, seen.word)}"
 
 
 def blueprint_of(

@@ -7,24 +7,24 @@ from dataclasses import dataclass, field
 
 from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, require
 from embodied.render.photograph import check_camera
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, recorded
 
 TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
 """Networks that encode without training here, with weights from disk."""
 TRAINED_NETWORKS = ("compact", "lite0")
 """Networks that are trained here; the first is the default."""
-PLAIN = PictureSettings(size=192)
+PLAIN = Unlit(size=192)
 """How the pictures are drawn that encoders are trained on, and features made from: the strip's resolution."""
 
 
 RENDER_PRESETS: Mapping[str, PictureSettings] = {
     "unlit": PLAIN,
-    "fast-matte": PictureSettings(192, "fast-matte"),
-    "fast": PictureSettings(192, "fast"),
-    "normal-matte": PictureSettings(192, "normal-matte"),
-    "normal": PictureSettings(192, "normal"),
-    "traced": PictureSettings(192, "traced", light="fast", rays=4),
-    "reference": PictureSettings(96, "reference", light="fast", rays=8),
+    "fast-matte": Baked("fast", gloss=False, size=192),
+    "fast": Baked("fast", size=192),
+    "normal-matte": Baked("normal", gloss=False, size=192),
+    "normal": Baked("normal", size=192),
+    "traced": Traced(4, "fast", size=192),
+    "reference": Traced(8, "fast", reference=True, size=96),
 }
 """How encoders and agents may be shown houses, besides as a data set holds them, by kinds of pictures. Traced ones are
 of few rays, and references coarse besides, or a house would take hours; their exposure is that of 'fast' light."""
@@ -32,13 +32,12 @@ of few rays, and references coarse besides, or a house would take hours; their e
 
 def drawing(pictures: PictureSettings) -> str:
     """How pictures were drawn as one word, for folders and files of features: 'unlit_192', 'glossy_normal_192'."""
-    stored = pictures.stored()
-    quality, backend = str(stored["quality"]), str(stored["backend"])
-    lit = () if pictures.lit_by in (None, quality) else (pictures.lit_by,)
-    other = () if backend == "classic" else (backend,)
-    look = ("gloss",) if pictures.gloss else ()
-    rays = () if pictures.rays is None else (f"{pictures.rays}rays",)
-    return "_".join([quality, *map(str, lit), *other, *look, str(pictures.size), *rays])
+    facts = recorded(pictures)
+    quality = str(facts["quality"])
+    light = () if pictures.quality in (None, quality) else (pictures.quality,)
+    look = ("gloss",) if "look" in facts else ()
+    rays = (f"{facts['rays']}rays",) if "rays" in facts else ()
+    return "_".join([quality, *light, *look, str(pictures.size), *rays])
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ CAPTURE_CONDITIONS: Mapping[str, CaptureCondition] = {
 
 @dataclass(frozen=True)
 class RenderedInputs:
-    """The pictures that the agents of an evaluation saw; part of its run.json."""
+    """The pictures that the agents of an evaluation saw, as its run.json says."""
 
     looking: tuple[str, ...] = ()
     """Rows whose agents look at pictures."""

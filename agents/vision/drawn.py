@@ -32,7 +32,7 @@ def pictures_of(data: Dataset, name: str, picture_kind: str | None = None) -> Pi
         holds none.
     """
     drawn = data.drawn_pictures(name)
-    if drawn is None or picture_kind not in (None, drawn.kind):
+    if drawn is None or picture_kind not in (None, drawn.word):
         return RENDER_PRESETS[picture_kind or "unlit"]
     return drawn
 

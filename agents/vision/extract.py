@@ -14,6 +14,7 @@ from embodied.agents.vision.drawn import drawn_world, pictures_of
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.features import has_features, save_features
 from embodied.datasets.store import Dataset
+from embodied.render.pictures import Traced
 from embodied.world import World
 
 AS_SEEN = CaptureCondition()
@@ -21,7 +22,7 @@ AS_SEEN = CaptureCondition()
 
 def features_of(world: World, encoder: Encoder, condition: CaptureCondition = AS_SEEN) -> np.ndarray:
     """(n, 36, D) float16 features of the panoramas of a house, as the camera of `condition` takes them."""
-    if world.pictures.traced or condition != AS_SEEN:
+    if isinstance(world.pictures, Traced) or condition != AS_SEEN:
         world.render_all()  # kept: they cost minutes a house, and several conditions show the same
     panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
     return photographed(encoder, panoramas, condition, world.house.name)
@@ -66,4 +67,4 @@ class Extractor:
                 path = captured_path(data, name, at, self.encoder.digest, pictures)
                 save_features(path, features_of(world, self.encoder, at), self.encoder, house.digest, pictures)
         ways = ", ".join(at.name or "as seen" for at in conditions)
-        return f"{name}: {ways}; {pictures.kind} pictures of {pictures.size} pixels"
+        return f"{name}: {ways}; {pictures.word} pictures of {pictures.size} pixels"

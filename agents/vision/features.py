@@ -120,7 +120,7 @@ def has_features(path: Path, encoder: Encoder, source: str, pictures: PictureSet
 
 
 def _command(pictures: PictureSettings | None) -> str:
-    picture_kind = "" if pictures is None or pictures.kind == PLAIN.kind else f" --pictures {pictures.kind}"
+    picture_kind = "" if pictures is None or pictures.word == PLAIN.word else f" --pictures {pictures.word}"
     return f"embodied features{picture_kind}"
 
 

@@ -157,7 +157,7 @@ class EncoderStudy(StudyLearner):
 
     def _lit(self) -> StripSource:
         """Pictures with light: of the first kind that is judged and has any."""
-        return self._source(next((k for k in self.pictures if RENDER_PRESETS[k].lit_by), "fast"))
+        return self._source(next((k for k in self.pictures if RENDER_PRESETS[k].quality), "fast"))
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         assert weights is not None, "every row is an encoder or a detector"

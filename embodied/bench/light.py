@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes.util
 import functools
 import math
 import time
@@ -28,7 +27,6 @@ from embodied.light.tracing.reference import Tracer
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
-from embodied.render.filament import FilamentPainter
 from embodied.render.jpeg import jpeg
 from embodied.world import gloss_of
 
@@ -45,9 +43,9 @@ AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""
 BAKES = ("fast", "normal")
 """Light qualities that are compared; what is traced reads the last one."""
-DRAWN = (*("unlit", *BAKES, "gloss"), *(("filament",) if ctypes.util.find_library("vulkan") else ()))
-"""What a Renderer draws: 'gloss' and, where Vulkan is, 'filament' over the last bake, all others matte."""
-WAYS = (*DRAWN, "glossy", "diffuse", "reference")
+WAYS_DRAWN = ("unlit", *BAKES, "gloss")
+"""What a Renderer draws: 'gloss' over the last bake, all others matte."""
+WAYS = (*WAYS_DRAWN, "glossy", "diffuse", "reference")
 TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
 VFOV = math.radians(65.0)
@@ -129,11 +127,10 @@ def draw(
     """Every view in every way; the milliseconds of the renderers are medians of five 256 x 256 cube faces."""
     shots, best, hour = [], baked[BAKES[-1]], house.sky.hour
     for way in WAYS:
-        if way in DRAWN:
+        if way in WAYS_DRAWN:
             lit = None if way == "unlit" else baked.get(way, best).lit
-            painter = FilamentPainter(house, catalogue, best.lit) if way == "filament" else None
             overlay = gloss_of(best, detail=False) if way == "gloss" else None
-            with Renderer(house, catalogue, lit=lit, painter=painter, overlay=overlay) as r:
+            with Renderer(house, catalogue, lit=lit, overlay=overlay) as r:
                 shots += [_drawn(r, way, v, hour) for v in views]
         else:
             tracer = Tracer(best, house, quality=way, rays=16 if way == "glossy" else RAYS)

@@ -21,7 +21,7 @@ from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain import PlainLanguage
 from embodied.render.panorama_file import PanoramaFile
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import parse_pictures
 from embodied.seeds import stream
 from embodied.tasks.find import find_pool, find_task
 from embodied.world import World, open_world
@@ -83,7 +83,7 @@ def _from_disk(world: World) -> Iterator[Measure]:
 
 def _batches(seed: int, cache: Path, kind: str) -> Iterator[Measure]:
     """One environment against batches of them, all in the flat that `make` generates from `seed`."""
-    drawn = PictureSettings(kind=kind)
+    drawn = parse_pictures(kind)
     asked: dict[str, Any] = {"seed": seed, "cache": cache, "sees": "rgb", "pictures": drawn}
     for world in flat_playground("find", seed, Asked(cache, pictures=drawn, sees=("rgb",))).worlds.values():
         assert isinstance(world, World), "generated, so it can be drawn"

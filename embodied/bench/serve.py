@@ -23,7 +23,7 @@ import psutil
 
 from embodied.bench.timing import Report
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Unlit
 from embodied.seeds import stream
 from embodied.splits import DatasetSize
 
@@ -161,7 +161,7 @@ def measure(
     config = DatasetConfig("hanna", DatasetSize(1, 40), seed, (80.0, 110.0), people=False)
     progress("a data set of three small houses")
     build_dataset(config, folder / "data", cache, workers=1)
-    draw_panoramas(config, folder / "data", cache, pictures=PictureSettings(512, "unlit"), workers=1)
+    draw_panoramas(config, folder / "data", cache, pictures=Unlit(size=512), workers=1)
     study = folder / "study.toml"
     study.write_text(STUDY, encoding="utf-8")
     shutil.rmtree(study.with_suffix(".people"), ignore_errors=True)

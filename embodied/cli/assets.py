@@ -1,7 +1,7 @@
 """Build, list or show the catalogue of furniture.
 
 `build` imports every model of the furniture packs into the cache (otherwise each is imported when first needed), `list`
-prints the catalogue, `sheet` draws contact sheets of all models.
+prints the catalogue, `attribution` writes who made which model, under which licence.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Options(Furnished, Printed):
-    action: Annotated[str, Option(words=("build", "list", "sheet", "attribution"), name="action")]
-    """What to do; attribution writes who made which model, under which licence."""
+    action: Annotated[str, Option(words=("build", "list", "attribution"), name="action")]
+    """What to do."""
     object_class: Annotated[str | None, Option(metavar="NAME", name="--class")] = None
     """Only this object class."""
-    out: Annotated[Path | None, Option(any_path, "PATH")] = None
-    """Folder for sheets, file for the attribution (default: out/sheets, ATTRIBUTION.md)."""
+    out: Annotated[Path, Option(any_path, "FILE")] = Path("ATTRIBUTION.md")
+    """File for the attribution."""
 
 
 def run(args: Options) -> None:
@@ -37,7 +37,7 @@ def run(args: Options) -> None:
         raise ValueError(
             f"no object class {args.object_class!r}; `embodied assets list` names all {len(catalogue.classes)}"
         )
-    actions = {"build": build, "list": list_assets, "sheet": sheet, "attribution": attribution}
+    actions = {"build": build, "list": list_assets, "attribution": attribution}
     actions[args.action](args, catalogue, chosen)
 
 
@@ -57,19 +57,9 @@ def list_assets(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) ->
     show(args, {name: [a.key for a in by_class[name]] for name in sorted(by_class)}, "\n".join(lines))
 
 
-def sheet(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
-    """Draw the contact sheets."""
-    from embodied.render.contact_sheet import draw_sheets
-
-    out = args.out or Path("out/sheets")
-    paths = draw_sheets(catalogue, [a.key for a in chosen], out)
-    show(args, {"sheets": [str(p) for p in paths]}, f"{len(paths)} sheets in {out}")
-
-
 def attribution(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Write who made which model, under which licence."""
     from embodied.assets.attribution import write_attribution
 
-    out = args.out or Path("ATTRIBUTION.md")
-    write_attribution(catalogue, out)
-    show(args, {"out": str(out)}, f"wrote {out}")
+    write_attribution(catalogue, args.out)
+    show(args, {"out": str(args.out)}, f"wrote {args.out}")

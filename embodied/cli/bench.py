@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.options import Count, Option, OutputFolder, drawn_as, whole
-from embodied.render.pictures import DRAWN, PictureSettings
+from embodied.render.pictures import DRAWN, parse_pictures
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
@@ -54,7 +54,7 @@ def run(args: Options) -> None:
     if unknown := sorted(set(parts) - set(PARTS)):
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     catalogue = catalogue_of(args)
-    lit = PictureSettings(kind=args.pictures).lit_by or "fast"
+    lit = parse_pictures(args.pictures).quality or "fast"
     if "serve" in parts:
         from embodied.bench import serve  # needs the extra of that name
     lines = {

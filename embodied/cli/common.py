@@ -53,11 +53,11 @@ def check_machine(pictures: str) -> None:
     """
     from embodied import gl
     from embodied.light.backend import device
-    from embodied.render.pictures import PictureSettings
+    from embodied.render.pictures import parse_pictures
 
     if pictures != "none":
         gl.info()
-    if PictureSettings.of(pictures).lit:
+    if parse_pictures(pictures).quality is not None:
         device()
 
 

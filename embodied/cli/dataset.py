@@ -18,8 +18,7 @@ from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
 from embodied.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
-from embodied.render.pictures import KINDS as PICTURE_KINDS
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import PICTURES, PictureSettings, in_words, parse_pictures
 from embodied.splits import SCALES, DatasetSize, described
 
 FROM_PEOPLE = "from-people"
@@ -63,7 +62,7 @@ class Options(Furnished, Printed):
     """from-people: the data set that the study used."""
     people_only: bool = False
     """from-people: leave out all routes but people's."""
-    pictures: Annotated[str | None, drawn_as(PICTURE_KINDS)] = None
+    pictures: Annotated[str | None, drawn_as(("none", *PICTURES))] = None
     """How the panorama of every viewpoint is drawn (default: as existing panoramas are, else fast; hari:
     none)."""
     size: CubeFace | None = None
@@ -127,25 +126,28 @@ def run(args: Options) -> None:
     )
     watch = lambda jobs, total: tqdm(jobs, "houses", total=total, unit="house", mininterval=pause())
     if args.ray in (None, "local") and not (args.out / "dataset.json").exists():
-        check_machine(chosen_pictures(args.kind, args.pictures, args.size, None).kind)
+        wanted = chosen_pictures(args.kind, args.pictures, args.size, None)
+        check_machine("none" if wanted is None else wanted.word)
     how: dict[str, Any] = {"workers": args.workers, "watch": watch, "ray_address": args.ray}
     build_dataset(config, args.out, args.cache, own=args.own, **how)
     data = Dataset(args.out)
     pictures = chosen_pictures(args.kind, args.pictures, args.size, data.pictures)
-    if pictures.kind != "none":
-        note(f"drawing panoramas: {pictures.kind}, faces of {pictures.size} pixels; what is drawn already is kept")
+    if pictures is not None:
+        note(f"drawing panoramas: {pictures.word}, faces of {pictures.size} pixels; what is drawn already is kept")
         draw_panoramas(config, args.out, args.cache, pictures=pictures, **how)
     if args.export:
         files = [f for name in programs for f in export_folder(name, data, args.export / name)]
         note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
     splits = {name: dataclasses.asdict(counts) for name, counts in data.index.splits.items()}
-    facts = {"folder": str(args.out), "digest": data.digest, "splits": splits}
-    facts["pictures"] = dataclasses.asdict(pictures)
+    facts: dict[str, Any] = {"folder": str(args.out), "digest": data.digest, "splits": splits}
+    facts["pictures"] = None if pictures is None else in_words(pictures)
     show(args, facts, f"{data.table()}\ndigest {data.digest[:16]}, in {args.out}")
 
 
-def chosen_pictures(kind: str, pictures: str | None, size: int | None, held: PictureSettings | None) -> PictureSettings:
-    """How the panoramas of a data set are drawn; 'none': not at all.
+def chosen_pictures(
+    kind: str, pictures: str | None, size: int | None, held: PictureSettings | None
+) -> PictureSettings | None:
+    """How the panoramas of a data set are drawn; None: not at all.
 
     Args:
       pictures, size: what --pictures and --size say; None where they are left out.
@@ -155,10 +157,9 @@ def chosen_pictures(kind: str, pictures: str | None, size: int | None, held: Pic
     from embodied.task_kind import kind_named
 
     if pictures is None and held is not None:
-        return dataclasses.replace(held, size=size or held.size)
-    return PictureSettings(
-        size or PictureSettings().size, pictures or ("fast" if kind_named(kind).pictures else "none")
-    )
+        return parse_pictures(held, size)
+    word = pictures or ("fast" if kind_named(kind).pictures else "none")
+    return None if word == "none" else parse_pictures(word, size)
 
 
 def chosen_scale(args: Options) -> str | DatasetSize:

@@ -72,7 +72,7 @@ def run(args: Options) -> int:
         else:  # libraries are found by processes that start when they are there
             again = ["doctor", "--cache", str(args.cache), *["--json"] * args.json]
             return subprocess.run([sys.executable, "-m", "embodied", *again], check=False).returncode
-    for look in (versions, extras, renderer, packs, path_tracer, vulkan, body, disk):
+    for look in (versions, extras, renderer, packs, path_tracer, body, disk):
         findings.append(look(args))
         if not args.json:
             print(line(findings[-1]), flush=True)
@@ -196,18 +196,6 @@ def path_tracer(_: Options) -> Finding:
         return Finding("path tracer", False, text, REMEDY, False)
     variant = next(v for v, _ in VARIANTS if v.startswith(found))
     return Finding("path tracer", True, f"Mitsuba on {found} (variant {variant})", needed=False)
-
-
-def vulkan(_: Options) -> Finding:
-    """The loader that the Filament back end needs."""
-    import ctypes.util
-
-    found = ctypes.util.find_library("vulkan")
-    remedy = (
-        "only --pictures fast-filament and normal-filament need it, with the extra [filament]: apt-get install "
-        "libvulkan1 mesa-vulkan-drivers"
-    )
-    return Finding("Vulkan", found is not None, found or "no Vulkan loader", remedy, False)
 
 
 def body(_: Options) -> Finding:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from embodied.cli.common import bar, note
+from embodied.render.pictures import in_words
 
 if TYPE_CHECKING:
     from embodied.agents.vision.lessons import Lessons
@@ -73,7 +74,7 @@ def evaluate_trained(
     looking = sorted({r.agent for r in found} - blind)
     names = [n for split in splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file), "looking": looking}
-    facts["pictures"] = {n: dataclasses.asdict(pictures_of(data, n, args.pictures)) for n in names}
+    facts["pictures"] = {n: in_words(pictures_of(data, n, args.pictures)) for n in names}
     facts |= {"goal_image": dataclasses.asdict(CAPTURE_CONDITIONS[args.goal_image]), "identity": identity_of(*JUDGES)}
     return found, facts
 

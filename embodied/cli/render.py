@@ -15,7 +15,7 @@ from embodied.cli.common import Furnished, Printed, catalogue_of, check_machine,
 from embodied.options import CubeFace, Option, OutputPng, drawn_as, house_folder, whole
 from embodied.render.panorama import VFOV36
 from embodied.render.photograph import CAMERAS
-from embodied.render.pictures import PICTURES, PictureSettings
+from embodied.render.pictures import PICTURES, parse_pictures
 
 if TYPE_CHECKING:
     from embodied.world import World
@@ -55,7 +55,7 @@ def run(args: Options) -> None:
         )
     check_machine("unlit")  # the house may be lit already
     catalogue = catalogue_of(args)
-    drawn = PictureSettings(args.size, args.pictures)
+    drawn = parse_pictures(args.pictures, args.size)
     with open_folder(args.folder, catalogue, args.cache, drawn) as world:
         fetch(catalogue, world.house)
         if args.node is not None:

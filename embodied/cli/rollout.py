@@ -14,7 +14,7 @@ from embodied.cli.common import Furnished, Printed, bar, catalogue_of, check_mac
 from embodied.cli.recording import Filmed, Viewers, film, viewers_of
 from embodied.options import Count, CubeFace, HouseFolder, Option, drawn_as
 from embodied.render.photograph import CAMERAS
-from embodied.render.pictures import DRAWN, PictureSettings
+from embodied.render.pictures import DRAWN, parse_pictures
 
 if TYPE_CHECKING:
     from embodied.world import World
@@ -95,7 +95,7 @@ def world_of(args: Options) -> World:
     from embodied.generate import generate_house
     from embodied.world import open_folder, open_world
 
-    catalogue, drawn = catalogue_of(args), PictureSettings(args.size, args.pictures)
+    catalogue, drawn = catalogue_of(args), parse_pictures(args.pictures, args.size)
     if args.house:
         return open_folder(args.house, catalogue, args.cache, drawn)
     house = generate_house(args.seed, catalogue=catalogue)

@@ -15,7 +15,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,7 +24,7 @@ from embodied.cli.model import WithModel, client_of
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 from embodied.options import Count, Option, OutputFolder, any_path, whole
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import Baked, PictureSettings, Traced, matte, parse_pictures
 from embodied.serve.address import page_address
 
 if TYPE_CHECKING:
@@ -112,12 +112,12 @@ def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
     if stored is not None and stored.size >= study.size:
         return data.panoramas(name)
     blurred = f"those of the data set have faces of {stored.size if stored else 0} pixels, which a page shows blurred"
-    if stored is not None and stored.traced:
+    if isinstance(stored, Traced):
         note(
             f"panoramas of {name}: {blurred}; for sharper ones, `embodied dataset` traces them with --size {study.size}"
         )
         return data.panoramas(name)
-    pictures = PictureSettings(study.size, study.pictures) if stored is None else replace(stored, size=study.size)
+    pictures = parse_pictures(study.pictures if stored is None else stored, study.size)
     note(f"panoramas of {name}: drawn with faces of {study.size} pixels" + (f"; {blurred}" if stored else ""))
     try:
         with world_of(data, name, pictures, args) as world:
@@ -131,8 +131,8 @@ def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
 
 def live_world(data: Dataset, name: str, study: Study, args: Options) -> World:
     """A house to be drawn for people who drive: as its panoramas are, as far as that is quick."""
-    pictures = data.drawn_pictures(name) or PictureSettings(study.size, study.pictures)
-    return world_of(data, name, PictureSettings(kind="fast-matte") if pictures.traced else pictures.matte, args)
+    pictures = data.drawn_pictures(name) or parse_pictures(study.pictures, study.size)
+    return world_of(data, name, Baked("fast", gloss=False) if isinstance(pictures, Traced) else matte(pictures), args)
 
 
 def world_of(data: Dataset, name: str, pictures: PictureSettings, args: Options) -> World:

@@ -141,8 +141,14 @@ def looked_at(run: Path) -> RenderedInputs:
       RecordError: a damaged run.json.
     """
     from embodied.agents.vision.config import RenderedInputs
-    from embodied.records import from_plain, read_json
+    from embodied.records import RecordError, from_plain, read_json
+    from embodied.render.pictures import from_words
 
     path = run / "run.json"
     facts = read_json(path) if path.exists() else {}
-    return from_plain(RenderedInputs, {k: facts[k] for k in ("looking", "pictures") if k in facts}, str(path))
+    looking = from_plain(tuple[str, ...], facts.get("looking", []), f"looking of {path}")
+    try:
+        pictures = {str(name): from_words(words) for name, words in facts.get("pictures", {}).items()}
+    except (AttributeError, TypeError, ValueError) as e:
+        raise RecordError(f"{path} does not say how pictures were drawn ({e}); evaluate again") from e
+    return RenderedInputs(looking, pictures)

@@ -30,7 +30,7 @@ from embodied.locks import LOCK, locked
 from embodied.navigation.graph import NavGraph, build_graph, from_matterport, to_matterport
 from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import load_json, read_json, save_lines
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import PictureSettings, parse_pictures
 from embodied.seeds import stream
 from embodied.splits import SCALES, DatasetSize, SplitPlan
 from embodied.task_kind import TaskInputs, TaskKind, kind_named
@@ -215,10 +215,10 @@ def draw_panoramas(
       LockedError: another process writes into the folder.
 
     Examples:
-      >>> pictures = embodied.PictureSettings(size=64)
+      >>> pictures = embodied.Unlit(size=64)
       >>> embodied.draw_panoramas(config, Path('data/hanna'), embodied.default_cache(), pictures=pictures)
     """
-    arguments = (Path(folder).resolve(), Path(cache), PictureSettings.of(pictures))
+    arguments = (Path(folder).resolve(), Path(cache), parse_pictures(pictures))
     work = units(config.plan)
     with locked(Path(folder)):
         for_each_unit(draw_unit, work, arguments, workers=workers, watch=watch, ray_address=ray_address)

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from embodied.datasets.build import missing_units, units
 from embodied.datasets.checks import (
@@ -26,7 +26,7 @@ from embodied.language.plain import PlainLanguage
 from embodied.language.said import PeoplesWords, Said
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import read_lines
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import PictureSettings, Unlit, from_recorded, parse_pictures
 from embodied.splits import SplitPlan
 from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 
@@ -167,10 +167,11 @@ class Dataset:
         name: str,
         catalogue: Catalogue,
         cache: Path,
-        pictures: PictureSettings | str = PictureSettings(),
-        **changes: Any,
+        pictures: PictureSettings | str = Unlit(),
+        *,
+        size: int | None = None,
     ) -> World:
-        """The world with pictures of one house; `pictures` and `changes` as in embodied.world.open_world."""
+        """The world with pictures of one house; `pictures` and `size` as in embodied.world.open_world."""
         from embodied.world import World  # the one part that needs a renderer
 
         place = self.place(name)
@@ -181,7 +182,7 @@ class Dataset:
             catalogue,
             place.graph,
             cache,
-            PictureSettings.of(pictures, **changes),
+            parse_pictures(pictures, size),
             file=self.panoramas(name),
             may_differ=may,
         )
@@ -202,7 +203,7 @@ class Dataset:
         if made_of.get("house") != self.place(name).house.digest:
             return None
         try:
-            return PictureSettings.from_stored(made_of)
+            return from_recorded(made_of)
         except ValueError:  # drawn by a version with other words for it
             return None
 

@@ -24,7 +24,7 @@ from embodied.generate import HouseConfig
 from embodied.gym.driving import TEXT, DriveSettings, Driving
 from embodied.gym.eyes import LARGE, pixel_spaces
 from embodied.gym.playground import AREA, pictures_of
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import PictureSettings, matte
 from embodied.seeds import checked_seed
 from embodied.world import World, open_world
 
@@ -147,7 +147,7 @@ def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings |
     """The houses of a split."""
     whole, catalogue = Dataset(data), load_catalogue(cache)
     names = whole.names(split)
-    drawn = pictures or pictures_of(whole, names, wanted=False).matte
+    drawn = pictures or matte(pictures_of(whole, names, wanted=False))
     return {name: whole.open_world(name, catalogue, cache, drawn) for name in names}
 
 

@@ -22,7 +22,7 @@ from embodied.generate.people import add_people, meet
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
-from embodied.render.pictures import PictureSettings
+from embodied.render.pictures import PictureSettings, Unlit, parse_pictures
 from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, kind_named
 from embodied.world import makers, open_world
 
@@ -100,9 +100,9 @@ def flat_playground(kind: str, seed: int, asked: Asked) -> Playground:
             met = meet(house, graph, catalogue, seed=seed)
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
-        drawn = PictureSettings.of(asked.pictures or ("fast" if set(asked.sees) - {"oracle"} else "unlit"))
+        drawn = parse_pictures(asked.pictures or ("fast" if set(asked.sees) - {"oracle"} else "unlit"))
         world = open_world(house, catalogue, asked.cache, graph=graph, pictures=drawn)
-        if drawn.lit:
+        if drawn.quality is not None:
             world.baked(progress=True)
         worlds = {name: world}
     name, place = next(iter(worlds.items()))
@@ -141,15 +141,15 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
             f"{data.folder} has pictures of {len(found)} of its {len(names)} houses here; draw them with "
             f"{again}, or choose sees='oracle'"
         )
-    if wanted and len(ways := {(p.kind, p.size) for p in found.values()}) > 1:
+    if wanted and len(ways := {(p.word, p.size) for p in found.values()}) > 1:
         raise ValueError(f"the pictures in {data.folder} are of several kinds ({sorted(ways)}); finish {again}")
-    return next(iter(found.values()), PictureSettings())
+    return next(iter(found.values()), Unlit())
 
 
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:
     """The semantic features of a world over all classes of the catalogue, kept in the cache."""
     classes = tuple(catalogue.classes)
-    code = code_digest(*makers(PictureSettings()), "embodied.render.sightings", "embodied.gym.semantic_features")
+    code = code_digest(*makers(Unlit()), "embodied.render.sightings", "embodied.gym.semantic_features")
     key = digest(world.house.digest, np.asarray(world.graph.positions).tolist(), classes, code)
     path = cache / "semantic" / f"{key[:32]}.npy"
     with contextlib.suppress(OSError, ValueError, EOFError):  # absent or damaged: made anew

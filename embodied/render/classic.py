@@ -38,16 +38,6 @@ BARE: tuple[np.ndarray, ...] = (np.zeros((1, 1, 3), np.uint8),)
 """Pages of a house that is drawn without colours."""
 
 
-class Painter(Protocol):
-    """Draws the colours of a house in the classic renderer's place."""
-
-    def rgb(self, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-        """(h, w, 3) uint8 as `camera` sees it, top row first, from camera.NEAR to FAR."""
-        ...
-
-    def close(self) -> None: ...
-
-
 class Overlay(Protocol):
     """Adds to the colours of a house what no page holds."""
 
@@ -75,7 +65,6 @@ class Renderer:
         *,
         size: int = 256,
         lit: LitPages | None = None,
-        painter: Painter | None = None,
         overlay: Overlay | None = None,
         colours: bool = True,
     ) -> None:
@@ -86,7 +75,6 @@ class Renderer:
         Args:
           size: side of a cube face of `panorama`, pixels.
           lit: the baked pages to show; even light from all sides without.
-          painter: draws the colours instead, from the same pages; it is closed with the renderer.
           overlay: adds reflections; depth and ids stay as they are.
           colours: False for depth and ids alone: where the CPU draws, a house without light then opens in a fifth of
             the time, and one in 200,000 pixels, at an edge, shows another id.
@@ -98,9 +86,9 @@ class Renderer:
         check_size(size)
         self.house, self.size = house, size
         self._drawing: Geoms | raster.Raster | None = None
-        self._painter, self._overlay = painter, overlay
+        self._overlay = overlay
         self._software = gl.info().software
-        if (lit is not None or not colours) and painter is None and self._software and raster.able():
+        if (lit is not None or not colours) and self._software and raster.able():
             if lit is None:
                 meshes, pages = _bare_meshes(house_parts(house, catalogue)), BARE
             else:
@@ -144,8 +132,6 @@ class Renderer:
         edges.
         """
         drawing, chosen = self._open(), self._chosen(camera, size)
-        if self._painter is not None:
-            return View(self._rgb(camera, size, chosen), *self._seen(camera, size, chosen))
         picture, depth, ids = drawing.view(camera, size, self._drawn_size(size), chosen)
         return View(self._overlaid(averaged(picture, size), camera), cv2.flip(depth, 0), cv2.flip(ids, 0))
 
@@ -181,9 +167,6 @@ class Renderer:
 
     def close(self) -> None:
         """Free what lies on the graphics side; the renderer cannot be used afterwards."""
-        if self._painter is not None:
-            self._painter.close()
-            self._painter = None
         if self._drawing is not None:
             with gl.drawing():
                 self._drawing.close()
@@ -236,8 +219,6 @@ class Renderer:
         return drawn_size(size) if self._software else size
 
     def _rgb(self, camera: Camera, size: tuple[int, int], chosen: np.ndarray) -> np.ndarray:
-        if self._painter is not None:
-            return self._overlaid(self._painter.rgb(camera, size), camera)
         picture = self._open().rgb(camera, self._drawn_size(size), chosen)
         return self._overlaid(averaged(picture, size), camera)
 
