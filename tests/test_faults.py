@@ -36,6 +36,7 @@ from embodied.evaluation.rollout import play
 from embodied.generate import generate_house
 from embodied.house.house import HouseError
 from embodied.interface import Episode
+from embodied.light import LightError, backend
 from embodied.light.baking import house as baking
 from embodied.mattersim.graphs import load_graphs
 from embodied.policies.baselines import Shortest
@@ -250,42 +251,33 @@ def test_two_that_light_one_house_light_it_once(tmp_path, monkeypatch):
     assert len(made) == 1
 
 
-@pytest.mark.parametrize(
-    ("device", "words"),
-    [
-        ("llvm", ", takes about a minute$"),
-        ("numpy", "takes about 7 minutes, at least 8 times as long.*neither.*doctor --fix"),
-    ],
-)
-def test_whoever_lights_a_house_is_told_before_how_long_it_takes(device, words, monkeypatch, tmp_path, caplog):
+def test_whoever_lights_a_house_is_told_before_how_long_it_takes(monkeypatch, tmp_path, caplog):
     house = grid_world(4).house
 
     class Begun(Exception):
         pass
 
     def begin(*_, **__):
-        assert re.search(f"lighting {house.name}, which .*{words}", caplog.text.strip())
+        assert re.search(f"lighting {house.name}, which .*, takes about a minute$", caplog.text.strip())
         raise Begun
 
     for name, value in {
-        "house_parts": lambda *_: (),
-        "looks_of": lambda _: "",
-        "Shared": begin,
-        "device": lambda: device,
-        "rays_per_second": lambda: house.area * baking.RAYS["fast"] / (6.5 * 60),
-    }.items():
+        "house_parts": lambda *_: (), "looks_of": lambda _: "", "Shared": begin, "device": lambda: "llvm"
+    }.items():  # fmt: skip
         monkeypatch.setattr(baking, name, value)
-    monkeypatch.setattr(os, "cpu_count", lambda: 4)
     with pytest.raises(Begun):
         baking.bake(house, None, tmp_path, "fast")
 
 
-def test_the_doctor_says_what_light_costs_without_llvm(monkeypatch):
-    assert 1e3 < baking.rays_per_second(faces=100) < 1e9, "measured"
-    monkeypatch.setattr("embodied.light.backend.device", lambda: "numpy")
-    monkeypatch.setattr(baking, "rays_per_second", lambda: baking.RAYS["fast"] / 3)
-    found = doctor.path_tracer(None)
-    assert "3.0 s per square metre" in found.text and "LLVM" in found.remedy and not found.ok and not found.needed
+def test_without_llvm_light_and_the_doctor_say_what_is_missing_before_any_work(monkeypatch, tmp_path, caplog):
+    monkeypatch.setattr("embodied.light.backend.mitsuba", lambda: backend.variant_of(lambda name: False))
+    for name, value in {"house_parts": lambda *_: (), "looks_of": lambda _: ""}.items():
+        monkeypatch.setattr(baking, name, value)
+    with pytest.raises(LightError, match=r"needs LLVM .*`embodied doctor --fix`"):
+        baking.bake(grid_world(4).house, None, tmp_path, "fast")
+    assert not caplog.text
+    finding = doctor.path_tracer(None)
+    assert "doctor --fix" in finding.text and "unlit" in finding.remedy and not finding.ok and not finding.needed
 
 
 # What is read -------------------------------------------------------------------------------------

@@ -181,19 +181,13 @@ def packs(args: Options) -> Finding:
 
 
 def path_tracer(_: Options) -> Finding:
-    """What computes light: Mitsuba with CUDA or LLVM, slower without; houses are drawn unlit without Mitsuba."""
-    from embodied.light.backend import REMEDY, VARIANTS, LightError, device
+    """Mitsuba with CUDA or LLVM, which computes light; houses are drawn unlit without."""
+    from embodied.light.backend import VARIANTS, LightError, device
 
     try:
         found = device()
     except LightError as e:
         return Finding("path tracer", False, str(e), "until then draw houses without light (unlit)", False)
-    if found == "numpy":
-        from embodied.light.baking.house import RAYS, rays_per_second
-
-        pace = RAYS["fast"] / rays_per_second()
-        text = f"NumPy, for lack of CUDA and LLVM: light takes {pace:.1f} s per square metre in fast quality"
-        return Finding("path tracer", False, text, REMEDY, False)
     variant = next(v for v, _ in VARIANTS if v.startswith(found))
     return Finding("path tracer", True, f"Mitsuba on {found} (variant {variant})", needed=False)
 

@@ -1,8 +1,7 @@
 """Where Mitsuba is found and started, and the few array helpers all of `embodied.light` shares.
 
-Mitsuba's fast variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
+Mitsuba's variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
 needs a shared libLLVM of version 15 or later (`embodied doctor --fix`, or Debian: `apt install libllvm19`).
-Where Dr.Jit finds neither, NumPy computes the light (`embodied.light.in_numpy`).
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from embodied.errors import UnableError
-from embodied.light import in_numpy
 from embodied.light.arrays import Array, Ray, RayScene
 from embodied.software import bundled, load_atomic
 from embodied.threads import threads_allowed
@@ -38,11 +36,10 @@ _LLVM_PLACES = (
 OLDEST_LLVM = 15
 VARIANTS = (("cuda_ad_rgb", "CUDA"), ("llvm_ad_rgb", "LLVM"))
 """Mitsuba's variants with arrays, best first, and what Dr.Jit needs for each."""
-REMEDY = (
-    "`embodied doctor --fix` brings LLVM on Linux on x86-64; elsewhere install it (Debian: apt install libllvm19, "
-    "macOS: brew install llvm) or name it in DRJIT_LIBLLVM_PATH"
+LLVM_REMEDY = (
+    "run `embodied doctor --fix` on Linux on x86-64, elsewhere install LLVM (Debian: apt install libllvm19, macOS: "
+    "brew install llvm) or name it in DRJIT_LIBLLVM_PATH"
 )
-"""What makes light fast where it is computed in NumPy."""
 
 
 class LightError(UnableError):
@@ -61,8 +58,12 @@ def find_llvm() -> str | None:
 
 
 @functools.cache
-def _module() -> types.ModuleType:
-    """Mitsuba itself, with its best variant switched on; what stands in for it where it has none."""
+def mitsuba() -> types.ModuleType:
+    """Mitsuba with its best variant switched on.
+
+    Raises:
+      LightError: Mitsuba is not installed, or there is neither CUDA nor LLVM.
+    """
     if "DRJIT_LIBLLVM_PATH" not in os.environ and (llvm := find_llvm()):
         os.environ["DRJIT_LIBLLVM_PATH"] = llvm  # Dr.Jit reads it once, when it is imported
     load_atomic()
@@ -76,40 +77,33 @@ def _module() -> types.ModuleType:
             remedy = "apt-get install libatomic1 or, without root on Debian and Ubuntu, embodied doctor --fix"
         raise LightError(f"light needs mitsuba ({why}); {remedy}, or look at houses without light (unlit)") from e
 
-    variant = variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name))))
-    if variant == in_numpy.variant():
-        return in_numpy
-    mi.set_variant(variant)
+    mi.set_variant(variant_of(lambda name: bool(dr.has_backend(getattr(dr.JitBackend, name)))))
     if (threads := threads_allowed()) is not None:
         dr.set_thread_count(threads)
     return mi
 
 
 def variant_of(has_backend: Callable[[str], bool]) -> str:
-    """The Mitsuba variant to use: CUDA's before LLVM's; 'numpy' for none.
+    """The Mitsuba variant to use: CUDA's before LLVM's.
 
     Args:
       has_backend: whether Dr.Jit can use 'CUDA' or 'LLVM' here.
+
+    Raises:
+      LightError: it can use neither.
     """
     for variant, name in VARIANTS:
         if has_backend(name):
             return variant
-    return in_numpy.variant()
-
-
-def mitsuba() -> types.ModuleType:
-    """Mitsuba in its best variant; `embodied.light.in_numpy` where it has none.
-
-    Raises:
-      LightError: Mitsuba is not installed.
-    """
-    return _module()
+    raise LightError(
+        f"light needs LLVM {OLDEST_LLVM} or later, or CUDA, and neither works here; {LLVM_REMEDY}, or look at houses "
+        "without light (unlit)"
+    )
 
 
 def drjit() -> types.ModuleType:
-    """Dr.Jit, for what can be done with Mitsuba's arrays; `embodied.light.in_numpy` where Mitsuba has none."""
-    if _module() is in_numpy:
-        return in_numpy
+    """Dr.Jit, for what can be done with Mitsuba's arrays; raises LightError as `mitsuba`."""
+    mitsuba()
     import drjit as dr
 
     return dr
@@ -129,8 +123,8 @@ mi, dr = _Late(mitsuba), _Late(drjit)
 
 
 def device() -> str:
-    """'cuda', 'llvm' or 'numpy': what the light is computed on, for fingerprints and tables."""
-    return _module().variant().split("_")[0]
+    """'cuda' or 'llvm': what the light is computed on, for fingerprints and tables; raises LightError as `mitsuba`."""
+    return mitsuba().variant().split("_")[0]
 
 
 def scene_of(corners: np.ndarray) -> RayScene:
@@ -139,28 +133,14 @@ def scene_of(corners: np.ndarray) -> RayScene:
     Args:
       corners: (m, 3, 3) metres; triangle i is primitive i.
     """
-    mi = _module()
-    if mi is not in_numpy:
-        scene = _scene(mi, corners)
-        return Apart(scene) if _one_scene_per_kernel() else scene
-    meet = in_numpy.embree(corners)
-    if meet is None:
-        import mitsuba
-
-        mitsuba.set_variant("scalar_rgb")
-        meet = in_numpy.one_by_one(_scene(mitsuba, corners), mitsuba)
-    return in_numpy.Triangles(meet)
-
-
-def _scene(mi: types.ModuleType, corners: np.ndarray) -> RayScene:
-    """`scene_of` in a variant of Mitsuba."""
     m = len(corners)
     mesh = mi.Mesh("triangles", 3 * m, m)
     params = mi.traverse(mesh)
     params["vertex_positions"] = np.ascontiguousarray(corners, np.float32).ravel()
     params["faces"] = np.arange(3 * m, dtype=np.uint32)
     params.update()
-    return mi.load_dict({"type": "scene", "triangles": mesh})
+    scene = mi.load_dict({"type": "scene", "triangles": mesh})
+    return Apart(scene) if _one_scene_per_kernel() else scene
 
 
 def _one_scene_per_kernel() -> bool:

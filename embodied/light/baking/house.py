@@ -24,7 +24,7 @@ from tqdm import tqdm
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.assets.catalogue import Catalogue
 from embodied.house.house import WEATHERS, House, Sky
-from embodied.light.backend import REMEDY, device, rest, warn
+from embodied.light.backend import device, rest, warn
 from embodied.light.baking.compose import Composer, Solved, page_of
 from embodied.light.baking.solve import Problem, Radiosity, solve
 from embodied.light.baking.stages import facts_of, kept_light, mark_of, same_atlas
@@ -36,7 +36,6 @@ from embodied.light.pages.colours import ColourMaps
 from embodied.light.pages.files import Bake, StaleBake, open_bake, packed_meshes, page_files, reopened, write_pages
 from embodied.light.pages.meshes import meshes_of
 from embodied.light.pages.tone import expose
-from embodied.light.pages.unwrap import openness
 from embodied.light.settings import QUALITIES, Settings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
 from embodied.light.tracing.luxels import Luxels, luxels_of, with_glow
@@ -57,10 +56,6 @@ SECONDS = {"fast": 1.0, "normal": 2.5, "high": 8.0}
 """Of one core per square metre of a house, by quality, with furniture that is new to the cache."""
 MOST_CORES = 8
 """More shorten it little."""
-SLOWER = 2
-"""How many times as long one core takes without CUDA and LLVM; more where Embree is not installed, either."""
-RAYS = {"fast": 2.0e6, "normal": 5.0e6, "high": 16e6}
-"""What light costs then per square metre, by quality, in rays of `rays_per_second`."""
 STAGES = {
     "unwrapping": (0.0, 0.2),
     "direct light": (0.2, 0.4),
@@ -75,31 +70,10 @@ TOGETHER = 8
 
 
 def duration(house: House, quality: str) -> str:
-    """About how long `bake` takes on this machine, in words; without CUDA and LLVM also how much longer that is, and
-    what helps."""
+    """About how long `bake` takes on this machine, in words."""
     cores = min(os.cpu_count() or 1, MOST_CORES)
-    if device() != "numpy":
-        return _minutes(house.area * SECONDS.get(quality, SECONDS["normal"]) / cores)
-    about = _minutes(house.area * RAYS.get(quality, RAYS["normal"]) / rays_per_second())
-    return (
-        f"{about}, at least {SLOWER * cores} times as long as with CUDA or LLVM, of which this machine has neither: "
-        f"NumPy computes it on one core; {REMEDY}"
-    )
-
-
-def _minutes(seconds: float) -> str:
+    seconds = house.area * SECONDS.get(quality, SECONDS["normal"]) / cores
     return f"about {math.ceil(seconds / 60)} minutes" if seconds > 60 else "about a minute"
-
-
-def rays_per_second(faces: int = 4000, rays: int = 8) -> float:
-    """How many rays this machine follows among scattered triangles, their arithmetic included, as it is used now."""
-    rng, took = np.random.default_rng(0), []
-    corners = rng.random((faces, 1, 3)) * 2 + rng.normal(0, 0.1, (faces, 3, 3))
-    for _ in range(3):
-        start = time.perf_counter()
-        openness(corners, rays)
-        took.append(time.perf_counter() - start)
-    return 2 * faces * rays / float(np.median(took))
 
 
 @contextlib.contextmanager
@@ -159,7 +133,7 @@ def bake(
       progress: told the stage's name and how far it is, 0 to 1.
 
     Raises:
-      LightError: Mitsuba is missing, or the bake disagrees with the path tracer.
+      LightError: Mitsuba, or CUDA and LLVM, are missing, or the bake disagrees with the path tracer.
     """
     return bake_all((house,), catalogue, cache, settings, progress=progress)[0]
 
@@ -195,6 +169,7 @@ def bake_all(
             done = reopened(folder, house)  # whoever held it may have made it
             if done is None:
                 if shared is None:
+                    device()  # or LightError, before any work
                     several = len(lightings) > 1
                     how_long = duration(house, _name_of(settings))
                     log.warning("lighting %s, which %s keeps, takes %s", house.name, cache, how_long)

@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 
 from embodied.house.house import House
 from embodied.light.arrays import Array
-from embodied.light.backend import array, device, dr, mi, vector
+from embodied.light.backend import array, dr, mi, vector
 from embodied.light.pages.colours import shown
 
 TARGET = 1.05
@@ -56,9 +56,7 @@ class Exposure:
         ).astype(np.float32)
 
     def many(self, position: np.ndarray) -> np.ndarray:
-        """`at` for many points, on Mitsuba's device where it has one."""
-        if device() == "numpy":
-            return self.at(position)
+        """`at` for many points, on Mitsuba's device."""
         grid, low = self._grid
         count = np.array(grid.shape[1:])
         where = ((np.asarray(position, np.float32) - low) / CELL + 0.5) / count

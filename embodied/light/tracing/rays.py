@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from embodied.light.backend import dr, mi, scene_of, vector
-from embodied.light.in_numpy import embree
 
 if TYPE_CHECKING:
     from embodied.render.gloss import Rays
@@ -19,6 +19,23 @@ def rays_among(corners: np.ndarray) -> Rays:
     Mitsuba is as quick, but its threads wait awake for more work, a third of the processor time of a picture.
     """
     return embree(corners) or mitsuba_among(corners)
+
+
+def embree(corners: np.ndarray) -> Rays | None:
+    """Embree's rays among triangles (m, 3, 3), on the thread that asks; None where it is not installed."""
+    if importlib.util.find_spec("embreex") is None:
+        return None
+    from embreex import mesh_construction, rtcore_scene  # late: not for every machine
+
+    scene = rtcore_scene.EmbreeScene()
+    mesh_construction.TriangleMesh(scene, np.ascontiguousarray(corners, np.float32))
+
+    def first(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        single = (np.ascontiguousarray(a, np.float32) for a in (start, onward))
+        hit = scene.run(*single, dists=None, output=1)
+        return hit["primID"], hit["tfar"], hit["u"], hit["v"]
+
+    return first
 
 
 def mitsuba_among(corners: np.ndarray) -> Rays:
