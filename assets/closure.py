@@ -185,4 +185,5 @@ def _distributions() -> Mapping[str, list[str]]:
 
 def _version(library: str) -> str:
     """Version of the distributions that a top name belongs to, by whatever names; '' where none is installed."""
-    return " ".join(sorted({importlib.metadata.version(d) for d in _distributions().get(library, ())}))
+    names = [name for name in _distributions().get(library, ()) if name]  # None: its metadata are lost
+    return " ".join(sorted({importlib.metadata.version(name) or "" for name in names}))

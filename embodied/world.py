@@ -294,12 +294,21 @@ class World:
         path = self.cache / "sightings" / f"{digest(self._origin, code)[:32]}.npz"
         table = load_table(path)
         if table is None:
-            with Renderer(self.house, self.catalogue, size=FACE, colours=False) as renderer:
-                table = sightings_table(
-                    [renderer.seen(p, FACE) for p in self.graph.positions], len(self.house.placements)
-                )
+            table = sightings_table(self._seen_from_nodes(), len(self.house.placements))
             save_table(path, table)
         return table
+
+    def _seen_from_nodes(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Depth and ids of the cube faces of FACE pixels around every node."""
+        positions = self.graph.positions
+        if not gl.available():
+            from embodied.render.ray_casting import RayCaster  # late: compiles the house
+
+            log.warning("no OpenGL here: rays find what is seen in %s, a second a viewpoint", self.name)
+            caster = RayCaster(self.house, self.catalogue)
+            return [caster.seen(p, FACE) for p in positions]
+        with Renderer(self.house, self.catalogue, size=FACE, colours=False) as renderer:
+            return [renderer.seen(p, FACE) for p in positions]
 
 
 def open_world(

@@ -20,6 +20,7 @@ from embodied.datasets.matterport import in_matterport_order
 from embodied.datasets.store import Dataset
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
+from embodied.render.pictures import recorded
 from embodied.scene.house_meshes import owners
 from embodied.seeds import stream
 
@@ -79,7 +80,7 @@ def paint(data, pictures, names=None):
         place = data.place(name)
         many = len(owners(place.house))
         nodes = [painted_panorama(k, many, pictures.size) for k in range(len(place.graph.ids))]
-        meta = {"house": place.house.digest, **pictures.stored()}
+        meta = {"house": place.house.digest, **recorded(pictures)}
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)
 
 

@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
-from embodied.render.pictures import Unlit
+from embodied.render.pictures import Unlit, recorded
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAD = 'title = "Finding things"\ndata = "data"\nconsent = "I agree."\npractice = false\npace = 0.02\nsize = 64\n'
@@ -33,7 +33,7 @@ def make_data(folder: Path, kind: str = "hanna"):
     pictures = Unlit(size=64)
     for name in sorted({n for s in data.splits for n in data.names(s)}):
         place = data.place(name)
-        meta = {"house": place.house.digest, **pictures.stored()}
+        meta = {"house": place.house.digest, **recorded(pictures)}
         nodes = [gradient(k) for k in range(len(place.graph.ids))]
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)
     return data

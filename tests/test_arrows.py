@@ -86,6 +86,18 @@ def test_imports_follow_the_arrows_of_the_design():
     assert not wrong, "\n".join(wrong)
 
 
+def test_opengl_is_loaded_by_the_raster_alone_and_the_raster_when_it_draws():
+    drawing = ("OpenGL", "mujoco.egl", "mujoco.osmesa", "embodied.render.raster")
+    early = []
+    for path in sources():
+        for node in ast.parse(path.read_text()).body:
+            names = [a.name for a in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
+            if isinstance(node, ast.ImportFrom):
+                names = [f"{node.module}.{name}" for name in names]
+            early += [f"{path.stem}: {name}" for name in names if name.startswith(drawing)]
+    assert early == ["raster: OpenGL.GL"]
+
+
 def test_a_wrong_arrow_is_noticed(tmp_path, monkeypatch):
     monkeypatch.setattr("test_arrows.ROOT", tmp_path)
     bad = tmp_path / "assets" / "bad.py"

@@ -11,6 +11,7 @@ import pytest
 import embodied.assets.closure as closure_module
 from embodied.assets.closure import ROOT, closure, code_digest
 from embodied.assets.importing import importer
+from embodied.cli import doctor
 from embodied.datasets.build import program
 from embodied.light import settings
 from embodied.light.pages import colours, unwrap
@@ -215,6 +216,18 @@ def test_versions_of_libraries_are_in_the_key(monkeypatch):
     monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == "mujoco" else "")
     assert key(ROOT, *makers(Unlit())) != before
     code_digest.cache_clear()
+
+
+def test_a_neighbour_without_metadata_neither_stops_the_digest_nor_the_doctor(tmp_path, monkeypatch):
+    before = closure_module._version("numpy")
+    for folder in ("Foo-1.0.dist-info", "torch-2.0.dist-info", "-1.0.dist-info"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "RECORD").write_text("numpy/__init__.py,,\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    closure_module._distributions.cache_clear()
+    assert closure_module._version("numpy") == before
+    closure_module._distributions.cache_clear()
+    assert "agents" in doctor.extras(None).remedy, "torch is there without a version"
 
 
 def test_an_optional_package_that_comes_or_goes_leaves_data_sets_as_they_are(monkeypatch):

@@ -8,7 +8,11 @@ import os
 import subprocess
 import sys
 import threading
+<<<<<<< HEAD
 import weakref
+=======
+from pathlib import Path
+>>>>>>> a0a483aa (Without OpenGL all works that draws nothing; broken neighbours in site-packages stop nothing)
 
 import numpy as np
 import pytest
@@ -16,6 +20,7 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
 from embodied import gl
+from embodied.house.house import House
 from embodied.navigation.graph import graph_of
 from embodied.render.classic import Renderer
 from embodied.render.pictures import Unlit
@@ -25,9 +30,13 @@ pytestmark = pytest.mark.gl
 EYE = (3.0, 2.0, 1.5)
 
 
+def house_to_draw() -> House:
+    return furnished(two_rooms())
+
+
 @pytest.fixture(scope="module")
 def house():
-    return furnished(two_rooms())
+    return house_to_draw()
 
 
 def world_of(house, tmp_path, **more) -> World:
@@ -110,6 +119,57 @@ def ended(code: str, **environment: str) -> subprocess.CompletedProcess:
         timeout=600,
         env={**os.environ, **environment},
     )
+
+
+WITHOUT_OPENGL = """
+import ctypes, ctypes.util, pkgutil, importlib, sys
+find, load = ctypes.util.find_library, ctypes.CDLL.__init__
+libraries = ("EGL", "OSMesa", "GL", "OpenGL", "GLX", "GLESv2", "GLESv1_CM")
+
+def refuse(self, name, *args, **more):
+    if any(f"lib{x}." in str(name) for x in libraries):
+        raise OSError(f"{name} cannot be opened")
+    load(self, name, *args, **more)
+
+ctypes.util.find_library = lambda name: None if name in libraries else find(name)
+ctypes.CDLL.__init__ = refuse
+
+from pathlib import Path
+import embodied, embodied.cli, embodied.datasets.build, embodied.evaluation.evaluate, embodied.gym.env
+from embodied import gl
+from test_gl import house_to_draw, sum_of, world_of
+for name in embodied.__all__:
+    getattr(embodied, name)
+for module in pkgutil.iter_modules(embodied.cli.__path__):
+    importlib.import_module("embodied.cli." + module.name)
+assert not gl.available() and "OpenGL.GL" not in sys.modules
+house, folder = house_to_draw(), Path(sys.argv[1])
+with world_of(house, folder, may_differ=("renderer", "code")) as world:
+    print(sum_of(world))
+world = embodied.open_world(house, world.catalogue, folder / "other cache", graph=world.graph)
+print(sorted(s.placement for s in world.sightings(0)))
+try:
+    world.panorama(0)
+except gl.GLError as e:
+    print(e)
+"""
+
+
+def test_without_opengl_stored_pictures_are_read_rays_find_what_is_seen_and_drawing_says_the_remedy(tmp_path):
+    with world_of(house_to_draw(), tmp_path) as world:
+        world.render_all()
+        total, seen = sum_of(world), sorted(s.placement for s in world.sightings(0))
+    child = subprocess.run(
+        [sys.executable, "-c", WITHOUT_OPENGL, tmp_path],
+        check=False,
+        capture_output=True,
+        text=True,
+        cwd=Path(__file__).parent,
+        env={k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")},
+    )
+    assert child.returncode == 0, child.stderr
+    stored, sighted, error = child.stdout.splitlines()
+    assert (int(stored), sighted) == (total, str(seen)) and "apt-get install libegl1" in error
 
 
 def test_nothing_is_printed_at_exit_where_dm_control_is_imported_after_the_first_picture():

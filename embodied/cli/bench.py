@@ -77,7 +77,7 @@ def run(args: Options) -> None:
     for m in itertools.chain.from_iterable(lines[p]() for p in parts if p in lines):
         note(timing.table([m]).splitlines()[-1])
         measures.append(m)
-    facts = {"renderer": str(gl.info()), **timing.machine(), "seed": args.seed}
+    facts = {"renderer": str(gl.info()) if gl.available() else "no OpenGL", **timing.machine(), "seed": args.seed}
     texts = [f"{facts['renderer']}; {facts['cores']} cores, {facts['system']}, seed {args.seed}"]
     facts["measures"] = [asdict(m) for m in measures]
     if measures:

@@ -55,8 +55,9 @@ def check_machine(pictures: str) -> None:
     from embodied.light.backend import device
     from embodied.render.pictures import parse_pictures
 
-    if pictures != "none":
-        gl.info()
+    if pictures == "none":
+        return
+    gl.info()
     if parse_pictures(pictures).quality is not None:
         device()
 

@@ -6,6 +6,7 @@ with 1, and says what to do, when houses cannot be generated or rendered.
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import platform
 import shutil
@@ -141,13 +142,17 @@ def extras(_: Options) -> Finding:
 
 
 def _installed(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    found, missing = [], []
+    installed: list[str] = []
+    missing: list[str] = []
     for name in names:
-        try:
-            found.append(f"{name} {importlib.metadata.version(name)}")
-        except importlib.metadata.PackageNotFoundError:
+        version = None
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            version = importlib.metadata.version(name)  # None: its metadata are lost
+        if version is None:
             missing.append(name)
-    return found, missing
+        else:
+            installed.append(f"{name} {version}")
+    return installed, missing
 
 
 def renderer(_: Options) -> Finding:

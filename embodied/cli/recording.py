@@ -57,7 +57,7 @@ def viewers_of(args: Viewers) -> Iterator[tuple[str, ...]]:
     from embodied.viz.sinks import open_viewers
 
     with open_viewers(spawn=args.spawn, connect=args.connect, serve=args.serve, bind=args.bind) as viewers:
-        if args.spawn and gl.info().software:
+        if args.spawn and gl.available() and gl.info().software:
             note(
                 "this machine draws by software: the native viewer is slow, and fills memory with some drivers; "
                 "better --serve"

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from embodied.house.house import House
-from embodied.render import raster, visibility
+from embodied.render import visibility
 from embodied.render.camera import Camera, View, camera_at, face_cameras
 from embodied.render.geoms import Geoms
 from embodied.render.panorama import Panorama
@@ -31,6 +31,7 @@ from embodied.scene.part import Part
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
+    from embodied.render.raster import Raster
 
 MULTISAMPLES = 4
 """Of a pixel, where a GPU draws."""
@@ -83,9 +84,11 @@ class Renderer:
           ValueError: impossible size.
           GLError: no OpenGL context can be opened.
         """
+        from embodied.render import raster  # late: loads OpenGL
+
         check_size(size)
         self.house, self.size = house, size
-        self._drawing: Geoms | raster.Raster | None = None
+        self._drawing: Geoms | Raster | None = None
         self._overlay = overlay
         self._software = gl.info().software
         if (lit is not None or not colours) and self._software and raster.able():
@@ -179,7 +182,7 @@ class Renderer:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _open(self) -> Geoms | raster.Raster:
+    def _open(self) -> Geoms | Raster:
         if self._drawing is None:
             raise RuntimeError("the renderer is closed; make a new one")
         return self._drawing
