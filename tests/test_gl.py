@@ -8,11 +8,8 @@ import os
 import subprocess
 import sys
 import threading
-<<<<<<< HEAD
 import weakref
-=======
 from pathlib import Path
->>>>>>> a0a483aa (Without OpenGL all works that draws nothing; broken neighbours in site-packages stop nothing)
 
 import numpy as np
 import pytest
