@@ -54,7 +54,7 @@ class GLError(UnableError):
 
 @dataclass(frozen=True)
 class GLInfo:
-    """What draws the pictures; goes into every recording, data set and benchmark."""
+    """Description of the device that draws; goes into every recording, data set and benchmark."""
 
     backend: str
     """'egl' or 'osmesa'."""
@@ -90,7 +90,7 @@ def choose() -> str:
 
 
 def available() -> bool:
-    """Whether some off-screen OpenGL is here."""
+    """True where some off-screen OpenGL is here."""
     try:
         choose()
     except GLError:
@@ -120,7 +120,7 @@ def _first_available() -> str:
 
 
 def _egl_works() -> bool:
-    """Whether some EGL device initialises, tried without PyOpenGL, which binds one platform for good."""
+    """True where some EGL device initialises, tried without PyOpenGL, which binds one platform for good."""
     name = ctypes.util.find_library("EGL")
     if name is None or not any(map(ctypes.util.find_library, ("OpenGL", "GLESv2", "GLESv1_CM"))):  # PyOpenGL needs one
         return False

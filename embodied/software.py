@@ -36,8 +36,8 @@ def bundled(stem: str) -> Path | None:
         return None
     folder = Path(spec.origin).parent.parent / FOLDER
     load_triton_first()
-    found = sorted(folder.glob(f"lib{stem}-*.so*"))
-    return found[0] if found and _loaded(folder, found[0]) else None
+    libraries = sorted(folder.glob(f"lib{stem}-*.so*"))
+    return libraries[0] if libraries and _loaded(folder, libraries[0]) else None
 
 
 def _loaded(folder: Path, wanted: Path) -> bool:
@@ -105,10 +105,10 @@ def unpack(package: str, pattern: str, folder: Path) -> bool:
             subprocess.run(order, cwd=place, check=True, capture_output=True)
         (file,) = Path(place).glob(f"{package}_*.deb")
         subprocess.run(["dpkg-deb", "-x", file.name, "whole"], cwd=place, check=True, capture_output=True)
-        found = list(Path(place, "whole").rglob(pattern))
+        files = list(Path(place, "whole").rglob(pattern))
         folder.mkdir(parents=True, exist_ok=True)
-        for path in found:  # where a name links to another file, that file
+        for path in files:  # where a name links to another file, that file
             with atomic_path(folder / path.name) as draft:
                 shutil.copyfile(path, draft)
-        return bool(found)
+        return bool(files)
     return False

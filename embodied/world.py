@@ -104,7 +104,7 @@ class World:
         return FreePoses(self.house, self.graph)
 
     def is_free(self, position: Sequence[float] | np.ndarray) -> bool:
-        """Whether the agent can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
+        """True where the agent can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
         return self._poses.is_free(position)
 
     def random_pose(self, *, rng: np.random.Generator) -> tuple[np.ndarray, float]:
@@ -114,7 +114,7 @@ class World:
 
     @functools.cached_property
     def _origin(self) -> dict[str, object]:
-        """What the world's geometry depends on."""
+        """Facts that the world's geometry depends on."""
         return {
             "house": self.house.digest,
             "nodes": digest(self.graph.positions.tolist()),
@@ -135,12 +135,12 @@ class World:
 
     @functools.cached_property
     def path(self) -> Path:
-        """Where the panoramas of this world are, or will be, on disk."""
+        """File of the panoramas of this world, there or not."""
         return self._path or self.cached_path
 
     @functools.cached_property
     def cached_path(self) -> Path:
-        """Where the cache keeps panoramas of this very world, whoever had them drawn."""
+        """File in which the cache keeps panoramas of this very world, whoever had them drawn."""
         return self.cache / "panoramas" / f"{digest(self.fingerprint)[:32]}.pano"
 
     @property
@@ -175,12 +175,12 @@ class World:
             from embodied import light  # late: loads the path tracer
 
             name = self.pictures.quality or "normal"
-            told: list[str] = []
+            stages: list[str] = []
             with light.progress_bar(shown=progress) as show:
 
                 def tell(stage: str, done: float) -> None:
-                    if stage not in told:
-                        told.append(stage)
+                    if stage not in stages:
+                        stages.append(stage)
                         log.info("lighting %s: %s", self.name, stage)
                     show(stage, done)
 
@@ -188,7 +188,7 @@ class World:
         return self._bake
 
     def _source(self, progress: bool = False) -> Renderer | Tracer:
-        """What draws the panoramas; what it needs is made first, with progress bars if wanted."""
+        """Source of the panoramas; what it needs is made first, with progress bars if wanted."""
         p = self.pictures
         if p.quality is not None:
             self.baked(progress)
@@ -215,7 +215,7 @@ class World:
         vfov: float = VFOV36,
         size: tuple[int, int] = (480, 640),
     ) -> View:
-        """What a camera anywhere sees, drawn now: rgb, depth and ids.
+        """View of a camera anywhere, drawn now: rgb, depth and ids.
 
         Args:
           position: (x, y, z) metres, world.
@@ -367,7 +367,7 @@ def open_folder(
 
 
 def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_differ: Collection[str] = ()) -> str:
-    """What differs between what pictures were made of and what they should be made of: 'size 256 instead of 192'.
+    """Difference between what pictures were made of and what they should be made of: 'size 256 instead of 192'.
 
     Args:
       may_differ: what is not looked at.
@@ -378,14 +378,14 @@ def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_diff
 
 
 def gloss_of(bake: Bake, *, detail: bool = True) -> Gloss:
-    """What lays a baked house's reflections over its pictures, and, unless told otherwise, what matter shows from
+    """Overlay of a baked house's reflections over its pictures, and, unless told otherwise, what matter shows from
     nearby."""
-    from embodied.light.pages.shine import shine_of  # late: loads the path tracer
+    from embodied.light.pages.gloss_data import gloss_data_of  # late: loads the path tracer
     from embodied.light.tracing.rays import rays_among
     from embodied.render.gloss import Gloss
 
-    shine = shine_of(bake)
-    return Gloss(bake.lit, shine if detail else dataclasses.replace(shine, detail=()), rays_among)
+    data = gloss_data_of(bake)
+    return Gloss(bake.lit, data if detail else dataclasses.replace(data, detail=()), rays_among)
 
 
 def makers(pictures: PictureSettings) -> tuple[str, ...]:

@@ -36,16 +36,18 @@ def lit(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def solved(lit):
+def solution(lit):
     house, catalogue, cache, _ = lit
-    return baking.solve_house(house, baking.Shared(house, house_parts(house, catalogue), cache / "light", TINY), TINY)
+    return baking.solve_house(
+        house, baking.BakeContext(house, house_parts(house, catalogue), cache / "light", TINY), TINY
+    )
 
 
-def test_what_stands_in_outer_walls_takes_light_from_the_open_sky_on_its_outer_side_only(solved):
+def test_what_stands_in_outer_walls_takes_light_from_the_open_sky_on_its_outer_side_only(solution):
     """Doors straight from the sky; windows, which stand behind the portal they are, through it."""
-    house, atlas, lux = solved.house, solved.atlas, solved.lux
-    problem = solve.Problem(house, atlas, lux, solved.space, solved.outdoors, solved.lamps, TINY)
-    e, all_ = solve.outer_light(problem).mean(1), solved.light.soft.mean(1)
+    house, atlas, lux = solution.house, solution.atlas, solution.lux
+    inputs = solve.BakeInput(house, atlas, lux, solution.space, solution.outdoors, solution.lamps, TINY)
+    e, all_ = solve.outer_light(inputs).mean(1), solution.light.soft.mean(1)
     kinds = set()
     for opening in (o for o in house.openings if None in o.rooms):
         window = opening.kind == "window"
@@ -57,15 +59,15 @@ def test_what_stands_in_outer_walls_takes_light_from_the_open_sky_on_its_outer_s
     assert kinds == {True, False}
 
 
-def test_where_a_kernel_knows_one_scene_light_is_the_same(lit, solved, tmp_path, monkeypatch):
+def test_where_a_kernel_knows_one_scene_light_is_the_same(lit, solution, tmp_path, monkeypatch):
     """As on CUDA, where rays into two scenes in one kernel meet nothing: every ray is traced by a kernel of its own."""
     if backend.device() != "llvm":
         pytest.skip("compares CUDA's way with LLVM's, on LLVM")
     house, catalogue, *_ = lit
     monkeypatch.setattr(backend, "_one_scene_per_kernel", lambda: True)
-    again = baking.solve_house(house, baking.Shared(house, house_parts(house, catalogue), tmp_path, TINY), TINY)
-    assert isinstance(again.space.scene, backend.Apart) and not isinstance(solved.space.scene, backend.Apart)
-    assert np.allclose(again.light.soft, solved.light.soft, rtol=1e-4, atol=1e-4)
+    again = baking.solve_house(house, baking.BakeContext(house, house_parts(house, catalogue), tmp_path, TINY), TINY)
+    assert isinstance(again.space.scene, backend.Apart) and not isinstance(solution.space.scene, backend.Apart)
+    assert np.allclose(again.light.soft, solution.light.soft, rtol=1e-4, atol=1e-4)
 
 
 def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):
@@ -74,32 +76,32 @@ def test_a_bake_agrees_with_the_path_tracer_within_ten_percent(lit):
 
 
 @pytest.mark.parametrize("fault", ["all bounces a third too bright", "no bounces", "lamps forgotten"])
-def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solved, monkeypatch):
+def test_a_bake_that_is_broken_on_purpose_fails_loudly(fault, solution, monkeypatch):
     monkeypatch.setattr(check, "AGAIN", 40)
-    light = solved.light
+    light = solution.light
     broken = {
         "all bounces a third too bright": dataclasses.replace(light, indirect=light.indirect * 1.33),
         "no bounces": dataclasses.replace(light, indirect=light.indirect * 0),
         "lamps forgotten": dataclasses.replace(light, direct=light.direct * 0),
     }[fault]
     with pytest.raises(LightError, match="disagrees with the path tracer.*worst at"):
-        check.check(dataclasses.replace(solved, light=broken))
+        check.check(dataclasses.replace(solution, light=broken))
 
 
-def test_a_third_of_the_luxels_dark_slips_through_one_time_in_eight_at_most(solved, monkeypatch):
+def test_a_third_of_the_luxels_dark_slips_through_one_time_in_eight_at_most(solution, monkeypatch):
     """Whichever third it is, and whichever luxels are looked at; a bake without fault is not told off."""
-    known = check.compare(solved, luxels=200, paths_each=check.PATHS)
+    known = check.compare(solution, luxels=200, paths_each=check.PATHS)
 
     def told(dark: float, trial: int) -> bool:
         rng = np.random.default_rng(trial)
 
-        def looked_at(solved, *, luxels=check.LUXELS, **_):
+        def looked_at(solution, *, luxels=check.LUXELS, **_):
             baked, *rest = (a[pick] for pick in [rng.choice(len(known[0]), luxels, replace=False)] for a in known)
             return (np.where(rng.random(luxels) < dark, 0.0, baked), *rest)
 
         monkeypatch.setattr(check, "compare", looked_at)
         try:
-            check.check(solved)
+            check.check(solution)
         except LightError:
             return True
         return False
@@ -175,8 +177,8 @@ def test_lit_at_several_hours_every_lighting_is_what_it_is_alone(lit, tmp_path, 
         bake_all((house, dataclasses.replace(house, rooms=house.rooms[:1])), catalogue, tmp_path, TINY)
 
 
-def test_rays_bring_the_light_of_what_they_met_whatever_it_is(solved):
-    space, lux = solved.space, solved.lux
+def test_rays_bring_the_light_of_what_they_met_whatever_it_is(solution):
+    space, lux = solution.space, solution.lux
     p = luxels.subset(lux, np.arange(0, len(lux.position), 50))
     first, later, all_ = (radiosity.meet(space, p, *rays) for rays in ((3, 0), (5, 3), (8, 0)))
     np.testing.assert_array_equal(first.bad + later.bad, all_.bad)
@@ -188,15 +190,23 @@ def test_rays_bring_the_light_of_what_they_met_whatever_it_is(solved):
     np.testing.assert_allclose(radiosity.gather(all_, floats(0.5 * lux.albedo))[0], 0.5 * whole, rtol=1e-4)
 
 
-def test_luxels_that_all_rays_find_covered_get_no_light_of_their_own(solved):
+def test_luxels_that_all_rays_find_covered_get_no_light_of_their_own(solution):
     """They are most of what costs rays for nothing: below cupboards, behind wardrobes, inside drawers."""
-    problem = solve.Problem(
-        solved.house, solved.atlas, solved.lux, solved.space, solved.outdoors, solved.lamps, TINY, None, solved.without
+    inputs = solve.BakeInput(
+        solution.house,
+        solution.atlas,
+        solution.lux,
+        solution.space,
+        solution.outdoors,
+        solution.lamps,
+        TINY,
+        None,
+        solution.without,
     )
-    covered = np.setdiff1d(np.arange(len(solved.lux.position)), problem.free)
-    assert 0.02 < len(covered) / len(solved.lux.position) < 0.6
-    assert not (solved.light.good & solved.lux.shell)[covered].any()
-    reached = np.concatenate([solve.shone_on(problem, source)[0] for source in solve.sources_of(problem)])
+    covered = np.setdiff1d(np.arange(len(solution.lux.position)), inputs.free)
+    assert 0.02 < len(covered) / len(solution.lux.position) < 0.6
+    assert not (solution.light.good & solution.lux.shell)[covered].any()
+    reached = np.concatenate([solve.shone_on(inputs, source)[0] for source in solve.sources_of(inputs)])
     assert len(reached) and not np.isin(reached, covered).any()
 
 
@@ -319,7 +329,7 @@ def test_a_mirror_shows_what_stands_before_it_however_few_rays_there_are(lit):
 
 def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):
     """Ended paths may be left behind or carried along: what the others bring is the same."""
-    from embodied.light.backend import array, flags, floats, mitsuba, vector
+    from embodied.light.backend import array, booleans, floats, mitsuba, vector
     from embodied.light.tracing import paths
     from embodied.light.tracing.radiosity import Points
     from embodied.light.tracing.scene import world_of
@@ -328,7 +338,7 @@ def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):
     world, n = world_of(baked, house), 4096
     at = vector(np.tile(np.array([4.2, 3.4, 1.0]), (n, 1)))
     up, zero = vector(np.tile(np.array([0.0, 0.0, 1.0]), (n, 1))), floats(np.zeros(n))
-    points = Points(n, at, up, up, flags(np.zeros(n, bool)), zero, zero)
+    points = Points(n, at, up, up, booleans(np.zeros(n, bool)), zero, zero)
     asked = np.arange(n) % 4 == 0
     trace = lambda **which: array(
         paths.irradiance(world.space, world.lights, world.surfaces, points, rng=np.random.default_rng(0), **which)

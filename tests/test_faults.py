@@ -236,7 +236,7 @@ def test_two_that_light_one_house_light_it_once(tmp_path, monkeypatch):
     for name, value in {
         "house_parts": lambda *_: (),
         "looks_of": lambda _: "",
-        "Shared": lambda *_, **__: None,
+        "BakeContext": lambda *_, **__: None,
         "_folder": lambda *_: tmp_path / "bake",
         "open_bake": open_bake,
         "reopened": lambda *_: made[0] if made else None,
@@ -262,7 +262,7 @@ def test_whoever_lights_a_house_is_told_before_how_long_it_takes(monkeypatch, tm
         raise Begun
 
     for name, value in {
-        "house_parts": lambda *_: (), "looks_of": lambda _: "", "Shared": begin, "device": lambda: "llvm"
+        "house_parts": lambda *_: (), "looks_of": lambda _: "", "BakeContext": begin, "device": lambda: "llvm"
     }.items():  # fmt: skip
         monkeypatch.setattr(baking, name, value)
     with pytest.raises(Begun):

@@ -15,7 +15,7 @@ from embodied.light.tracing.rays import embree, mitsuba_among, rays_among
 from embodied.render import gloss
 from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
-from embodied.render.gloss import Gloss, Shine, interleaved, schlick
+from embodied.render.gloss import Gloss, GlossData, interleaved, schlick
 from embodied.render.mirrored import Mirrored
 from embodied.render.pictures import Baked, matte, parse_pictures
 from embodied.scene.lit_pages import LitMesh, LitPages
@@ -59,7 +59,7 @@ def house(rough: float, specular: float = 0.5, metal: float = 0.0, gains=(1.0, 1
     tint = np.full((2, 3), 0.9, np.float32) if metal else None
     room, wall_s = (np.full(3, g, np.float32) for g in gains)
     exposed = lambda p: np.where(p[:, :1] > 3.99, wall_s, room)
-    known = Shine([shine, None], [tint, None], [None, None], exposed, np.ones(3, np.float32), 1.0)
+    known = GlossData([shine, None], [tint, None], [None, None], exposed, np.ones(3, np.float32), 1.0)
     return Gloss(LitPages((floor, back), pages, "x"), known, rays_among)
 
 
@@ -170,7 +170,7 @@ def night_window(kind: str = "opening", rough: float = 0.02, night_at: float = 5
     pane = quad("pane", [(2, 1, -1), (2, -1, -1), (2, -1, 1), (2, 1, 1)], 2)
     pane = dataclasses.replace(pane, kind=kind, alpha=0.08, gloss=(rough, 0.5))
     everywhere = lambda p: np.ones((len(p), 3), np.float32)
-    known = Shine([None] * 3, [None] * 3, [None] * 3, everywhere, np.ones(3, np.float32), 1.0)
+    known = GlossData([None] * 3, [None] * 3, [None] * 3, everywhere, np.ones(3, np.float32), 1.0)
     ahead = Camera((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     gloss = Gloss(LitPages((behind, night, pane), pages, "x"), known, rays_among)
     return gloss.over(np.zeros((64, 64, 3), np.uint8), ahead)

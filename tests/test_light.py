@@ -61,7 +61,7 @@ def closed_box(size: float, finish: Finish, lights: tuple[Light, ...] = ()):
     lux = luxels.with_glow(luxels.luxels_of(atlas, ColourMaps()), house, atlas, lamps)
     space = radiosity.with_env(radiosity.space_of(atlas, lux.texels), DARK.picture)
     settings = dataclasses.replace(TINY, bounce_rays=16, seen_rays=32, lamp_rays=24)
-    return lux, solve.solve(solve.Problem(house, atlas, lux, space, DARK, lamps, settings))
+    return lux, solve.solve(solve.BakeInput(house, atlas, lux, space, DARK, lamps, settings))
 
 
 def test_in_a_furnace_light_is_emission_over_absorption():
@@ -122,8 +122,8 @@ def flat_luxels(z: float, owner: int, up: float = 1.0, n: int = 40, step: float 
 
 def test_a_glint_that_reaches_no_luxel_adds_nothing():
     """Dr.Jit refuses loops over no points: a flat of 56 (seed 0) could not be lit."""
-    problem = SimpleNamespace(space=None, lux=SimpleNamespace())
-    assert solve._lit_by(problem, None, np.zeros(0, np.int64)).shape == (0, 3)
+    inputs = SimpleNamespace(space=None, lux=SimpleNamespace())
+    assert solve._lit_by(inputs, None, np.zeros(0, np.int64)).shape == (0, 3)
 
 
 def test_a_sunlit_floor_has_as_many_small_lights_whatever_the_luxels_are():
@@ -157,7 +157,7 @@ def test_bright_spots_are_tamed_without_loss_of_light():
     lux, _ = closed_box(2.0, Finish((SRGB_HALF,) * 3 + (1.0,)))
     seen = np.ones((len(lux.area), 3), np.float32)
     seen[:40] = np.geomspace(1.1, 60.0, 40)[:, None]
-    tamed = solve._tamed(lux, seen)
+    tamed = solve._clamp_fireflies(lux, seen)
     assert tamed.max() < 55.0
     assert (tamed * lux.area[:, None]).sum() == pytest.approx((seen * lux.area[:, None]).sum(), rel=1e-4)
 

@@ -17,9 +17,9 @@ from embodied.scene.house_meshes import house_parts
 from embodied.world import open_world
 
 FLAT = HouseConfig(area=(60.0, 70.0), hour=10.5, weather="clear")
-"""What is lit."""
+"""The flat that is lit."""
 HOUSE = HouseConfig(area=(97.0, 103.0), hour=10.5, weather="clear")
-"""What is made from its seed on."""
+"""The house that is made from its seed on."""
 QUALITIES = {"fast": 12.0, "normal": 30.0}
 """And the seconds that the project promises for the flat."""
 WHOLE = 90.0

@@ -29,7 +29,7 @@ FRAMES = (((128, 128), 200.0), ((480, 640), 60.0))
 TOGETHER = 1.4
 """Times that rgb, depth and ids may take of rgb alone."""
 LINES = (("physics alone", ()), ("rgb, 128 x 128", ("rgb",)), ("rgb and depth, 128 x 128", ("rgb", "depth")))
-"""What is seen at every command."""
+"""Channels that are seen at every command."""
 
 
 def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterator[Measure]:

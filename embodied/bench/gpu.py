@@ -129,9 +129,9 @@ def _by_processes(
 ) -> list[float]:
     """Frames per second of `count` processes together, which draw at the same time."""
     spawn = multiprocessing.get_context("spawn")
-    begin, told = spawn.Barrier(count), spawn.SimpleQueue()
+    begin, results = spawn.Barrier(count), spawn.SimpleQueue()
     jobs = [
-        spawn.Process(target=_film, args=(begin, told, house, catalogue, cache, light, size, seed))
+        spawn.Process(target=_film, args=(begin, results, house, catalogue, cache, light, size, seed))
         for _ in range(count)
     ]
     for job in jobs:
@@ -140,11 +140,11 @@ def _by_processes(
         job.join()
     if failed := [job.exitcode for job in jobs if job.exitcode]:
         raise UnableError(f"{len(failed)} of {count} drawing processes failed; try fewer contexts, see above why")
-    return [sum(told.get() for _ in jobs)]
+    return [sum(results.get() for _ in jobs)]
 
 
 def _film(
-    begin: Any, told: Any, house: House, catalogue: Catalogue, cache: Path, light: str, size: int, seed: int
+    begin: Any, results: Any, house: House, catalogue: Catalogue, cache: Path, light: str, size: int, seed: int
 ) -> None:
     """Draw for SECONDS, together with the other processes; tells the frames per second."""
     try:
@@ -160,7 +160,7 @@ def _film(
             while time.perf_counter() < start + SECONDS:
                 renderer.rgb(cameras[frames % len(cameras)], (size, size))
                 frames += 1
-            told.put(frames / (time.perf_counter() - start))
+            results.put(frames / (time.perf_counter() - start))
     except BaseException:
         begin.abort()
         raise

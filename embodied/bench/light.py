@@ -44,7 +44,7 @@ AREA = (35.0, 70.0)
 BAKES = ("fast", "normal")
 """Light qualities that are compared; what is traced reads the last one."""
 WAYS_DRAWN = ("unlit", *BAKES, "gloss")
-"""What a Renderer draws: 'gloss' over the last bake, all others matte."""
+"""Ways by a Renderer: 'gloss' over the last bake, all others matte."""
 WAYS = (*WAYS_DRAWN, "glossy", "diffuse", "reference")
 TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
@@ -108,17 +108,17 @@ def viewpoints(house: House, shown: Sequence[str] = ()) -> list[tuple[str, np.nd
     """
     graph = build_graph(house)
     area = {r.id: abs(float(np.ptp(np.array(r.polygon), axis=0).prod())) for r in house.rooms}
-    found: list[tuple[str, np.ndarray, float]] = []
+    viewpoints_by_room: list[tuple[str, np.ndarray, float]] = []
     kinds: set[str] = set()
     for room in sorted(house.rooms, key=lambda r: (shown.count(r.kind), -area[r.id])):
         nodes = [i for i, r in enumerate(graph.room_of_node) if r == room.id]
-        if not nodes or room.kind in kinds or len(found) == VIEWS:
+        if not nodes or room.kind in kinds or len(viewpoints_by_room) == VIEWS:
             continue
         kinds.add(room.kind)
         corner = np.array(max(room.polygon, key=lambda c: min(np.hypot(*(graph.positions[i][:2] - c)) for i in nodes)))
         eye = max((graph.positions[i] for i in nodes), key=lambda p: float(np.hypot(*(p[:2] - corner))))
-        found.append((room.id, eye, math.atan2(*(corner - eye[:2])[::-1])))
-    return found
+        viewpoints_by_room.append((room.id, eye, math.atan2(*(corner - eye[:2])[::-1])))
+    return viewpoints_by_room
 
 
 def draw(

@@ -27,7 +27,7 @@ from embodied.tasks.find import find_pool, find_task
 from embodied.world import World, open_world
 
 FLAT = HouseConfig(area=(70.0, 110.0))
-"""Where the agent walks."""
+"""The flat that the agent walks in."""
 STEPS = 200
 """Of one timed call."""
 ROUND = 20
@@ -43,7 +43,7 @@ LINES = (
     ("rgb, depth and ids, 128 x 128", ("rgb", "depth", "ids"), ViewSettings(), 2000.0),
     ("rgb, the 36 views at 128 x 128", ("rgb",), ViewSettings("views36"), 60.0),
 )
-"""What is seen, and how many steps per second the project promises with it."""
+"""Channels that are seen, and how many steps per second the project promises with it."""
 
 
 def seen(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
@@ -143,6 +143,6 @@ def _walk(env: HelpGymEnv, steps: int, seed: int, look: Callable[[], object] = l
 
 
 def _draw(env: HelpGymEnv, world: World) -> None:
-    """What the agent sees, drawn from the model."""
+    """The agent's view, drawn from the model."""
     pose = env._env.pose
     world.renderer.view(world.graph.positions[pose.node], pose.yaw, pose.pitch, ViewSettings().vfov, (128, 128))

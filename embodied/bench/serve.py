@@ -106,7 +106,7 @@ async def _person(address: str, word: str, times: Times, end: float, rng: np.ran
 
 
 def _next(screen: dict[str, Any], rng: np.random.Generator) -> dict[str, Any] | None:
-    """What somebody does on a screen."""
+    """The next thing that somebody does on a screen."""
     if screen["screen"] in ("consent", "ready"):
         return {"do": "consent" if screen["screen"] == "consent" else "ready"}
     if not screen.get("yours"):

@@ -27,11 +27,11 @@ class Measure:
     """10th and 90th percentile."""
     repeats: int
     aim: float | None = None
-    """What the project promises; None where it promises nothing."""
+    """The project's promise; None where it promises nothing."""
 
     @property
     def met(self) -> bool | None:
-        """Whether the aim is met; rates and ratios must reach it, the rest must stay below."""
+        """The aim is met: rates and ratios must reach it, the rest must stay below."""
         if self.aim is None:
             return None
         return self.value >= self.aim if self.unit in ("1/s", "x") else self.value <= self.aim
@@ -39,7 +39,7 @@ class Measure:
 
 @dataclass(frozen=True)
 class Report:
-    """What a benchmark shows that is no list of measures."""
+    """A benchmark's result that is no list of measures."""
 
     facts: dict
     text: str
@@ -100,7 +100,7 @@ def share(name: str, part: Measure, whole: Measure, unit: str = "share", *, aim:
 
 
 def machine() -> dict[str, object]:
-    """What the numbers were made on."""
+    """Facts about the machine that the numbers were made on."""
     return {
         "cores": os.cpu_count(),
         "machine": platform.machine(),

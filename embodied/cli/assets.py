@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, kw_only=True)
 class Options(Furnished, Printed):
     action: Annotated[str, Option(words=("build", "list", "attribution"), name="action")]
-    """What to do."""
+    """Action."""
     object_class: Annotated[str | None, Option(metavar="NAME", name="--class")] = None
     """Only this object class."""
     out: Annotated[Path, Option(any_path, "FILE")] = Path("ATTRIBUTION.md")

@@ -27,14 +27,14 @@ from embodied.software import bring_atomic, load_atomic, unpack
 LIBRARIES = (
     DISTRIBUTION, "mujoco-core", "opencv-python-headless", "gymnasium", "mitsuba", "numpy", "shapely",
 )  # fmt: skip
-"""What houses, light and pictures need."""
+"""Libraries that houses, light and pictures need."""
 EXTRAS = {
     "agents": ("torch", "safetensors"),
     "viz": ("rerun-sdk", "av", "matplotlib"),
     "data": ("pyarrow",),
     "numba": ("numba",),
 }
-"""What else there is, by the extra of the distribution that brings it."""
+"""Further libraries, by the extra of the distribution that brings it."""
 FREE_DISK = 2.0
 """GiB below which rendering houses will soon fail."""
 
@@ -48,7 +48,7 @@ class Finding:
     text: str
     remedy: str = ""
     needed: bool = True
-    """Whether the main job fails without it."""
+    """The main job fails without it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +65,8 @@ def run(args: Options) -> int:
     findings = []
     if args.fix:
         done = False
-        for said in fix(args.pack):
-            note(said)
+        for line_of_work in fix(args.pack):
+            note(line_of_work)
             done = True
         if not done:
             note("nothing is missing that can be brought without root")
@@ -84,7 +84,7 @@ def run(args: Options) -> int:
 
 
 def line(f: Finding) -> str:
-    """What is shown of a finding, with the remedy below it."""
+    """A finding as it is printed, with the remedy below it."""
     mark = "ok  " if f.ok else ("FAIL" if f.needed else "note")
     return f"[{mark}] {f.name:<12} {f.text}" + ("" if f.ok else f"\n       {'':<12} -> {f.remedy}")
 
@@ -124,8 +124,8 @@ def _pip(name: str) -> bool:
 
 def versions(_: Options) -> Finding:
     """Python and library versions; every one listed is needed."""
-    found, missing = _installed(LIBRARIES)
-    text = ", ".join([f"Python {platform.python_version()}", *found])
+    installed, missing = _installed(LIBRARIES)
+    text = ", ".join([f"Python {platform.python_version()}", *installed])
     text += f"; missing: {', '.join(missing)}" if missing else ""
     return Finding("versions", not missing, text, f"pip install {DISTRIBUTION}")
 
@@ -134,8 +134,8 @@ def extras(_: Options) -> Finding:
     """Libraries that only some commands need."""
     parts, lacking = [], []
     for extra, names in EXTRAS.items():
-        found, missing = _installed(names)
-        parts += found
+        installed, missing = _installed(names)
+        parts += installed
         lacking += [extra] * bool(missing)
     remedy = f"pip install '{DISTRIBUTION}[{','.join(lacking)}]' (agents that learn, recordings, exports, speed)"
     return Finding("extras", not lacking, ", ".join(parts) or "none installed", remedy, False)
@@ -176,10 +176,12 @@ def packs(args: Options) -> Finding:
         "until then houses hold the simple furniture that is built in code"
     )
     try:
-        found, missing = find_packs(), catalogue_of(args).missing()
+        libraries, missing = find_packs(), catalogue_of(args).missing()
     except (ValueError, OSError) as e:
         return Finding("furniture", False, message_of(e), remedy, False)
-    text = ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in found) or "no furniture library found"
+    text = (
+        ", ".join(f"{p.name} ({p.stat().st_size / 2**20:.0f} MiB)" for p in libraries) or "no furniture library found"
+    )
     if missing:
         text += f"; {len(missing)} models of the catalogue are in none of them, e.g. {', '.join(missing[:3])}"
     return Finding("furniture", not missing, text, remedy, False)
@@ -190,18 +192,18 @@ def path_tracer(_: Options) -> Finding:
     from embodied.light.backend import VARIANTS, LightError, device
 
     try:
-        found = device()
+        backend = device()
     except LightError as e:
         return Finding("path tracer", False, str(e), "until then draw houses without light (unlit)", False)
-    variant = next(v for v, _ in VARIANTS if v.startswith(found))
-    return Finding("path tracer", True, f"Mitsuba on {found} (variant {variant})", needed=False)
+    variant = next(v for v, _ in VARIANTS if v.startswith(backend))
+    return Finding("path tracer", True, f"Mitsuba on {backend} (variant {variant})", needed=False)
 
 
 def body(_: Options) -> Finding:
     """dm-control, which the driven body needs; its dependency labmaze has no wheel for Python 3.13."""
-    found, missing = _installed(("dm-control",))
+    installed, missing = _installed(("dm-control",))
     remedy = "only environments with wheels=True need it: pip install --no-deps dm-control"
-    return Finding("driven body", not missing, (*found, "no dm-control")[0], remedy, False)
+    return Finding("driven body", not missing, (*installed, "no dm-control")[0], remedy, False)
 
 
 def disk(args: Options) -> Finding:

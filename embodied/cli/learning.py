@@ -120,7 +120,7 @@ NamedFiles = tuple[Annotated[NamedFile, Option(named_file, "NAME=FILE")], ...]
 
 def by_name(files: Sequence[NamedFile]) -> dict[str, list[Path]]:
     """The files of each name, in the order in which they were given."""
-    found: dict[str, list[Path]] = {}
+    files_by_name: dict[str, list[Path]] = {}
     for name, path in files:
-        found.setdefault(name, []).append(path)
-    return found
+        files_by_name.setdefault(name, []).append(path)
+    return files_by_name

@@ -30,14 +30,14 @@ def hour(text: str) -> float:
     """Hours in [0, 24) of a word, a number, or hours and minutes."""
     try:
         clock = re.fullmatch(r"(\d{1,2}):([0-5]\d)", text)
-        found = int(clock[1]) + int(clock[2]) / 60 if clock else TIMES[text] if text in TIMES else float(text)
+        hours = int(clock[1]) + int(clock[2]) / 60 if clock else TIMES[text] if text in TIMES else float(text)
     except ValueError:
-        found = -1.0
-    if not 0 <= found < 24:
+        hours = -1.0
+    if not 0 <= hours < 24:
         raise argparse.ArgumentTypeError(
             f"should be one of {', '.join(TIMES)} or an hour from 0 to 24 such as 17:30 or 17.5, got {text[:40]!r}"
         )
-    return found
+    return hours
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class Options(Furnished, Printed):
     weather: Annotated[str | None, Option(words=WEATHERS)] = None
     """The sky."""
     landscape: Annotated[str | None, Option(words=LANDSCAPES)] = None
-    """What the windows show."""
+    """Landscape that the windows show."""
     season: Annotated[str | None, Option(words=SEASONS)] = None
     """The season of the landscape."""
     lamps: Annotated[str | None, Option(words=("on", "off"))] = None
@@ -83,12 +83,12 @@ def run(args: Options) -> None:
         for h, b in zip(lightings, bakes)
     ]
     text = "; ".join(f"{h.sky.hour:g} h, {h.sky.weather}" for h in lightings)
-    told = (
+    message = (
         f"{changed.name} is lit at {text}\n"
         f"pictures: embodied render {args.folder} --pictures {'fast' if args.quality == 'fast' else 'normal'}\n"
         f"MuJoCo:   embodied export mjcf --house {args.folder} --light {args.quality} --out {args.folder / 'lit'}"
     )
-    show(args, facts[0] if args.lights == 1 else {"lights": facts}, told)
+    show(args, facts[0] if args.lights == 1 else {"lights": facts}, message)
 
 
 def with_sky(

@@ -36,7 +36,7 @@ class Viewers:
     serve: bool = False
     """Serve the web viewer, watch in the browser, end with Ctrl-C."""
     bind: Annotated[str, Option(metavar="ADDRESS")] = "127.0.0.1"
-    """Where --serve listens; the default is this machine only, 0.0.0.0 lets everybody look and write."""
+    """Address on which --serve listens; the default is this machine only, 0.0.0.0 lets everybody look and write."""
 
 
 @dataclass(frozen=True, kw_only=True)

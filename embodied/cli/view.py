@@ -49,15 +49,15 @@ def run(args: Options) -> None:
         return
     from embodied.viz.report import load_run, summary_line, write_page
 
-    found = load_run(args.folder)
+    episodes = load_run(args.folder)
     if args.episode is not None:
-        record_one(args, found, args.episode)
+        record_one(args, episodes, args.episode)
     elif args.page:
-        page = write_page(args.folder, found)
-        show(args, {"page": str(page), "episodes": len(found)}, f"wrote {page}")
+        page = write_page(args.folder, episodes)
+        show(args, {"page": str(page), "episodes": len(episodes)}, f"wrote {page}")
     else:
-        facts = [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(found)]
-        show(args, {"episodes": facts}, "\n".join(summary_line(i, e) for i, e in enumerate(found)))
+        facts = [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(episodes)]
+        show(args, {"episodes": facts}, "\n".join(summary_line(i, e) for i, e in enumerate(episodes)))
 
 
 def show_file(args: Options) -> None:
@@ -75,18 +75,18 @@ def show_file(args: Options) -> None:
             send_file(args.folder, viewers)
 
 
-def record_one(args: Options, found: Sequence[Listed], number: int) -> None:
+def record_one(args: Options, episodes: Sequence[Listed], number: int) -> None:
     """Draw one episode of a run again, into a recording."""
     from embodied.datasets.store import Dataset
     from embodied.viz.sinks import Sinks
 
-    if not 0 <= number < len(found):
-        raise ValueError(f"--episode {number} does not exist; this run has the episodes 0 to {len(found) - 1}")
+    if not 0 <= number < len(episodes):
+        raise ValueError(f"--episode {number} does not exist; this run has the episodes 0 to {len(episodes) - 1}")
     if args.data is None:
         raise ValueError(
             "--episode needs --data DIR, the data set that the run was made on: its houses are drawn again"
         )
-    episode = found[number].episode
+    episode = episodes[number].episode
     file = args.rrd or args.folder / "recordings" / f"{number}.rrd"
     with viewers_of(args) as viewers:
         video = (args.video, args.video_size) if args.video else None
@@ -135,7 +135,7 @@ def record_again(
 
 
 def looked_at(run: Path) -> RenderedInputs:
-    """What the agents of a run looked at; nothing where it does not say.
+    """Pictures that the agents of a run looked at; none where it does not say.
 
     Raises:
       RecordError: a damaged run.json.

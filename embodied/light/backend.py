@@ -1,4 +1,4 @@
-"""Where Mitsuba is found and started, and the few array helpers all of `embodied.light` shares.
+"""Finds and starts Mitsuba, and holds the few array helpers that all of `embodied.light` shares.
 
 Mitsuba's variants compile kernels: `cuda_ad_rgb` where a GPU is, else `llvm_ad_rgb`, which
 needs a shared libLLVM of version 15 or later (`embodied doctor --fix`, or Debian: `apt install libllvm19`).
@@ -48,13 +48,13 @@ class LightError(UnableError):
 
 def find_llvm() -> str | None:
     """Path of the newest libLLVM on this machine that Dr.Jit can use; None if there is none."""
-    found = []
+    versions = []
     for place in _LLVM_PLACES:
         for path in sorted(glob.glob(place)):
             version = re.search(r"libLLVM(?:[-.]so[-.]|[-.])?(?:so\.)?(\d+)", os.path.basename(path))
             if version and OLDEST_LLVM <= int(version[1]) < 40:
-                found.append((int(version[1]), path))
-    return max(found)[1] if found else ctypes.util.find_library("LLVM") or (str(bundled("LLVM") or "") or None)
+                versions.append((int(version[1]), path))
+    return max(versions)[1] if versions else ctypes.util.find_library("LLVM") or (str(bundled("LLVM") or "") or None)
 
 
 @functools.cache
@@ -144,7 +144,7 @@ def scene_of(corners: np.ndarray) -> RayScene:
 
 
 def _one_scene_per_kernel() -> bool:
-    """Whether rays are traced by OptiX, which meets nothing where one kernel traces rays in two scenes."""
+    """True where rays are traced by OptiX, which meets nothing where one kernel traces rays in two scenes."""
     return device() == "cuda"
 
 
@@ -161,9 +161,9 @@ class Apart:
         return _evaluated(self.scene.ray_intersect_preliminary(ray, coherent, active))
 
 
-def _evaluated(found: Any) -> Any:
-    dr.eval(found)
-    return found
+def _evaluated(hits: Any) -> Any:
+    dr.eval(hits)
+    return hits
 
 
 def looped(
@@ -184,7 +184,7 @@ def floats(a: ArrayLike) -> Array:
     return mi.Float(_aligned(a, np.float32))
 
 
-def wholes(a: ArrayLike) -> Array:
+def unsigned(a: ArrayLike) -> Array:
     """`floats` for whole numbers from 0 to 2**32 - 1."""
     return mi.UInt32(_aligned(a, np.uint32))
 
@@ -194,7 +194,7 @@ def signed(a: ArrayLike) -> Array:
     return mi.Int32(_aligned(a, np.int32))
 
 
-def flags(a: ArrayLike) -> Array:
+def booleans(a: ArrayLike) -> Array:
     """`floats` for truth values."""
     return mi.Bool(_aligned(a, np.bool_))
 
@@ -230,12 +230,12 @@ def brightness(e: np.ndarray) -> np.ndarray:
     return np.asarray(e, np.float32) @ np.full(3, 1 / 3, np.float32)
 
 
-def constant(x: float) -> Array:
+def opaque_float(x: float) -> Array:
     """A number that kernels read as data, so that changing it compiles nothing anew."""
     return dr.opaque(mi.Float, float(x))
 
 
-def rest() -> None:
+def free_memory() -> None:
     """Give back the memory of finished stages: Dr.Jit keeps freed arrays, and the C library freed pages, for later."""
     dr.flush_malloc_cache()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
@@ -257,19 +257,19 @@ def bilinear(x: Array, y: Array) -> tuple[Array, Array, tuple[tuple[int, int, Ar
     return x0, y0, tuple((dx, dy, wx * wy) for dx, wx in across for dy, wy in down)
 
 
-def number(x: int) -> Array:
+def opaque_uint(x: int) -> Array:
     """A whole number that kernels read as data, so that changing it compiles nothing anew."""
     return dr.opaque(mi.UInt32, int(x))
 
 
-def added_up(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Array) -> tuple[Array, ...]:
+def accumulate(count: int, one: Callable[[Array], tuple[Array, ...]], *zeros: Array) -> tuple[Array, ...]:
     """Sums of what `one` returns for 0 to `count` - 1, in one kernel where rays allow it (`looped`).
 
     Args:
       one: from a device number k (UInt32) to as many arrays as there are `zeros`.
       zeros: device arrays to begin with.
     """
-    last = number(count)
+    last = opaque_uint(count)
     body = lambda k, *totals: (k + 1, *(t + x for t, x in zip(totals, one(k))))
     totals = looped((mi.UInt32(0), *zeros), lambda k, *_: k < last, body)[1:]
     dr.eval(*totals)

@@ -16,7 +16,7 @@ APART = (
     "embodied.scene.house_meshes",
     "tqdm",
 )
-"""What the code of a bake does not count: what builds a house's parts and the settings, since the parts and the
+"""Modules that the code of a bake does not count: what builds a house's parts and the settings, since the parts and the
 settings themselves are in a bake's key; what packages offer by name; the progress bar."""
 
 

@@ -234,7 +234,7 @@ class Renderer:
 
 
 def _bare_meshes(parts: Sequence[Part]) -> list[LitMesh]:
-    """What has faces, where it stands in the world, with nothing painted on."""
+    """Meshes of what has faces, where it stands in the world, with nothing painted on."""
     meshes = []
     for p in parts:
         if len(p.mesh.faces):

@@ -41,7 +41,7 @@ class Corners:
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """What all copies need to know of meshes."""
+    """Facts about meshes that all copies need."""
 
     place: np.ndarray
     """(n,) int: number of the place, of those of one mesh, where a corner lies."""
@@ -57,7 +57,7 @@ class _Shape:
 
 @dataclass(frozen=True, eq=False)
 class _Groups:
-    """What is drawn together; by copies with wider cells, too."""
+    """Meshes that are drawn together; by copies with wider cells, too."""
 
     cluster: np.ndarray
     """(p,) int of places."""

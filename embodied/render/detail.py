@@ -86,7 +86,7 @@ class Detail:
 LAST = PIXELS.bit_length() - 1
 """Level of the tile at which a single pixel is left."""
 STARTS = np.cumsum([0, *(4**k for k in range(LAST, 0, -1))])
-"""Where the levels of a tile begin."""
+"""First texels of the levels of a tile."""
 
 
 def _read(kind: np.ndarray, level: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:

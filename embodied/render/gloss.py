@@ -49,13 +49,14 @@ CLOUDY = 0.5
 LIFT = 1e-3
 """Metres that a ray begins above its surface."""
 SUBPIXEL_OFFSETS = ((-0.25, -0.25), (0.25, 0.25))
-"""Where in a pixel smooth surfaces are looked at, from its centre: no two in a row or column."""
+"""Places in a pixel where smooth surfaces are looked at, from its centre: no two in a row or column."""
 MIN_SAMPLES = 24.0
-"""Rays averaged on a surface below which each of its pixels sends MORE: on thin bars what few rays find would jump from
-frame to frame of a video, as the pattern of directions lies still in the picture."""
-NOTED = 0.02
+"""Rays averaged on a surface below which each of its pixels sends UNDERSAMPLED_RAYS: on thin bars what few rays find
+would jump from frame to frame of a video, as the pattern of directions lies still in the picture."""
+VISIBLE_GLOSS = 0.02
 """Mirrored light, of that of a white sheet, below which that goes unnoticed."""
-MORE = 8
+UNDERSAMPLED_RAYS = 8
+"""Rays of each of those pixels."""
 BRUSHED = 4
 """Rays of each pixel of polished metal that is not smooth, in each of SUBPIXEL_OFFSETS."""
 WHITE = 5.0
@@ -67,8 +68,8 @@ PANE_F0 = 0.04
 
 
 @dataclass(frozen=True, eq=False)
-class Shine:
-    """What a bake knows of a house's gloss besides its pages; each sequence goes with LitPages.meshes or .pages."""
+class GlossData:
+    """A house's gloss besides its pages; each sequence goes with LitPages.meshes or .pages."""
 
     gloss: Sequence[np.ndarray | None]
     """Per mesh (m, 3) uint8: roughness, specular and metallic share of each face, times 255; None: matte."""
@@ -81,7 +82,7 @@ class Shine:
     outdoors: np.ndarray
     """(3,) what light is multiplied by that windows show."""
     middle: float
-    """What light is multiplied by in rooms, in the median."""
+    """Factor of light in rooms, in the median."""
     detail: Sequence[np.ndarray | None] = ()
     """Per mesh (m,) uint8 of each face (embodied.render.detail); empty: none shows any."""
 
@@ -107,7 +108,7 @@ class _Faces:
     outer: np.ndarray
     """(m,) bool, beyond the windows."""
     detail: np.ndarray
-    """(m,) uint8, as of `Shine`; 0 for none."""
+    """(m,) uint8, as of `GlossData`; 0 for none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,27 +125,27 @@ class _Panes:
 class Gloss:
     """Owns the faces of a lit house, arranged for rays, and its light, coarser than the pages."""
 
-    def __init__(self, lit: LitPages, shine: Shine, rays_among: Callable[[np.ndarray], Rays]) -> None:
+    def __init__(self, lit: LitPages, data: GlossData, rays_among: Callable[[np.ndarray], Rays]) -> None:
         """
         Args:
           rays_among: from triangles (m, 3, 3) to rays among them.
         """
-        self._faces = _faces_of(lit, shine)
+        self._faces = _faces_of(lit, data)
         self._pages = lit.pages
         gloss = self._faces.gloss
         self._mirrors = np.append((gloss[:, 0] < MATTE) & (gloss[:, 1] > 0), False)  # nothing that is met is face -1
         self._first = rays_among(self._faces.corners)
         self._panes = _panes_of(lit, rays_among)
-        self._gain_at, self._beyond = shine.gain_at, shine.outdoors / GLASS
+        self._gain_at, self._beyond = data.gain_at, data.outdoors / GLASS
         some_of_page = {m.page: m.vertices.mean(0)[None] for m in lit.meshes if len(m.vertices)}
-        gains = [shine.gain_at(some_of_page[i])[0] if i in some_of_page else None for i in range(len(lit.pages))]
-        small = [_coarse(*one) for one in zip(lit.pages, shine.glow, gains, strict=True)]
+        gains = [data.gain_at(some_of_page[i])[0] if i in some_of_page else None for i in range(len(lit.pages))]
+        small = [_coarse(*one) for one in zip(lit.pages, data.glow, gains, strict=True)]
         self._width = np.array([s.shape[1] for s in small], np.int32)
         self._height = np.array([s.shape[0] for s in small], np.int32)
         texels = self._width.astype(np.int64) * self._height
         self._base = np.cumsum(texels) - texels
         self._light = np.concatenate([s.reshape(-1, 3) for s in small])
-        self._middle = shine.middle
+        self._middle = data.middle
         self._detail = Detail(self._faces.corners, self._faces.normal, self._faces.detail)
 
     def over(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
@@ -156,8 +157,8 @@ class Gloss:
         met = self._met(camera, ahead)
         self._detail.lay(out, camera, _directions(camera, (h, w)), *met)
         seen = self._seen(ahead, *met)
-        if seen.dull.any():
-            values = self._enlarged(camera, self._rough(seen.of(seen.dull), camera, half), (h, w))
+        if seen.rough.any():
+            values = self._enlarged(camera, self._rough(seen.of(seen.rough), camera, half), (h, w))
             where = np.flatnonzero(values[0])
             lost, mirrored = values[0].ravel()[where, None], values[1:].reshape(3, -1)[:, where].T
             own = light_of(out.reshape(-1, 3)[where])
@@ -179,7 +180,7 @@ class Gloss:
     def _seen(
         self, directions: np.ndarray, face: np.ndarray, distance: np.ndarray, pixels: np.ndarray | None = None
     ) -> _Seen:
-        """What mirrors of what was met along directions (n, 3), `pixels` of a picture."""
+        """Hits that mirror, of those met along directions (n, 3), `pixels` of a picture."""
         faces = self._faces
         hit = np.flatnonzero(self._mirrors[face])
         face, ahead = face[hit], directions[hit]
@@ -195,7 +196,7 @@ class Gloss:
         return _Seen(pixels, face, distance[hit], ahead, normal, gloss[:, 0], worth & ~sharp, worth & sharp, hit)
 
     def _mirrored(self, camera: Camera, seen: _Seen, half: np.ndarray, *, sharp: bool) -> tuple[np.ndarray, np.ndarray]:
-        """What shares of their own light surfaces lose, and what they send for it, each (n, 3) exposed.
+        """Shares of their own light that surfaces lose, and what they send for it, each (n, 3) exposed.
 
         Args:
           half: (n, 3) half vectors: the normals that the rays are mirrored at.
@@ -218,10 +219,10 @@ class Gloss:
         rough = _directions(camera, (h, w), step=PANE_STEP)
         at = np.asarray(camera.position, np.float32)
         shape = (-(-h // PANE_STEP), -(-w // PANE_STEP))
-        found = (panes.first(np.broadcast_to(at, rough.shape), rough)[0] >= 0).reshape(shape)
-        if not found.any():
+        on_pane = (panes.first(np.broadcast_to(at, rough.shape), rough)[0] >= 0).reshape(shape)
+        if not on_pane.any():
             return
-        near = cv2.dilate(found.astype(np.uint8), np.ones((3, 3), np.uint8)).repeat(PANE_STEP, 0).repeat(PANE_STEP, 1)
+        near = cv2.dilate(on_pane.astype(np.uint8), np.ones((3, 3), np.uint8)).repeat(PANE_STEP, 0).repeat(PANE_STEP, 1)
         pixels = np.flatnonzero(near[:h, :w])
         ahead = _directions(camera, (h, w), pixels)
         origin = np.broadcast_to(at, ahead.shape)
@@ -280,7 +281,7 @@ class Gloss:
         return out
 
     def _rough(self, seen: _Seen, camera: Camera, size: tuple[int, int]) -> Mirrored:
-        """What rough surfaces lose and mirror in a picture of half the size, averaged over neighbours on the same
+        """Light that rough surfaces lose and mirror in a picture of half the size, averaged over neighbours on the same
         surface; what they lose is the mean of the colours."""
         row, column = np.divmod(seen.pixel, size[1])
         k = interleaved(TILE)[row % TILE, column % TILE]
@@ -288,10 +289,14 @@ class Gloss:
         values = self._averaged(camera, seen, k, TILE * TILE, 1, sharp=False)
         rays = np.ones(len(k), np.float32)
         grid.smooth(values[:, :3].mean(1), values[:, 3:], rays)
-        lonely = (grid.averaged < MIN_SAMPLES) & (grid.values[1:].reshape(3, -1)[:, seen.pixel].max(0) > NOTED)
-        if lonely.any():
-            values[lonely] = self._averaged(camera, seen.of(lonely), k[lonely], TILE * TILE, MORE, sharp=False)
-            rays[lonely] = MORE
+        undersampled = (grid.averaged < MIN_SAMPLES) & (
+            grid.values[1:].reshape(3, -1)[:, seen.pixel].max(0) > VISIBLE_GLOSS
+        )
+        if undersampled.any():
+            values[undersampled] = self._averaged(
+                camera, seen.of(undersampled), k[undersampled], TILE * TILE, UNDERSAMPLED_RAYS, sharp=False
+            )
+            rays[undersampled] = UNDERSAMPLED_RAYS
             grid.smooth(values[:, :3].mean(1), values[:, 3:], rays)
         return grid
 
@@ -305,7 +310,7 @@ class Gloss:
         """
         several = seen.of(np.repeat(np.arange(len(k)), rays))
         u = _lobe(count * rays)[(k[:, None] * rays + np.arange(rays)).ravel()]
-        half = _half_vectors(several.normal, several.rough, u)
+        half = _half_vectors(several.normal, several.roughness, u)
         values = np.concatenate(self._mirrored(camera, several, half, sharp=sharp), axis=1)
         return values.reshape(len(k), rays, 6).mean(1)
 
@@ -320,7 +325,7 @@ class Gloss:
         flat[:, pixels] = 0
         ahead = _directions(camera, size, pixels)
         seen = self._seen(ahead, *self._met(camera, ahead), pixels)
-        seen = seen.of(seen.dull)
+        seen = seen.of(seen.rough)
         near = grid.nearest(*np.divmod(seen.pixel, w), self._faces.owner[seen.face], seen.normal)
         flat[:, seen.pixel] = near.T
         return values
@@ -340,7 +345,7 @@ class Gloss:
         seen = seen.of(seen.sharp)
         if not len(seen.pixel):
             return
-        polished = seen.rough < SMOOTH
+        polished = seen.roughness < SMOOTH
         both = np.empty((len(k), 6), np.float32)
         clear = seen.of(polished)
         both[polished] = np.concatenate(self._mirrored(camera, clear, clear.normal, sharp=True), axis=1)
@@ -351,7 +356,7 @@ class Gloss:
         there = np.bincount(which, minlength=len(pixels)) > 0
         mean = lambda a: np.bincount(which, a, len(pixels))[there] / len(SUBPIXEL_OFFSETS)
         values = np.stack([mean(a) for a in (*lost.T, *np.minimum(mirrored, WHITE).T)], axis=1)
-        where, rough = pixels[there], mean(seen.rough >= SMOOTH) > 0.5
+        where, rough = pixels[there], mean(seen.roughness >= SMOOTH) > 0.5
         if rough.any():
             values[rough] = evened(values[rough], where[rough], rgb.shape[:2])
         own = light_of(out.reshape(-1, 3)[where])
@@ -360,7 +365,7 @@ class Gloss:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What n rays met first."""
+    """First hits of n rays."""
 
     pixel: np.ndarray
     """(n,) flat positions in the picture."""
@@ -370,16 +375,16 @@ class _Seen:
     """(n, 3) the rays."""
     normal: np.ndarray
     """(n, 3) towards the camera."""
+    roughness: np.ndarray
     rough: np.ndarray
-    dull: np.ndarray
     sharp: np.ndarray
-    """(n,) bool: whether it mirrors enough to look, and is looked at in half the size or in full."""
+    """(n,) bool: it mirrors enough to look, and is looked at in half the size or in full."""
     which: np.ndarray
     """(n,) of the rays that were sent."""
 
     def of(self, which: np.ndarray) -> _Seen:
         """Some of them."""
-        names = ("pixel", "face", "distance", "ahead", "normal", "rough", "dull", "sharp", "which")
+        names = ("pixel", "face", "distance", "ahead", "normal", "roughness", "rough", "sharp", "which")
         return _Seen(*(getattr(self, name)[which] for name in names))
 
 
@@ -486,7 +491,7 @@ def _across(size: tuple[int, int], step: int, tall: float) -> tuple[np.ndarray, 
     return x, (1 - (np.arange(0, h, step) + step / 2) / h * 2) * tall
 
 
-def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
+def _faces_of(lit: LitPages, data: GlossData) -> _Faces:
     """The faces of what is hardly seen through, and of the sky; what is a little mirrors nothing."""
     solid = [(i, m) for i, m in enumerate(lit.meshes) if m.alpha >= CLOUDY and len(m.faces)]
     each = lambda value: np.concatenate([np.full(len(m.faces), value(i, m)) for i, m in solid])
@@ -497,10 +502,10 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
     known = lambda of, *shape: np.concatenate(
         [np.zeros((len(m.faces), *shape), np.uint8) if not len(of) or of[i] is None else of[i] for i, m in solid]
     )
-    gloss = known(shine.gloss, 3).astype(np.float32) / 255
+    gloss = known(data.gloss, 3).astype(np.float32) / 255
     gloss[outer] = 0
     gloss[each(lambda i, m: m.alpha < 0.9)] = 0
-    gloss[np.concatenate([_glowing(m, shine.glow[m.page]) for _, m in solid])] = 0
+    gloss[np.concatenate([_glowing(m, data.glow[m.page]) for _, m in solid])] = 0
     return _Faces(
         corners,
         (normal / np.maximum(length, 1e-12)).astype(np.float32),
@@ -508,9 +513,9 @@ def _faces_of(lit: LitPages, shine: Shine) -> _Faces:
         each(lambda i, m: m.page).astype(np.int32),
         each(lambda i, m: i).astype(np.int32),
         gloss,
-        known(shine.tint, 3).astype(np.float32),
+        known(data.tint, 3).astype(np.float32),
         outer,
-        known(shine.detail),
+        known(data.detail),
     )
 
 

@@ -1,4 +1,4 @@
-"""What embodied.render.sampling does pixel by pixel, compiled by Numba (extra [numba]): the same numbers, sooner."""
+"""The pixel loops of embodied.render.sampling, compiled by Numba (extra [numba]): the same numbers, sooner."""
 
 from __future__ import annotations
 
@@ -52,16 +52,16 @@ def locate(
 @compiled_for(f"int64[:, ::1]({MAP}, {MAP}, int64, int64)")
 def shown(x: np.ndarray, y: np.ndarray, side: int, step: int) -> np.ndarray:
     """(6, 4): first and last row and column of what `sampling.shown` finds of each face; -1 where it shows none."""
-    found = np.full((6, 4), -1)
+    extents = np.full((6, 4), -1)
     for i in range(0, x.shape[0], step):
         for j in range(0, x.shape[1], step):
             row, column = int(y[i, j]), int(x[i, j])
             face = row // side
-            if found[face, 1] < 0:
-                found[face] = row
-                found[face, 2:] = column
-            found[face, 0] = min(found[face, 0], row)
-            found[face, 1] = max(found[face, 1], row)
-            found[face, 2] = min(found[face, 2], column)
-            found[face, 3] = max(found[face, 3], column)
-    return found
+            if extents[face, 1] < 0:
+                extents[face] = row
+                extents[face, 2:] = column
+            extents[face, 0] = min(extents[face, 0], row)
+            extents[face, 1] = max(extents[face, 1], row)
+            extents[face, 2] = min(extents[face, 2], column)
+            extents[face, 3] = max(extents[face, 3], column)
+    return extents

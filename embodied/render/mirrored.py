@@ -1,4 +1,4 @@
-"""What a picture's surfaces mirror, in half its size: averaged over neighbours on the same surface, and enlarged."""
+"""Light that a picture's surfaces mirror, in half its size: averaged over a surface's neighbours, and enlarged."""
 
 from __future__ import annotations
 
@@ -80,8 +80,8 @@ class Mirrored:
     def nearest(self, row: np.ndarray, column: np.ndarray, owner: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """(n, 4) values for pixels of the full picture: of the nearest pixels here that show the same surface."""
         known = np.concatenate([self.values, self._normal]).reshape(7, -1).T.copy()
-        total, found = self._around(known, row, column, owner, normal, (0, 1))
-        if len(left := np.flatnonzero(~found)):
+        total, is_known = self._around(known, row, column, owner, normal, (0, 1))
+        if len(left := np.flatnonzero(~is_known)):
             wider = (-1, 0, 1, 2)
             total[left] = self._around(known, row[left], column[left], owner[left], normal[left], wider)[0]
         return total
@@ -109,15 +109,15 @@ class Mirrored:
             for dx in steps:
                 at = np.clip(y0 + dy, 0, h - 1) * w + np.clip(x0 + dx, 0, w - 1)
                 there = np.flatnonzero(owners[at] == owner)
-                found = known[at[there]]
+                neighbours = known[at[there]]
                 near = np.exp(-2 * (np.square(y[there] - dy) + np.square(x[there] - dx)))
-                near *= np.einsum("ij,ij->i", found[:, 4:], normal[there]) > CREASE
-                total[there] += found[:, :4] * near[:, None]
+                near *= np.einsum("ij,ij->i", neighbours[:, 4:], normal[there]) > CREASE
+                total[there] += neighbours[:, :4] * near[:, None]
                 weight[there] += near
         return total / np.maximum(weight, 1e-6)[:, None], weight > 0
 
     def _alike(self, near: tuple[slice, slice], far: tuple[slice, slice]) -> np.ndarray:
-        """Whether pixels and their neighbours show the same surface."""
+        """True where pixels and their neighbours show the same surface."""
         x, y, z = self._normal
         cos = x[near] * x[far] + y[near] * y[far] + z[near] * z[far]
         return (self.owner[near] == self.owner[far]) & (cos > CREASE)

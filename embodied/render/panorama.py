@@ -222,7 +222,7 @@ class _Scratch:
     maps: np.ndarray
     """(3, h, w)."""
     grid: PixelGrid | None = None
-    """Whose maps they are."""
+    """Key of the maps."""
 
 
 @functools.lru_cache(maxsize=8)
@@ -238,7 +238,7 @@ def _scratch(shape: tuple[int, int], thread: int) -> _Scratch:
 
 
 class PixelGrid:
-    """Where the pixels of a picture lie on the padded faces."""
+    """Places of a picture's pixels on the padded faces."""
 
     def __init__(
         self,

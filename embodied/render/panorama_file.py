@@ -51,7 +51,7 @@ class PanoramaFileError(ValueError):
 
 @dataclass(frozen=True)
 class PanoramaIndex:
-    """What stands at the end of a file."""
+    """The index at the end of a file."""
 
     meta: dict[str, object]
     size: int
@@ -84,7 +84,7 @@ class PanoramaFile:
 
     @property
     def meta(self) -> Mapping[str, object]:
-        """What the file was made from and with."""
+        """Facts about what the file was made from and with."""
         return self.index.meta
 
     @property
@@ -268,9 +268,9 @@ def _read_index(f: BinaryIO, path: Path) -> PanoramaIndex:
     if hashlib.sha256(index).digest() != checksum:
         raise PanoramaFileError(f"{path}: the index is damaged; delete the file, it is made again")
     try:
-        found = from_plain(PanoramaIndex, parse(index, "an index"), "the index")
-        if not all(0 <= at <= at + n <= end for node in found.nodes for at, n, _ in node.values()):
+        decoded = from_plain(PanoramaIndex, parse(index, "an index"), "the index")
+        if not all(0 <= at <= at + n <= end for node in decoded.nodes for at, n, _ in node.values()):
             raise RecordError("pictures outside the file")
-        return found
+        return decoded
     except RecordError as e:
         raise PanoramaFileError(f"{path}: {e}; delete the file, it is made again") from e

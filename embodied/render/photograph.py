@@ -259,7 +259,7 @@ def compressed(rgb: np.ndarray, quality: int) -> np.ndarray:
 
 @functools.lru_cache(maxsize=16)
 def lens_map(radial: tuple[float, float], vfov: float, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where in the ideal picture each pixel of the photograph lies: two (h, w) float32 maps of cv2.remap.
+    """Places of the photograph's pixels in the ideal picture: two (h, w) float32 maps of cv2.remap.
 
     The lens is zoomed so that nothing is missing: the corners stay where they are when lines bend outwards, the
     nearest edges when they bend inwards.
@@ -273,11 +273,11 @@ def lens_map(radial: tuple[float, float], vfov: float, height: int, width: int) 
     r = np.hypot(x, y)
     pinned = float(r.max()) if k1 < 0 else float(min(np.abs(x).max(), np.abs(y).max()))
     wanted = r * (1 + k1 * pinned**2 + k2 * pinned**4)
-    found = r.copy()
+    radius = r.copy()
     for _ in range(8):
-        off = found * (1 + k1 * found**2 + k2 * found**4) - wanted
-        found -= off / np.maximum(1 + 3 * k1 * found**2 + 5 * k2 * found**4, 0.1)
-    scale = found / np.maximum(r, 1e-9) * focal
+        off = radius * (1 + k1 * radius**2 + k2 * radius**4) - wanted
+        radius -= off / np.maximum(1 + 3 * k1 * radius**2 + 5 * k2 * radius**4, 0.1)
+    scale = radius / np.maximum(r, 1e-9) * focal
     return (
         np.ascontiguousarray(x * scale + (width - 1) / 2, np.float32),
         np.ascontiguousarray(y * scale + (height - 1) / 2, np.float32),

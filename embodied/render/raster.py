@@ -41,7 +41,7 @@ PICTURES = {
 }
 """How what shaders write is kept and read, and what it is where nothing is; `near` is 1 over metres."""
 FRAMES = {"places": ("column", "row"), "numbers": ("number", "near"), "all": tuple(PICTURES)}
-"""What shaders write, in their order."""
+"""Numbers that shaders write, in their order."""
 EDGE = 0.01
 """Metres before the eye from which on it is known where a point is seen."""
 COARSE = 1.5
@@ -261,7 +261,7 @@ class Raster:
 
 
 def able() -> bool:
-    """Whether the OpenGL of this process, within gl.drawing(), knows what a `Raster` needs."""
+    """True where the OpenGL of this process, within gl.drawing(), knows what a `Raster` needs."""
     return (GL.glGetIntegerv(GL.GL_MAJOR_VERSION), GL.glGetIntegerv(GL.GL_MINOR_VERSION)) >= VERSION
 
 

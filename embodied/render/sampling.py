@@ -1,4 +1,4 @@
-"""Where the rays of a picture meet the faces of a panorama.
+"""Places where the rays of a picture meet the faces of a panorama.
 
 Faces have side s and borders of a pixel, and lie below each other. Numbers are rounded to float32 after each operation,
 in the same order here and in embodied.render.kernels, so that pictures are the same with Numba and without.
@@ -67,30 +67,30 @@ def locate(s: int, rays: Rays, maps: np.ndarray) -> None:
     spare = _spare(maps[0].size, threading.get_ident())
     for face, i, j in _seen(rays):
         here = maps[:, i, j]
-        found, scale = spare[: here.size].reshape(here.shape), spare[-here[0].size :].reshape(here.shape[1:])
+        places, scale = spare[: here.size].reshape(here.shape), spare[-here[0].size :].reshape(here.shape[1:])
         across, up = (PICTURE_AXES[face] @ rays.columns[:, j])[:, None], (PICTURE_AXES[face] @ rays.up)[:, None, None]
         if not straight:
-            across = np.multiply(rays.rows[0, i, None], across, out=found)
-        np.add(across, rays.rows[1, i, None] * up, out=found)
+            across = np.multiply(rays.rows[0, i, None], across, out=places)
+        np.add(across, rays.rows[1, i, None] * up, out=places)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            np.divide(half, found[0], out=scale)
-            found[1:] *= scale
-        found[1:] += middle
-        found[2] += np.float32(face) * side
-        nearer = cv2.compare(found[0], here[0], cv2.CMP_GT)
-        for values, to in zip(found, here, strict=True):
+            np.divide(half, places[0], out=scale)
+            places[1:] *= scale
+        places[1:] += middle
+        places[2] += np.float32(face) * side
+        nearer = cv2.compare(places[0], here[0], cv2.CMP_GT)
+        for values, to in zip(places, here, strict=True):
             cv2.copyTo(values, nearer, to)
 
 
 def shown(s: int, x: np.ndarray, y: np.ndarray) -> list[tuple[slice, slice]]:
     """About which rows and columns of the faces a picture shows, of which two maps of `locate` are given."""
     if (kernels := numba_kernels()) is not None:
-        found = kernels.shown(x, y, s + 2, NEXT).tolist()
+        extents = kernels.shown(x, y, s + 2, NEXT).tolist()
     else:
         across, down = x[::NEXT, ::NEXT].astype(int), y[::NEXT, ::NEXT].astype(int)
         of = [(down[on], across[on]) for on in (down // (s + 2) == face for face in EVERY_FACE) if on.any()]
-        found = [(rows.min(), rows.max(), columns.min(), columns.max()) for rows, columns in of]
-    return [(slice(top, bottom + NEXT), slice(left, right + NEXT)) for top, bottom, left, right in found if top >= 0]
+        extents = [(rows.min(), rows.max(), columns.min(), columns.max()) for rows, columns in of]
+    return [(slice(top, bottom + NEXT), slice(left, right + NEXT)) for top, bottom, left, right in extents if top >= 0]
 
 
 def near(s: int, rays: Rays) -> frozenset[int]:
@@ -140,5 +140,5 @@ def _spare(size: int, thread: int) -> np.ndarray:
 
 def _span(where: np.ndarray) -> slice:
     """From the first to the last that is true."""
-    found = np.flatnonzero(where)
-    return slice(int(found[0]), int(found[-1]) + 1)
+    indices = np.flatnonzero(where)
+    return slice(int(indices[0]), int(indices[-1]) + 1)

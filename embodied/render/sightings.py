@@ -78,7 +78,7 @@ def save_table(path: Path, table: SightingTable) -> None:
 
 
 def load_table(path: Path) -> SightingTable | None:
-    """What `save_table` wrote; None where there is no such file or it is damaged, so that it is made again."""
+    """Table that `save_table` wrote; None where there is no such file or it is damaged, so that it is made again."""
     try:
         with open_arrays(path) as file:
             columns = [file[name] for name in COLUMNS]

@@ -168,7 +168,7 @@ def sector_of(forward: np.ndarray, right: np.ndarray, up: np.ndarray, wide: floa
 
 
 def overlap(one: Sector, other: Sector) -> list[Sector]:
-    """What two sectors share, as none, one or two sectors."""
+    """Intersection of two sectors, as none, one or two sectors."""
     bottom, top = max(one.bottom, other.bottom), min(one.top, other.top)
     shared = []
     for turn in (-TWO_PI, 0.0, TWO_PI):
@@ -198,7 +198,7 @@ class Spans:
 
 
 def spans_of(eye: np.ndarray, middles: np.ndarray, reaches: np.ndarray) -> Spans:
-    """Where boxes lie.
+    """Places of boxes.
 
     Args:
       eye: (3,) metres.

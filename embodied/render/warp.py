@@ -51,7 +51,7 @@ APART = 5e-4
 """How far the two faces of a thin thing are moved apart, metres: of two faces in one place a ray meets either."""
 FACE_YAWS = tuple(math.atan2(f[1], f[0]) if f[2] == 0 else 0.0 for f, _ in FACES)
 FACE_PITCHES = tuple(math.asin(f[2]) for f, _ in FACES)
-"""Where the faces of a panorama look, radians."""
+"""Directions of a panorama's faces, radians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +239,7 @@ def card() -> str | None:
 
 
 def _context(model: mujoco.MjModel, worlds: int, size: tuple[int, int]) -> Any:
-    """What MuJoCo Warp draws colour, depth and ids of every world with."""
+    """Context that MuJoCo Warp draws colour, depth and ids of every world with."""
     context = mjw.create_render_context(
         model,
         worlds,

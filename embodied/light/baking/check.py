@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from embodied.light.backend import LightError, array
-from embodied.light.baking.compose import Solved
+from embodied.light.baking.compose import LightSolution
 from embodied.light.tracing import paths, radiosity
 from embodied.light.tracing.emitters import portals_of
 from embodied.light.tracing.luxels import AMBIENT, subset
@@ -29,7 +29,7 @@ all luxels at fault pass the first twenty one time in seventeen, and a hundred o
 
 
 def compare(
-    solved: Solved, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first"
+    solution: LightSolution, *, luxels: int = LUXELS, paths_each: int = PATHS, name: str = "first"
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Brightness of baked and path-traced e at random luxels, the latter's standard error, and positions: (k,) and
     (k, 3).
@@ -37,7 +37,7 @@ def compare(
     Rooms that get less than a twentieth of the house's middle light are left out: there the
     difference is far below what a picture shows. Single dark luxels are not: they may be the fault.
     """
-    s = solved
+    s = solution
     y = np.array([0.2126, 0.7152, 0.0722])
     whole = s.light.soft + AMBIENT + s.light.sun[:, None] * s.outdoors.sun * radiosity.GLASS
     bright = whole @ y
@@ -57,7 +57,7 @@ def compare(
     return whole[pick] @ y, traced.mean(1), traced.std(1) / np.sqrt(paths_each), s.lux.position[pick]
 
 
-def check(solved: Solved, tolerance: float = LIMIT) -> dict:
+def check(solution: LightSolution, tolerance: float = LIMIT) -> dict:
     """How far the bake is off: {'luxels', 'bias', 'beyond'}, the last being the share of luxels that differ too much.
 
     Twenty random luxels tell most bakes; where the bias is over `LIMIT` or more than `FEW` of them are off, a hundred
@@ -69,18 +69,18 @@ def check(solved: Solved, tolerance: float = LIMIT) -> dict:
     Raises:
       LightError: their bias is over `LIMIT` or the share that is off over `MOST`.
     """
-    if not solved.lux.shell.any():
+    if not solution.lux.shell.any():
         return {"luxels": 0}
-    first = compare(solved, luxels=LUXELS)
-    result, told = judge(*first, tolerance)
-    if not told and result["beyond"] * len(first[0]) <= FEW:
+    first = compare(solution, luxels=LUXELS)
+    result, complaint = judge(*first, tolerance)
+    if not complaint and result["beyond"] * len(first[0]) <= FEW:
         return result
-    result, told = judge(*compare(solved, luxels=AGAIN, paths_each=AGAIN_PATHS, name="again"), tolerance)
-    if told:
+    result, complaint = judge(*compare(solution, luxels=AGAIN, paths_each=AGAIN_PATHS, name="again"), tolerance)
+    if complaint:
         raise LightError(
-            f"the bake of house {solved.house.name!r} disagrees with the path tracer at {result['luxels']} luxels: "
+            f"the bake of house {solution.house.name!r} disagrees with the path tracer at {result['luxels']} luxels: "
             f"bias {result['bias']:+.1%} (at most {LIMIT:.0%}), {result['beyond']:.0%} of them by more than "
-            f"{tolerance:.0%} (at most {MOST:.0%}); {told}; raise the settings' rays, or report the house's seed"
+            f"{tolerance:.0%} (at most {MOST:.0%}); {complaint}; raise the settings' rays, or report the house's seed"
         )
     return result
 

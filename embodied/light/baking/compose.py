@@ -13,9 +13,21 @@ import shapely
 
 from embodied.house.house import House
 from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import added_up, array, brightness, constant, dr, flags, floats, mi, number, vector, wholes
+from embodied.light.backend import (
+    accumulate,
+    array,
+    booleans,
+    brightness,
+    dr,
+    floats,
+    mi,
+    opaque_float,
+    opaque_uint,
+    unsigned,
+    vector,
+)
 from embodied.light.baking.solve import Radiosity
-from embodied.light.memory import Memory, once
+from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages.atlas import Atlas, Page
 from embodied.light.pages.colours import ColourMaps, colour_at, linear, paints_of, shown
 from embodied.light.pages.cover import Cover, Texels, cover, sources, surface
@@ -34,12 +46,12 @@ DULL, SHARP_RAYS, DULL_RAYS = 0.1, 1 / 3, 2
 """Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left;
 and the rays of sharp metals per texel and of dull ones per luxel, times the settings' `other_rays`."""
 AROUND = 0.15
-"""What is added to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it,
+"""Addition to the blur of dull metals, tangent of an angle: what they show from elsewhere in the room is in it,
 too."""
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class LightSolution:
     """A house with its light, in memory: what pages are composed from and checks are made on."""
 
     house: House
@@ -52,7 +64,7 @@ class Solved:
     space: Space
     """The house as rays meet it."""
     without: Mapping[str, RayScene]
-    """As in `solve.Problem`."""
+    """As in `solve.BakeInput`."""
 
 
 T = TypeVar("T")
@@ -63,40 +75,42 @@ Mirrors: TypeAlias = tuple[Array, Array, Array, Array, np.ndarray]
 class Composer:
     """Makes the pages of a solved house; owns what all of them share on the device."""
 
-    def __init__(self, solved: Solved, settings: Settings, maps: ColourMaps, memory: Memory | None = None) -> None:
-        self.solved, self.space, self.settings, self.maps = solved, solved.space, settings, maps
+    def __init__(
+        self, solution: LightSolution, settings: Settings, maps: ColourMaps, memory: LightingCache | None = None
+    ) -> None:
+        self.solution, self.space, self.settings, self.maps = solution, solution.space, settings, maps
         self.memory = memory
-        counts = [len(t.index) for t in solved.lux.texels]
+        counts = [len(t.index) for t in solution.lux.texels]
         self._starts = np.cumsum([0, *counts])
-        self.soft = solved.light.soft + AMBIENT.astype(np.float32)
+        self.soft = solution.light.soft + AMBIENT.astype(np.float32)
         """(n, 3) all light but the sun's own."""
-        self.sun = (solved.outdoors.sun * radiosity.GLASS).astype(np.float32)
+        self.sun = (solution.outdoors.sun * radiosity.GLASS).astype(np.float32)
         """(3,) e of the sun behind the glass."""
 
     def kept(self, what: str, number: int, make: Callable[[], T]) -> T:
         """`make`, of a page's geometry, once for all lightings."""
-        return once(self.memory, (what, number), make)
+        return get_or_compute(self.memory, (what, number), make)
 
     @functools.cached_property
     def gains(self) -> np.ndarray:
         """(n, 3) exposure at luxels."""
-        return self.solved.exposure.many(self.solved.lux.position)
+        return self.solution.exposure.many(self.solution.lux.position)
 
     def luxels(self, number: int) -> slice:
-        """Where the luxels of a page lie among all."""
+        """Positions of a page's luxels among all."""
         return slice(self._starts[number], self._starts[number + 1])
 
     @functools.cached_property
     def portals(self) -> RayScene | None:
-        """What sunlight comes in by; None without sun or windows."""
-        portals = portals_of(self.solved.house)
-        return radiosity.portal_scene(portals) if portals and self.solved.outdoors.sun.any() else None
+        """Portals that sunlight comes in by; None without sun or windows."""
+        portals = portals_of(self.solution.house)
+        return radiosity.portal_scene(portals) if portals and self.solution.outdoors.sun.any() else None
 
     @functools.cached_property
     def seen(self) -> tuple[tuple[float, Array], tuple[float, Array]]:
         """For sharp and for dull metals the most that they show of a lamp's glint, which few rays would find, and the
         radiance of all luxels cut to that, on the device."""
-        lux, light = self.solved.lux, self.solved.light
+        lux, light = self.solution.lux, self.solution.light
         seen = lux.albedo * (light.soft + light.sun[:, None] * self.sun) + lux.glow
         bright = float(np.percentile(brightness(seen), 95))
         sharp, dull = ((most * bright, floats(np.minimum(seen, most * bright))) for most in (8.0, 3.0))
@@ -105,18 +119,18 @@ class Composer:
 
 def page_of(number: int, composer: Composer) -> Ingredients:
     """Compose page `number` of the atlas."""
-    solved = composer.solved
-    page, coarse, mine = solved.atlas.pages[number], solved.lux.texels[number], composer.luxels(number)
-    light = np.concatenate([composer.soft[mine], solved.light.sun[mine, None]], axis=1)
-    good = solved.light.good[mine]
+    solution = composer.solution
+    page, coarse, luxels = solution.atlas.pages[number], solution.lux.texels[number], composer.luxels(number)
+    light = np.concatenate([composer.soft[luxels], solution.light.sun[luxels, None]], axis=1)
+    good = solution.light.good[luxels]
     known = filled(composer.kept("filling", number, lambda: filling(coarse.index, good, coarse.shape)), light)
     soft, share = np.ascontiguousarray(known[..., :3]), known[..., 3]
-    fine = lambda: cover(page, page.fineness, solved.lux.sheets[number])
+    fine = lambda: cover(page, page.fineness, solution.lux.sheets[number])
     c = coarse if page.fineness == 1 else composer.kept("cover", number, fine)
     sun = _sharp_sun(composer, page, coarse, c, share)
     nearest_luxel = composer.kept("luxels", number, lambda: sources(coarse.index, coarse.shape))
-    gain = composer.gains[mine][nearest_luxel].reshape(*coarse.shape, 3)
-    glow = glow_of(solved.house, solved.atlas, page, c.face, solved.lamps)
+    gain = composer.gains[luxels][nearest_luxel].reshape(*coarse.shape, 3)
+    glow = glow_of(solution.house, solution.atlas, page, c.face, solution.lamps)
     picture, albedo = _painted(composer, number, c, soft, gain, sun, glow, _mirrors(composer, page, coarse, c))
     whole = np.zeros(c.shape, np.uint8)
     if sun is not None:
@@ -129,7 +143,7 @@ def page_of(number: int, composer: Composer) -> Ingredients:
         codes = codes[shown_by] if len(codes) else shown_by.astype(np.uint32)
         return cv2.cvtColor(codes.astype("<u4").view(np.uint8).reshape(*c.shape, 4), cv2.COLOR_RGBA2RGB)
 
-    glow = solved.lux.glow[mine]
+    glow = solution.lux.glow[luxels]
     glow = glow[nearest_luxel].reshape(*coarse.shape, 3) if glow.any() else np.zeros((0, 0, 3))
     half = lambda a: np.clip(a, 0, 6e4).astype(np.float16)
     return Ingredients(half(soft), whole, page_like(albedo), page_like(picture), half(glow))
@@ -152,8 +166,8 @@ def _painted(
     """
     if not len(c.index):
         return np.zeros(0, np.uint32), np.zeros(0, np.uint32)
-    face, b1, b2 = wholes(c.face), floats(c.b1), floats(c.b2)
-    page = composer.solved.atlas.pages[number]
+    face, b1, b2 = unsigned(c.face), floats(c.b1), floats(c.b2)
+    page = composer.solution.atlas.pages[number]
 
     def colours() -> np.ndarray:
         codes = _packed(shown(colour_at(paints_of(page, page.fineness, composer.maps), face, b1, b2)))
@@ -161,11 +175,11 @@ def _painted(
         return np.array(codes)
 
     albedo = composer.kept("albedo", number, colours)
-    colour = _linear(wholes(albedo))
+    colour = _linear(unsigned(albedo))
     read = _Bilinear(c, page)
     e = read(soft)
     if sun is not None:
-        e += mi.Color3f(*(constant(x) for x in composer.sun)) * floats(sun)
+        e += mi.Color3f(*(opaque_float(x) for x in composer.sun)) * floats(sun)
     radiance = colour * e
     if mirrors is not None:
         metal, tint, dull, sharp, blurred = mirrors
@@ -184,7 +198,9 @@ class _Bilinear:
 
     def __init__(self, c: Cover, page: Page) -> None:
         row, column = np.divmod(c.index.astype(np.int32), np.int32(c.shape[1]))
-        right, bottom, width, step = (number(x) for x in (page.width - 1, page.height - 1, page.width, page.fineness))
+        right, bottom, width, step = (
+            opaque_uint(x) for x in (page.width - 1, page.height - 1, page.width, page.fineness)
+        )
         at = lambda a, last: dr.clip((floats(a) + 0.5) / mi.Float(step) - 0.5, 0.0, mi.Float(last))
         x, y = at(column, right), at(row, bottom)
         x0, y0 = mi.UInt32(x), mi.UInt32(y)
@@ -215,8 +231,8 @@ def _linear(codes: Array) -> Array:
 
 
 def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirrors | None:
-    """What mirrors and metals show in place of their diffuse light: what somebody in the middle of the room sees in
-    them.
+    """The sight that mirrors and metals show in place of their diffuse light: what somebody in the middle
+    of the room sees in them.
 
     A texture cannot follow the eye; one fixed viewpoint gives them a plausible picture to wear.
 
@@ -239,7 +255,7 @@ def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirror
     if len(i := np.nonzero((~dull & (metal > 0))[c.face])[0]):
         sharp[i] = _mirrored(composer, page, c.face[i], surface(page, c, i), rough[c.face[i]])
     tint = np.where((metal > 0) & (rough < 0.02), 0.85, 0.0).astype(np.float32)
-    return floats(metal), floats(tint), flags(dull), mi.Color3f(vector(sharp)), blurred
+    return floats(metal), floats(tint), booleans(dull), mi.Color3f(vector(sharp)), blurred
 
 
 def _mirrored(
@@ -256,7 +272,7 @@ def _mirrored(
       face: (k,) of the page. surfaces: position, normal and face normal, (k, 3) each. rough: (k,).
       turn: (2, k) of the samples at dull ones; None for sharp ones.
     """
-    house, atlas, space = composer.solved.house, composer.solved.atlas, composer.space
+    house, atlas, space = composer.solution.house, composer.solution.atlas, composer.space
     position, normal, face_normal = surfaces
     room = house.room_by_id.get(atlas.rooms[page.owner[face[0]]], house.rooms[0])
     eye = [*shapely.Polygon(room.polygon).representative_point().coords[0], house.storey_of(room).elevation + 1.5]
@@ -279,7 +295,7 @@ def _mirrored(
         near, hit = radiosity.hit_colour(space, table, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
         return (dr.select(hit, near, radiosity.env_lookup(space.env, d, ~hit) * radiosity.GLASS),)
 
-    return np.minimum(array(added_up(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays, limit)
+    return np.minimum(array(accumulate(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays, limit)
 
 
 def _rays(composer: Composer, *, dull: bool) -> int:
@@ -363,7 +379,7 @@ def _sharp_sun(composer: Composer, page: Page, coarse: Texels, c: Cover, share: 
     none."""
     if composer.portals is None or not len(c.index) or share.max() <= 0:
         return None
-    towards = composer.solved.outdoors.sun_direction
+    towards = composer.solution.outdoors.sun_direction
     facing = np.clip(coarse.normal @ towards.astype(np.float32), 0, 1)
     own = share.ravel()[coarse.index]
     whole = np.where(own > 0.5 * facing, facing, 0.0) * (own > 0.004)

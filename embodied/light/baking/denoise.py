@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from embodied.light.arrays import Array
-from embodied.light.backend import array, brightness, constant, dr, floats, mi, signed, vector
+from embodied.light.backend import array, brightness, dr, floats, mi, opaque_float, signed, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels
 
@@ -50,7 +50,7 @@ def smooth_pages(
         least = floats(floor) + 1e-4
         shade = dr.log(_brightness(own) + least)
         total, weight, squares = mi.Color3f(0.0), mi.Float(0.0), mi.Float(0.0)
-        tight = 1 / (constant(like**2) + dr.square(NOISES * own_noise))
+        tight = 1 / (opaque_float(like**2) + dr.square(NOISES * own_noise))
         for i, j, q, inside in grid.around(step):
             *colour, trusted = dr.gather(mi.Vector4f, values, q, inside)
             other = mi.Color3f(*colour)

@@ -24,12 +24,12 @@ from tqdm import tqdm
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.assets.catalogue import Catalogue
 from embodied.house.house import WEATHERS, House, Sky
-from embodied.light.backend import device, rest, warn
-from embodied.light.baking.compose import Composer, Solved, page_of
-from embodied.light.baking.solve import Problem, Radiosity, solve
+from embodied.light.backend import device, free_memory, warn
+from embodied.light.baking.compose import Composer, LightSolution, page_of
+from embodied.light.baking.solve import BakeInput, Radiosity, solve
 from embodied.light.baking.stages import facts_of, kept_light, mark_of, same_atlas
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
-from embodied.light.memory import Memory, once
+from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages import tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
 from embodied.light.pages.colours import ColourMaps
@@ -64,7 +64,7 @@ STAGES = {
     "pages": (0.75, 1.0),
     "done": (1.0, 1.0),
 }
-"""Where each stage lies on the progress bar: its rough share of a bake's time."""
+"""Begin and end of each stage on the progress bar: its rough share of a bake's time."""
 TOGETHER = 8
 """Pages that are composed before they are written, in one go; an interrupted bake loses no more."""
 
@@ -96,7 +96,7 @@ def progress_bar(*, shown: bool = True) -> Iterator[Progress]:
 
 
 def key_of(house: House, looks: str, settings: Settings) -> str:
-    """What a bake is filed under: another catalogue, model or material makes another bake. `looks`: of its parts."""
+    """Name of a bake's file: another catalogue, model or material makes another bake. `looks`: of its parts."""
     return digest("light", light_code(), house.digest, owners(house), looks, dataclasses.asdict(settings))[:24]
 
 
@@ -157,7 +157,7 @@ def bake_all(
     settings = settings_of(settings) if isinstance(settings, str) else settings
     if len({_unlit(h).digest for h in lightings}) > 1:
         raise ValueError("bake_all lights one house at several hours; what came differs in more than sky and lamps")
-    shared, out = None, []
+    context, out = None, []
     parts = house_parts(lightings[0], catalogue)  # which know neither sky nor lamps
     looks = looks_of(parts)
     for house in lightings:
@@ -168,13 +168,15 @@ def bake_all(
         with locked(folder, wait=True):
             done = reopened(folder, house)  # whoever held it may have made it
             if done is None:
-                if shared is None:
+                if context is None:
                     device()  # or LightError, before any work
                     several = len(lightings) > 1
                     how_long = duration(house, _name_of(settings))
                     log.warning("lighting %s, which %s keeps, takes %s", house.name, cache, how_long)
-                    shared = Shared(house, parts, Path(cache) / "light", settings, several=several, progress=progress)
-                done = _make(house, shared, folder, settings, progress)
+                    context = BakeContext(
+                        house, parts, Path(cache) / "light", settings, several=several, progress=progress
+                    )
+                done = _make(house, context, folder, settings, progress)
         out.append(done)
     return tuple(out)
 
@@ -204,8 +206,8 @@ def lightings_of(house: House, count: int) -> tuple[House, ...]:
     return tuple(out)
 
 
-class Shared:
-    """What all lightings of a house share: surfaces, and what rays meet."""
+class BakeContext:
+    """All that lightings of a house share: surfaces, and what rays meet."""
 
     def __init__(
         self,
@@ -235,17 +237,17 @@ class Shared:
         self.atlas = atlas_of(coarsened(things, settings.texels))
         self.lux = luxels_of(self.atlas, self.maps)
         self.space = space_of(self.atlas, self.lux.texels)
-        self.memory: Memory | None = {} if several else None
+        self.memory: LightingCache | None = {} if several else None
         clock("luxels")
 
     @functools.cached_property
     def outside(self) -> Outside | None:
-        """What the sun and the sky light outside."""
+        """Parts that the sun and the sky light outside."""
         return outside_of(self._outer, self.space.scene, self._cache, self.maps, self._sharpness)
 
     @functools.cached_property
     def meshes(self) -> tuple[list[LitMesh], list[np.ndarray]]:
-        """What renderers draw, and the gloss of its faces."""
+        """Meshes that renderers draw, and the gloss of their faces."""
         first = len(self.atlas.pages)
         meshes, gloss = meshes_of(self.atlas, 0)
         if self.outside is not None:
@@ -263,28 +265,28 @@ class Shared:
 
 def solve_house(
     house: House,
-    shared: Shared,
+    context: BakeContext,
     settings: Settings,
     folder: Path | None = None,
     *,
     progress: Progress = lambda s, d: None,
     took: dict[str, float] | None = None,
-) -> Solved:
+) -> LightSolution:
     """Everything up to the light of every luxel, which is kept in `folder` where one is given."""
     clock = _Clock({} if took is None else took)
-    atlas = shared.atlas
+    atlas = context.atlas
     if folder is not None:
-        same_atlas(folder, once(shared.memory, "mark", lambda: mark_of(atlas)))
+        same_atlas(folder, get_or_compute(context.memory, "mark", lambda: mark_of(atlas)))
     outdoors = outdoors_of(house, settings.rows)
     clock("outdoors")
-    space = with_env(shared.space, outdoors.picture)
+    space = with_env(context.space, outdoors.picture)
     lamps = tuple(in_the_open(x, space.scene) for x in lamps_of(house, atlas))
-    lux = with_glow(shared.lux, house, atlas, lamps)
+    lux = with_glow(context.lux, house, atlas, lamps)
     clock("luxels")
     bare = tuple(sorted({x.owner for x in lamps if x.owner in atlas.owners}))
-    without = once(shared.memory, ("without", bare), lambda: scenes_without(space, atlas, bare))
-    problem = Problem(house, atlas, lux, space, outdoors, lamps, settings, shared.memory, without)
-    light = kept_light(folder, len(lux.position), lambda: solve(problem, progress, clock))
+    without = get_or_compute(context.memory, ("without", bare), lambda: scenes_without(space, atlas, bare))
+    inputs = BakeInput(house, atlas, lux, space, outdoors, lamps, settings, context.memory, without)
+    light = kept_light(folder, len(lux.position), lambda: solve(inputs, progress, clock))
     clock("direct")
     rows = len(outdoors.picture)
     outside = np.median(outdoors.picture[rows * 300 // 1024 : rows * 540 // 1024].reshape(-1, 3), axis=0)
@@ -293,36 +295,36 @@ def solve_house(
     if dark and 8 < house.sky.hour < 17:
         warn(f"rooms {dark} have neither window nor lamp that lights them; they are shown nearly dark")
     exposure = expose(house, light_of_rooms, outside)
-    return Solved(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
+    return LightSolution(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
 
 
-def _make(house: House, shared: Shared, folder: Path, settings: Settings, progress: Progress) -> Bake:
+def _make(house: House, context: BakeContext, folder: Path, settings: Settings, progress: Progress) -> Bake:
     from embodied.light.baking.check import check
 
-    took, shared.took = shared.took, {}
+    took, context.took = context.took, {}
     start, used = time.perf_counter(), time.process_time()
-    s = solve_house(house, shared, settings, folder, progress=progress, took=took)
+    s = solve_house(house, context, settings, folder, progress=progress, took=took)
     clock = _Clock(took)
     error = check(s, settings.tolerance)
     clock("check")
-    composer = Composer(s, settings, shared.maps, shared.memory)
+    composer = Composer(s, settings, context.maps, context.memory)
     every = range(len(s.atlas.pages))
     for i in every[::TOGETHER]:
         progress("pages", i / len(every))
         missing = [k for k in every[i : i + TOGETHER] if not all((folder / n).exists() for n in page_files(k))]
-        write_pages(folder, {k: page_of(k, composer) for k in missing}, settings.jpeg, shared.memory)
+        write_pages(folder, {k: page_of(k, composer) for k in missing}, settings.jpeg, context.memory)
     clock("pages")
     first = len(s.atlas.pages)
-    pictures = daylit(shared.outside, s.outdoors, s.exposure, settings.other_rays)
+    pictures = daylit(context.outside, s.outdoors, s.exposure, settings.other_rays)
     for i, picture in enumerate(pictures, first):
         write_bytes(folder / f"page_{i:03d}.jpg", jpeg(picture, settings.jpeg))
     clock("surroundings")
-    write_bytes(folder / "meshes.npz", shared.meshes_file)
+    write_bytes(folder / "meshes.npz", context.meshes_file)
     write_lamps(folder / "lamps.npz", s.lamps)
     clock("meshes")
     (folder / "stage_light.npz").unlink(missing_ok=True)
     manifest = {
-        **facts_of(s, shared.meshes[0], folder),
+        **facts_of(s, context.meshes[0], folder),
         "settings": dataclasses.asdict(settings),
         "pages": first + len(pictures),
         "seconds": {k: round(v, 2) for k, v in took.items()},
@@ -342,7 +344,7 @@ class _Clock:
         self._took, self._last = took, time.process_time()
 
     def __call__(self, name: str) -> None:
-        rest()
+        free_memory()
         now = time.process_time()
         self._took[name] = self._took.get(name, 0.0) + now - self._last
         self._last = now
@@ -358,9 +360,9 @@ def _light_of_rooms(house: House, atlas: Atlas, lux: Luxels, light: Radiosity) -
     room = room_of_owner[lux.owner]
     out = {}
     for i, r in enumerate(house.rooms):
-        mine = (room == i) & lux.shell & light.good
-        full = np.percentile(e[mine], 85, axis=0) if mine.any() else np.zeros(3)
-        most = brightest(e[mine]).mean() if mine.any() else 0.0
+        lit = (room == i) & lux.shell & light.good
+        full = np.percentile(e[lit], 85, axis=0) if lit.any() else np.zeros(3)
+        most = brightest(e[lit]).mean() if lit.any() else 0.0
         out[r.id] = full * np.clip(0.45 * most / max(full.mean(), 1e-9), 1.0, 1.35)
     return out
 
@@ -382,7 +384,7 @@ def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings |
 
 
 def _folder(cache: Path, house: House, looks: str, settings: Settings) -> Path:
-    """Where the bake of `house` is, or will be; its name begins with the quality's. `looks`: of its parts."""
+    """Folder of the bake of `house`, there or not; its name begins with the quality's. `looks`: of its parts."""
     return Path(cache) / "light" / f"{_name_of(settings)}-{key_of(house, looks, settings)}"
 
 

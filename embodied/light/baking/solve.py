@@ -13,7 +13,7 @@ from embodied.house.shapes import inward
 from embodied.light.arrays import RayScene
 from embodied.light.backend import array, brightness, floats, mi
 from embodied.light.baking import denoise
-from embodied.light.memory import Memory, once
+from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages.atlas import Atlas
 from embodied.light.settings import Settings
 from embodied.light.tracing import radiosity
@@ -32,7 +32,7 @@ ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class Radiosity:
-    """What reaches each luxel: (n, 3) float32 each, radiosity e = E / pi in 100 cd/m2."""
+    """Light that reaches each luxel: (n, 3) float32 each, radiosity e = E / pi in 100 cd/m2."""
 
     direct: np.ndarray
     """From sky and lamps."""
@@ -52,7 +52,7 @@ class Radiosity:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class BakeInput:
     """A house to be lit, at one hour."""
 
     house: House
@@ -62,21 +62,23 @@ class Problem:
     outdoors: Outdoors
     lamps: tuple[Lamp, ...]
     settings: Settings
-    memory: Memory | None = None
-    """Where the house is lit more than once."""
+    memory: LightingCache | None = None
+    """Results that lightings share; None where the house is lit once."""
     without: Mapping[str, RayScene] = field(default_factory=dict)
-    """What the shadow rays of a bare bulb meet, by the owner that the bulb hangs in."""
-    _own: Memory = field(default_factory=dict)
+    """Scenes that the shadow rays of a bare bulb meet, by the owner that the bulb hangs in."""
+    _own: LightingCache = field(default_factory=dict)
 
     @functools.cached_property
     def points(self) -> Points:
         """All luxels on the device."""
-        return once(self.memory, "points", lambda: points(self.lux, self.settings.seen_rays))
+        return get_or_compute(self.memory, "points", lambda: points(self.lux, self.settings.seen_rays))
 
     @functools.cached_property
     def near(self) -> Met:
-        """What the rays meet that carry light from bounce to bounce."""
-        return once(self.memory, "near", lambda: radiosity.meet(self.space, self.points, self.settings.bounce_rays))
+        """Hits of the rays that carry light from bounce to bounce."""
+        return get_or_compute(
+            self.memory, "near", lambda: radiosity.meet(self.space, self.points, self.settings.bounce_rays)
+        )
 
     @functools.cached_property
     def free(self) -> np.ndarray:
@@ -85,9 +87,11 @@ class Problem:
 
     @functools.cached_property
     def far(self) -> Met:
-        """What the other rays of the luxels `free` meet."""
+        """Hits of the other rays of the luxels `free`."""
         first, last = self.settings.bounce_rays, self.settings.seen_rays
-        return once(self.memory, "far", lambda: radiosity.meet(self.space, self.at(self.free), last - first, first))
+        return get_or_compute(
+            self.memory, "far", lambda: radiosity.meet(self.space, self.at(self.free), last - first, first)
+        )
 
     def reached(self, sees: Callable[[np.ndarray], np.ndarray], tries: int = TRIES) -> np.ndarray:
         """Numbers of the luxels that may be seen and that a light may reach.
@@ -100,7 +104,7 @@ class Problem:
         if not len(free):
             return free
         memory = self._own if self.memory is None else self.memory
-        some = once(memory, ("tried", tries), lambda: radiosity.tried(units, tries))
+        some = get_or_compute(memory, ("tried", tries), lambda: radiosity.tried(units, tries))
         return free[radiosity.reached(units, some, sees(free[some]))]
 
     @functools.cached_property
@@ -113,102 +117,104 @@ class Problem:
         return radiosity.only(self.points, luxels)
 
 
-def sources_of(problem: Problem) -> tuple[Portal | Lamp, ...]:
+def sources_of(inputs: BakeInput) -> tuple[Portal | Lamp, ...]:
     """Sky and lamps."""
-    return *portals_of(problem.house), *problem.lamps
+    return *portals_of(inputs.house), *inputs.lamps
 
 
-def _shine(problem: Problem, source: Portal | Lamp, i: np.ndarray, rays: int | None = None) -> np.ndarray:
+def _shine(inputs: BakeInput, source: Portal | Lamp, i: np.ndarray, rays: int | None = None) -> np.ndarray:
     """(m, 3) e that a source gives to luxels (m,), by so many rays; by those of the settings, and remembered, without a
     number."""
-    points, settings = problem.at(i), problem.settings
+    points, settings = inputs.at(i), inputs.settings
     if isinstance(source, Portal):
-        memory = problem.memory if rays is None else None
-        return array(radiosity.sky_light(problem.space, points, source, rays or settings.sky_rays, memory))
-    scene = problem.without.get(source.owner or "", problem.space.scene)
+        memory = inputs.memory if rays is None else None
+        return array(radiosity.sky_light(inputs.space, points, source, rays or settings.sky_rays, memory))
+    scene = inputs.without.get(source.owner or "", inputs.space.scene)
     return array(radiosity.lamp_light(scene, points, source, rays or settings.lamp_rays))
 
 
-def shone_on(problem: Problem, source: Portal | Lamp) -> tuple[np.ndarray, np.ndarray]:
+def shone_on(inputs: BakeInput, source: Portal | Lamp) -> tuple[np.ndarray, np.ndarray]:
     """The light of a source: (k,) luxels that it may reach, rooms that it reaches nowhere left out, and (k, 3) e."""
     radiance = np.asarray(source.radiance, np.float32) if isinstance(source, Lamp) else None
 
     def shone() -> tuple[np.ndarray, np.ndarray]:
-        seen = lambda: problem.reached(lambda i: _shine(problem, source, i, 4).sum(1) > 0)
-        which = once(problem.memory, ("reached", source.id), seen)
-        e = _shine(problem, source, which) if len(which) else np.zeros((0, 3), np.float32)
-        return which, e if radiance is None or problem.memory is None else e / radiance
+        seen = lambda: inputs.reached(lambda i: _shine(inputs, source, i, 4).sum(1) > 0)
+        which = get_or_compute(inputs.memory, ("reached", source.id), seen)
+        e = _shine(inputs, source, which) if len(which) else np.zeros((0, 3), np.float32)
+        return which, e if radiance is None or inputs.memory is None else e / radiance
 
-    if radiance is None or problem.memory is None:
+    if radiance is None or inputs.memory is None:
         return shone()
-    which, e = once(problem.memory, ("shone", source.id), shone)  # of the same lamp with another colour or power
+    which, e = get_or_compute(
+        inputs.memory, ("shone", source.id), shone
+    )  # of the same lamp with another colour or power
     return which, e * radiance
 
 
-def outer_light(problem: Problem, samples: int = 24) -> np.ndarray:
+def outer_light(inputs: BakeInput, samples: int = 24) -> np.ndarray:
     """(n, 3) e that the outer side of windows and outer doors takes from the open sky.
 
     What faces the room takes none: its luxels at the frame's edge lie in the plane of the lintel, from where
     every second ray runs up inside the wall.
     """
-    house, atlas, lux, space = problem.house, problem.atlas, problem.lux, problem.space
+    house, atlas, lux, space = inputs.house, inputs.atlas, inputs.lux, inputs.space
     e = np.zeros((len(lux.position), 3), np.float32)
     into = {o.id: inward(house, o) for o in house.openings if None in o.rooms}
     outer = [k == "opening" and o.split("/")[0] in into for o, k in zip(atlas.owners, atlas.kinds)]
     inwards = np.array([into[o.split("/")[0]] if x else [np.nan] * 2 for o, x in zip(atlas.owners, outer)]).reshape(
         -1, 2
     )
-    mine = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
-    if not len(mine):
+    outer_side = np.nonzero((lux.face_normal[:, :2] * inwards[lux.owner]).sum(1) < 0.7)[0]
+    if not len(outer_side):
         return e
     ways = portals_of(house)
     scene = Together((space.scene, radiosity.portal_scene(ways))) if ways else space.scene
-    e[mine] = radiosity.open_sky(scene, space.env, problem.at(mine), samples, mi.Color3f(0.0))
+    e[outer_side] = radiosity.open_sky(scene, space.env, inputs.at(outer_side), samples, mi.Color3f(0.0))
     return e
 
 
-def _lit_by(problem: Problem, patches: Patches, which: np.ndarray) -> np.ndarray:
+def _lit_by(inputs: BakeInput, patches: Patches, which: np.ndarray) -> np.ndarray:
     """(k, 3) e of sunlit patches at some luxels; of none at none (a glint may reach no luxel)."""
     if not len(which):
         return np.zeros((0, 3), np.float32)
-    return radiosity.patch_light(problem.space.scene, problem.at(which), patches)
+    return radiosity.patch_light(inputs.space.scene, inputs.at(which), patches)
 
 
-def sun_light(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+def sun_light(inputs: BakeInput) -> tuple[np.ndarray, np.ndarray]:
     """(n,) share of the sun at luxels, and (n, 3) e of its first bounce."""
-    lux, scene, outdoors = problem.lux, problem.space.scene, problem.outdoors
-    portals = portals_of(problem.house)
+    lux, scene, outdoors = inputs.lux, inputs.space.scene, inputs.outdoors
+    portals = portals_of(inputs.house)
     share, e = np.zeros(len(lux.position), np.float32), np.zeros((len(lux.position), 3), np.float32)
     if not portals or not outdoors.sun.any():
         return share, e
     through, towards = radiosity.portal_scene(portals), outdoors.sun_direction
-    seen = lambda i, rays: np.asarray(radiosity.sun_share(scene, problem.at(i), through, towards, rays))
-    mine = problem.reached(lambda i: seen(i, 1) > 0, tries=1000)
-    mine = mine[lux.thin[mine] | (lux.face_normal[mine] @ towards.astype(np.float32) > 0)]
-    if len(mine):
-        share[mine] = seen(mine, 4)
+    seen = lambda i, rays: np.asarray(radiosity.sun_share(scene, inputs.at(i), through, towards, rays))
+    facing = inputs.reached(lambda i: seen(i, 1) > 0, tries=1000)
+    facing = facing[lux.thin[facing] | (lux.face_normal[facing] @ towards.astype(np.float32) > 0)]
+    if len(facing):
+        share[facing] = seen(facing, 4)
     flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
     for u in np.unique(lux.unit[share > 0]):
-        patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], problem.settings.patches)
+        patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], inputs.settings.patches)
         if patches is not None:
-            lit = functools.partial(_lit_by, problem, patches)
-            which = problem.reached(lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
+            lit = functools.partial(_lit_by, inputs, patches)
+            which = inputs.reached(lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
             e[which] += lit(which)
     return share, e
 
 
-def _patches(lux: Luxels, flux: np.ndarray, mine: np.ndarray, most: int) -> Patches | None:
-    """At most so many small lights for the sunlit luxels `mine` of one room; None for a glint."""
+def _patches(lux: Luxels, flux: np.ndarray, sunlit: np.ndarray, most: int) -> Patches | None:
+    """At most so many small lights for the luxels `sunlit` of one room; None for a glint."""
     power = brightness(flux)
-    at = np.round(lux.position[mine] * 4)
-    mine = mine[np.lexsort((at[:, 0], at[:, 1], at[:, 2]))]
-    cut = np.cumsum(power[mine])
+    at = np.round(lux.position[sunlit] * 4)
+    sunlit = sunlit[np.lexsort((at[:, 0], at[:, 1], at[:, 2]))]
+    cut = np.cumsum(power[sunlit])
     if cut[-1] < 1e-4:
         return None
-    k = int(np.clip(most * min(1.0, 0.8 * float(lux.area[mine].sum()) + 0.1), 4, most))
-    pick = mine[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(mine) - 1)]
+    k = int(np.clip(most * min(1.0, 0.8 * float(lux.area[sunlit].sum()) + 0.1), 4, most))
+    pick = sunlit[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(sunlit) - 1)]
     strength = flux[pick] / flux[pick].mean(1, keepdims=True) * (cut[-1] / k)
-    extent = np.full(k, max(float(lux.area[mine].sum()) / k, 1e-3))
+    extent = np.full(k, max(float(lux.area[sunlit].sum()) / k, 1e-3))
     return Patches(lux.position[pick], lux.normal[pick], lux.thin[pick], strength, extent)
 
 
@@ -224,15 +230,15 @@ class Bounced:
     """(n,) of brightness, before it is smoothed."""
 
 
-def bounce(problem: Problem, soft: np.ndarray, tell: Callable[[float], None]) -> Bounced:
+def bounce(inputs: BakeInput, soft: np.ndarray, tell: Callable[[float], None]) -> Bounced:
     """All further bounces, by Jacobi rounds of gathering along the same few rays, and more of them for what is seen.
 
-    In the last round and in what is seen no spot sparkles (`_tamed`).
+    In the last round and in what is seen no spot sparkles (`_clamp_fireflies`).
 
     Args:
       soft: (n, 3) first light, without the sun's own.
     """
-    lux, near, free = problem.lux, problem.near, problem.free
+    lux, near, free = inputs.lux, inputs.near, inputs.free
     seen = lux.albedo * (soft + AMBIENT.astype(np.float32)) + np.where(lux.sampled[:, None], 0.0, lux.glow).astype(
         np.float32
     )
@@ -240,23 +246,23 @@ def bounce(problem: Problem, soft: np.ndarray, tell: Callable[[float], None]) ->
     for k in range(ROUNDS):
         tell(k / (ROUNDS + 1))
         table = seen + lux.albedo * e
-        e = radiosity.gather(near, floats(table if k < ROUNDS - 1 else _tamed(lux, table)))[0] / near.rays
+        e = radiosity.gather(near, floats(table if k < ROUNDS - 1 else _clamp_fireflies(lux, table)))[0] / near.rays
         if k == 0:
-            e += _endless(lux, e, near.bad < 0.5 * near.rays)
+            e += _infinite_bounces(lux, e, near.bad < 0.5 * near.rays)
     tell(ROUNDS / (ROUNDS + 1))
-    last = floats(_tamed(lux, seen + lux.albedo * e))
+    last = floats(_clamp_fireflies(lux, seen + lux.albedo * e))
     total, square = radiosity.gather(near, last)
     bad, rays = near.bad.copy(), np.full(len(e), near.rays, np.float32)
-    if len(free) and problem.settings.seen_rays > near.rays:
-        for all_, more in zip((total, square, bad), (*radiosity.gather(problem.far, last), problem.far.bad)):
+    if len(free) and inputs.settings.seen_rays > near.rays:
+        for all_, more in zip((total, square, bad), (*radiosity.gather(inputs.far, last), inputs.far.bad)):
             all_[free] += more
-        rays[free] += problem.far.rays
+        rays[free] += inputs.far.rays
     e = total / rays[:, None]
     variance = np.maximum(square / rays - brightness(e) ** 2, 0.0) / np.maximum(rays - 1, 1)
     return Bounced(e, bad < 0.5 * rays, variance)
 
 
-def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
+def _clamp_fireflies(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     """Radiosity cut, room by room, where at most `SPARKS` of the room's light is lost by it: what is smaller
     than a hand beside a bulb would show as sparks on far walls, one ray in hundreds. What was cut is shared out
     over the room, or every bounce would lose it anew."""
@@ -264,8 +270,8 @@ def _tamed(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     order = np.argsort(units, kind="stable")
     first = np.flatnonzero(np.diff(units[order], prepend=-1))
     most = np.zeros(int(units.max(initial=0)) + 1, np.float32)
-    for mine in np.split(order, first[1:]):
-        most[units[mine[:1]]] = max(_most(y[mine], lux.area[mine]), 1e-9)
+    for unit in np.split(order, first[1:]):
+        most[units[unit[:1]]] = max(_most(y[unit], lux.area[unit]), 1e-9)
     out = seen * np.minimum(1.0, most[units] / np.maximum(y, 1e-9))[:, None]
     before, after = ([np.bincount(units, c * lux.area, len(most)) for c in a.T] for a in (seen, out))
     scale = np.transpose([b / np.maximum(a, 1e-12) for b, a in zip(before, after, strict=True)])
@@ -286,47 +292,47 @@ def _most(y: np.ndarray, area: np.ndarray) -> float:
     return float(rising[min(int(np.searchsorted(-lost, -allowed)), len(rising) - 1)])
 
 
-def _endless(lux: Luxels, once: np.ndarray, good: np.ndarray) -> np.ndarray:
-    """First guess (n, 3) of all bounces after the first one `once`: each room as a sphere, e * rho / (1 - rho).
+def _infinite_bounces(lux: Luxels, direct: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """First guess (n, 3) of all bounces after the first one `direct`: each room as a sphere, e * rho / (1 - rho).
 
     Jacobi rounds from nothing would miss a fifth of a white room's light after four of them. The
     brightest luxels count at most three times the middle one: what lies between window and closed
     curtain does not light the room.
     """
-    out = np.zeros_like(once)
+    out = np.zeros_like(direct)
     openings = 0.03  # share of a room's walls that lets light out
     for u in np.unique(lux.unit):
-        mine = np.nonzero((lux.unit == u) & lux.shell & good)[0]
-        if len(mine):
-            weight = lux.area[mine, None] / lux.area[mine].sum()
-            rho = (lux.albedo[mine] * weight).sum(0) * (1 - openings)
-            arrived = np.minimum(once[mine], 3 * np.median(once[mine], axis=0))
+        walls = np.nonzero((lux.unit == u) & lux.shell & good)[0]
+        if len(walls):
+            weight = lux.area[walls, None] / lux.area[walls].sum()
+            rho = (lux.albedo[walls] * weight).sum(0) * (1 - openings)
+            arrived = np.minimum(direct[walls], 3 * np.median(direct[walls], axis=0))
             out[lux.unit == u] = (arrived * weight).sum(0) * rho / (1 - rho)
     return out
 
 
 def solve(
-    problem: Problem,
+    inputs: BakeInput,
     tell: Callable[[str, float], None] = lambda stage, done: None,
     clock: Callable[[str], None] = lambda name: None,
 ) -> Radiosity:
     """The light of a house."""
-    atlas, lux = problem.atlas, problem.lux
-    sources, direct = sources_of(problem), np.zeros((len(lux.position), 3), np.float32)
+    atlas, lux = inputs.atlas, inputs.lux
+    sources, direct = sources_of(inputs), np.zeros((len(lux.position), 3), np.float32)
     for k, source in enumerate(sources):
         tell("direct light", k / len(sources))
-        which, e = shone_on(problem, source)
+        which, e = shone_on(inputs, source)
         direct[which] += e
     clock("direct")
-    share, patches = sun_light(problem)
+    share, patches = sun_light(inputs)
     clock("sun")
-    bounced = bounce(problem, direct + patches, lambda x: tell("bounces", x))
+    bounced = bounce(inputs, direct + patches, lambda x: tell("bounces", x))
     clock("bounces")
     tell("smoothing", 0.0)
-    good, grid = bounced.good, once(problem.memory, "grid", lambda: denoise.Grid(atlas, lux.texels))
+    good, grid = bounced.good, get_or_compute(inputs.memory, "grid", lambda: denoise.Grid(atlas, lux.texels))
     smooth = functools.partial(denoise.smooth_pages, grid=grid, good=good)
     indirect = smooth(bounced.e, steps=(1, 2, 4), likeness=(0.08, 0.08, 0.08), variance=bounced.variance)
     grain = denoise.spatial_variance(direct, grid) * 0.8
     direct = smooth(direct, steps=(1, 2), likeness=(0.3, 0.2), variance=grain)
     clock("smooth")
-    return Radiosity(direct, share, patches, indirect + outer_light(problem), good | ~lux.shell)
+    return Radiosity(direct, share, patches, indirect + outer_light(inputs), good | ~lux.shell)

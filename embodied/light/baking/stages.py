@@ -9,7 +9,7 @@ import numpy as np
 
 from embodied.assets.cache import atomic_path, digest, write_bytes
 from embodied.light.backend import device, warn
-from embodied.light.baking.compose import Solved
+from embodied.light.baking.compose import LightSolution
 from embodied.light.baking.solve import Radiosity
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.files import checksum
@@ -39,7 +39,7 @@ def same_atlas(folder: Path, mark: str) -> None:
 
 
 def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Radiosity:
-    """What `work` returns, from disk if an interrupted run left it there whole."""
+    """Result of `work`, from disk if an interrupted run left it there whole."""
     if folder is None:
         return work()
     path = folder / "stage_light.npz"
@@ -54,8 +54,8 @@ def kept_light(folder: Path | None, n: int, work: Callable[[], Radiosity]) -> Ra
     return made
 
 
-def facts_of(s: Solved, meshes: Sequence[LitMesh], folder: Path) -> dict[str, object]:
-    """What the manifest says of a bake whose files are written, but how it was made."""
+def facts_of(s: LightSolution, meshes: Sequence[LitMesh], folder: Path) -> dict[str, object]:
+    """Facts of the manifest about a bake whose files are written, but how it was made."""
     written = [p for p in sorted(folder.iterdir()) if p.name != "manifest.json" and not p.name.startswith(".")]
     return {
         "code": light_code(),

@@ -1,4 +1,4 @@
-"""What windows show: a dome with the painted outdoors, and the house's own outer parts in daylight."""
+"""The view through windows: a dome with the painted outdoors, and the house's own outer parts in daylight."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light.arrays import RayScene
-from embodied.light.backend import constant, dr, floats, mi, scene_of, vector
+from embodied.light.backend import dr, floats, mi, opaque_float, scene_of, vector
 from embodied.light.baking.compose import spread
 from embodied.light.pages.atlas import Atlas, atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps, albedo
@@ -51,7 +51,7 @@ class Outside:
 def outside_of(
     parts: Sequence[Part], indoors: RayScene, cache: Path, maps: ColourMaps, sharpness: float = 1.0
 ) -> Outside | None:
-    """What light falls on outside; None for a house without outer parts.
+    """Surfaces that light falls on outside; None for a house without outer parts.
 
     Args:
       parts: the house's parts of kind 'outdoor'.
@@ -113,7 +113,7 @@ def _evenings(corners: np.ndarray) -> np.ndarray:
 
 
 def _flat(part: Part) -> Part:
-    """What is flat outdoors unfolds like the walls inside: all but hedges and trees."""
+    """Outdoor parts that are flat; each unfolds like the walls inside: all but hedges and trees."""
     flat = part.owner not in ("outdoor/hedge", "outdoor/trees")
     return dataclasses.replace(part, kind="wall") if flat else part
 
@@ -122,7 +122,7 @@ def _daylight(scene: RayScene, outdoors: Outdoors, texels: Texels, thin: np.ndar
     """(n, 3) e from open sky and sun; what is hidden by other things counts as a third as bright as the mean."""
     p = points_of(texels.position, texels.normal, texels.face_normal, thin)
     small = small_sky(outdoors.picture).astype(np.float32)
-    hidden = mi.Color3f(*(constant(float(x) / 3) for x in small.mean((0, 1))))
+    hidden = mi.Color3f(*(opaque_float(float(x) / 3) for x in small.mean((0, 1))))
     e = radiosity.open_sky(scene, floats(small), p, rays, hidden)
     if outdoors.sun.any():
         cos, side, active = radiosity.facing(p, vector(np.tile(outdoors.sun_direction, (1, 1))))

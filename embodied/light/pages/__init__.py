@@ -1,1 +1,1 @@
-"""Where light is kept: surfaces laid out flat, pages of texels, their colours and exposure, and their files."""
+"""The store of light: surfaces laid out flat, pages of texels, their colours and exposure, and their files."""

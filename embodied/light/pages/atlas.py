@@ -97,9 +97,9 @@ def things_of(
     for p in parts:
         groups.setdefault((p.owner, p.room, p.kind, p.mesh.finish.color[3] < 0.9, p.position, p.yaw), []).append(p)
     things = []
-    for done, ((owner, room, kind, glass, position, yaw), mine) in enumerate(groups.items()):
+    for done, ((owner, room, kind, glass, position, yaw), thing_parts) in enumerate(groups.items()):
         progress(done, len(groups))
-        meshes: list[MeshPart] = [p.mesh for p in mine]
+        meshes: list[MeshPart] = [p.mesh for p in thing_parts]
         if kind in SHELL:
             flat = unwrap_planes(meshes, density)
         else:
@@ -144,21 +144,21 @@ def atlas_of(things: Sequence[UnwrappedThing], widest: int = 4096, most: int = 3
     for t in things:
         shelves.setdefault((t.room, t.fineness, t.glass), []).append(t)
     pages = []
-    for (_, fineness, glass), mine in shelves.items():
+    for (_, fineness, glass), shelf in shelves.items():
         limit = widest // fineness
-        while mine:
-            whole = min(sum(int(t.flat.size.prod()) for t in mine), most / fineness**2)
-            sizes = np.array([t.flat.size for t in mine])
+        while shelf:
+            whole = min(sum(int(t.flat.size.prod()) for t in shelf), most / fineness**2)
+            sizes = np.array([t.flat.size for t in shelf])
             widths = [int(min(limit, max(128, x * np.sqrt(whole)))) for x in (0.8, 0.9, 1.0, 1.05, 1.1, 1.2, 1.35, 1.5)]
             width, (places, _) = min(((w, pack(sizes, w)) for w in widths), key=lambda x: int(x[1][1].prod()))
-            tall = min(limit, max(most / fineness**2 / width, max(int(t.flat.size[1]) for t in mine)))
-            inside = [bool(y + t.flat.size[1] <= tall) for t, (_, y) in zip(mine, places)]
+            tall = min(limit, max(most / fineness**2 / width, max(int(t.flat.size[1]) for t in shelf)))
+            inside = [bool(y + t.flat.size[1] <= tall) for t, (_, y) in zip(shelf, places)]
             if not any(inside):
                 raise ValueError(
-                    f"{mine[0].owner!r} needs an atlas of {mine[0].flat.size} luxels, over {limit}; lower the density"
+                    f"{shelf[0].owner!r} needs an atlas of {shelf[0].flat.size} luxels, over {limit}; lower the density"
                 )
-            pages.append(_page([t for t, ok in zip(mine, inside) if ok], places[inside], fineness, glass, number))
-            mine = [t for t, ok in zip(mine, inside) if not ok]
+            pages.append(_page([t for t, ok in zip(shelf, inside) if ok], places[inside], fineness, glass, number))
+            shelf = [t for t, ok in zip(shelf, inside) if not ok]
     return Atlas(tuple(pages), owners, tuple(first[o].room for o in owners), tuple(first[o].kind for o in owners))
 
 
@@ -201,7 +201,7 @@ def flat_areas(corners: np.ndarray) -> np.ndarray:
 
 
 def _is_print(flat: Unwrapped, areas: np.ndarray) -> bool:
-    """Whether a patterned thing is flat and small enough to be looked at as pictures are: posters, paintings, books."""
+    """True for a patterned thing that is flat and small enough to be looked at as pictures are: posters, books."""
     return areas.sum() < 2 * PRINT_AREA and np.ptp(flat.corners.reshape(-1, 3), axis=0).min() < PRINT_THICKNESS
 
 

@@ -15,7 +15,7 @@ from embodied.assets.archives import read_picture
 from embodied.assets.cache import atomic_path, digest
 from embodied.assets.closure import code_digest
 from embodied.light.arrays import Array
-from embodied.light.backend import array, bilinear, dr, floats, mi, wholes
+from embodied.light.backend import array, bilinear, dr, floats, mi, unsigned
 from embodied.light.pages.atlas import Page, flat_areas
 from embodied.light.pages.cover import Cover
 
@@ -28,7 +28,7 @@ APART = (
     "embodied.light",
     *(f"embodied.light.pages.{name}" for name in ("atlas", "cover", "unwrap")),
 )
-"""What the code of halved maps does not count: packages' names, and the geometry that this module colours."""
+"""Modules that the code of halved maps does not count: packages' names, and the geometry that this module colours."""
 HALVINGS = 8
 """Of a colour map, at most."""
 CODE = 1023
@@ -60,7 +60,7 @@ class ColourMaps:
         return self._levels(path)[start : start + math.prod(sizes[-1])].reshape(sizes[-1])
 
     def _read(self, path: str) -> np.ndarray:
-        """What `_halvings` returns of the map at a path, from disk where it is there and younger than the map."""
+        """Result of `_halvings` for the map at a path, from disk where it is there and younger than the map."""
         source, make = Path(path), lambda: _halvings(read_colours(path))
         if self._cache is None or not source.is_file():
             return make()
@@ -97,7 +97,7 @@ def shown(x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Paints:
-    """What colours the faces of one page, on the device; m faces."""
+    """Colours of the faces of one page, on the device; m faces."""
 
     plain: Array
     """(m * 3) linear colour of faces without a map."""
@@ -122,18 +122,18 @@ def paints_of(page: Page, scale: float, read: ColourMaps) -> Paints:
     maps, end = [np.zeros(1, np.uint32)], 1
     source, target = flat_areas(page.uv), flat_areas(page.luxels) * scale**2
     for f, finish in enumerate(page.finishes):
-        mine = np.nonzero(page.finish == f)[0]
-        if finish.texture is None or not len(mine):
+        faces = np.nonzero(page.finish == f)[0]
+        if finish.texture is None or not len(faces):
             continue
         full = read.shape(finish.texture)
-        levels = _levels(source[mine] * math.prod(full), target[mine])
+        levels = _levels(source[faces] * math.prod(full), target[faces])
         for level in np.unique(levels):
             image = read.halved(finish.texture, int(level))
-            which = mine[levels == level]
+            which = faces[levels == level]
             first[which], height[which], width[which] = end, *image.shape
             maps.append(image.ravel())
             end += image.size
-    return Paints(floats(plain), floats(page.uv), *(wholes(a) for a in (first, width, height, np.concatenate(maps))))
+    return Paints(floats(plain), floats(page.uv), *(unsigned(a) for a in (first, width, height, np.concatenate(maps))))
 
 
 def colour_at(paints: Paints, face: Array, b1: Array, b2: Array) -> Array:
@@ -160,7 +160,7 @@ def albedo(page: Page, c: Cover, read: ColourMaps) -> np.ndarray:
     if not len(c.face):
         return np.zeros((0, 3), np.float32)
     paints = paints_of(page, c.shape[1] / page.width, read)
-    return array(colour_at(paints, wholes(c.face), floats(c.b1), floats(c.b2)))
+    return array(colour_at(paints, unsigned(c.face), floats(c.b1), floats(c.b2)))
 
 
 def _levels(source: np.ndarray, target: np.ndarray) -> np.ndarray:

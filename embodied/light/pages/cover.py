@@ -1,4 +1,4 @@
-"""What lies under every texel of a page: which face, where on it, and the surface there."""
+"""The surface under every texel of a page: which face, where on it, and the surface there."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import constant, dr, floats, looped, mi, number, scene_of
+from embodied.light.backend import dr, floats, looped, mi, opaque_float, opaque_uint, scene_of
 from embodied.light.pages.atlas import Page
 from embodied.light.pages.unwrap import face_normals
 
@@ -17,8 +17,8 @@ OFFSETS = (
     *((-0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (0.3, -0.3), (0.0, 0.47), (0.0, -0.47), (0.47, 0.0), (-0.47, 0.0)),
     *((0.45, 0.45), (-0.45, -0.45), (0.45, -0.45), (-0.45, 0.45), (0.15, -0.15), (-0.15, 0.15)),
 )
-"""Where in a texel a face is looked for when its centre shows none, one after the other: slivers that miss all centres
-still get texels of their own."""
+"""Places in a texel where a face is looked for when its centre shows none, one after the other: slivers that miss all
+centres still get texels of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Sheet:
     scene: RayScene
     """The layouts of some pages, one above the other a metre apart."""
     height: int
-    """Where this one lies."""
+    """Its place among them."""
     first: int
     """Number of its first face."""
 
@@ -145,8 +145,8 @@ def _straight_down(
     if not len(spot) or not len(offsets) or sheet.scene is None:
         return np.full(len(spot), -1, np.int32), np.zeros(len(spot), np.float32), np.zeros(len(spot), np.float32)
     row, column = (floats(a) for a in np.divmod(spot.astype(np.int32), np.int32(width)))
-    aside, step, above = floats(offsets), constant(1 / fineness), constant(sheet.height + 0.5)
-    down, first, last = mi.Vector3f(0, 0, -1), number(sheet.first), number(len(offsets))
+    aside, step, above = floats(offsets), opaque_float(1 / fineness), opaque_float(sheet.height + 0.5)
+    down, first, last = mi.Vector3f(0, 0, -1), opaque_uint(sheet.first), opaque_uint(len(offsets))
 
     def body(k: Array, face: Array, u: Array, v: Array) -> tuple[Array, ...]:
         o = dr.gather(mi.Point2f, aside, k)

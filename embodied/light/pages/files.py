@@ -21,7 +21,7 @@ from embodied.assets.cache import write_files
 from embodied.assets.json_file import read_json
 from embodied.house.house import House
 from embodied.light.backend import LightError, warn
-from embodied.light.memory import Memory, once
+from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages.records import packed
 from embodied.light.pages.tone import Exposure
 from embodied.light.settings import light_code
@@ -64,7 +64,7 @@ class Bake:
 
     @functools.cached_property
     def lit(self) -> LitPages:
-        """What renderers draw."""
+        """Pages and meshes that renderers draw."""
         pages = tuple(_read_picture(self.folder / f"page_{i:03d}.jpg") for i in range(self.manifest["pages"]))
         with open_arrays(self.folder / "meshes.npz") as z:
             corners, uv = np.split(z["vertices"], z["vertex_ends"]), np.split(z["uv"], z["vertex_ends"])
@@ -145,7 +145,9 @@ def page_files(i: int) -> tuple[str, ...]:
     return f"light_{i:03d}.npz", f"sun_{i:03d}.png", f"albedo_{i:03d}.jpg", f"page_{i:03d}.jpg"
 
 
-def write_pages(folder: Path, pages: Mapping[int, Ingredients], quality: int, memory: Memory | None = None) -> None:
+def write_pages(
+    folder: Path, pages: Mapping[int, Ingredients], quality: int, memory: LightingCache | None = None
+) -> None:
     """Pages by number: light as half floats, the sun as PNG, colours (the same at all hours) and picture as JPEG of
     `quality`."""
     files = {}
@@ -153,7 +155,7 @@ def write_pages(folder: Path, pages: Mapping[int, Ingredients], quality: int, me
         light, sun, shown, picture = page_files(i)
         files[light] = packed({"soft": page.soft, "glow": page.glow})
         files[sun] = cv2.imencode(".png", page.sun)[1].tobytes()
-        files[shown] = once(memory, ("colours", i), functools.partial(jpeg, page.albedo, quality))
+        files[shown] = get_or_compute(memory, ("colours", i), functools.partial(jpeg, page.albedo, quality))
         files[picture] = jpeg(page.picture, quality)
     write_files(folder, files)
 

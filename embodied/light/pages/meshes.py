@@ -1,4 +1,4 @@
-"""What renderers draw of an atlas: one mesh per owner and page."""
+"""Meshes that renderers draw of an atlas: one mesh per owner and page."""
 
 from __future__ import annotations
 
@@ -26,17 +26,19 @@ def meshes_of(atlas: Atlas, first: int) -> tuple[list[LitMesh], list[np.ndarray]
         gloss = np.array([gloss_of(f) for f in page.finishes], np.uint8).reshape(-1, 3)
         kinds, areas = np.column_stack([gloss[page.finish], detail_of(page)]), areas_of(page.corners)
         for o in np.unique(page.owner):
-            mine = np.nonzero(page.owner == o)[0]
-            both = np.concatenate([page.corners[mine], uv[mine]], axis=-1).reshape(-1, 5)
+            owned = np.nonzero(page.owner == o)[0]
+            both = np.concatenate([page.corners[owned], uv[owned]], axis=-1).reshape(-1, 5)
             corner, index = welded(np.round(both, 5))
             faces = index.reshape(-1, 3).astype(np.int32)
-            thin = page.thin[mine]
+            thin = page.thin[owned]
             faces = np.concatenate([faces, faces[thin][:, ::-1]])
             real = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
             alpha = (
-                min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[mine]))) if page.glass else 1.0
+                min(f.color[3] for f in (page.finishes[k] for k in np.unique(page.finish[owned])))
+                if page.glass
+                else 1.0
             )
-            kind, area = kinds[mine], areas[mine]
+            kind, area = kinds[owned], areas[owned]
             mean = tuple(((kind[:, :2] * area[:, None]).sum(0) / max(area.sum(), 1e-12) / 255).round(3).tolist())
             whose = atlas.owners[o], atlas.kinds[o], atlas.rooms[o]
             xyz, at = both[corner, :3].astype(np.float32), both[corner, 3:].astype(np.float32)

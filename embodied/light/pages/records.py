@@ -20,7 +20,7 @@ LEVEL = 1
 
 
 def packed(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """What np.savez_compressed writes, at `LEVEL`."""
+    """Bytes as np.savez_compressed writes them, at `LEVEL`."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=LEVEL) as archive:
         for name, a in arrays.items():

@@ -23,7 +23,7 @@ from embodied.assets.closure import code_digest
 from embodied.assets.records import MeshPart
 from embodied.geometry import r2
 from embodied.light.arrays import Array
-from embodied.light.backend import added_up, dr, floats, fraction, mi, scene_of, vector
+from embodied.light.backend import accumulate, dr, floats, fraction, mi, scene_of, vector
 from embodied.light.pages.records import load_record, save_record
 
 ONCE = 6000.0
@@ -35,7 +35,7 @@ REST = 0.05
 _retired: list[tuple[Any, float]] = []
 """The atlas that is freed next, and since when it rests."""
 APART = ("embodied.assets", "embodied.assets.data", "embodied", "embodied.light")
-"""What the code of an unwrapping does not count: what packages offer by name, and the catalogue's rows."""
+"""Modules that the code of an unwrapping does not count: what packages offer by name, and the catalogue's rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,15 +113,15 @@ def unwrap_planes(parts: Sequence[MeshPart], density: float) -> Unwrapped:
     flat = np.zeros((len(corners), 3, 2))
     sizes = []
     for c in range(chart.max() + 1):
-        mine = chart == c
-        across = np.cross([0.0, 0.0, 1.0], n[mine][0])
+        in_chart = chart == c
+        across = np.cross([0.0, 0.0, 1.0], n[in_chart][0])
         across = across / np.linalg.norm(across) if np.linalg.norm(across) > 0.05 else np.array([1.0, 0.0, 0.0])
-        up = np.cross(n[mine][0], across)
-        q = np.stack([corners[mine] @ across, -(corners[mine] @ up)], axis=-1)
+        up = np.cross(n[in_chart][0], across)
+        q = np.stack([corners[in_chart] @ across, -(corners[in_chart] @ up)], axis=-1)
         if np.diff(np.ptp(q.reshape(-1, 2), axis=0)) > 0:  # what lies packs well
             q = np.stack([q[..., 1], -q[..., 0]], axis=-1)
-        flat[mine] = (q - q.reshape(-1, 2).min(0)) * density
-        sizes.append(np.ceil(flat[mine].reshape(-1, 2).max(0) - 1e-6).astype(int) + 2)
+        flat[in_chart] = (q - q.reshape(-1, 2).min(0)) * density
+        sizes.append(np.ceil(flat[in_chart].reshape(-1, 2).max(0) - 1e-6).astype(int) + 2)
     places, size = pack(np.array(sizes))
     flat += places[chart][:, None] + 1.0
     return _single(Unwrapped(corners, normals, flat, uv, part, np.zeros(len(part), bool), size, chart))
@@ -265,8 +265,8 @@ def cached_model(
     def known(budget: float, make: Callable[[], Unwrapped]) -> Unwrapped:
         key = digest(code_digest(__name__, without=APART), round(budget), trusted, alone, shapes)
         path = Path(cache) / "unwrapped" / f"{key[:32]}.npz"
-        if (found := load_record(Unwrapped, path)) is not None:
-            return found
+        if (stored := load_record(Unwrapped, path)) is not None:
+            return stored
         made = make()
         save_record(made, path)
         return made
@@ -349,10 +349,10 @@ def _strips(corners: np.ndarray, chart: np.ndarray, full: float = 0.25, most: in
     """
     out, area = np.zeros(len(chart), int), areas_of(corners)
     for c in range(chart.max() + 1):
-        mine = np.nonzero(chart == c)[0]
-        pieces = [mine]
-        if len(mine) <= most and area[mine].sum() < full * _spread(corners[mine]):
-            pieces = [np.array([k]) for k in mine]
+        chart_faces = np.nonzero(chart == c)[0]
+        pieces = [chart_faces]
+        if len(chart_faces) <= most and area[chart_faces].sum() < full * _spread(corners[chart_faces]):
+            pieces = [np.array([k]) for k in chart_faces]
             joined = True
             while joined:
                 joined = False
@@ -405,7 +405,7 @@ def openness(corners: np.ndarray, rays: int = 96) -> tuple[np.ndarray, np.ndarra
             d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(r0 + a, r1 + b))))
             return (dr.select(scene.ray_test(mi.Ray3f(origin, d)), 0.0, 1.0),)
 
-        shares.append(np.asarray(added_up(rays, one, dr.zeros(mi.Float, len(corners)))[0]) / rays)
+        shares.append(np.asarray(accumulate(rays, one, dr.zeros(mi.Float, len(corners)))[0]) / rays)
     return shares[0], shares[1]
 
 

@@ -1,4 +1,4 @@
-"""What gives light: portals (the sky through windows), lamps, and the sun.
+"""Emitters of light: portals (the sky through windows), lamps, and the sun.
 
 All intensities are radiosities or radiances in units of 100 cd/m2 (see sky.py).
 """
@@ -19,7 +19,7 @@ from embodied.geometry import r2
 from embodied.house.house import House, Opening
 from embodied.house.shapes import inward
 from embodied.light.arrays import Array, RayScene
-from embodied.light.backend import added_up, constant, dr, fraction, mi, vector
+from embodied.light.backend import accumulate, dr, fraction, mi, opaque_float, vector
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.records import packed
 from embodied.light.pages.unwrap import areas_of, face_normals
@@ -134,9 +134,9 @@ def in_the_open(lamp: Lamp, scene: RayScene, *, rays: int = 48, reach: float = 0
 
     def one(k: Array) -> tuple[Array, ...]:
         d = frame.to_world(mi.warp.square_to_cosine_hemisphere(fraction(mi.Point2f(*r2(mi.Float(k) + 1)))))
-        return (dr.select(scene.ray_test(mi.Ray3f(origin, d, constant(reach), 0.0, [])), 0.0, 1.0),)
+        return (dr.select(scene.ray_test(mi.Ray3f(origin, d, opaque_float(reach), 0.0, [])), 0.0, 1.0),)
 
-    share = np.asarray(added_up(rays, one, dr.zeros(mi.Float, len(lamp.points)))[0]) / rays
+    share = np.asarray(accumulate(rays, one, dr.zeros(mi.Float, len(lamp.points)))[0]) / rays
     if not share.any():
         return lamp
     chance = np.where(share > 0, np.maximum(share, 0.1), 0.0)
@@ -150,12 +150,12 @@ def in_the_open(lamp: Lamp, scene: RayScene, *, rays: int = 48, reach: float = 0
 
 def glowing_faces(atlas: Atlas) -> dict[str, np.ndarray]:
     """Owner to the triangles (m, 3, 3) whose finish emits."""
-    found: dict[str, list[np.ndarray]] = {}
+    triangles: dict[str, list[np.ndarray]] = {}
     for page in atlas.pages:
         emits = np.array([f.emission is not None for f in page.finishes])[page.finish]
         for o in np.unique(page.owner[emits]):
-            found.setdefault(atlas.owners[o], []).append(page.corners[emits & (page.owner == o)])
-    return {o: np.concatenate(c).astype(np.float64) for o, c in found.items()}
+            triangles.setdefault(atlas.owners[o], []).append(page.corners[emits & (page.owner == o)])
+    return {o: np.concatenate(c).astype(np.float64) for o, c in triangles.items()}
 
 
 def _luminance(color: np.ndarray) -> float:
@@ -189,7 +189,7 @@ def write_lamps(path: Path, lamps: Sequence[Lamp]) -> None:
 
 
 def read_lamps(path: Path, rows: Sequence[Mapping[str, Any]]) -> tuple[Lamp, ...]:
-    """What `write_lamps` wrote.
+    """Lamps that `write_lamps` wrote.
 
     Args:
       rows: id, room and owner of each.

@@ -49,15 +49,15 @@ class Luxels:
 
 
 def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
-    """What lies under every luxel; nothing glows yet (`with_glow`)."""
+    """Surfaces under every luxel; nothing glows yet (`with_glow`)."""
     sheets = sheets_of(atlas.pages)
     texels = tuple(rasterise(p, 1, s) for p, s in zip(atlas.pages, sheets))
     pairs = list(zip(atlas.pages, texels))
     owner = np.concatenate([p.owner[t.face] for p, t in pairs])
     ends = np.cumsum([len(t.index) for t in texels])
     places = {k: np.concatenate([getattr(t, k) for t in texels]) for k in ("position", "normal", "face_normal")}
-    mine = lambda i: {k: a[ends[i] - len(texels[i].index) : ends[i]] for k, a in places.items()}
-    texels = tuple(replace(t, **mine(i)) for i, t in enumerate(texels))  # type: ignore[arg-type]  # views: once in memory, not twice
+    of_page = lambda i: {k: a[ends[i] - len(texels[i].index) : ends[i]] for k, a in places.items()}
+    texels = tuple(replace(t, **of_page(i)) for i, t in enumerate(texels))  # type: ignore[arg-type]  # views: once in memory, not twice
     names = [o.split("/")[0] if k == "opening" else r for o, r, k in zip(atlas.owners, atlas.rooms, atlas.kinds)]
     unit = {name: i for i, name in enumerate(dict.fromkeys(names))}
     return Luxels(
@@ -79,9 +79,9 @@ def luxels_of(atlas: Atlas, maps: ColourMaps) -> Luxels:
 
 def with_glow(lux: Luxels, house: House, atlas: Atlas, lamps: Sequence[Lamp]) -> Luxels:
     """The same luxels with what shines itself: the lamps that are on, screens."""
-    found = [glow_of(house, atlas, p, t.face, lamps) for p, t in zip(atlas.pages, lux.texels)]
+    glows = [glow_of(house, atlas, p, t.face, lamps) for p, t in zip(atlas.pages, lux.texels)]
     glow = np.concatenate(
-        [np.zeros((len(t.face), 3), np.float32) if g is None else g for g, t in zip(found, lux.texels)]
+        [np.zeros((len(t.face), 3), np.float32) if g is None else g for g, t in zip(glows, lux.texels)]
     )
     lit = {x.id for x in lamps}
     sampled = np.array([any(x.placement == o and x.id in lit for x in house.lights) for o in atlas.owners])
@@ -108,13 +108,13 @@ def glow_of(house: House, atlas: Atlas, page: Page, face: np.ndarray, lamps: Seq
     by_light = {x.id: x for x in lamps}
     for o in np.unique(page.owner[emission.any(1)]):
         name = atlas.owners[o]
-        mine = (page.owner == o) & (emission.sum(1) > 0)
+        emitting = (page.owner == o) & (emission.sum(1) > 0)
         lights = [x for x in house.lights if x.placement == name]
         if not lights:  # screens, stars on a nursery ceiling: they glow by themselves
-            out[mine] = emission[mine]
+            out[emitting] = emission[emitting]
         for x in lights:
             if x.id in by_light:
-                out[mine] = by_light[x.id].radiance
+                out[emitting] = by_light[x.id].radiance
     return out[face]
 
 

@@ -12,7 +12,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import added_up, array, constant, dr, flags, floats, mi, number, vector, wholes
+from embodied.light.backend import (
+    accumulate,
+    array,
+    booleans,
+    dr,
+    floats,
+    mi,
+    opaque_float,
+    opaque_uint,
+    unsigned,
+    vector,
+)
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, Portal
 from embodied.light.tracing.luxels import AMBIENT, Luxels
@@ -123,10 +134,10 @@ def lights_of(
         floats([np.zeros((POINTS, 3))] * len(portals) + [fill(x.points) for x in lamps]),
         floats([np.zeros((POINTS, 3))] * len(portals) + [fill(x.normals) for x in lamps]),
         floats([np.zeros(POINTS)] * len(portals) + [fill(x.weights) for x in lamps]),
-        flags([False] * len(portals) + [not x.normals.any() for x in lamps]),
-        flags([False] * len(portals) + [True] * len(lamps)),
+        booleans([False] * len(portals) + [not x.normals.any() for x in lamps]),
+        booleans([False] * len(portals) + [True] * len(lamps)),
         tuple(scenes),
-        wholes(index or [0]),
+        unsigned(index or [0]),
         ways,
         outdoors.sun_direction,
         outdoors.sun * radiosity.GLASS,
@@ -140,19 +151,19 @@ def direct(space: Space, lights: Lights, p: Points, *, rng: np.random.Generator,
         total = total + _one_light(space, lights, p, rng) / picks
     if lights.portal_scene is not None:
         share = radiosity.sun_share(space.scene, p, lights.portal_scene, lights.towards_sun, 1)
-        total = total + mi.Color3f(*(constant(x) for x in lights.sun)) * share
+        total = total + mi.Color3f(*(opaque_float(x) for x in lights.sun)) * share
     return total
 
 
 def _one_light(space: Space, lights: Lights, p: Points, rng: np.random.Generator) -> Array:
     u = rng.random((3, p.n), np.float32)
-    count, zero = number(lights.count), dr.zeros(mi.Float, p.n)
+    count, zero = opaque_uint(lights.count), dr.zeros(mi.Float, p.n)
 
     def weight(i: Array) -> Array:
         far = dr.gather(mi.Point3f, lights.centre, i) - p.position
         return dr.gather(mi.Float, lights.power, i) / (dr.squared_norm(far) + 0.3)
 
-    (whole,) = added_up(lights.count, lambda i: (weight(i),), zero)
+    (whole,) = accumulate(lights.count, lambda i: (weight(i),), zero)
     target = floats(u[0]) * whole
 
     def until(i: Array, sum_: Array, pick: Array, chance: Array) -> tuple[Array, ...]:
@@ -242,7 +253,7 @@ def irradiance(
             continue
         sums[of] += array(total)
         of, p = of[living], radiosity.only(q, living)
-        throughput = dr.gather(type(throughput), throughput, wholes(living))
+        throughput = dr.gather(type(throughput), throughput, unsigned(living))
         total, alive = mi.Color3f(0.0), mi.Bool(True)
     if len(of):
         sums[of] += array(total)
@@ -250,7 +261,7 @@ def irradiance(
 
 
 def hit_points(space: Space, surfaces: Surfaces, ray: Ray, active: Array, p: Points) -> tuple[Array, Array, Points]:
-    """Where rays meet the house from the front: luxel, whether they do, and the points there."""
+    """Hits of rays on the house from the front: luxel, whether they do, and the points there."""
     h = space.scene.ray_intersect_preliminary(ray, False, active)
     luxel, hit, front, _ = radiosity.hit_luxel(space, ray, active, h)
     flat = dr.gather(mi.Vector3f, space.normal, h.prim_index, hit)

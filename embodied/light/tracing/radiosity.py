@@ -17,21 +17,21 @@ import numpy as np
 from embodied.geometry import r2
 from embodied.light.arrays import Array, Ray, RayScene
 from embodied.light.backend import (
-    added_up,
+    accumulate,
     array,
     bilinear,
-    constant,
+    booleans,
     dr,
-    flags,
     floats,
     fraction,
     mi,
-    number,
+    opaque_float,
+    opaque_uint,
     scene_of,
+    unsigned,
     vector,
-    wholes,
 )
-from embodied.light.memory import Memory
+from embodied.light.lighting_cache import LightingCache
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels, sources
 from embodied.light.pages.unwrap import face_normals
@@ -75,7 +75,7 @@ def points_of(
         mi.Point3f(vector(position)),
         vector(normal),
         vector(face_normal),
-        flags(thin),
+        booleans(thin),
         floats(turn[0]),
         floats(turn[1]),
     )
@@ -97,7 +97,7 @@ def only(p: Points, which: np.ndarray) -> Points:
     """Some of the points, by their numbers."""
     if len(which) == p.n:
         return p
-    numbers = wholes(which)
+    numbers = unsigned(which)
     fields = (p.position, p.normal, p.face_normal, p.thin, p.turn0, p.turn1)
     some = Points(len(which), *(dr.gather(type(a), a, numbers) for a in fields))
     dr.eval(some.position, some.normal, some.face_normal, some.thin, some.turn0, some.turn1)
@@ -140,14 +140,14 @@ def space_of(atlas: Atlas, luxels: Sequence[Texels]) -> Space:
     return Space(
         scene_of(corners[keep]),
         keep,
-        wholes(page[keep]),
+        unsigned(page[keep]),
         floats(xy),
         floats(face_normals(corners[keep])),
-        flags(thin),
-        wholes([p.width for p in atlas.pages]),
-        wholes([p.height for p in atlas.pages]),
-        wholes(np.cumsum(sizes) - sizes),
-        wholes(_nearest_luxel(luxels)),
+        booleans(thin),
+        unsigned([p.width for p in atlas.pages]),
+        unsigned([p.height for p in atlas.pages]),
+        unsigned(np.cumsum(sizes) - sizes),
+        unsigned(_nearest_luxel(luxels)),
         floats(np.zeros((ENV_ROWS, 2 * ENV_ROWS, 3))),
     )
 
@@ -164,11 +164,11 @@ class Together:
     scenes: tuple[RayScene, ...]
 
     def ray_test(self, ray: Ray, active: Array = True) -> Array:
-        """Whether rays meet anything."""
-        found = self.scenes[0].ray_test(ray, active)
+        """True for rays that meet anything."""
+        blocked = self.scenes[0].ray_test(ray, active)
         for scene in self.scenes[1:]:
-            found |= scene.ray_test(ray, active)
-        return found
+            blocked |= scene.ray_test(ray, active)
+        return blocked
 
 
 def scenes_without(space: Space, atlas: Atlas, owners: Sequence[str]) -> dict[str, RayScene]:
@@ -211,10 +211,10 @@ def open_sky(scene: RayScene, env: Array, p: Points, samples: int, hidden: Array
         free = ~scene.ray_test(mi.Ray3f(p.position + p.face_normal * LIFT, d))
         return (dr.select(free, env_lookup(env, d, free), hidden),)
 
-    return array(added_up(samples, one, dr.zeros(mi.Color3f, p.n))[0]) / samples
+    return array(accumulate(samples, one, dr.zeros(mi.Color3f, p.n))[0]) / samples
 
 
-def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Memory | None = None) -> Array:
+def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: LightingCache | None = None) -> Array:
     """e (a Color3f) from the outdoors through one portal, by area sampling.
 
     Args:
@@ -224,8 +224,8 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Mem
     a few centimetres from the glass turn into fireflies.
     """
     sides = portal.corner, portal.along, portal.up, portal.normal
-    corner, along, up, n = (mi.Vector3f(*(constant(x) for x in a)) for a in sides)
-    area, share = constant(portal.area / np.pi / samples * GLASS), constant(10.0 / samples)
+    corner, along, up, n = (mi.Vector3f(*(opaque_float(x) for x in a)) for a in sides)
+    area, share = opaque_float(portal.area / np.pi / samples * GLASS), opaque_float(10.0 / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
         u = p.sample(k)
@@ -235,27 +235,27 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Mem
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d, far - 4 * LIFT, 0.0, [])
         free = active & (~space.scene.ray_test(ray, active) if ways is None else ((ways >> k) & 1) == 1)
         g = dr.minimum(dr.select(free, cos * leaving / dr.maximum(dr.square(far), 1e-4) * area, 0.0), share)
-        found = env_lookup(space.env, d, free) * g, g
-        return found if ways is not None or memory is None else (*found, dr.select(free, mi.UInt32(1) << k, 0))
+        arriving = env_lookup(space.env, d, free) * g, g
+        return arriving if ways is not None or memory is None else (*arriving, dr.select(free, mi.UInt32(1) << k, 0))
 
     nothing = dr.zeros(mi.Color3f, p.n), dr.zeros(mi.Float, p.n)
     memory = memory if samples <= WAYS else None
     ways = None if memory is None else memory.get(("ways", portal.id))
     if memory is None or ways is not None:
-        total, seen = added_up(samples, one, *nothing)
+        total, seen = accumulate(samples, one, *nothing)
     else:
-        total, seen, met = added_up(samples, one, *nothing, dr.zeros(mi.UInt32, p.n))
+        total, seen, met = accumulate(samples, one, *nothing, dr.zeros(mi.UInt32, p.n))
         memory["ways", portal.id] = met
     return total * dr.select(seen > 1, 1 / seen, 1)
 
 
 def lamp_light(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> Array:
     """e (a Color3f) from one lamp."""
-    bare, count = not lamp.normals.any(), number(len(lamp.points))
+    bare, count = not lamp.normals.any(), opaque_uint(len(lamp.points))
     at = floats(lamp.points)
     out = floats(lamp.normals)
     weights = floats(lamp.weights)
-    strength, most = constant(lamp.area / np.pi / samples), constant((400.0 if bare else 4.0) / samples)
+    strength, most = opaque_float(lamp.area / np.pi / samples), opaque_float((400.0 if bare else 4.0) / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
         i = dr.minimum(mi.UInt32(p.sample(k).x * mi.Float(count)), count - 1)
@@ -272,8 +272,8 @@ def lamp_light(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> Array:
         active &= reach > 0
         return (dr.minimum(dr.select(active & ~scene.ray_test(ray, active), g * strength, 0.0), most),)
 
-    (total,) = added_up(samples, one, dr.zeros(mi.Float, p.n))
-    return mi.Color3f(*(constant(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
+    (total,) = accumulate(samples, one, dr.zeros(mi.Float, p.n))
+    return mi.Color3f(*(opaque_float(x) for x in lamp.radiance)) * (total if bare else dr.minimum(total, 1.0))
 
 
 SUN = 0.006
@@ -286,18 +286,18 @@ def sun_share(scene: RayScene, p: Points, portals: RayScene, towards: np.ndarray
     Args:
       directions: rays over the disc, the same for all points: ragged shadow edges come from random ones.
     """
-    frame = mi.Frame3f(mi.Vector3f(*(constant(x) for x in towards)))
-    whole = constant(directions)
+    frame = mi.Frame3f(mi.Vector3f(*(opaque_float(x) for x in towards)))
+    whole = opaque_float(directions)
 
     def one(k: Array) -> tuple[Array, ...]:
-        r, turn = constant(SUN * (directions > 1)) * dr.sqrt((mi.Float(k) + 0.5) / whole), mi.Float(k) * 2.399963
+        r, turn = opaque_float(SUN * (directions > 1)) * dr.sqrt((mi.Float(k) + 0.5) / whole), mi.Float(k) * 2.399963
         d = dr.normalize(frame.n + frame.s * (r * dr.cos(turn)) + frame.t * (r * dr.sin(turn)))
         cos, side, active = facing(p, d)
         ray = mi.Ray3f(p.position + p.face_normal * side * LIFT, d)
         active &= portals.ray_test(ray, active)
         return (dr.select(active & ~scene.ray_test(ray, active), cos, 0.0),)
 
-    (total,) = added_up(directions, one, dr.zeros(mi.Float, p.n))
+    (total,) = accumulate(directions, one, dr.zeros(mi.Float, p.n))
     return total / whole
 
 
@@ -320,7 +320,7 @@ def patch_light(scene: RayScene, p: Points, patches: Patches) -> np.ndarray:
     """(n, 3) e from sunlit patches, the same ones for all points and so free of noise."""
     lift = np.where(patches.thin[:, None], 0.0, LIFT)
     places, normals = floats(patches.position + patches.normal * lift), floats(patches.normal)
-    both, flux, extent = flags(patches.thin), floats(patches.flux), floats(patches.extent)
+    both, flux, extent = booleans(patches.thin), floats(patches.flux), floats(patches.extent)
 
     def one(k: Array) -> tuple[Array, ...]:
         d, far, cos, side, active = towards(p, dr.gather(mi.Point3f, places, k), 1e-5)
@@ -331,7 +331,7 @@ def patch_light(scene: RayScene, p: Points, patches: Patches) -> np.ndarray:
         g = cos * leaving / (dr.pi * dr.square(far) + dr.gather(mi.Float, extent, k))
         return (dr.gather(mi.Color3f, flux, k) * dr.select(active & ~scene.ray_test(ray, active), g, 0.0),)
 
-    return array(added_up(len(patches.flux), one, dr.zeros(mi.Color3f, p.n))[0])
+    return array(accumulate(len(patches.flux), one, dr.zeros(mi.Color3f, p.n))[0])
 
 
 WAYS = 32
@@ -342,7 +342,7 @@ NOTHING = 0xFFFFFFFF
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """What cosine-distributed rays of n points meet, whatever shines there."""
+    """Hits of cosine-distributed rays of n points, whatever shines there."""
 
     rays: int
     """Of each point."""
@@ -358,17 +358,17 @@ def meet(space: Space, p: Points, rays: int, first: int = 0) -> Met:
     Args:
       first: index of the first point of the R2 sequence, so that later rays of the same points differ.
     """
-    one_ray, found = _rays(space, p, first), dr.zeros(mi.UInt32, rays * p.n)
-    lane, count = dr.arange(mi.UInt32, p.n), number(p.n)
+    one_ray, luxels = _rays(space, p, first), dr.zeros(mi.UInt32, rays * p.n)
+    lane, count = dr.arange(mi.UInt32, p.n), opaque_uint(p.n)
 
     def one(k: Array) -> tuple[Array, ...]:
         luxel, seen, wrong = one_ray(k)
-        dr.scatter(found, dr.select(seen, luxel, NOTHING), k * count + lane)
+        dr.scatter(luxels, dr.select(seen, luxel, NOTHING), k * count + lane)
         return (wrong,)
 
-    (bad,) = added_up(rays, one, dr.zeros(mi.Float, p.n))
-    dr.eval(found)
-    return Met(rays, found, np.array(bad))
+    (bad,) = accumulate(rays, one, dr.zeros(mi.Float, p.n))
+    dr.eval(luxels)
+    return Met(rays, luxels, np.array(bad))
 
 
 def gather(met: Met, table: Array) -> tuple[np.ndarray, np.ndarray]:
@@ -378,21 +378,21 @@ def gather(met: Met, table: Array) -> tuple[np.ndarray, np.ndarray]:
       table: flat (n luxels * 3), radiosity of the whole house on the device.
     """
     n = len(met.bad)
-    lane, count = dr.arange(mi.UInt32, n), number(n)
+    lane, count = dr.arange(mi.UInt32, n), opaque_uint(n)
 
     def one(k: Array) -> tuple[Array, ...]:
         luxel = dr.gather(mi.UInt32, met.luxels, k * count + lane)
         colour = dr.gather(mi.Color3f, table, luxel, luxel != NOTHING)
         return colour, dr.square((colour.x + colour.y + colour.z) * (1.0 / 3.0))
 
-    total, square = added_up(met.rays, one, dr.zeros(mi.Color3f, n), dr.zeros(mi.Float, n))
+    total, square = accumulate(met.rays, one, dr.zeros(mi.Color3f, n), dr.zeros(mi.Float, n))
     return array(total), np.array(square)
 
 
 def _rays(space: Space, p: Points, first: int) -> Callable:
     """From the number of a sample to the luxels that cosine-distributed rays meet, whether they see them, and 1 where
     they meet a back face or something nearer than 12 mm."""
-    start = number(first)
+    start = opaque_uint(first)
 
     def meet(k: Array) -> tuple[Array, ...]:
         side = dr.select(p.thin & (((k + start) & 1) == 1), -1.0, 1.0)
@@ -432,7 +432,7 @@ def hit_colour(space: Space, table: Array, ray: Ray) -> Array:
 
 
 def _met(space: Space, ray: Ray, active: Array, met: Array = None) -> Array:
-    """Where on its page a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the
+    """Place on its page that a ray hits, in luxels; the page's width, height and first luxel; whether it hits, from the
     front, within 12 mm."""
     h = space.scene.ray_intersect_preliminary(ray, False, active) if met is None else met
     hit = h.is_valid() & active
@@ -475,9 +475,9 @@ def reached(units: np.ndarray, some: np.ndarray, sees: np.ndarray) -> np.ndarray
       units: (n,) unit number of each luxel.
       some: (k,) luxels that were `tried`, and (k,) bool whether each `sees` the light.
     """
-    found = np.zeros(int(units.max(initial=0)) + 1, bool)
-    found[units[some[sees]]] = True
-    return np.flatnonzero(found[units])
+    unit_is_reached = np.zeros(int(units.max(initial=0)) + 1, bool)
+    unit_is_reached[units[some[sees]]] = True
+    return np.flatnonzero(unit_is_reached[units])
 
 
 def towards(p: Points, q: Array, least: float = 1e-6) -> tuple[Array, ...]:

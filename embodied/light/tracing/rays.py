@@ -1,4 +1,4 @@
-"""What rays meet first among bare triangles, with NumPy's arrays in and out: for pictures that are drawn elsewhere."""
+"""First hits of rays among bare triangles, with NumPy's arrays in and out: for pictures that are drawn elsewhere."""
 
 from __future__ import annotations
 

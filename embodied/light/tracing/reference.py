@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light.arrays import Array, Ray, Triple
-from embodied.light.backend import array, constant, dr, floats, mi, vector
+from embodied.light.backend import array, dr, floats, mi, opaque_float, vector
 from embodied.light.pages.files import Bake
 from embodied.light.pages.tone import develop
 from embodied.light.tracing import paths, radiosity
@@ -313,4 +313,4 @@ def _camera_rays(
     sx = (((x + jitter[0]) / w * 2 - 1) * t * w / h)[..., None]  # (each, views, h * w, 1)
     sy = ((1 - (y + jitter[1]) / h * 2) * t)[..., None]
     d = ahead[:, None] + np.cross(ahead, up)[:, None] * sx + up[:, None] * sy
-    return mi.Ray3f(mi.Point3f(*(constant(k) for k in position)), dr.normalize(vector(d.reshape(-1, 3))))
+    return mi.Ray3f(mi.Point3f(*(opaque_float(k) for k in position)), dr.normalize(vector(d.reshape(-1, 3))))

@@ -9,7 +9,7 @@ import numpy as np
 
 from embodied.house.house import House
 from embodied.light.arrays import Array, Ray, RayScene
-from embodied.light.backend import bilinear, dr, flags, floats, mi, scene_of, wholes
+from embodied.light.backend import bilinear, booleans, dr, floats, mi, scene_of, unsigned
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
 from embodied.light.pages.unwrap import distinct, face_normals
@@ -54,7 +54,7 @@ class BakedScene:
     exposure: Array
     outdoors: Outdoors
     panes: Panes | None
-    """What is seen through: glass and sheer curtains."""
+    """See-through faces: glass and sheer curtains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +149,14 @@ def world_of(bake: Bake, house: House) -> BakedScene:
     space = Space(
         scene_of(corners),
         np.arange(len(corners)),
-        wholes(page),
+        unsigned(page),
         floats(xy),
         floats(face_normals(corners.astype(np.float64))),
-        flags(thin),
-        wholes(lw),
-        wholes(lh),
-        wholes(np.cumsum(lw * lh) - lw * lh),
-        wholes(np.arange(int((lw * lh).sum()))),
+        booleans(thin),
+        unsigned(lw),
+        unsigned(lh),
+        unsigned(np.cumsum(lw * lh) - lw * lh),
+        unsigned(np.arange(int((lw * lh).sum()))),
         floats(radiosity.small_sky(sun.picture)),
     )
     dark = np.zeros_like(pages.coarse_glow)
@@ -169,11 +169,11 @@ def world_of(bake: Bake, house: House) -> BakedScene:
         surfaces,
         lights,
         owner,
-        flags(outer),
+        booleans(outer),
         floats(np.concatenate([g for _, g in solid]) / 255),
         floats(uv),
-        wholes(pages.sizes.ravel()),
-        wholes(np.cumsum(texels) - texels),
+        unsigned(pages.sizes.ravel()),
+        unsigned(np.cumsum(texels) - texels),
         floats(pages.albedo),
         floats(pages.light),
         floats(pages.glow) if pages.glow.any() else None,
@@ -209,16 +209,16 @@ def _panes_of(lit: LitPages, number: dict[str, int]) -> Panes | None:
         floats(each(lambda m: m.alpha)),
         floats(each(glass_surfaces)),
         each(lambda m: number.get(m.owner, 0)).astype(np.int32),
-        wholes(each(lambda m: used[m.page])),
-        wholes(size.ravel()),
-        wholes(np.cumsum(texels) - texels),
+        unsigned(each(lambda m: used[m.page])),
+        unsigned(size.ravel()),
+        unsigned(np.cumsum(texels) - texels),
         floats(np.concatenate([p.reshape(-1, 3) for p in pictures]) / 255),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """What rays meet first."""
+    """First hits of rays."""
 
     ok: Array
     distance: Array
@@ -278,7 +278,7 @@ def look(world: BakedScene, ray: Ray, active: Array = True) -> Hit:
 
 
 def through(panes: Panes, ray: Ray, behind: Array, most: int = 6) -> Array:
-    """What see-through things before `behind` (distances) put over a picture, front to back.
+    """Light that see-through things before `behind` (distances) put over a picture, front to back.
 
     Returns:
       Their own share of the shown colour, the share of what lies behind, distance and face of the first (inf and 0

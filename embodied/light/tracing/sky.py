@@ -28,7 +28,7 @@ VISIBILITY = {"clear": 26e3, "hazy": 4e3, "overcast": 12e3}
 
 @dataclass(frozen=True, eq=False)
 class Outdoors:
-    """What surrounds a house."""
+    """Surroundings of a house."""
 
     picture: np.ndarray
     """(h, 2h, 3) float32 radiance, row 0 at the zenith, column 0 looking along world -x, yaw falling to the right."""

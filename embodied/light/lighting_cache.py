@@ -1,4 +1,4 @@
-"""What several lightings of one house have in common, computed for the first of them."""
+"""Results that several lightings of one house share, computed for the first of them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Callable, Hashable
 from typing import Any, TypeAlias, TypeVar
 
 T = TypeVar("T")
-Memory: TypeAlias = dict[Hashable, Any]
+LightingCache: TypeAlias = dict[Hashable, Any]
 """Results by name; owned by those who light a house several times."""
 
 
-def once(memory: Memory | None, key: Hashable, make: Callable[[], T]) -> T:
-    """What `make` returned when `key` was first asked for; `make` itself where there is no memory."""
+def get_or_compute(memory: LightingCache | None, key: Hashable, make: Callable[[], T]) -> T:
+    """Result of `make` when `key` was first asked for; without a cache it is made each time."""
     if memory is None:
         return make()
     if key not in memory:

@@ -1,4 +1,4 @@
-"""What a bake knows of gloss, for pictures that reflect."""
+"""The gloss of a baked house, for pictures that reflect."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 from embodied.light.pages.colours import linear
 from embodied.light.pages.files import Bake
-from embodied.render.gloss import Shine
+from embodied.render.gloss import GlossData
 
 
-def shine_of(bake: Bake) -> Shine:
-    """What a bake knows of its house's gloss; colours of metal faces from the middle of each face."""
+def gloss_data_of(bake: Bake) -> GlossData:
+    """Gloss of a bake's house; colours of metal faces from the middle of each face."""
     own, lit = bake.manifest["own_pages"], bake.lit
     faces = [g if m.page < own else None for g, m in zip(bake.gloss, lit.meshes, strict=True)]
     gloss, detail = ([None if f is None else f[:, k] for f in faces] for k in (slice(3), 3))
@@ -30,4 +30,4 @@ def shine_of(bake: Bake) -> Shine:
         tint.append(linear(picture[y, x] / 255.0))
     exposure = bake.exposure
     outdoors = exposure.outdoors.astype(np.float32)
-    return Shine(gloss, tint, glow, exposure.near, outdoors, float(np.median(exposure.gains)), detail)
+    return GlossData(gloss, tint, glow, exposure.near, outdoors, float(np.median(exposure.gains)), detail)
