@@ -338,7 +338,7 @@ def test_a_machine_without_a_renderer_is_told_before_any_work(words, capsys, tmp
 
 @pytest.mark.parametrize("words", [*(w for w in DRAWING if "unlit" not in w and "render" not in w), ("light", "house")])
 def test_a_machine_that_cannot_light_is_told_before_any_work(words, capsys, tmp_path, monkeypatch):
-    unable(monkeypatch, "embodied.light.backend._module", LightError("light needs mitsuba"))
+    unable(monkeypatch, "embodied.light.backend.mitsuba", LightError("light needs mitsuba"))
     refused_at_once(words, "light needs mitsuba", capsys, tmp_path, monkeypatch)
 
 
