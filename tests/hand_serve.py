@@ -11,6 +11,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+import urllib.request
 import uuid
 from pathlib import Path
 
@@ -71,11 +72,13 @@ class Served:
         command = [sys.executable, "-m", "embodied", "serve", str(self.study), "--port", str(self.port), *self.options]
         env = {**os.environ, "PYTHONPATH": str(ROOT)}
         self.process = subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        for _ in range(300):
-            with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1):
-                break
+        for _ in range(1200):  # a busy machine is slow to start
+            with contextlib.suppress(OSError), urllib.request.urlopen(self.address + "/health", timeout=5):
+                break  # a bare connection could be one of the socket with itself
             assert self.process.poll() is None, self.process.stdout.read().decode()
             time.sleep(0.1)
+        else:
+            raise TimeoutError("the server did not start within two minutes")
         self.links = json.loads((self.people / "links.json").read_text())
 
     @property
@@ -151,4 +154,6 @@ def pair(server: Served) -> tuple[Human, Human]:
     one, two = Human(server), Human(server)
     for human in (one, two):
         assert "error" not in human.say("consent")
+        assert human.until("ready")["role"] in ("agent", "assistant"), "people read what to do before they do it"
+        assert "error" not in human.say("ready")
     return one, two

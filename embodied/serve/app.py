@@ -29,7 +29,7 @@ from embodied.serve.driving import Live
 from embodied.serve.game import Game
 from embodied.serve.pictures import Pictures
 from embodied.serve.results import summary
-from embodied.serve.screens import coming, houses_of, live_name, plan_of, screen_of
+from embodied.serve.screens import houses_of, live_name, next_part, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions
 from embodied.serve.store import Event, Store
 from embodied.serve.study import LONGEST_TEXT
@@ -320,7 +320,7 @@ class Server:
             person.ready = True
         elif do == "consent":
             await self.happen(Event("consented", now, person.id, name))
-            person.ready = not any(coming(self.sessions, person).values())  # else they read that first
+            person.ready = next_part(self.sessions, person) is None  # else they read first what to do
         elif do == "leave":
             await self.happen(Event("ended", now, person.id, name, {"person": person.id, "why": "left"}))
             await self.late()

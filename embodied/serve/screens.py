@@ -53,13 +53,19 @@ def progress(sessions: Sessions, person: Person) -> Screen:
 
 def coming(sessions: Sessions, person: Person) -> Screen:
     """What the next part asks, to be read before it begins."""
-    for part in sessions.study.parts:
-        if person.done[part.name] < part.per_person and part.name not in person.without:
-            role = person.roles.get(part.name) or (part.roles[0] if len(part.roles) == 1 else None)
-            practise = sessions.study.practice and part.kind == "play" and role not in person.practised
-            shown = "alone" if role == "agent" and part.assistant == "none" else role
-            return {"advice": part.advice, "role": shown, "practise": practise}
-    return {"advice": "", "role": None, "practise": False}
+    part = next_part(sessions, person)
+    if part is None:
+        return {"advice": "", "role": None, "practise": False}
+    role = person.roles.get(part.name) or (part.roles[0] if len(part.roles) == 1 else None)
+    practise = sessions.study.practice and part.kind == "play" and role not in person.practised
+    shown = "alone" if role == "agent" and part.assistant == "none" else role
+    return {"advice": part.advice, "role": shown, "practise": practise}
+
+
+def next_part(sessions: Sessions, person: Person) -> Part | None:
+    """The part that `person` does next; None where they have done all."""
+    todo = (p for p in sessions.study.parts if person.done[p.name] < p.per_person and p.name not in person.without)
+    return next(todo, None)
 
 
 def game_of(game: Game, role: str, pictures: Pictures) -> Screen:

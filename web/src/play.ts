@@ -158,7 +158,7 @@ export class AgentView implements View<AgentScreen> {
         : "";
     this.questions(screen);
     this.moves(screen, waiting);
-    this.keys.textContent = this.elsewhere ? LOOK : screen.live ? DRIVE : screen.words.length ? "" : `${LOOK} ${GO}`;
+    this.keys.textContent = this.elsewhere || waiting ? LOOK : screen.live ? DRIVE : screen.words.length ? "" : `${LOOK} ${GO}`;
     const left = screen.horizon - screen.time;
     const stop = button(screen.subtask ? "I have followed this advice" : "I am there: stop here", () => this.stop(), "primary stop");
     stop.disabled = waiting;
