@@ -1,19 +1,24 @@
-"""How many threads this process may use, and whom that is told to."""
+"""The processors and threads that this process may use, and what is made to keep to them."""
 
 from __future__ import annotations
 
 import os
 
 
+def processors() -> int:
+    """Processors that this process may run on; all there are on systems that do not tell, such as macOS."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def threads_allowed() -> int | None:
-    """How many threads this process should use, as OMP_NUM_THREADS has it but no more than there are processors; None
-    where nobody says.
+    """Threads that this process should use, as OMP_NUM_THREADS has it but no more than there are processors; None where
+    nobody says.
 
     The workers of joblib and of Ray get it as their share of the machine. Without it every process takes all
     processors, and threads that wait for work do so awake (docs/pictures.md has what it costs).
     """
     first = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # a list is for nested loops
-    return min(int(first), os.cpu_count() or 1) if first.isdecimal() and int(first) > 0 else None
+    return min(int(first), processors()) if first.isdecimal() and int(first) > 0 else None
 
 
 def keep_drawing_to_threads() -> None:

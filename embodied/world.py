@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import logging
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -79,6 +79,15 @@ class World:
         self._bake: Bake | None = None
         self._refused = False
         self._recent = functools.lru_cache(maxsize=KEPT)(self._load)
+
+    def __reduce__(self) -> tuple[Callable[[], World], tuple[()]]:
+        """Pickled as what it was made of; nothing is open in the process that reads it."""
+        made_of = self.house, self.catalogue, self.graph, self.cache, self.pictures
+        return functools.partial(World, *made_of, file=self._path, may_differ=self._may_differ), ()
+
+    def __deepcopy__(self, memo: object) -> World:
+        """Copies of an environment share its houses."""
+        return self
 
     @property
     def name(self) -> str:

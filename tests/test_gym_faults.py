@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import gc
 import os
+import pickle
 import subprocess
 import sys
 import weakref
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from hand_data import built
@@ -133,6 +136,44 @@ def test_every_last_info_has_success_is_success_and_spl(kind, tmp):
         assert isinstance(last["is_success"], bool) and last["is_success"] == (last["success"] == 1)
 
 
+@pytest.mark.parametrize("needs_stop", [False, True])
+@pytest.mark.parametrize("mode", ["one", "vector_entry_point", "sync"])
+def test_gymnasiums_limit_keeps_success_and_spl_in_the_last_info(tmp, mode, needs_stop):
+    """It cuts an episode short without a word to the environment: here at the goal, or two steps before."""
+    options = {"cache": tmp, "worlds": {"grid": grid_world()}, "sees": "oracle", "needs_stop": needs_stop}
+    env = make("find", tmp)
+    _, info = env.reset(seed=2)
+    options, way = options | {"disable_env_checker": True}, []
+    while env.pose.node not in env.task.goal_nodes:
+        s = env._env.situation
+        way.append(number(shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes), SpaceLayout()))
+        env.step(way[-1])
+    for steps in (len(way), len(way) - 2):
+        options["max_episode_steps"] = steps
+        if mode == "one":
+            one = gym.make("embodied/Find-v0", **options)
+        else:
+            one = gym.make_vec("embodied/Find-v0", num_envs=1, vectorization_mode=mode, **options)
+        one.reset(seed=2)
+        ends = [one.step(a if mode == "one" else np.array([a])) for a in way[:steps]]
+        last = {name: np.ravel(ends[-1][4][name])[0] for name in ("success", "is_success", "spl")}
+        assert [bool(np.ravel(e[3])[0]) for e in ends] == [False] * (steps - 1) + [True]
+        won = steps == len(way) and not needs_stop
+        assert last == {"success": won, "is_success": won, "spl": pytest.approx(float(won))}
+
+
+def test_an_environment_that_is_registered_again_has_its_limit_in_batches_too(tmp):
+    known = gym.spec("embodied/Find-v0")
+    kwargs = {**known.kwargs, "cache": tmp, "worlds": {"grid": grid_world()}, "sees": "oracle"}
+    makers = {"entry_point": known.entry_point, "vector_entry_point": known.vector_entry_point}
+    gym.register("mine/Find-v0", **makers, kwargs=kwargs, max_episode_steps=1)
+    for env in (gym.make("mine/Find-v0"), gym.make_vec("mine/Find-v0", num_envs=2)):
+        env.reset(seed=0)
+        assert np.all(env.step(env.action_space.sample() * 0)[3])
+    with pytest.raises(ValueError, match="max_episode_steps should be"):
+        gym.make_vec("mine/Find-v0", num_envs=2, max_episode_steps=0)
+
+
 def test_strict_success_needs_a_stop(tmp):
     found = {}
     for needs_stop in (False, True):
@@ -187,6 +228,18 @@ def drawn(tmp_path_factory) -> Path:
     with contextlib.closing(pixels(cache)) as env:
         env._opened[0].render_all()
     return cache
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_and_what_was_pickled_go_on_where_the_environment_was(drawn, copied):
+    with contextlib.closing(pixels(drawn)) as env:
+        env.reset(seed=1)
+        env.step(0)
+        for action in (0, STOP):
+            other = copied(env)
+            (a, *ends), (b, *others) = env.step(action), other.step(action)
+            assert ends == others and all(np.array_equal(a[name], b[name]) for name in a)
 
 
 @pytest.mark.gl

@@ -35,7 +35,7 @@ from embodied.light.tracing.emitters import lamps_of, portals_of
 from embodied.light.tracing.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.scene.landscapes import Scenery
 from embodied.scene.part import Part
-from embodied.threads import keep_drawing_to_threads, threads_allowed
+from embodied.threads import keep_drawing_to_threads, processors, threads_allowed
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
@@ -235,7 +235,7 @@ def test_cuda_goes_before_llvm_and_without_both_the_remedy_is_said():
 
 
 def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
-    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    monkeypatch.setattr("embodied.threads.processors", lambda: 3)
     nothing = dict.fromkeys(("", "0", "-2", "many"))
     for text, threads in {"1": 1, "2,4": 2, " 3 ": 3, "64": 3, **nothing}.items():
         monkeypatch.setenv("OMP_NUM_THREADS", text)
@@ -244,10 +244,18 @@ def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
     assert threads_allowed() is None
 
 
+def test_processors_are_those_of_this_process_and_all_where_the_system_does_not_tell(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {1, 5}, raising=False)
+    assert processors() == 2
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    assert processors() == 3
+
+
 def test_drawing_keeps_to_the_threads_of_a_process(monkeypatch):
     told = []
     monkeypatch.setattr(cv2, "setNumThreads", told.append)
-    monkeypatch.setattr(os, "cpu_count", lambda: 3)
+    monkeypatch.setattr("embodied.threads.processors", lambda: 3)
     for given, mesa in ((None, None), ("1", "0"), ("2", "2")):
         monkeypatch.setenv("LP_NUM_THREADS", "")  # so that what was there comes back
         monkeypatch.delenv("LP_NUM_THREADS")

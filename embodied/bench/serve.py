@@ -26,6 +26,7 @@ from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
 from embodied.render.pictures import Unlit
 from embodied.seeds import stream
 from embodied.splits import DatasetSize
+from embodied.threads import processors
 
 THINKING = 1.0
 """Mean seconds that somebody looks before the next step; people take longer."""
@@ -177,7 +178,7 @@ def report(times: Times, people: int, seconds: float, busy: float) -> Report:
     """Percentiles in milliseconds; `busy`: processor seconds of the server."""
     facts: dict[str, object] = {"people": people, "seconds": seconds, "refused": times.refused, "server busy s": busy}
     lines = [
-        f"{people} people for {seconds:g} s, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}",
+        f"{people} people for {seconds:g} s, {processors()} processors, load {os.getloadavg()[0]:.1f}",
         f"server    {busy:.1f} processor seconds",
     ]
     for name, values in (("step", times.steps), ("panorama", times.pictures)):

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from embodied.threads import processors
+
 
 @dataclass(frozen=True)
 class Measure:
@@ -102,7 +104,7 @@ def share(name: str, part: Measure, whole: Measure, unit: str = "share", *, aim:
 def machine() -> dict[str, object]:
     """Facts about the machine that the numbers were made on."""
     return {
-        "cores": os.cpu_count(),
+        "cores": processors(),
         "machine": platform.machine(),
         "system": platform.platform(),
         "python": platform.python_version(),

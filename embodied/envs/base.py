@@ -171,10 +171,14 @@ class HelpEnv:
         """
         if self.ended is None:
             raise RuntimeError(f"episode of task {self.task.id!r} has not ended; step until it returns None")
+        return self.so_far(agent)
+
+    def so_far(self, agent: str = "") -> Episode:
+        """The episode as if its time were up now, unless it has ended."""
         return Episode(
             task=self.task,
             steps=tuple(self._steps),
-            ended=self.ended,
+            ended=self.ended or "limit",
             seed=self.seed,
             agent=agent,
             budget=self.budget,

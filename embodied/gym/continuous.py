@@ -29,6 +29,7 @@ from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
 from embodied.gym.eyes import LARGE, check_live, live_pixels, pixel_spaces
+from embodied.gym.in_step import checked_limit
 from embodied.gym.playground import Asked, flat_playground
 from embodied.gym.spaces import codes_of
 from embodied.render.camera import camera_at
@@ -92,8 +93,9 @@ class ContinuousGymEnv(LiveEnv):
     """Continuous navigation as a Gymnasium environment.
 
     Reward: 1 on success, minus 0.01 an action, plus a tenth for every metre nearer to the goal along the floor. STOP
-    terminates, the last action truncates. Every info has is_success, distance_to_goal, collided and steps_taken; the
-    last one of an episode has every measure of embodied.evaluation.continuous.
+    terminates, the last action truncates. Every info has success, is_success and spl (zero before STOP),
+    distance_to_goal, collided and steps_taken; the last one of an episode that ends by itself has every measure of
+    embodied.evaluation.continuous.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
@@ -187,7 +189,9 @@ class ContinuousGymEnv(LiveEnv):
     def _told(self) -> dict[str, Any]:
         play = self.play
         return {
+            "success": 0.0,
             "is_success": False,
+            "spl": 0.0,
             "distance_to_goal": play.distance,
             "collided": play.collided,
             "steps_taken": play.steps,
@@ -209,11 +213,26 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> Contin
 
 
 def make_vec(
-    kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any
+    kind: str,
+    num_envs: int = 1,
+    *,
+    render_mode: str | None = None,
+    max_episode_steps: int | None = None,
+    disable_env_checker: bool | None = None,
+    **options: Any,
 ) -> gym.vector.SyncVectorEnv:
-    """So many environments in this process that share houses and floors."""
-    course = make_course(kind, **options)
-    return gym.vector.SyncVectorEnv([lambda: ContinuousGymEnv(course, render_mode=render_mode)] * num_envs)
+    """So many environments in this process that share houses and floors; arguments as of embodied.gym.in_step.make_vec.
+
+    Raises:
+      ValueError: no such limit, and what `make_course` raises.
+    """
+    limit, course = checked_limit(max_episode_steps), make_course(kind, **options)
+
+    def one() -> gym.Env[Any, Any]:
+        env = ContinuousGymEnv(course, render_mode=render_mode)
+        return env if limit is None else gym.wrappers.TimeLimit(env, limit)
+
+    return gym.vector.SyncVectorEnv([one] * num_envs)
 
 
 def make_course(

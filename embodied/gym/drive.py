@@ -60,7 +60,8 @@ class DriveEnv(LiveEnv):
 
     Reward: 1 on success, minus 0.01 a command and 0.05 for every collision, plus a tenth for every
     metre nearer to the goal along the floor. An episode ends when the point is reached, when the object is said to be
-    here, and is cut short after `seconds`. info: success, spl, collisions, metres, seconds, distance_to_goal (metres).
+    here, and is cut short after `seconds`. info: success, is_success, spl, collisions, metres, seconds,
+    distance_to_goal (metres).
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -86,9 +87,7 @@ class DriveEnv(LiveEnv):
         outcome = self.driving.step(action)
         ended = outcome.ended
         terminated = ended in ("reached", "said")
-        info: dict[str, Any] = dict(outcome.facts)
-        if ended is not None:
-            info["is_success"] = info["success"] > 0
+        info: dict[str, Any] = {**outcome.facts, "is_success": outcome.facts["success"] > 0}
         return self.driving.look(), outcome.reward, terminated, ended == "limit", info
 
     def _picture(self) -> np.ndarray:

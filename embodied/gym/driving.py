@@ -97,6 +97,11 @@ class Outcome:
     """success, spl, collisions, metres, seconds and distance_to_goal, since the episode began."""
 
 
+def stage_of(world: World) -> tuple[Driver, FloorWays]:
+    """The physics and the floor of a world."""
+    return Driver(world.house, world.catalogue), FloorWays(world.house)
+
+
 class Driving:
     """Owns the physics and the pictures of some houses, and plays one episode at a time."""
 
@@ -104,10 +109,7 @@ class Driving:
         self,
         worlds: Mapping[str, World],
         settings: DriveSettings,
-        stage_of: Callable[[World], tuple[Driver, FloorWays]] = lambda w: (
-            Driver(w.house, w.catalogue),
-            FloorWays(w.house),
-        ),
+        stage_of: Callable[[World], tuple[Driver, FloorWays]] = stage_of,
     ) -> None:
         """
         Args:

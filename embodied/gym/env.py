@@ -72,8 +72,9 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
 
     Reward: 1 on success at the end, minus 0.01 per step and the price of a question (Ask-v0); HARI: minus the cost
     of the step. With `shaping`, minus the change of the distance to the nearest goal in metres / 10 (in HARI, in
-    edges, Eq 4.20), which leaves the best policy as it is. The last info of an episode, however it
-    ends, holds success, is_success (for Stable-Baselines3), spl and the other metrics of every task.
+    edges, Eq 4.20), which leaves the best policy as it is. The info of every step holds success, is_success (for
+    Stable-Baselines3) and spl, as if the episode were cut short there: that is what Gymnasium's TimeLimit does. The
+    last info of an episode that ends by itself has the other metrics of every task, too.
 
     An action that the mask forbids leaves everything as it was and is reported in
     info["invalid_action"]; after `patience` of them the episode is truncated. With `strict` it
@@ -176,14 +177,13 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
             if self._strict or self._env.ended is not None:
                 raise
             self._invalid += 1
-            info: dict[str, Any] = {"invalid_action": str(e)} | self._words()
             if over := self._invalid >= self._patience:
                 self._env.cut_short()
-                info |= self._judged()
+            info = {"invalid_action": str(e)} | self._words() | self._judged()
             return self._encoded(self._o), -STEP_COST, False, over, info
         ended = self._env.ended
-        info = {} if ended is None else self._judged()
-        reward = self._env.reward(info.get("success", 0.0))
+        info = self._judged()
+        reward = self._env.reward(0.0 if ended is None else info["success"])
         if self._shaping:
             reward += before - self._env.potential()
         self._o = o if o is not None else self._o
@@ -258,11 +258,16 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         return encode(o, self._sensor, self._layout)
 
     def _judged(self) -> dict[str, Any]:
-        episode, graph = self._env.episode(), self._env.world.graph
-        found: dict[str, Any] = {name.replace(" ", "_"): f(episode, graph) for name, f in PER_EPISODE.items()}
-        if self._needs_stop and not found["strict_success"]:
-            found |= {"success": 0.0, "spl": 0.0}
-        return found | {"is_success": found["success"] > 0}
+        """Success and SPL, and once the episode has ended all metrics of every task."""
+        env, graph = self._env, self._env.world.graph
+        away = min(graph.distance[env.pose.node, g] for g in env.task.goal_nodes)
+        if env.ended is None and (self._needs_stop or away > env.task.radius + 1e-6):  # a success costs more to find
+            return {"success": 0.0, "spl": 0.0, "is_success": False}
+        episode, names = env.so_far(), ("success", "spl") if env.ended is None else PER_EPISODE
+        measures: dict[str, Any] = {name.replace(" ", "_"): PER_EPISODE[name](episode, graph) for name in names}
+        if self._needs_stop and not measures["strict_success"]:
+            measures |= {"success": 0.0, "spl": 0.0}
+        return measures | {"is_success": measures["success"] > 0}
 
 
 def check_options(render_mode: str | None, *, patience: int = 1, **others: bool) -> None:

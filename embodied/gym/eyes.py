@@ -178,6 +178,10 @@ class PanoramaStore:
         self._worlds, self._budget = worlds, budget
         self._kept: OrderedDict[Viewpoint, Panorama] = OrderedDict()
 
+    def __reduce__(self) -> tuple[type[PanoramaStore], tuple[Mapping[str, World], int]]:
+        """Pickled and copied without the panoramas, whose files are open here."""
+        return PanoramaStore, (self._worlds, self._budget)
+
     def at(self, sight: Sight) -> Panorama:
         """The panorama of a sight; drawn, or read from the disk, when it is not in memory.
 

@@ -9,7 +9,6 @@ write straight into the batch. For several processes, use Gymnasium's AsyncVecto
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,6 +23,7 @@ from embodied.gym.env import OWN, HelpGymEnv, check_options, open_resources
 from embodied.gym.eyes import Arrays, Sensor, SensorSuite
 from embodied.gym.spaces import observation_space
 from embodied.seeds import checked_seed
+from embodied.threads import processors
 
 if TYPE_CHECKING:
     from embodied.world import World
@@ -32,19 +32,30 @@ COPIES = 2
 """Of an observation that a batch holds per slot: what was handed out last, and what is being filled."""
 
 
-def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **options: Any) -> SharedSyncVectorEnv:
+def make_vec(
+    kind: str,
+    num_envs: int = 1,
+    *,
+    render_mode: str | None = None,
+    max_episode_steps: int | None = None,
+    disable_env_checker: bool | None = None,
+    **options: Any,
+) -> SharedSyncVectorEnv:
     """`num_envs` environments that share resources: houses, pages and decoded panoramas are held once.
 
     Each has its own task, target, instruction and generator.
 
     Args:
+      max_episode_steps: steps after which an episode is truncated, as by Gymnasium's TimeLimit; -1 and None: its own.
+      disable_env_checker: as of gymnasium.make; these environments have no checker.
       options: as of `make`, and `threads` that look (default: one per core).
 
     Raises:
-      ValueError: fewer than one, or more than memory has room for.
+      ValueError: fewer than one, more than memory has room for, or no such limit.
     """
     if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
         raise ValueError(f"num_envs should be a whole number of at least 1, got {num_envs!r}")
+    limit = checked_limit(max_episode_steps)
     own = {name: options.pop(name) for name in OWN if name in options}
     check_options(render_mode, **own)
     threads = options.pop("threads", None)
@@ -56,7 +67,7 @@ def make_vec(kind: str, num_envs: int = 1, *, render_mode: str | None = None, **
         )
 
     refuse_too_many(num_envs, observation_space(shared.layout, shared.sensor))
-    return SharedSyncVectorEnv(one, int(num_envs), shared.sensor, threads=threads, opened=shared.opened)
+    return SharedSyncVectorEnv(one, int(num_envs), shared.sensor, threads=threads, opened=shared.opened, limit=limit)
 
 
 class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
@@ -73,12 +84,14 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         *,
         threads: int | None = None,
         opened: Sequence[World] = (),
+        limit: int | None = None,
     ) -> None:
         """Args:
         make_one: makes the environment of a slot, with a sensor that sees nothing.
         sensor: what the slots see; shared.
         threads: that look; one per core by default.
         opened: worlds that `close` closes.
+        limit: steps after which an episode is truncated.
 
         Raises:
           ValueError: fewer than one thread.
@@ -96,8 +109,8 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         self.single_observation_space = gym.spaces.Dict({**self._seen, **told.spaces})
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._told = _arrays_of(told.spaces, num_envs)
-        self._over = np.zeros(num_envs, bool)
-        self._threads = min(threads or len(os.sched_getaffinity(0)), num_envs)
+        self._over, self._steps, self._limit = np.zeros(num_envs, bool), np.zeros(num_envs, int), limit
+        self._threads = min(threads or processors(), num_envs)
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
         self._opened = tuple(opened)
 
@@ -112,7 +125,7 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
             self.envs[k].chosen(options)  # or nothing happens at all
         for k in slots:
             o, one = self.envs[k].reset(seed=seeds[k], options=options or None)
-            self._over[k] = False
+            self._over[k], self._steps[k] = False, 0
             self._note(k, o)
             info = self._add_info(info, one, k)
         return self._shown(), info
@@ -137,8 +150,11 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
             try:
                 if was_over:
                     o, one = env.reset()
+                    self._steps[k] = 0
                 else:
                     o, rewards[k], terminated[k], truncated[k], one = env.step(action)
+                    self._steps[k] += 1
+                    truncated[k] |= self._steps[k] == self._limit
             except Exception as e:
                 e.add_note(f"in slot {k} of {self.num_envs}, which the next step resets")
                 errors.append(e)
@@ -196,6 +212,19 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
 
 def _arrays_of(kinds: Mapping[str, gym.Space[Any]], num_envs: int) -> Arrays:
     return {name: np.empty((num_envs, *(s.shape or ())), s.dtype) for name, s in kinds.items()}
+
+
+def checked_limit(max_episode_steps: int | None) -> int | None:
+    """The steps after which Gymnasium truncates an episode; None where an episode has its own end only.
+
+    Raises:
+      ValueError: not a positive number of steps.
+    """
+    if max_episode_steps is None or max_episode_steps == -1:
+        return None
+    if not isinstance(max_episode_steps, (int, np.integer)) or max_episode_steps < 1:
+        raise ValueError(f"max_episode_steps should be a whole number of at least 1, or -1, got {max_episode_steps!r}")
+    return int(max_episode_steps)
 
 
 def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:

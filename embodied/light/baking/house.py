@@ -12,7 +12,6 @@ import dataclasses
 import functools
 import logging
 import math
-import os
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -47,6 +46,7 @@ from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 from embodied.seeds import stream
+from embodied.threads import processors
 
 log = logging.getLogger(__name__)
 Progress = Callable[[str, float], None]
@@ -71,7 +71,7 @@ TOGETHER = 8
 
 def duration(house: House, quality: str) -> str:
     """About how long `bake` takes on this machine, in words."""
-    cores = min(os.cpu_count() or 1, MOST_CORES)
+    cores = min(processors(), MOST_CORES)
     seconds = house.area * SECONDS.get(quality, SECONDS["normal"]) / cores
     return f"about {math.ceil(seconds / 60)} minutes" if seconds > 60 else "about a minute"
 
