@@ -111,21 +111,19 @@ def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
     stored = data.drawn_pictures(name)
     if stored is not None and stored.size >= study.size:
         return data.panoramas(name)
-    blurred = f"those of the data set have faces of {stored.size if stored else 0} pixels, which a page shows blurred"
     if isinstance(stored, Traced):
-        note(
-            f"panoramas of {name}: {blurred}; for sharper ones, `embodied dataset` traces them with --size {study.size}"
-        )
+        note(f"panoramas of {name}: {stored.size} pixels are blurred on a page; trace them with --size {study.size}")
         return data.panoramas(name)
-    pictures = parse_pictures(study.pictures if stored is None else stored, study.size)
-    note(f"panoramas of {name}: drawn with faces of {study.size} pixels" + (f"; {blurred}" if stored else ""))
+    note(f"panoramas of {name}: drawn with faces of {study.size} pixels")
+    if stored is not None:
+        note(f"  (the data set's {stored.size} are blurred on a page; `size = {stored.size}` in the study keeps them)")
     try:
-        with world_of(data, name, pictures, args) as world:
+        with world_of(data, name, parse_pictures(stored or study.pictures, study.size), args) as world:
             return world.render_all(progress=True)
     except UnableError as e:
         if stored is None:
             raise
-        note(f"panoramas of {name}: {blurred}; this machine draws no others: {e}")
+        note(f"  (the data set's are used, for this machine draws none: {e})")
         return data.panoramas(name)
 
 
