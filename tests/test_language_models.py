@@ -184,6 +184,7 @@ FAILURES = {
     "an empty body": (sent(""), 3, "its answer is empty"),
     "a stream of events": (sent('data: {"choices": []}\n\ndata: [DONE]', "text/event-stream"), 1, "stream of events"),
     "half of an answer": (sent(said(GOOD)[2][:90]), 3, "no chat completion"),
+    "a moved server whose address is none": ((308, {"Location": "http://[x/v1"}, b""), 1, r"sends on to 'http://\[x"),
     "a moved server": ((307, {"Location": "https://new.example/v1"}, b""), 1, "https://new.example"),
     "an error that repeats the key": (sent('{"error": "no key sk-secret"}'), 3, r"no key \*\*\*"),
     "a form that is unknown": ((400, {}, b'{"error": "no json_schema"}'), 1, "another form \\(--form\\) may suit"),
@@ -201,6 +202,15 @@ def test_a_failure_of_the_server_is_no_answer_and_the_run_goes_on_from_it(reply,
         assert len(server.requests) == tries and client.sent == len(client.cache) == 0
         server.behaviour = lambda r: said(GOOD)
         assert client.ask(ASKED, ONE).value == {"word": "yes"} and client.sent == 1
+
+
+def test_a_request_is_sent_on_within_its_host(answers):
+    moves = [(307, {"Location": "/v1/chat/completions/"}, b""), said(GOOD)]
+    with ChatServer(lambda r: moves.pop(0)) as server:
+        assert client_of(server, answers).ask(ASKED, ONE).value == {"word": "yes"}
+        server.behaviour = lambda r: (308, {"Location": "/v1/chat/completions"}, b"")
+        with pytest.raises(UnableError, match="status 308; it sends on to '/v1/chat/completions'"):
+            client_of(server, answers, temperature=1.0).ask(ASKED, ONE)
 
 
 def test_a_newer_model_is_asked_with_the_settings_that_it_knows(answers):

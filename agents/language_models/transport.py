@@ -6,6 +6,7 @@ Every failure is a ServerError that names its cause and says what to do; no more
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import functools
 import html
 import http.client
@@ -21,7 +22,7 @@ import urllib.request
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import urlsplit, urlunsplit
+from urllib.parse import urljoin, urlsplit, urlunsplit
 
 from embodied.assets.json_file import RecordError, parse
 
@@ -61,8 +62,11 @@ class Endpoint:
     timeout: float
     """Seconds to wait for a whole answer."""
 
-    def post(self, body: Mapping[str, Any]) -> bytes:
+    def post(self, body: Mapping[str, Any], hops: int = 3) -> bytes:
         """The content of the response to `body`, which is sent as JSON.
+
+        Args:
+          hops: at most so many times the request is sent on to another address of the same host.
 
         Raises:
           ServerError: no answer, or a status that is none.
@@ -76,6 +80,10 @@ class Endpoint:
             raise self._unreachable(e, proxy) from None
         if 200 <= status < 300:
             return content
+        with contextlib.suppress(ValueError):  # an address that is none
+            target = urljoin(self.url, headers.get("location") or "")
+            if status in (307, 308) and hops and urlsplit(target)[:2] == urlsplit(self.url)[:2]:
+                return dataclasses.replace(self, url=target).post(body, hops - 1)
         wait = headers.get("retry-after") or ""
         raise failure(
             status,
