@@ -60,7 +60,7 @@ def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
     [
         ("embodied/language/templates.toml", "embodied.language.voice"),
         ("embodied/language/speakers.toml", "embodied.language.voice"),
-        ("embodied/generate/tastes.toml", "embodied.generate"),
+        ("embodied/generate/style_finishes.toml", "embodied.generate"),
         ("embodied/generate/furnish/smalls.toml", "embodied.generate"),
     ],
 )

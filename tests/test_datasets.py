@@ -183,7 +183,7 @@ def test_a_data_set_of_other_furniture_groups_is_another_one_and_is_not_continue
     def made(group: str, folder: str) -> Dataset:
         shop = tmp_path / group
         shop.mkdir(exist_ok=True)
-        (shop / "groups.toml").write_text(f'[rooms.living_room]\nwishes = [{{ group = "{group}" }}]\n')
+        (shop / "groups.toml").write_text(f'[rooms.living_room]\nrules = [{{ group = "{group}" }}]\n')
         build_dataset(config, tmp_path / folder, tmp_path / "cache", make_house=small_house, own=(shop,))
         return Dataset(tmp_path / folder)
 

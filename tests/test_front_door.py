@@ -91,7 +91,7 @@ def test_a_room_that_stays_closed_has_doors_and_furniture_drawn_anew(tmp_path, m
             raise DeadEndError("room 'kitchen_1' cannot be entered on foot")
         return house
 
-    monkeypatch.setattr(stages, "cleared", closed_at_first)
+    monkeypatch.setattr(stages, "remove_blocking_objects", closed_at_first)
     house = house_of_plan(plan, seed=0)
     assert house.placements and house.openings != asked[0].openings
     assert [r.polygon for r in house.rooms] == [r.polygon for r in asked[0].rooms]

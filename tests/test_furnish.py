@@ -22,7 +22,7 @@ from embodied.generate.furnish.lights import LUMENS
 from embodied.generate.furnish.space import box, overlap, room_space
 from embodied.generate.furnish.style import PREFERENCES
 from embodied.generate.furnish.tables import tables
-from embodied.generate.lacking import lacking
+from embodied.generate.requirements import missing_requirements
 from embodied.geometry import facing_of, rectangle, wrap
 from embodied.house.house import DOORS, House, HouseError, Opening, Room, Storey, check
 from embodied.house.validation import STYLES
@@ -291,39 +291,39 @@ LACKED = ((1434163573, "sink and cooker"), (1583581038, "fridge and bed"), (1652
 @pytest.mark.parametrize("seed", [s for s, _ in LACKED])
 def test_rooms_are_drawn_anew_until_nothing_is_lacking(seed):
     house = generate_house(seed, HouseConfig(area=(90.0, 200.0)), catalogue())
-    assert lacking(house) == ()
+    assert missing_requirements(house) == ()
     assert house.seed == seed
     beds = tuple(p for p in house.placements if p.object_class in BEDS)
     robbed = dataclasses.replace(house, placements=tuple(p for p in house.placements if p.room != beds[0].room))
-    assert f"{beds[0].room}: bed" in lacking(robbed)
+    assert f"{beds[0].room}: bed" in missing_requirements(robbed)
 
 
 @pytest.mark.slow
 def test_a_small_flat_may_be_drawn_ten_times_until_its_kitchen_has_a_worktop():
     house = generate_house(11120, HouseConfig(area=(40.0, 55.0)), catalogue())
-    assert lacking(house) == ()
+    assert missing_requirements(house) == ()
 
 
 @pytest.mark.slow
 def test_a_house_is_drawn_anew_where_a_bedroom_opens_off_the_living_room_only():
     config = HouseConfig(area=(160.0, 200.0))
     drafted = generate_house(12037, config, stages=BARE)
-    assert lacking(drafted)[-1] == "bedroom_1: way from a hall or corridor"
-    assert not [x for x in lacking(generate_house(12037, config, catalogue())) if "way" in x]
+    assert missing_requirements(drafted)[-1] == "bedroom_1: way from a hall or corridor"
+    assert not [x for x in missing_requirements(generate_house(12037, config, catalogue())) if "way" in x]
     flat = generate_house(9000, HouseConfig(area=(40.0, 55.0)), stages=BARE)
-    assert not [x for x in lacking(flat) if "way" in x]
+    assert not [x for x in missing_requirements(flat) if "way" in x]
 
 
 @pytest.mark.slow
 def test_of_houses_that_all_lack_something_the_one_that_lacks_least_is_kept(monkeypatch):
     short = iter([("a", "b"), ("a",), ("a", "b", "c"), ("a",), ("a",)])
-    monkeypatch.setattr(stages, "lacking", lambda *_: next(short))
+    monkeypatch.setattr(stages, "missing_requirements", lambda *_: next(short))
     monkeypatch.setattr(stages, "RETRIES", dataclasses.replace(RETRIES, house=5))
     drawn = []
     room = {**STAGES, "rooms": lambda draft: (drawn.append(draft.attempt), STAGES["rooms"](draft))[1]}
     house = generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=room)
     assert drawn == [0, 1, 2, 3, 4]
-    monkeypatch.setattr(stages, "lacking", lambda *_: ())
+    monkeypatch.setattr(stages, "missing_requirements", lambda *_: ())
     second = {**STAGES, "rooms": lambda draft: STAGES["rooms"](dataclasses.replace(draft, attempt=1))}
     assert house.digest == generate_house(7, HouseConfig(area=(38.0, 46.0)), catalogue(), stages=second).digest
 

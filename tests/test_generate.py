@@ -16,12 +16,12 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.assets.materials import MATERIALS
 from embodied.assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
-from embodied.generate.clearing import cleared
 from embodied.generate.config import RETRIES
 from embodied.generate.footprint import draw_footprint
 from embodied.generate.kinds import BEDROOMS, KINDS, Extra
 from embodied.generate.stages import Draft
-from embodied.generate.tastes import TASTES
+from embodied.generate.style_finishes import STYLE_FINISHES
+from embodied.generate.walkways import remove_blocking_objects
 from embodied.house.house import DOORS, House, HouseError, Placement, Room, check
 from embodied.house.shapes import inward
 from embodied.house.validation import STYLES
@@ -229,7 +229,7 @@ def test_living_rooms_mostly_look_south():
 
 
 def test_every_style_has_a_taste():
-    assert tuple(TASTES) == STYLES
+    assert tuple(STYLE_FINISHES) == STYLES
 
 
 def test_palettes_use_known_materials_and_one_style_per_house(some):
@@ -348,7 +348,7 @@ def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(tmp_path, monkeypa
     often = Extra(house=0.0, size=14.0, likely=1e6)
     monkeypatch.setitem(KINDS, "music_room", replace(KINDS["library"], extra=often))
     (tmp_path / "groups.toml").write_text(
-        '[rooms.music_room]\nwishes = [{ group = "piece", role = "upright piano" }, { group = "greenery" }]'
+        '[rooms.music_room]\nrules = [{ group = "piece", role = "upright piano" }, { group = "greenery" }]'
     )
     house = generate_house(4, HouseConfig(rooms=6, bedrooms=2), load_catalogue(own=tmp_path))
     rooms = {r.id for r in house.rooms if r.kind == "music_room"}
@@ -369,7 +369,7 @@ def test_a_wardrobe_in_the_doorway_is_cleared_away_with_what_lies_on_it():
     rug = Placement("rug_1", "a/d", "rug", door.rooms[0], (x, y, 0.0), 0.3, (1.2, 1.2, 0.01))
     blocked = House(**{**vars_of(house), "placements": (block, box, rug)})
     assert door.rooms[0] in unreachable_rooms(blocked)
-    assert [p.id for p in cleared(blocked).placements] == ["rug_1"]
+    assert [p.id for p in remove_blocking_objects(blocked).placements] == ["rug_1"]
     assert math.isfinite(house.area)
 
 

@@ -14,7 +14,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish import groups, likes
 from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.smalls import Board, Tops
+from embodied.generate.furnish.smalls import CarrierSurface, SurfaceOccupancy
 from embodied.generate.furnish.space import Thing, overlap, room_space
 from embodied.generate.furnish.stock import Stock
 from embodied.generate.furnish.style import house_style
@@ -75,8 +75,8 @@ def test_every_small_thing_and_every_part_of_a_group_is_something_that_the_catal
     assert all(stock.of_role(r) for some in known.shelves.values() for r in some)
     assert all(stock.of_role(p.role) for g in known.groups.values() for p in g.parts if p.role)
     assert set(likes.LIKES) == {*LIKES, "ahead"} and {"wall", *groups.AROUND} == set(AT)
-    wishes = [w for p in known.rooms.values() for w in (*p.wishes, *p.extras, *p.fillers)]
-    assert all(stock.of_role(r) for w in wishes for r in (w.role, *w.roles) if r)
+    rules = [w for p in known.rooms.values() for w in (*p.rules, *p.extras, *p.fillers)]
+    assert all(stock.of_role(r) for w in rules for r in (w.role, *w.roles) if r)
 
 
 def test_a_board_is_filled_without_overlaps_until_nothing_fits():
@@ -89,10 +89,10 @@ def test_a_board_is_filled_without_overlaps_until_nothing_fits():
     carrier = Thing(table, x, y, space.bottom, 0.0, table.size)
     stock = Stock(catalogue(), house_style("warm", 0.4, rng=np.random.default_rng(0)), tables())
     full = space.holding([carrier], [carrier.box])
-    tops = Tops(Context(full, stock, np.random.default_rng(3), ("living_room",), household_of(house)))
-    board = Board(carrier, max(table.surfaces, key=lambda s: (s.x1 - s.x0) * (s.y1 - s.y0)))
+    occupancy = SurfaceOccupancy(Context(full, stock, np.random.default_rng(3), ("living_room",), household_of(house)))
+    board = CarrierSurface(carrier, max(table.surfaces, key=lambda s: (s.x1 - s.x0) * (s.y1 - s.y0)))
     laid = []
-    while (thing := tops.put(mug, board, "any", 3.2)) is not None:
+    while (thing := occupancy.put(mug, board, "any", 3.2)) is not None:
         laid.append(thing)
         assert len(laid) < 500
     assert len(laid) > 20

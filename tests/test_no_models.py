@@ -8,7 +8,7 @@ import embodied.assets.importing.packs as packs
 from embodied.assets.built import BASICS
 from embodied.assets.catalogue import _tell_once, load_catalogue
 from embodied.generate import HouseConfig, generate_house
-from embodied.generate.lacking import lacking
+from embodied.generate.requirements import missing_requirements
 
 
 def test_a_house_without_models_lacks_nothing_and_is_the_same_every_time(tmp_path, monkeypatch):
@@ -19,7 +19,7 @@ def test_a_house_without_models_lacks_nothing_and_is_the_same_every_time(tmp_pat
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         first, again = (generate_house(3, HouseConfig(area=(32, 40)), load_catalogue(tmp_path)) for _ in range(2))
-    assert first.digest == again.digest and not lacking(first)
+    assert first.digest == again.digest and not missing_requirements(first)
     assert sum("no furniture models" in str(w.message) for w in told) == 1
     assert {"sofa", "bed", "toilet"} <= {p.object_class for p in first.placements}
     assert any(p.asset in BASICS for p in first.placements)

@@ -9,8 +9,8 @@ from hand_data import build
 from embodied.assets.catalogue import CatalogueError, load_catalogue
 from embodied.datasets.build import DatasetConfig
 from embodied.generate import HouseConfig, generate_house
-from embodied.generate.novelty import NOVEL_STYLE, furnishable, taste_of
-from embodied.generate.tastes import TASTES
+from embodied.generate.novelty import NOVEL_STYLE, finishes_of, furnishable
+from embodied.generate.style_finishes import STYLE_FINISHES
 from embodied.house.house import HouseError
 from embodied.language import People
 from embodied.language.clauses import Enter, Forward, StopBy, To, Turn
@@ -80,16 +80,18 @@ def test_looks_of_novel_houses_are_not_those_that_agents_learn_in(houses):
     assert {h.style for h in houses["novel"]} == {NOVEL_STYLE}
     assert NOVEL_STYLE not in {h.style for h in houses["familiar"]}
     floors = {n: {r.floor_finish for h in houses[n] for r in h.rooms if r.kind != "garage"} for n in houses}
-    carpets = {k for taste in TASTES.values() for k in taste.carpets}
+    carpets = {k for taste in STYLE_FINISHES.values() for k in taste.carpets}
     assert not (floors["novel"] & floors["familiar"]) - carpets
 
 
 def test_novel_tastes_leave_something_to_choose():
-    taste = taste_of(NOVEL_STYLE, "novel")
-    others = {k for name, t in TASTES.items() if name != NOVEL_STYLE for k in (*t.woods, *t.stones, *t.wet_walls)}
+    taste = finishes_of(NOVEL_STYLE, "novel")
+    others = {
+        k for name, t in STYLE_FINISHES.items() if name != NOVEL_STYLE for k in (*t.woods, *t.stones, *t.wet_walls)
+    }
     assert not {*taste.woods, *taste.stones, *taste.wet_walls} & others
     assert min(map(len, (taste.woods, taste.stones, taste.wet_floors, taste.wet_walls, taste.papers))) > 1
-    assert taste_of("warm", "familiar") is TASTES["warm"]
+    assert finishes_of("warm", "familiar") is STYLE_FINISHES["warm"]
 
 
 def test_a_house_refuses_novelties_that_cannot_be():

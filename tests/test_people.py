@@ -15,8 +15,20 @@ from hand_worlds import grid_world, thing
 
 from embodied.assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
-from embodied.generate.another_day import another_day
-from embodied.generate.people import APART, BACK, CLASS, FARTHEST, LAP, NEAREST, POLITE, add_people, meet, sits, stands
+from embodied.generate.people import (
+    APART,
+    BACK,
+    CLASS,
+    FARTHEST,
+    LAP,
+    NEAREST,
+    POLITE,
+    add_people,
+    place_people,
+    sits,
+    stands,
+)
+from embodied.generate.rearrange import rearranged
 from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Opening, Placement, check
 from embodied.house.shapes import footprint
@@ -45,7 +57,9 @@ def catalogue(*figures: Asset) -> SimpleNamespace:
 
 def populated(starts=(0, 14, 14, 30), world=None, figures=(FIGURE,), seed=1) -> tuple[House, object]:
     world = world or grid_world(6, spacing=2.2)
-    return add_people(world.house, meet(world.house, world.graph, catalogue(*figures), seed=seed), starts), world
+    return add_people(
+        world.house, place_people(world.house, world.graph, catalogue(*figures), seed=seed), starts
+    ), world
 
 
 def people_of(house: House) -> list[Placement]:
@@ -58,7 +72,7 @@ def seated(world, node: int, dx: float, dy: float, yaw: float = 0.0):
     room = world.graph.room_of_node[node]
     chair = Placement("dining_chair_1", CHAIR.key, CHAIR.object_class, room, (x + dx, y + dy, 0.0), yaw, CHAIR.size)
     house = dataclasses.replace(world.house, placements=(chair,))
-    return chair, meet(house, world.graph, catalogue(SITTER), seed=1)
+    return chair, place_people(house, world.graph, catalogue(SITTER), seed=1)
 
 
 def test_one_person_per_start_looking_at_it_or_at_a_start_nearby():
@@ -99,7 +113,7 @@ def test_nobody_stands_in_the_open_leaf_of_a_door():
     open_leaves = shapely.union_all([leaf for o in wide for leaf in leaves(house, o)])
     apart = []
     for seed in range(8):
-        met = meet(house, world.graph, catalogue(FIGURE), seed=seed)
+        met = place_people(house, world.graph, catalogue(FIGURE), seed=seed)
         apart += [open_leaves.distance(shapely.Point(p.position[:2])) for p in met.values()]
     assert min(apart) >= max(FIGURE.size[:2]) / 2 - 0.02
 
@@ -140,7 +154,7 @@ def test_nobody_sits_where_one_cannot(what, monkeypatch):
             thing("box", 1, chair.room, *chair.position[:2]), position=(*chair.position[:2], 0.47), size=(0.3, 0.3, 0.3)
         )
         house = dataclasses.replace(world.house, placements=(chair, box))
-        met = meet(house, world.graph, catalogue(SITTER), seed=1)
+        met = place_people(house, world.graph, catalogue(SITTER), seed=1)
     else:
         monkeypatch.setattr(
             "test_people.CHAIR", dataclasses.replace(CHAIR, surfaces=(dataclasses.replace(CHAIR.surfaces[0], z=0.75),))
@@ -151,7 +165,7 @@ def test_nobody_sits_where_one_cannot(what, monkeypatch):
 
 def test_routes_begin_where_somebody_is_met():
     world = grid_world(6, spacing=2.2)
-    met = meet(world.house, world.graph, catalogue(FIGURE), seed=1)
+    met = place_people(world.house, world.graph, catalogue(FIGURE), seed=1)
     some = dict(list(met.items())[:5])
     paths = route_paths(world.graph, "grid", seed=0, house_split="test", starts=some)
     assert paths and {p[0] for p in paths} <= set(some)
@@ -177,14 +191,14 @@ def nook_before_a_door() -> tuple[House, NavGraph]:
 def test_whoever_shuts_a_room_steps_aside_alone(seed):
     house, graph = nook_before_a_door()
     assert unreachable_rooms(house) == ()
-    met = meet(house, graph, catalogue(FIGURE), seed=seed)
+    met = place_people(house, graph, catalogue(FIGURE), seed=seed)
     assert set(met) == {0} and unreachable_rooms(add_people(house, met, (0,))) == ()
     # in a house whose bedroom has a door of its own to the garden, the same two people stay
     garden = dataclasses.replace(
         house.openings[0], id="back_door_1", kind="back_door", rooms=("bedroom_1", None), a=(9.0, 1.0), b=(9.0, 2.0)
     )
     shut_anyway = dataclasses.replace(house, openings=(garden, *house.openings[1:]))
-    both = meet(shut_anyway, graph, catalogue(FIGURE), seed=seed)
+    both = place_people(shut_anyway, graph, catalogue(FIGURE), seed=seed)
     assert set(both) == {0, 1} and both[0] == met[0] and both[1].position[0] > 4.2
 
 
@@ -238,7 +252,7 @@ def test_on_another_day_people_are_elsewhere_and_small_things_moved_but_the_furn
     house, world = populated(figures=(FIGURE, SLIM))
     house = dataclasses.replace(house, placements=(chair, *mugs, *house.placements))
     days = [
-        another_day(house, world.graph, catalogue(FIGURE, SLIM), (0, 14, 14, 30), day=day) for day in (0, 1, 1, 2, 3)
+        rearranged(house, world.graph, catalogue(FIGURE, SLIM), (0, 14, 14, 30), day=day) for day in (0, 1, 1, 2, 3)
     ]
     assert days[0] is house and days[1].digest == days[2].digest, "a day is the same whenever it is looked at"
     things = [{p.id: p for p in d.placements if p.object_class != CLASS} for d in days]

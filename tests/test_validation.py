@@ -64,7 +64,7 @@ NONSENSE = {
     "seed='many'; a value like 0.0": lambda: edited(lambda p: p.asset.startswith("built/"), params=(("seed", "many"),)),
     "unknown surface 'roof' of": lambda: edited(lambda p: p.surface is not None, surface="roof"),
     "unknown surface 'top' of None": lambda: edited(anything, surface="top"),
-    "wears the unknown material 'gold/7'": lambda: painted(floor_finish="gold/7"),
+    "has the unknown material 'gold/7'": lambda: painted(floor_finish="gold/7"),
     "unknown material 'cheese'": lambda: painted(accent_finish="cheese", accent_wall=0),
     "opening .* unknown material 'tin'": lambda: leafed("tin"),
 }

@@ -24,7 +24,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.json_file import read_json
 from embodied.datasets.store import Dataset
-from embodied.generate.another_day import another_day
+from embodied.generate.rearrange import rearranged
 from embodied.house.house import House
 from embodied.interface import TURNS, VIEWS, Route
 from embodied.light import lightings_of
@@ -42,7 +42,7 @@ def house_at(data: Dataset, name: str, condition: CaptureCondition, cache: Path)
         return lightings_of(place.house, condition.lighting + 1)[-1]
     routes = load_lines(data.folder / "houses" / name / "routes.jsonl", Route)
     starts = [r.path[0] for r in routes]
-    house = another_day(place.house, place.graph, load_catalogue(cache), starts, day=condition.day)
+    house = rearranged(place.house, place.graph, load_catalogue(cache), starts, day=condition.day)
     return lightings_of(house, condition.lighting + 1)[-1]
 
 

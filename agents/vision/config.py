@@ -47,7 +47,7 @@ class CaptureCondition:
     lighting: int = 0
     """Number in embodied.light.lightings_of: another hour, weather and lamps; 0 is the house's own."""
     day: int = 0
-    """Day of embodied.generate.another_day: people elsewhere, small things moved; 0 is the agent's own."""
+    """Day of embodied.generate.rearrange: people elsewhere, small things moved; 0 is the agent's own."""
     camera: str = "ideal"
     """What took it, one of embodied.render.photograph.CAMERAS: exposure, balance, lens, noise, JPEG."""
     view: bool = False

@@ -134,13 +134,13 @@ def show_a_room(args: Options) -> None:
 def inhabited(house: House, catalogue: Catalogue, args: Options) -> tuple[House, NavGraph, tuple[Route, ...]]:
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
     from embodied.assistants.route_system import WORDINGS, route_paths, worded
-    from embodied.generate.people import add_people, meet
+    from embodied.generate.people import add_people, place_people
     from embodied.language import People
     from embodied.navigation.graph import build_graph
     from embodied.world import open_world
 
     graph = build_graph(house)
-    met = meet(house, graph, catalogue, seed=args.seed)
+    met = place_people(house, graph, catalogue, seed=args.seed)
     paths = route_paths(graph, house.name, seed=args.seed, house_split="test", starts=met)
     house = add_people(house, met, (p[0] for p in paths))
     with open_world(house, catalogue, args.cache, graph=graph) as world:

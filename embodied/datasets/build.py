@@ -22,7 +22,7 @@ from embodied.datasets.scale import Scale, quota, scale
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish.tables import tables_of
 from embodied.generate.novelty import furnishable
-from embodied.generate.people import add_people, meet
+from embodied.generate.people import add_people, place_people
 from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
@@ -333,7 +333,7 @@ def _write_unit(
     kind = config.task_kind
     if kind.routes:
         figures = furnishable(catalogue, novelty)
-        met = meet(house, graph, figures, seed=config.seed) if kind.people and config.people else None
+        met = place_people(house, graph, figures, seed=config.seed) if kind.people and config.people else None
         if config.routes == "spanning":
             paths, wording = spanning_paths(graph), tuple(dict.fromkeys(wording))
         else:

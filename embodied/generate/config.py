@@ -40,7 +40,7 @@ class Retries:
     doors: int = 8
     """Doors and windows of one plan: while a leaf shuts a room off."""
     room: int = 6
-    """Furniture of one room: while it lacks something (Programme.needs)."""
+    """Furniture of one room: while it lacks something (RoomSpec.needs)."""
     fillers: int = 8
     """Groups that are added to one room while it looks bare."""
     clearing: int = 8

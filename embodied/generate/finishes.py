@@ -1,4 +1,4 @@
-"""One palette per house, and what each room wears of it: floors, walls, doors, an accent wall here and there.
+"""One palette per house, and the materials each room has of it: floors, walls, doors, an accent wall here and there.
 
 Names of materials only ('oak_planks/0'); embodied.assets.materials makes them.
 """
@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 
 from embodied.generate.kinds import BEDROOMS
-from embodied.generate.novelty import styles_of, taste_of
-from embodied.generate.tastes import TABLE
+from embodied.generate.novelty import finishes_of, styles_of
+from embodied.generate.style_finishes import FINISH_TABLE
 from embodied.house.house import House, Room
 
 WET = ("bathroom", "toilet", "laundry_room")
@@ -50,33 +50,37 @@ class Palette:
 def draw_palette(style: str | None, novelty: str | None = None, *, rng: np.random.Generator) -> Palette:
     """The palette of one house in `style`, or in a style drawn from those of its novelty."""
     name = style or str(rng.choice(styles_of(novelty)))
-    taste = taste_of(name, novelty)
-    floor, stone = _one(taste.woods, rng), _one(taste.stones, rng)
+    finishes = finishes_of(name, novelty)
+    floor, stone = _one(finishes.woods, rng), _one(finishes.stones, rng)
     if rng.random() < 0.1:
         floor = stone
     soft = float(rng.random())
     return Palette(  # drawn in this order
         style=name,
         floor=floor,
-        private_floor=floor if soft < 0.5 else _one(taste.carpets, rng) if soft < 0.75 else _one(taste.woods, rng),
+        private_floor=floor
+        if soft < 0.5
+        else _one(finishes.carpets, rng)
+        if soft < 0.75
+        else _one(finishes.woods, rng),
         kitchen_floor=floor if rng.random() < 0.45 else stone,
         hall_floor=floor if rng.random() < 0.6 else stone,
-        door=(door := _one(taste.doors, rng)),
-        frame=_one(taste.frames, rng),
-        wet_floors=_some(taste.wet_floors, 2, rng),
-        rough_floor=_one(TABLE.rough, rng),
-        walls=_some(taste.walls, 3, rng),
-        wet_walls=_some(taste.wet_walls, 2, rng),
-        accents=_some(taste.accents, 2, rng),
-        papers=_some(taste.papers, 2, rng),
-        ceiling=_one(taste.ceilings, rng),
+        door=(door := _one(finishes.doors, rng)),
+        frame=_one(finishes.frames, rng),
+        wet_floors=_some(finishes.wet_floors, 2, rng),
+        rough_floor=_one(FINISH_TABLE.rough, rng),
+        walls=_some(finishes.walls, 3, rng),
+        wet_walls=_some(finishes.wet_walls, 2, rng),
+        accents=_some(finishes.accents, 2, rng),
+        papers=_some(finishes.papers, 2, rng),
+        ceiling=_one(finishes.ceilings, rng),
         skirting="paint_white/0" if "paint" in door or rng.random() < 0.5 else door,
-        front_door=_one(taste.front_doors, rng),
+        front_door=_one(finishes.front_doors, rng),
         boldness=float(rng.uniform(0.1, 0.6)),
     )
 
 
-def dressed(house: House, palette: Palette, *, rng: np.random.Generator) -> House:
+def assign_materials(house: House, palette: Palette, *, rng: np.random.Generator) -> House:
     """The house with every room's finishes."""
     rooms = []
     nth: dict[str, int] = {}
@@ -133,7 +137,7 @@ def _wall(room: Room, palette: Palette, nth: int, rng: np.random.Generator) -> s
     if kind in ("garage", "workshop", "laundry_room", "pantry", "closet"):
         return "paint_white/0"
     if kind == "kids_room":
-        return _one(TABLE.kids, rng)
+        return _one(FINISH_TABLE.kids, rng)
     if kind in TALK or kind in ("kitchen", "sun_room"):
         return palette.walls[0]
     if palette.style == "classic" and kind in BEDROOMS and rng.random() < 0.3:
@@ -142,7 +146,7 @@ def _wall(room: Room, palette: Palette, nth: int, rng: np.random.Generator) -> s
 
 
 def _accent(room: Room, house: House, palette: Palette, rng: np.random.Generator) -> tuple[int | None, str | None]:
-    """An edge without doors or windows, not a short one, and what it wears; (None, None) in most rooms."""
+    """An edge without doors or windows, not a short one, and its material; (None, None) in most rooms."""
     kinds = (*BEDROOMS, "living_room", "dining_room", "family_room", "study", "library", "playroom")
     chance, pick, paper = (float(x) for x in rng.random(3))
     if room.kind not in kinds or chance > palette.boldness:
@@ -157,6 +161,6 @@ def _accent(room: Room, house: House, palette: Palette, rng: np.random.Generator
     if not walls:
         return None, None
     if room.kind == "kids_room":
-        return walls[int(pick * len(walls))], TABLE.kids_papers[int(paper * len(TABLE.kids_papers))]
+        return walls[int(pick * len(walls))], FINISH_TABLE.kids_papers[int(paper * len(FINISH_TABLE.kids_papers))]
     choice = palette.papers if paper < 0.4 and room.kind in BEDROOMS else palette.accents
     return walls[int(pick * len(walls))], choice[int(pick * 997) % len(choice)]

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.records import Asset
-from embodied.generate.tastes import TABLE, TASTES, Taste
+from embodied.generate.style_finishes import FINISH_TABLE, STYLE_FINISHES, StyleFinishes
 from embodied.house.validation import STYLES
 from embodied.novelty import FAMILIAR, NOVEL, novel_among
 
@@ -40,22 +40,28 @@ def styles_of(novelty: str | None) -> tuple[str, ...]:
     return tuple(s for s in STYLES if (s == NOVEL_STYLE) == (novelty == NOVEL))
 
 
-def taste_of(style: str, novelty: str | None) -> Taste:
+def finishes_of(style: str, novelty: str | None) -> StyleFinishes:
     """What a style chooses from; in novel houses only what no other style has, where that is a choice.
 
     Paints and carpets are everybody's, and so are the walls of children's rooms and the floors of garages.
     """
-    taste = TASTES[style]
+    finishes = STYLE_FINISHES[style]
     if novelty != NOVEL:
-        return taste
-    tastes = [keys for name, other in TASTES.items() if name != style for keys in _finishes(other).values()]
-    others = {key for keys in (*tastes, TABLE.kids, TABLE.kids_papers, TABLE.rough) for key in keys}
-    own = {field: tuple(k for k in keys if k not in others) for field, keys in _finishes(taste).items()}
-    return dataclasses.replace(taste, **{field: keys for field, keys in own.items() if len(keys) > 1})
+        return finishes
+    other_finishes = [
+        keys for name, other in STYLE_FINISHES.items() if name != style for keys in _finishes(other).values()
+    ]
+    others = {
+        key
+        for keys in (*other_finishes, FINISH_TABLE.kids, FINISH_TABLE.kids_papers, FINISH_TABLE.rough)
+        for key in keys
+    }
+    own = {field: tuple(k for k in keys if k not in others) for field, keys in _finishes(finishes).items()}
+    return dataclasses.replace(finishes, **{field: keys for field, keys in own.items() if len(keys) > 1})
 
 
-def _finishes(taste: Taste) -> Mapping[str, tuple[str, ...]]:
-    return {f.name: getattr(taste, f.name) for f in dataclasses.fields(taste)}
+def _finishes(finishes: StyleFinishes) -> Mapping[str, tuple[str, ...]]:
+    return {f.name: getattr(finishes, f.name) for f in dataclasses.fields(finishes)}
 
 
 @functools.lru_cache(maxsize=4)

@@ -48,7 +48,7 @@ DEEP, GROWN = 0.68, 0.8
 """Depth from which a seat has cushions to lean on, and a sitting figure legs that reach its front, metres."""
 
 
-def meet(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: int) -> dict[int, Placement]:
+def place_people(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: int) -> dict[int, Placement]:
     """Whom one could meet at which node: somebody in its room, 0.5 to 2 m away, who stands on free floor or sits.
 
     One person may be met at several nodes. The navigation graph stays valid: everybody keeps the

@@ -12,17 +12,17 @@ from typing import SupportsIndex, TypeVar
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue, load_catalogue
-from embodied.generate.clearing import cleared
 from embodied.generate.config import RETRIES, DeadEndError, HouseConfig
-from embodied.generate.finishes import Palette, draw_palette, dressed
+from embodied.generate.finishes import Palette, assign_materials, draw_palette
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
-from embodied.generate.lacking import lacking
 from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
 from embodied.generate.modules import Cell
 from embodied.generate.novelty import furnishable
 from embodied.generate.openings import Leaves, draw_openings
 from embodied.generate.program import WantedRoom, draw_area, draw_program
+from embodied.generate.requirements import missing_requirements
+from embodied.generate.walkways import remove_blocking_objects
 from embodied.geometry import wrap
 from embodied.house.house import House, HouseError, Room, Sky, Storey, check
 from embodied.house.shapes import inward
@@ -174,10 +174,10 @@ def _bare_room(cell: Cell, name: str, palette: Palette) -> Room:
 
 
 def finishes(draft: Draft) -> Draft:
-    """What every room wears, and the weather outside."""
+    """Floors, walls and other materials of every room, and the weather outside."""
     bare = _made(draft.house, "openings")
     sky = draw_sky(draft.config, bare, rng=stream(draft.seed, "house", "sky"))
-    house = dressed(bare, _made(draft.palette, "openings"), rng=stream(draft.seed, "house", "finishes"))
+    house = assign_materials(bare, _made(draft.palette, "openings"), rng=stream(draft.seed, "house", "finishes"))
     return dataclasses.replace(draft, house=dataclasses.replace(house, sky=sky))
 
 
@@ -209,7 +209,7 @@ def furnishing(draft: Draft) -> Draft:
 
 def clearing(draft: Draft) -> Draft:
     """Every room can be entered on foot; whatever stood in the way is gone."""
-    return dataclasses.replace(draft, house=cleared(_made(draft.house, "openings")))
+    return dataclasses.replace(draft, house=remove_blocking_objects(_made(draft.house, "openings")))
 
 
 def checking(draft: Draft) -> Draft:
@@ -238,8 +238,8 @@ def generate_house(
 ) -> House:
     """The house that belongs to `seed`: the same in every process and on every machine.
 
-    Of up to `RETRIES.house` houses, the first that lacks nothing that makes its rooms what they are (lacking.py), or
-    the one that lacks least. A plan that lacks the same twice is not tried again.
+    Of up to `RETRIES.house` houses, the first that lacks nothing that makes its rooms what they are
+    (requirements.py), or the one that lacks least. A plan that lacks the same twice is not tried again.
 
     Args:
       seed: any integer.
@@ -267,7 +267,7 @@ def generate_house(
             dead_end = e
             continue
         house = _made(draft.house, "openings")
-        short = lacking(house, catalogue)
+        short = missing_requirements(house, catalogue)
         if best is None or len(short) < best[0]:
             best = len(short), house
         if not short or not house.placements or (draft.plan, short) in tried:

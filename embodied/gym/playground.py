@@ -18,7 +18,7 @@ from embodied.assistants.route_system import WORDINGS, route_paths, worded
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
-from embodied.generate.people import add_people, meet
+from embodied.generate.people import add_people, place_people
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
@@ -97,7 +97,7 @@ def flat_playground(kind: str, seed: int, asked: Asked) -> Playground:
         name = f"flat_{seed}"
         house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
         if known.people:
-            met = meet(house, graph, catalogue, seed=seed)
+            met = place_people(house, graph, catalogue, seed=seed)
             paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
         drawn = parse_pictures(asked.pictures or ("fast" if set(asked.sees) - {"oracle"} else "unlit"))

@@ -85,7 +85,7 @@ class Room:
     ceiling_finish: str
     skirting_finish: str
     accent_wall: int | None = None
-    """Index of the polygon edge (corner i to i+1) that wears `accent_finish`."""
+    """Index of the polygon edge (corner i to i+1) that has `accent_finish`."""
     accent_finish: str | None = None
     storey: int = 0
 
@@ -188,7 +188,7 @@ class House:
     outer_wall: float = 0.32
     """Wall thicknesses, metres."""
     style: str = "light"
-    """The palette and taste of its furnishing: one of embodied.house.validation.STYLES."""
+    """The palette and style of its furnishing: one of embodied.house.validation.STYLES."""
     disorder: float = 0.4
     """0 is tidy, 1 is thoroughly lived in."""
 

@@ -12,7 +12,7 @@ from embodied.assets.materials import MATERIALS
 from embodied.house.house import House, HouseError, Placement
 
 STYLES = ("light", "warm", "dark", "classic", "colourful")
-"""Names of the palettes and tastes of a house's furnishing; embodied.generate.finishes says what each chooses from."""
+"""Names of the palettes and styles of a house's furnishing; embodied.generate.finishes says what each chooses from."""
 
 
 def load_house(path: Path, catalogue: Catalogue) -> House:
@@ -51,7 +51,7 @@ def check_known(house: House, catalogue: Catalogue) -> None:
 
 def _check_material(owner: str, key: str | None) -> None:
     if key is not None and key not in MATERIALS:
-        raise HouseError(f"{owner} wears the unknown material {key!r}; {_near(key, MATERIALS)}")
+        raise HouseError(f"{owner} has the unknown material {key!r}; {_near(key, MATERIALS)}")
 
 
 def _check_placement(house: House, p: Placement, catalogue: Catalogue) -> None:

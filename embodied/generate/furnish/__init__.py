@@ -16,7 +16,7 @@ from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.hanging import hang_all
 from embodied.generate.furnish.lights import lights
 from embodied.generate.furnish.own import place_own
-from embodied.generate.furnish.programme import furnish_room, shortage
+from embodied.generate.furnish.room import furnish_room, shortage
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import RoomSpace, Thing, room_space
 from embodied.generate.furnish.stock import Stock

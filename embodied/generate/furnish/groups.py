@@ -97,7 +97,7 @@ def _model(ctx: Context, part: Part, k: int, of: Asset | None) -> Asset | None:
         return before[-1].asset
     for role in (part.role, *part.other):
         tagged = (lambda a: any(t in a.tags for t in part.tags)) if part.tags else None
-        avoid = {"avoid": ()} if part.again else {}
+        avoid = {"avoid": ()} if part.allow_duplicate else {}
         found = ctx.pick(role, least=least, most=most, where=tagged, **avoid)
         if found is not None:
             return found
@@ -162,7 +162,7 @@ class _Plan:
         w, d, h = size = _size(self.ctx, part, asset, None)
         yaw = self._turn(part, asset) + self.hand * math.radians(part.turn)
         turned = part.long and d > w
-        y = -(w if turned else d) / 2 - part.ahead
+        y = -(w if turned else d) / 2 - part.forward
         z = part.z if part.z is not None else asset.elevation * (asset.support == "wall")
         item = Item(asset, 0.0, y, yaw + turned * math.pi / 2, z, size, self.ctx.looks(asset), passage=part.passage)
         self._keep(part, dataclasses.replace(item, clear=at_round(part.clear, self.round, 0.0)))
@@ -174,8 +174,11 @@ class _Plan:
     ) -> None:
         u, v, turn = place
         rng = self.ctx.rng
-        if part.stray:
-            u, v = u + rng.uniform(-part.stray, part.stray), v + rng.uniform(-part.stray, part.stray)
+        if part.position_jitter:
+            u, v = (
+                u + rng.uniform(-part.position_jitter, part.position_jitter),
+                v + rng.uniform(-part.position_jitter, part.position_jitter),
+            )
         turn += self._turn(part, asset)
         mounted = asset.support == "wall" and part.at != "on"
         z = part.z if part.z is not None else asset.elevation * mounted
@@ -206,7 +209,7 @@ class _Plan:
         rng, (w, d, _) = self.ctx.rng, asset.size
         if part.turn_any and (part.at == "about" or abs(w - d) < 0.03):
             return float(rng.uniform(-math.pi, math.pi))
-        return wobble(rng, part.wobble)
+        return jitter(rng, part.angle_jitter)
 
     def _keep(self, part: Part, item: Item) -> None:
         spot = _Spot(len(self.items), item.asset, item.extent, item.x, item.y, item.yaw)
@@ -235,7 +238,7 @@ Places = Iterable[tuple[float, float, float]]
 
 
 def _on(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
-    yield plan.hand * part.off_middle * anchor.size[0], -part.ahead, 0.0
+    yield plan.hand * part.off_middle * anchor.size[0], -part.forward, 0.0
 
 
 def _about(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
@@ -245,13 +248,13 @@ def _about(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> 
 
 
 def _before(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
-    yield 0.0, -anchor.size[1] / 2 - part.gap - size[1] / 2 - part.ahead, 0.0
+    yield 0.0, -anchor.size[1] / 2 - part.gap - size[1] / 2 - part.forward, 0.0
 
 
 def _beside(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
     deep = size[1] if part.look else size[0]
     x = anchor.size[0] / 2 + part.gap + deep / 2
-    y = ((anchor.size[1] - size[1]) / 2 if part.flush else 0.0) - part.ahead
+    y = ((anchor.size[1] - size[1]) / 2 if part.flush else 0.0) - part.forward
     sides = {"right": (1,), "left": (-1,), "both": (1, -1)}[part.side]
     for sign in sides[: int(at_round(part.count, plan.round, 2))]:
         yield plan.hand * sign * x, y, -plan.hand * sign * math.radians(part.turn)
@@ -321,7 +324,7 @@ def _pulled(rng: np.random.Generator) -> float:
     return float(rng.uniform(0.12, 0.3)) if rng.random() < 0.12 else float(rng.uniform(0.0, 0.06))
 
 
-def wobble(rng: np.random.Generator, degrees: float) -> float:
+def jitter(rng: np.random.Generator, degrees: float) -> float:
     """A small turn left by people, radians."""
     return float(np.radians(rng.uniform(-degrees, degrees))) if degrees else 0.0
 

@@ -1,4 +1,4 @@
-"""Small things on tables, shelves, walls and floors: what stands there, and what the household leaves there.
+"""SmallObject things on tables, shelves, walls and floors: what stands there, and what the household leaves there.
 
 smalls.toml says what there is: kettles on worktops, shoes at the door, dishes by the sink, clothes on a chair.
 """
@@ -20,7 +20,7 @@ from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import door_distance, nearest
 from embodied.generate.furnish.mounting import Hanging, Spot, along_stretches, hang_first
 from embodied.generate.furnish.space import CELL, Box, Thing, Wall, box, overlap, same_box
-from embodied.generate.furnish.tables import Small
+from embodied.generate.furnish.tables import SmallObject
 
 EDGE, APART = 0.012, 0.008
 """Free strip at the edge of a surface, and between two things on it, metres."""
@@ -62,7 +62,7 @@ CUT_TO_FIT = ("storage box", "folded clothes", "towel", "row of folders", "cushi
 
 
 @dataclass(frozen=True)
-class Board:
+class CarrierSurface:
     """One surface of a thing that stands in the room, in the thing's own frame, metres."""
 
     carrier: Thing
@@ -101,12 +101,12 @@ class Board:
 
 
 @dataclass
-class Tops:
+class SurfaceOccupancy:
     """What already lies on the surfaces of one room."""
 
     ctx: Context
     taken: dict[tuple[int, str], list[tuple[float, float, float, float]]] = field(default_factory=dict)
-    """For each Board.key, x0, y0, x1, y1 of what lies there, in the carrier's frame."""
+    """For each CarrierSurface.key, x0, y0, x1, y1 of what lies there, in the carrier's frame."""
     alike: Counter[str] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -122,7 +122,7 @@ class Tops:
         self.taken.setdefault(key, []).append((u - a, v - b, u + a, v + b))
 
     def put(
-        self, asset: Asset | None, board: Board, spot: str = "any", turn: float = 0.2, size: Size | None = None
+        self, asset: Asset | None, board: CarrierSurface, spot: str = "any", turn: float = 0.2, size: Size | None = None
     ) -> Thing | None:
         """Rest `asset` on a board wherever there is a gap for it, near `spot` if it can be; None where there is none.
 
@@ -154,7 +154,7 @@ class Tops:
                     return self._lay(asset, board, (u - a, v - b, u + a, v + b), yaw, own, (w, d, h))
         return None
 
-    def _gaps(self, board: Board, within: tuple[float, float, float, float], a: float, b: float) -> np.ndarray:
+    def _gaps(self, board: CarrierSurface, within: tuple[float, float, float, float], a: float, b: float) -> np.ndarray:
         """(n, 2) middles, in the carrier's frame, at which something a, b metres half wide and deep would lie free."""
         low_x, high_x, low_y, high_y = within
         if low_x > high_x or low_y > high_y:
@@ -166,7 +166,7 @@ class Tops:
         columns, rows = np.nonzero(np.all(beside[:, None] | before[None], axis=2))
         return np.stack([us[columns], vs[rows]], axis=1)
 
-    def put_exactly(self, asset: Asset, board: Board, at: tuple[float, float], turn: float) -> None:
+    def put_exactly(self, asset: Asset, board: CarrierSurface, at: tuple[float, float], turn: float) -> None:
         """Rest `asset` at a point of a board, moved inwards where it would stick out, if the place is free."""
         x0, x1, y0, y1 = board.surface.x0, board.surface.x1, board.surface.y0, board.surface.y1
         (u, v), (a, b) = at, _reach(asset.size, turn)
@@ -188,7 +188,13 @@ class Tops:
         return any(overlap(own, q) and not same_box(q, support) for q in self.ctx.space.solids)
 
     def _lay(
-        self, asset: Asset, board: Board, taken: tuple[float, float, float, float], turn: float, own: Box, size: Size
+        self,
+        asset: Asset,
+        board: CarrierSurface,
+        taken: tuple[float, float, float, float],
+        turn: float,
+        own: Box,
+        size: Size,
     ) -> Thing:
         carrier, looks = board.carrier, self.ctx.looks(asset)
         (x, y, z), yaw, name = (own.x, own.y, own.bottom), carrier.yaw + turn, board.surface.name
@@ -222,17 +228,17 @@ def _in_frame(carrier: Thing, thing: Thing) -> tuple[float, float]:
 
 def clutter(ctx: Context) -> None:
     """Put the small things of daily life onto everything in the room that can carry them."""
-    tops = Tops(ctx)
+    occupancy = SurfaceOccupancy(ctx)
     carriers = [t for t in ctx.things if t.asset.surfaces and not _hollow(t.asset)]
     for thing in carriers:
         if thing.role == "dining table":
-            _set_table(tops, thing)
+            _set_table(occupancy, thing)
     for thing in carriers:
-        _shelves(tops, thing)
+        _shelves(occupancy, thing)
     small = ctx.tables.smalls
-    leave(ctx, [s for name in ("everywhere", *ctx.tables.lies_in.get(ctx.kind, ())) for s in small[name]], tops)
+    leave(ctx, [s for name in ("everywhere", *ctx.tables.lies_in.get(ctx.kind, ())) for s in small[name]], occupancy)
     for thing in carriers:
-        _more(tops, thing)
+        _more(occupancy, thing)
 
 
 def _hollow(asset: Asset) -> bool:
@@ -243,20 +249,20 @@ def _hollow(asset: Asset) -> bool:
     )
 
 
-def main_board(thing: Thing) -> Board:
+def main_board(thing: Thing) -> CarrierSurface:
     """The surface that one puts things on first: large and open to above."""
     surfaces = thing.asset.surfaces
-    return Board(thing, max(surfaces, key=lambda s: (min(s.headroom, 0.6), (s.x1 - s.x0) * (s.y1 - s.y0))))
+    return CarrierSurface(thing, max(surfaces, key=lambda s: (min(s.headroom, 0.6), (s.x1 - s.x0) * (s.y1 - s.y0))))
 
 
-def _set_table(tops: Tops, table: Thing) -> None:
+def _set_table(occupancy: SurfaceOccupancy, table: Thing) -> None:
     """Something in the middle, and now and then places laid before the chairs."""
-    ctx = tops.ctx
+    ctx = occupancy.ctx
     top = main_board(table)
     for role in ctx.rng.permutation(ctx.tables.centrepieces)[: 1 + int(ctx.chance(0.3))]:
         asset = ctx.pick(str(role), most=(0.5, 0.5, 0.6))
         if asset is not None and ctx.chance(0.85):
-            tops.put(asset, top, "centre", 3.2)
+            occupancy.put(asset, top, "centre", 3.2)
     laid = ctx.chance(0.3)
     cup = ctx.pick("mug") if ctx.chance(0.5) else ctx.pick("glass")
     plate = ctx.pick("place setting") if laid else None
@@ -270,12 +276,12 @@ def _set_table(tops: Tops, table: Thing) -> None:
             place, turn = (math.copysign(w / 2 - 0.24, u), v), -math.copysign(math.pi / 2, u)
         else:
             place, turn = (u, math.copysign(d / 2 - 0.24, v)), (0.0 if v < 0 else math.pi)
-        tops.put_exactly(asset, top, place, turn)
+        occupancy.put_exactly(asset, top, place, turn)
 
 
-def _shelves(tops: Tops, thing: Thing) -> None:
+def _shelves(occupancy: SurfaceOccupancy, thing: Thing) -> None:
     """Fill the boards of a shelf: rows of books, or what one keeps in that room."""
-    ctx = tops.ctx
+    ctx = occupancy.ctx
     surfaces = [s for s in thing.asset.surfaces if 0.1 < s.headroom < 1.2] or (
         list(thing.asset.surfaces) if thing.asset.object_class == "shelving unit" else []
     )
@@ -283,9 +289,9 @@ def _shelves(tops: Tops, thing: Thing) -> None:
         return
     books = ctx.pick("row of books", avoid=())
     bookish = ctx.kind not in STORING
-    for board in (Board(thing, s) for s in surfaces):
+    for board in (CarrierSurface(thing, s) for s in surfaces):
         if books is not None and bookish and board.surface.headroom < 0.45 and ctx.chance(0.8):
-            _book_row(tops, board, ctx.pick("row of books", avoid=()) or books)
+            _book_row(occupancy, board, ctx.pick("row of books", avoid=()) or books)
         if bookish:
             count, share = int(ctx.rng.integers(1, 4)), 0.75 * _density(ctx)
         else:  # storage is there to be filled
@@ -297,13 +303,13 @@ def _shelves(tops: Tops, thing: Thing) -> None:
             if not bookish and ctx.chance(0.4):
                 asset, size = _box_for(ctx, board)
             if asset is None:
-                asset = _resident(tops, board, 2 if bookish else 5)
-            tops.put(asset, board, "any", 0.2, size)
+                asset = _resident(occupancy, board, 2 if bookish else 5)
+            occupancy.put(asset, board, "any", 0.2, size)
 
 
-def _book_row(tops: Tops, board: Board, books: Asset) -> None:
+def _book_row(occupancy: SurfaceOccupancy, board: CarrierSurface, books: Asset) -> None:
     """A row of books on one board, from one end, rarely full."""
-    ctx, s, (kx, ky, kz) = tops.ctx, board.surface, board.scale
+    ctx, s, (kx, ky, kz) = occupancy.ctx, board.surface, board.scale
     width, depth, free = (s.x1 - s.x0) * kx, (s.y1 - s.y0) * ky, s.headroom * kz
     h = min(0.3, free - 0.03) * float(ctx.rng.uniform(0.85, 1.0))
     w = width * float(ctx.rng.uniform(0.35, 0.95)) - 2 * EDGE
@@ -315,10 +321,10 @@ def _book_row(tops: Tops, board: Board, books: Asset) -> None:
     back = s.y1 * ky - d - 0.02
     (x0, x1), (y0, y1) = (middle - w / 2, middle + w / 2), (back, back + d)
     at = dataclasses.replace(s, x0=x0 / kx, y0=y0 / ky, x1=x1 / kx + 1e-6, y1=y1 / ky + 1e-6)
-    tops.put(books, Board(board.carrier, at), "centre", 0.0, (w, d, h))
+    occupancy.put(books, CarrierSurface(board.carrier, at), "centre", 0.0, (w, d, h))
 
 
-def _box_for(ctx: Context, board: Board) -> tuple[Asset | None, Size | None]:
+def _box_for(ctx: Context, board: CarrierSurface) -> tuple[Asset | None, Size | None]:
     """A box or basket for a board of a storage shelf, somewhat smaller than its model where it must be."""
     asset = ctx.pick("storage box" if ctx.chance(0.5) else "box", avoid=())
     if asset is None:
@@ -330,9 +336,9 @@ def _box_for(ctx: Context, board: Board) -> tuple[Asset | None, Size | None]:
     return (asset, (shrink * w, shrink * d, shrink * h)) if shrink > 0.55 else (None, None)
 
 
-def _resident(tops: Tops, board: Board, most_alike: int) -> Asset | None:
+def _resident(occupancy: SurfaceOccupancy, board: CarrierSurface, most_alike: int) -> Asset | None:
     """Something that is kept on such a board in such a room, of which there are fewer than `most_alike`."""
-    ctx, s = tops.ctx, board.surface
+    ctx, s = occupancy.ctx, board.surface
     most = ((s.x1 - s.x0) * 0.8, s.y1 - s.y0, s.headroom - 0.01)
     fitting = [
         (a, w)
@@ -344,7 +350,7 @@ def _resident(tops: Tops, board: Board, most_alike: int) -> Asset | None:
     else:
         roles = ctx.tables.shelves.get(ctx.kind) or ctx.tables.shelves["any"]
         asset = ctx.pick(roles[int(ctx.rng.integers(len(roles)))], most=most)
-    return asset if asset is not None and tops.allows(asset, most_alike) else None
+    return asset if asset is not None and occupancy.allows(asset, most_alike) else None
 
 
 def _weighted(ctx: Context, options: list[tuple[Asset, float]]) -> Asset:
@@ -353,9 +359,9 @@ def _weighted(ctx: Context, options: list[tuple[Asset, float]]) -> Asset:
     return options[int(ctx.rng.choice(len(options), p=weights / weights.sum()))][0]
 
 
-def _more(tops: Tops, thing: Thing) -> None:
+def _more(occupancy: SurfaceOccupancy, thing: Thing) -> None:
     """A few more things that the catalogue says lie on this class of object in this kind of room."""
-    ctx = tops.ctx
+    ctx = occupancy.ctx
     if thing.asset.object_class in SHELVES or thing.role in ("bed", "dining chair", "bedside table", "bench"):
         return
     top = main_board(thing)
@@ -365,11 +371,11 @@ def _more(tops: Tops, thing: Thing) -> None:
         return
     fitting = ctx.stock.resting_on(thing.asset.object_class, ctx.kind)
     for _ in range(min(count, 4)):
-        options = [(a, w) for a, w in fitting if tops.allows(a)]
+        options = [(a, w) for a, w in fitting if occupancy.allows(a)]
         if not options:
             return
         asset = _weighted(ctx, options)
-        tops.put(asset, top, "any", 0.4 if asset.size[0] > 0.12 else 3.2)
+        occupancy.put(asset, top, "any", 0.4 if asset.size[0] > 0.12 else 3.2)
 
 
 def _density(ctx: Context) -> float:
@@ -377,9 +383,9 @@ def _density(ctx: Context) -> float:
     return 1.5 - 0.87 * ctx.stock.style.tidiness
 
 
-def leave(ctx: Context, smalls: Iterable[Small], tops: Tops | None = None) -> None:
+def leave(ctx: Context, smalls: Iterable[SmallObject], occupancy: SurfaceOccupancy | None = None) -> None:
     """Put small things of the table where they go, as many as its people have or leave there."""
-    tops = tops or Tops(ctx)
+    occupancy = occupancy or SurfaceOccupancy(ctx)
     for small in smalls:
         if (small.kinds and ctx.kind not in small.kinds) or (
             ctx.kind in CHILDRENS and small.put in ctx.tables.grown_up
@@ -390,10 +396,10 @@ def leave(ctx: Context, smalls: Iterable[Small], tops: Tops | None = None) -> No
             continue
         for some in [[t] for t in carriers] if small.per == "carrier" else [carriers]:
             for _ in range(_number(ctx, small)):
-                _leave(tops, small, some)
+                _leave(occupancy, small, some)
 
 
-def _number(ctx: Context, small: Small) -> int:
+def _number(ctx: Context, small: SmallObject) -> int:
     """How many of it there are: the whole part of the mean, and one more with the rest as its chance."""
     household = ctx.household
     if small.habit and small.habit not in household.habits:
@@ -412,14 +418,14 @@ def _number(ctx: Context, small: Small) -> int:
     return int(mean) + int(ctx.chance(mean - int(mean)))
 
 
-def _leave(tops: Tops, small: Small, carriers: list[Thing]) -> None:
+def _leave(occupancy: SurfaceOccupancy, small: SmallObject, carriers: list[Thing]) -> None:
     """One of it, if there is a place for it."""
-    ctx = tops.ctx
+    ctx = occupancy.ctx
     asset = ctx.pick(small.put, most=(1.6, 1.6, 1.6), avoid=())
-    if asset is None or not tops.allows(asset, small.most):
+    if asset is None or not occupancy.allows(asset, small.most):
         return
     if small.on:
-        _lay_on(tops, small, asset, carriers)
+        _lay_on(occupancy, small, asset, carriers)
         return
     if small.wall is not None:
         z = min(small.wall, ctx.space.height - 0.1) - asset.size[2]
@@ -427,12 +433,12 @@ def _leave(tops: Tops, small: Small, carriers: list[Thing]) -> None:
         found = hang_first(ctx, hanging, _wall_spots(ctx, small, asset)) is not None
     else:
         found = _put_down(ctx, small, asset)
-    tops.alike[asset.object_class] += found
+    occupancy.alike[asset.object_class] += found
 
 
-def _lay_on(tops: Tops, small: Small, asset: Asset, carriers: list[Thing]) -> None:
+def _lay_on(occupancy: SurfaceOccupancy, small: SmallObject, asset: Asset, carriers: list[Thing]) -> None:
     """On one of the carriers: the nearest ones where it keeps close to something, else any."""
-    rng, anchors = tops.ctx.rng, tops.ctx.called(*small.near)
+    rng, anchors = occupancy.ctx.rng, occupancy.ctx.called(*small.near)
     if anchors:
         carriers = sorted(carriers, key=lambda t: nearest(t.x, t.y, anchors) + 0.5 * rng.random())
     elif len(carriers) > 1:
@@ -440,14 +446,14 @@ def _lay_on(tops: Tops, small: Small, asset: Asset, carriers: list[Thing]) -> No
     for carrier in carriers[:3]:
         boards = [main_board(carrier)]
         if carrier.asset.object_class in (*SHELVES, "shoe rack"):
-            found = [Board(carrier, s) for s in carrier.asset.surfaces]
+            found = [CarrierSurface(carrier, s) for s in carrier.asset.surfaces]
             boards = [found[int(k)] for k in rng.permutation(len(found))[:4]]
         for board in boards:
-            if tops.put(asset, board, small.spot, small.turn, _fitting(asset, board)) is not None:
+            if occupancy.put(asset, board, small.spot, small.turn, _fitting(asset, board)) is not None:
                 return
 
 
-def _fitting(asset: Asset, board: Board) -> tuple[float, float, float] | None:
+def _fitting(asset: Asset, board: CarrierSurface) -> tuple[float, float, float] | None:
     """The size of cloth and boxes that come in the size of what they lie on; None for what keeps its own."""
     x0, x1, y0, y1 = board.area
     w, d, h = asset.size
@@ -459,7 +465,7 @@ def _fitting(asset: Asset, board: Board) -> tuple[float, float, float] | None:
     return (shrink * w, shrink * d, shrink * h) if shrink > 0.55 else None
 
 
-def _wall_spots(ctx: Context, small: Small, asset: Asset) -> Iterator[Spot]:
+def _wall_spots(ctx: Context, small: SmallObject, asset: Asset) -> Iterator[Spot]:
     """Spots on the walls: beside what it keeps close to, the nearest first, else about the middles of free walls."""
     anchors = ctx.called(*small.near)
     if not anchors:
@@ -474,7 +480,7 @@ def _wall_spots(ctx: Context, small: Small, asset: Asset) -> Iterator[Spot]:
     yield from ((ctx.space.walls[k], s) for _, k, s in sorted(spots))
 
 
-def _put_down(ctx: Context, small: Small, asset: Asset) -> bool:
+def _put_down(ctx: Context, small: SmallObject, asset: Asset) -> bool:
     """On the floor: at a wall close to something, or anywhere out of the way."""
     w, d = asset.size[:2]
     anchors = ctx.called(*small.near)

@@ -1,4 +1,4 @@
-"""What there is to choose from: assets by the role they play in a group, weighted by taste."""
+"""What there is to choose from: assets by the role they play in a group, weighted by style."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.records import Asset, Size
-from embodied.generate.furnish.style import Style, liking
+from embodied.generate.furnish.style import Style, style_score
 from embodied.generate.furnish.tables import Tables
 
 SMALLEST, LARGEST = (0.0, 0.0, 0.0), (99.0, 99.0, 99.0)
@@ -41,7 +41,7 @@ class Stock:
     style: Style
     tables: Tables
     _by_role: dict[str, tuple[Asset, ...]] = field(default_factory=dict)
-    _liking: dict[str, float] = field(default_factory=dict)
+    _style_scores: dict[str, float] = field(default_factory=dict)
     _resting: dict[tuple[str, str], list[tuple[Asset, float]]] = field(default_factory=dict)
 
     def of_role(self, role: str) -> tuple[Asset, ...]:
@@ -82,12 +82,12 @@ class Stock:
         return fit[int(rng.choice(len(fit), p=weights / weights.sum()))]
 
     def _weight(self, asset: Asset, kind: str | None) -> float:
-        if asset.key not in self._liking:
-            self._liking[asset.key] = liking(self.style, asset)
+        if asset.key not in self._style_scores:
+            self._style_scores[asset.key] = style_score(self.style, asset)
         room = 1.0
         if kind is not None and asset.rooms:
             room = 0.15 + asset.rooms.get(kind, 0.0)
-        return self._liking[asset.key] * room
+        return self._style_scores[asset.key] * room
 
     def resting_on(self, object_class: str, kind: str) -> list[tuple[Asset, float]]:
         """Small assets that rest on this class, with their weight in this kind of room."""

@@ -1,4 +1,4 @@
-"""The taste of one house: which woods, colours and periods its owner prefers, how tidy it is."""
+"""The style of one house: which woods, colours and periods its owner prefers, how tidy it is."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from embodied.house.house import HouseError
 
 @dataclass(frozen=True)
 class Style:
-    """One house's taste; words are matched against an asset's colours, materials, name and tags."""
+    """One house's style; words are matched against an asset's colours, materials, name and tags."""
 
     name: str
     favours: tuple[str, ...]
@@ -46,18 +46,18 @@ PREFERENCES: Mapping[str, Style] = {
 
 
 def house_style(name: str, disorder: float, *, rng: np.random.Generator) -> Style:
-    """The taste called `name` (House.style), drawn up for one house of that disorder.
+    """The style called `name` (House.style), for one house of that disorder.
 
     Raises:
-      HouseError: nobody has such a taste.
+      HouseError: an unknown style.
     """
     if name not in PREFERENCES:
         raise HouseError(f"the house has the unknown style {name!r}; use one of {tuple(PREFERENCES)}")
     return replace(PREFERENCES[name], tidiness=1.0 - disorder, warmth=float(rng.uniform(0.2, 1.0)))
 
 
-def liking(style: Style, asset: Asset) -> float:
-    """How much the taste multiplies the weight of an asset; 1 is indifferent."""
+def style_score(style: Style, asset: Asset) -> float:
+    """Factor of the weight of an asset in this style; 1 is indifferent."""
     words = {*asset.colours, *asset.materials, *asset.tags, *asset.name.split()}
     good = sum(w in words for w in style.favours)
     bad = sum(w in words for w in style.shuns)

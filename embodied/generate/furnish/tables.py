@@ -45,16 +45,56 @@ PER = ("room", "carrier", "person", "adult", "child", "young")
 
 
 @dataclass(frozen=True)
-class Part:
-    """One kind of thing in a group. Tuples of numbers have a value for each round, the last one for all that follow."""
+class PartModel:
+    """The thing itself. Tuples of numbers have a value for each round, the last one for all that follow."""
 
     role: str
-    """What it is: a role, or a class of object; empty where the wish says it."""
+    """What it is: a role, or a class of object; empty where the rule says it."""
     name: str = ""
-    """What wishes and small things call it, besides its class; its class if empty. Other parts call it so or, if it
+    """What rules and small things call it, besides its class; its class if empty. Other parts call it so or, if it
     is empty, by its role."""
     other: tuple[str, ...] = ()
     """Roles to choose from where the catalogue has none of `role` that fits."""
+    least: Size = (0.0, 0.0, 0.0)
+    most: Size = (99.0, 99.0, 99.0)
+    narrowest: tuple[float, ...] = ()
+    widest: tuple[float, ...] = ()
+    deepest: tuple[float, ...] = ()
+    fits: bool = False
+    """It is no wider than `of`."""
+    tags: tuple[str, ...] = ()
+    """It has one of these tags."""
+    allow_duplicate: bool = False
+    """The same model may stand in the room already."""
+    same: float = 0.0
+    """Chance that it is the model of the last thing of its name in the room."""
+
+    @property
+    def called(self) -> str:
+        return self.name or self.role
+
+
+@dataclass(frozen=True)
+class PartSize:
+    """Its size, if that is not its model's own."""
+
+    width: float | None = None
+    """Its width, whatever its model's; so are `depth` and `height`."""
+    depth: float | None = None
+    height: float | None = None
+    wider: float | None = None
+    """Its width is that of `of` and so much more; `deeper` likewise. `least` and `most` bound it."""
+    deeper: float | None = None
+    of_room: tuple[float, float] | None = None
+    """Its width and depth, as shares of the longer and the shorter side of the room."""
+    long: bool = False
+    """Its longer side is its width, however its model is turned."""
+
+
+@dataclass(frozen=True)
+class PartPose:
+    """Its place in the group, and its turn."""
+
     at: str = "wall"
     """Where it goes: the first part to the "wall"; others "on", "under", "before", "beside" or "over" (above it, at
     the wall) the part `of`, "about" on its area, "facing" it from across the room, on "seats" around it, or in a
@@ -65,7 +105,7 @@ class Part:
     """Of `of`: "right", "left" or "both". Which is which is drawn for every group."""
     gap: float = 0.0
     """Free space between the two, metres."""
-    ahead: float = 0.0
+    forward: float = 0.0
     """How much nearer to the front of `of` (of a first part: to the room) it is, metres."""
     flush: bool = False
     """Its back is in line with that of `of`, instead of its middle."""
@@ -73,11 +113,11 @@ class Part:
     """How far aside it stands on a surface, as a share of its width."""
     z: float | None = None
     """Height of its underside above the floor, metres; None for its own."""
-    stray: float = 0.0
+    position_jitter: float = 0.0
     """It stands up to so far from its place, metres."""
     turn: float = 0.0
     """Degrees; on the right toward the middle."""
-    wobble: float = 0.0
+    angle_jitter: float = 0.0
     """It is turned by up to so many degrees more."""
     turn_any: bool = False
     """It is turned anyhow, if its base is about square or it lies about."""
@@ -85,9 +125,12 @@ class Part:
     """It is not turned with `of`."""
     look: bool = False
     """Its front looks at `of`."""
-    clear: tuple[float, ...] = ()
-    """Depth before its front that nothing may fill but what is `under` it, metres; negative: behind its back. From 0.5
-    m on, somebody must be able to stand there."""
+
+
+@dataclass(frozen=True)
+class PartPresence:
+    """Conditions under which it is there, and how often."""
+
     optional: bool = False
     """It is left out where it does not fit, instead of giving the group up."""
     must: tuple[int, ...] = ()
@@ -102,49 +145,35 @@ class Part:
     """Up to so many more, drawn."""
     every: float = 0.6
     """Distance of the things of a row, metres."""
-    aisle: float = 0.0
-    """Depth that stays free beyond it, before a part that it faces, metres."""
     chance: float = 1.0
     kinds: tuple[str, ...] = ()
     """Only in these kinds of room."""
     lower_than: float = 99.0
     """Only if the upper edge of `of` is lower, metres."""
-    least: Size = (0.0, 0.0, 0.0)
-    most: Size = (99.0, 99.0, 99.0)
-    narrowest: tuple[float, ...] = ()
-    widest: tuple[float, ...] = ()
-    deepest: tuple[float, ...] = ()
-    fits: bool = False
-    """It is no wider than `of`."""
-    tags: tuple[str, ...] = ()
-    """It has one of these tags."""
-    again: bool = False
-    """The same model may stand in the room already."""
-    same: float = 0.0
-    """Chance that it is the model of the last thing of its name in the room."""
-    width: float | None = None
-    """Its width, whatever its model's; so are `depth` and `height`."""
-    depth: float | None = None
-    height: float | None = None
-    wider: float | None = None
-    """Its width is that of `of` and so much more; `deeper` likewise. `least` and `most` bound it."""
-    deeper: float | None = None
-    of_room: tuple[float, float] | None = None
-    """Its width and depth, as shares of the longer and the shorter side of the room."""
-    long: bool = False
-    """Its longer side is its width, however its model is turned."""
+
+
+@dataclass(frozen=True)
+class PartClearance:
+    """Free space around it."""
+
+    clear: tuple[float, ...] = ()
+    """Depth before its front that nothing may fill but what is `under` it, metres; negative: behind its back. From 0.5
+    m on, somebody must be able to stand there."""
+    aisle: float = 0.0
+    """Depth that stays free beyond it, before a part that it faces, metres."""
     under: bool = False
     """It may be pushed under `of`."""
     passage: bool = False
     """It may lie in doorways (mats and rugs)."""
 
+
+@dataclass(frozen=True)
+class Part(PartClearance, PartPresence, PartPose, PartSize, PartModel):
+    """One kind of thing in a group; groups.toml gives the fields of all five records side by side."""
+
     def __post_init__(self) -> None:
         _one_of("at", self.at, AT)
         _one_of("side", self.side, ("right", "left", "both"))
-
-    @property
-    def called(self) -> str:
-        return self.name or self.role
 
 
 @dataclass(frozen=True)
@@ -194,27 +223,9 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Wish:
-    """One line of what a room gets: a group or choice of that name, or several wishes, under conditions."""
+class RuleCondition:
+    """Conditions under which a rule is tried."""
 
-    group: str = ""
-    role: str = ""
-    """What the first part is."""
-    roles: tuple[str, ...] = ()
-    """Roles for each of which the wish is made."""
-    clear: float | None = None
-    """Of the first part, as are `most` and `again`."""
-    most: Size | None = None
-    again: bool = False
-    near: tuple[str, ...] = ()
-    """What the group is near."""
-    first: tuple[Wish, ...] = ()
-    """Wishes of which the first that finds a place is fulfilled."""
-    all: tuple[Wish, ...] = ()
-    """Wishes that are all tried."""
-    either: tuple[Wish, ...] = ()
-    """Two wishes: the first with the chance `odds`, else the second."""
-    odds: float = 0.5
     chance: float = 1.0
     """Probability that it is tried, where all that follows allows it."""
     above: float = 0.0
@@ -237,10 +248,34 @@ class Wish:
     from_attempt: int = 0
     """Only if the room has been tried so often without success."""
     upto_attempt: int = 99
+
+
+@dataclass(frozen=True)
+class PlacementRule(RuleCondition):
+    """One line of what a room gets: a group or choice of that name, or several rules, under conditions."""
+
+    group: str = ""
+    role: str = ""
+    """What the first part is."""
+    roles: tuple[str, ...] = ()
+    """Roles for each of which the rule is made."""
+    clear: float | None = None
+    """Of the first part, as are `most` and `allow_duplicate`."""
+    most: Size | None = None
+    allow_duplicate: bool = False
+    near: tuple[str, ...] = ()
+    """What the group is near."""
+    first: tuple[PlacementRule, ...] = ()
+    """Rules of which the first that finds a place is fulfilled."""
+    all: tuple[PlacementRule, ...] = ()
+    """Rules that are all tried."""
+    either: tuple[PlacementRule, ...] = ()
+    """Two rules: the first with the chance `odds`, else the second."""
+    odds: float = 0.5
     name: str = ""
-    """By which the `unless` of a later wish refers to it."""
+    """By which the `unless` of a later rule refers to it."""
     unless: str = ""
-    """Only if the wish of this name found no place."""
+    """Only if the rule of this name found no place."""
     times: tuple[int, int] = (1, 1)
     """How often: drawn evenly between the two."""
     per_area: float = 0.0
@@ -248,9 +283,9 @@ class Wish:
 
     def __post_init__(self) -> None:
         if bool(self.group) + bool(self.first) + bool(self.all) + bool(self.either) != 1:
-            raise RecordError("a wish has either a group, or first, all or either")
+            raise RecordError("a rule has either a group, or first, all or either")
         if self.either and len(self.either) != 2:
-            raise RecordError(f"either wants two wishes, got {len(self.either)}")
+            raise RecordError(f"either wants two rules, got {len(self.either)}")
 
 
 @dataclass(frozen=True)
@@ -265,23 +300,23 @@ class Need:
 
 
 @dataclass(frozen=True)
-class Programme:
+class RoomSpec:
     """How one kind of room is furnished."""
 
-    wishes: tuple[Wish, ...] = ()
+    rules: tuple[PlacementRule, ...] = ()
     """What makes the room what it is, in the order in which it claims its place; those of a user's own file follow."""
-    extras: tuple[Wish, ...] = ()
+    extras: tuple[PlacementRule, ...] = ()
     """What it gets after that."""
     needs: tuple[Need, ...] = ()
     """Most important first: a room is tried again, in its house, while it lacks one."""
     fill: float = 0.0
     """Share of the floor that furniture should stand on."""
-    fillers: tuple[Wish, ...] = ()
+    fillers: tuple[PlacementRule, ...] = ()
     """What is drawn from, evenly, until `fill` is reached."""
 
 
 @dataclass(frozen=True)
-class Small:
+class SmallObject:
     """One kind of small thing, and where the people of a house put it or leave it."""
 
     put: str
@@ -321,11 +356,11 @@ class Tables:
     roles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Role to the object classes that can play it; a class is its own role."""
     groups: Mapping[str, Group] = field(default_factory=dict)
-    choices: Mapping[str, Wish] = field(default_factory=dict)
-    """Wishes that others refer to like groups."""
-    rooms: Mapping[str, Programme] = field(default_factory=dict)
+    choices: Mapping[str, PlacementRule] = field(default_factory=dict)
+    """Rules that others refer to like groups."""
+    rooms: Mapping[str, RoomSpec] = field(default_factory=dict)
     """Kind of room to its furniture."""
-    smalls: Mapping[str, tuple[Small, ...]] = field(default_factory=dict)
+    smalls: Mapping[str, tuple[SmallObject, ...]] = field(default_factory=dict)
     """Lists of small things."""
     lies_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Kind of room to the lists whose things are there, besides those of the list "everywhere"."""
@@ -335,7 +370,7 @@ class Tables:
     """Object class to how many of it one room may hold on its surfaces; 2 for the others."""
     grown_up: tuple[str, ...] = ()
     """What children's rooms lack."""
-    hung: tuple[Small, ...] = ()
+    hung: tuple[SmallObject, ...] = ()
     """What hangs on walls before pictures do."""
     centrepieces: tuple[str, ...] = ()
     """Roles of what stands in the middle of dining tables."""
@@ -354,7 +389,7 @@ def _one_of(what: str, word: str, known: tuple[str, ...]) -> None:
 def tables(own: tuple[Path, ...] = ()) -> Tables:
     """The tables that ship, with what the files `own` add.
 
-    Groups, choices and roles of the same name are replaced; wishes, extras, fillers, needs and small things go after
+    Groups, choices and roles of the same name are replaced; rules, extras, fillers, needs and small things go after
     those that are there.
 
     Raises:
@@ -411,11 +446,11 @@ def _check(found: Tables) -> None:
     known = tuple(sorted({*found.groups, *found.choices, *BUILT}))
     if twice := sorted({*found.groups} & {*found.choices}):
         raise RecordError(f"{twice} are both groups and choices; give them names of their own")
-    wishes = {f"rooms.{kind}": (*p.wishes, *p.extras, *p.fillers) for kind, p in found.rooms.items()}
-    wishes |= {f"choices.{name}": (wish,) for name, wish in found.choices.items()}
-    for place, some in wishes.items():
-        for name in (name for wish in some for name in groups_of(wish)):
-            _one_of(f"the group of a wish of {place}", name, known)
+    rules = {f"rooms.{kind}": (*p.rules, *p.extras, *p.fillers) for kind, p in found.rooms.items()}
+    rules |= {f"choices.{name}": (rule,) for name, rule in found.choices.items()}
+    for place, some in rules.items():
+        for name in (name for rule in some for name in groups_of(rule)):
+            _one_of(f"the group of a rule of {place}", name, known)
     for name in found.choices:
         _refuse_circle(found, name, ())
     for kind, names in found.lies_in.items():
@@ -423,11 +458,11 @@ def _check(found: Tables) -> None:
             _one_of(f"a list in lies_in.{kind}", name, tuple(found.smalls))
 
 
-def groups_of(wish: Wish) -> Iterator[str]:
-    """Names of all groups and choices of a wish and of those in it."""
-    if wish.group:
-        yield wish.group
-    for other in (*wish.first, *wish.all, *wish.either):
+def groups_of(rule: PlacementRule) -> Iterator[str]:
+    """Names of all groups and choices of a rule and of those in it."""
+    if rule.group:
+        yield rule.group
+    for other in (*rule.first, *rule.all, *rule.either):
         yield from groups_of(other)
 
 

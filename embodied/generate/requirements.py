@@ -11,7 +11,7 @@ FLAT = 75.0
 """Up to here bedrooms may open off the living room, square metres."""
 
 
-def lacking(house: House, catalogue: Catalogue | None = None) -> tuple[str, ...]:
+def missing_requirements(house: House, catalogue: Catalogue | None = None) -> tuple[str, ...]:
     """'kitchen_1: fridge' for everything that a room of `house` lacks, 'bedroom_1: way from a hall or corridor'.
 
     Counted are the needs of the table of rooms that name object classes. The furnisher tries for

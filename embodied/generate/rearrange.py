@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from embodied.generate.people import CLASS, add_people, meet
+from embodied.generate.people import CLASS, add_people, place_people
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement, rounded
 from embodied.house.shapes import footprint
@@ -26,7 +26,7 @@ SMALL = 0.6
 EDGE, TRIES = 0.01, 12
 
 
-def another_day(house: House, graph: NavGraph, catalogue: Catalogue, starts: Iterable[int], *, day: int) -> House:
+def rearranged(house: House, graph: NavGraph, catalogue: Catalogue, starts: Iterable[int], *, day: int) -> House:
     """The same rooms and furniture, as they look on another day.
 
     Args:
@@ -42,7 +42,7 @@ def another_day(house: House, graph: NavGraph, catalogue: Catalogue, starts: Ite
     empty = dataclasses.replace(tidied, placements=tuple(p for p in tidied.placements if p.object_class != CLASS))
     if len(empty.placements) == len(tidied.placements):
         return tidied  # nobody was there
-    met = meet(empty, graph, catalogue, seed=int(rng.integers(2**31)))
+    met = place_people(empty, graph, catalogue, seed=int(rng.integers(2**31)))
     return add_people(empty, met, starts)
 
 

@@ -1,6 +1,7 @@
-"""What each style of a house chooses its floors, walls, doors and papers from.
+"""Materials of floors, walls, doors and papers that each style of a house chooses from.
 
-Names of materials only ('oak_planks/0'); assets.materials makes them. The table is tastes.toml beside this module.
+Names of materials only ('oak_planks/0'); assets.materials makes them. The table is style_finishes.toml beside this
+module.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from embodied.assets.json_file import from_plain, read_toml
 
 
 @dataclass(frozen=True)
-class Taste:
-    """What a style chooses from: material keys."""
+class StyleFinishes:
+    """Material keys that a style chooses from."""
 
     woods: tuple[str, ...]
     stones: tuple[str, ...]
@@ -33,10 +34,10 @@ class Taste:
 
 
 @dataclass(frozen=True)
-class Tastes:
-    """What is in tastes.toml."""
+class FinishTable:
+    """The content of style_finishes.toml."""
 
-    styles: Mapping[str, Taste]
+    styles: Mapping[str, StyleFinishes]
     """By the names of embodied.house.validation.STYLES."""
     rough: tuple[str, ...]
     """Floors of garages and workshops, whatever the style."""
@@ -46,5 +47,5 @@ class Tastes:
     """Their accents."""
 
 
-TABLE = from_plain(Tastes, read_toml(Path(__file__).with_name("tastes.toml")))
-TASTES = TABLE.styles
+FINISH_TABLE = from_plain(FinishTable, read_toml(Path(__file__).with_name("style_finishes.toml")))
+STYLE_FINISHES = FINISH_TABLE.styles

@@ -19,7 +19,7 @@ NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge"
 """Words of object classes that are moved out of the way last."""
 
 
-def cleared(house: House) -> House:
+def remove_blocking_objects(house: House) -> House:
     """`house` without the things that keep a body of the agent's radius out of some room.
 
     Raises:
