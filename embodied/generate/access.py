@@ -73,14 +73,14 @@ def shared_wall(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> S
 
 def walls_between(cells: list[Cell]) -> dict[tuple[int, int], SharedWall]:
     """(i, j) with i < j to the wall they share."""
-    found = {}
+    shared = {}
     for i, a in enumerate(cells):
         x0, y0, x1, y1 = a.rect
         for j in range(i + 1, len(cells)):
             p0, q0, p1, q1 = cells[j].rect
             if p0 <= x1 and p1 >= x0 and q0 <= y1 and q1 >= y0 and (wall := shared_wall(a.rect, cells[j].rect)):
-                found[i, j] = wall
-    return found
+                shared[i, j] = wall
+    return shared
 
 
 def outer_stretches(
@@ -89,7 +89,7 @@ def outer_stretches(
     """Stretches of the edges of cell i that look outdoors, each with the sense of its outward normal, longest first."""
     x0, y0, x1, y1 = cells[i].rect
     taken = [w for pair, w in walls.items() if i in pair]
-    found = []
+    stretches = []
     for axis, across, low, high, side in (
         ("x", y0, x0, x1, -1),
         ("y", x1, y0, y1, 1),
@@ -99,15 +99,15 @@ def outer_stretches(
         at = low
         for _, _, p, q in sorted(w for w in taken if w.axis == axis and w.across == across):
             if p > at:
-                found.append((SharedWall(axis, across, at, p), side))
+                stretches.append((SharedWall(axis, across, at, p), side))
             at = max(at, q)
         if high > at:
-            found.append((SharedWall(axis, across, at, high), side))
-    return sorted(found, key=lambda f: (-f[0].length, f[0]))
+            stretches.append((SharedWall(axis, across, at, high), side))
+    return sorted(stretches, key=lambda f: (-f[0].length, f[0]))
 
 
 def has_outer_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> bool:
-    """Whether the hall has room for a front door and every garage for a car to drive in."""
+    """True if the hall has room for a front door and every garage for a car to drive in."""
     need = {"hall": 14, "garage": 29}
     for i, c in enumerate(cells):
         if c.kind in need:
@@ -162,7 +162,7 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tupl
 
 def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall], links: list[Link]) -> list[Link]:
     """A door to hall or corridor for living rooms and kitchens that are entered through each other only."""
-    found = []
+    doors = []
     for i, c in enumerate(cells):
         if c.kind not in ("living_room", "kitchen", "family_room"):
             continue
@@ -176,8 +176,8 @@ def _second_doors(cells: list[Cell], walls: dict[tuple[int, int], SharedWall], l
         ]
         if beside:
             _, _, other, wall = min(beside)
-            found.append(Link(i, other, wall))
-    return found
+            doors.append(Link(i, other, wall))
+    return doors
 
 
 def _cost(cells: list[Cell], child: int, parent: int) -> float | None:

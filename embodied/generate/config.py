@@ -79,7 +79,7 @@ class HouseConfig:
     weather: str | None = None
     """Weather, which decides the light from the sky."""
     landscape: str | None = None
-    """What the windows show."""
+    """Scenery that the windows show."""
     season: str | None = None
     """Season of the landscape (leaves, bare trees, snow)."""
     novelty: str | None = None

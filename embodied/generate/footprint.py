@@ -72,7 +72,7 @@ class Band(Stretch):
     high: int
     """World coordinates across."""
     free: tuple[bool, bool]
-    """Whether its start and its end lie on an outer wall, so that a room may take them over."""
+    """True if its start and its end lie on an outer wall, so that a room may take them over."""
 
     def rect(self, s0: int, s1: int) -> Rect:
         return self.between(s0, s1, self.low, self.high)
@@ -124,7 +124,7 @@ class CrossShape:
     """Length of the bar."""
     south: Wing
     x_below: int
-    """Where on the bar the wing below begins."""
+    """Start of the wing below, along the bar."""
     below: int
     """Length of the wing below."""
     north: Wing

@@ -11,7 +11,7 @@ from embodied.house.house import House
 from embodied.seeds import stream
 
 HABITS = {"cooks": 0.5, "reads": 0.5, "plays": 0.4, "does sports": 0.35, "works at home": 0.4, "makes things": 0.2}
-"""What a household may like doing, and the share of households that do."""
+"""Habits that a household may have, and the share of households that do."""
 ROOM_FOR = {"study": "works at home", "library": "reads", "gym": "does sports", "workshop": "makes things"}
 """Room kind to the habit that whoever has such a room certainly has."""
 PRIVATE = ("main_bedroom", "bedroom", "kids_room")

@@ -26,7 +26,7 @@ class Extra:
 
 @dataclass(frozen=True)
 class RoomKind:
-    """What is usual for rooms of one kind."""
+    """Usual properties of rooms of one kind."""
 
     area: tuple[float, float]
     """Smallest and largest usual area, square metres."""
@@ -37,14 +37,14 @@ class RoomKind:
     entered_from: Mapping[str, float] = field(default_factory=dict)
     """Kinds of room it may be entered from, with a cost; a room that another owns is entered from its owner."""
     is_main: bool = True
-    """Whether advertisements of flats count it."""
+    """True if advertisements of flats count it."""
     is_bedroom: bool = False
     is_open: bool = False
-    """Whether wide openings may join it to others of the sort."""
+    """True if wide openings may join it to others of the sort."""
     leads_on: bool = False
-    """Whether one may cross it on the way to another room."""
+    """True if one may cross it on the way to another room."""
     is_tight: bool = False
-    """Whether its furniture does not fit below the usual size."""
+    """True if its furniture does not fit below the usual size."""
     longest: float = 1.65
     """Longest side over shortest, before it costs."""
     door: float = 0.85

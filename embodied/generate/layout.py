@@ -66,12 +66,12 @@ class Genome:
     rows: int
     cuts: int
     privacy: tuple[float, ...]
-    """What is added to the privacy of each space's kind."""
+    """Addition to the privacy of each space's kind."""
 
 
 @dataclass(frozen=True)
 class Ends:
-    """What is settled of the rows when the rooms at the ends of corridors are chosen."""
+    """Rows as they are when the rooms at the ends of corridors are chosen."""
 
     footprint: Footprint
     rows: Rows
@@ -294,7 +294,7 @@ def _assign(
 
 
 def _slimness(m: Module, depth: int) -> float:
-    """What it costs, in decimetres of spine, that the module's main room would be narrow at this depth."""
+    """Cost, in decimetres of spine, of the fact that the module's main room would be narrow at this depth."""
     if m.main.kind == "hall":
         return 0.0
     own = m.main.area * 100 / depth
@@ -346,7 +346,7 @@ def _along_band(band: Band, rect: Rect, axis: str) -> tuple[int, int]:
 
 
 def _corridors(footprint: Footprint, limits: list[list[int]], halls: list[tuple[int, int, int]]) -> list[Cell] | None:
-    """What the end rooms and the halls (band, from, to) leave of each corridor; None if a piece is too short."""
+    """The rest of each corridor beside end rooms and halls (band, from, to); None if a piece is too short."""
     cells = []
     for b, band in enumerate(footprint.bands):
         pieces = [(limits[b][0], limits[b][1])]
@@ -364,17 +364,17 @@ def _take_end(ends: Ends, b: int, end: int, limits: list[int]) -> None:
     """Let the shorter of the two rooms at a free corridor end reach across it, if the other keeps its door."""
     footprint, rows = ends.footprint, ends.rows
     band = footprint.bands[b]
-    found = []
+    at_end = []
     for i, s in enumerate(footprint.strips):
         at = s.u_band == 0 if end == 0 else s.u_band + s.length == band.length
         if s.band == b and at:
             k = 0 if end == 0 else len(rows[i]) - 1
             a, z = ends.cuts[i][k]
-            found.append((z - a, i, k))
-    if len(found) < 2 or any(rows[i][k][0].main.kind == "hall" for _, i, k in found):
+            at_end.append((z - a, i, k))
+    if len(at_end) < 2 or any(rows[i][k][0].main.kind == "hall" for _, i, k in at_end):
         return
-    found.sort()
-    (short, i, k), (long, _, _) = found[0], found[1]
+    at_end.sort()
+    (short, i, k), (long, _, _) = at_end[0], at_end[1]
     m = rows[i][k][0]
     if long - short < 12 or m.owned or m.guest or m.main.kind in ("toilet", "closet"):
         return

@@ -11,7 +11,7 @@ from embodied.generate.kinds import BEDROOMS, KINDS
 from embodied.generate.program import WantedRoom
 
 FILLERS = {"kitchen": "pantry", **dict.fromkeys((*BEDROOMS, "hall", "study", "laundry_room"), "closet")}
-"""What a leftover niche beside such a room becomes."""
+"""Kind of room that a leftover niche beside such a room becomes."""
 NICHE = 12
 """Shortest side of a niche worth a door, decimetres."""
 

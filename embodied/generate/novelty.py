@@ -41,7 +41,7 @@ def styles_of(novelty: str | None) -> tuple[str, ...]:
 
 
 def finishes_of(style: str, novelty: str | None) -> StyleFinishes:
-    """What a style chooses from; in novel houses only what no other style has, where that is a choice.
+    """Materials that a style chooses from; in novel houses only what no other style has, where that is a choice.
 
     Paints and carpets are everybody's, and so are the walls of children's rooms and the floors of garages.
     """
@@ -77,7 +77,7 @@ def _novel_models(catalogue: Catalogue) -> frozenset[str]:
 
 
 def _group(asset: Asset) -> str:
-    """What an asset is an alternative in: its class, or the kitchen lines; what fits several lines is everybody's."""
+    """The group of an asset's alternatives: its class, or the kitchen lines; what fits several lines is everybody's."""
     lines = _lines(asset)
     return asset.object_class if not lines else KITCHEN_LINE if len(lines) == 1 else asset.key
 

@@ -78,7 +78,7 @@ class _Openings:
     found: list[Opening] = field(default_factory=list)
     swings: list[Rectangle] = field(default_factory=list)
     stands: list[Rectangle] = field(default_factory=list)
-    """Where leaves stand open."""
+    """Areas of leaves that stand open."""
     zones: list[Rectangle] = field(default_factory=list)
     """Floor before and behind every way through, which no leaf should stand in."""
     counts: Counter[str] = field(default_factory=Counter)
@@ -156,7 +156,7 @@ def draw_openings(
 
 
 def _is_wide(plan: Plan, link: Link) -> bool:
-    """Whether a way through is a passage without a leaf."""
+    """True if a way through is a passage without a leaf."""
     kinds = {plan.cells[link.child].kind, plan.cells[link.parent].kind}
     return all(KINDS[k].is_open for k in kinds) or kinds <= CIRCULATION or kinds == {"hall", "living_room"}
 
@@ -236,7 +236,7 @@ def _front(axis: str, across: float, low: float, high: float) -> Rectangle:
 
 
 def _open_leaf(axis: str, across: float, low: float, high: float, side: int, at_low: bool) -> Rectangle:
-    """Where the leaf stands when open at a right angle, with a little air."""
+    """Area of the leaf when open at a right angle, with a little air."""
     a, b = (low - 0.05, low + 0.1) if at_low else (high - 0.1, high + 0.05)
     return _beside(axis, a, b, across + side * 0.06, across + side * (high - low + 0.3))
 
@@ -290,7 +290,7 @@ def _hinge(jambs: tuple[Point, Point], at_low: bool) -> str:
 
 
 def _is_tiny(cell: Cell) -> bool:
-    """Whether a leaf inside would leave no room to stand."""
+    """True if a leaf inside would leave no room to stand."""
     x0, y0, x1, y1 = cell.rect
     return cell.kind == "toilet" and (x1 - x0) * (y1 - y0) < 300
 
@@ -383,7 +383,7 @@ def _french_window(made: _Openings, i: int, rng: np.random.Generator) -> None:
 
 
 def _back_door(made: _Openings, i: int, rng: np.random.Generator) -> bool:
-    """Whether there was an outer wall for it."""
+    """True if there was an outer wall for it."""
     fits = [w for w in made.outside[i] if w.length > 2.4]
     if fits:
         w = fits[-1]

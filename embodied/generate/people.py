@@ -49,7 +49,7 @@ DEEP, GROWN = 0.68, 0.8
 
 
 def place_people(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: int) -> dict[int, Placement]:
-    """Whom one could meet at which node: somebody in its room, 0.5 to 2 m away, who stands on free floor or sits.
+    """People whom one could meet, by node: somebody in its room, 0.5 to 2 m away, who stands on free floor or sits.
 
     One person may be met at several nodes. The navigation graph stays valid: everybody keeps the
     walker's radius from its edges, and nobody shuts a room. Figures are tried in a drawn order until
@@ -68,10 +68,10 @@ def place_people(house: House, graph: NavGraph, catalogue: Catalogue, *, seed: i
         rng = stream(seed, "person", house.name, node)
         site = _Site(house, room, eye, ways, people)
         sit = rng.random() < SIT
-        found = site.sit(sitting, seats, rng) if sit else site.stand(standing, rng)
-        found = found or (site.stand(standing, rng) if sit else site.sit(sitting, seats, rng))
-        if found is not None:
-            people.append(dataclasses.replace(found, id=f"{CLASS}_{len(people) + 1}"))
+        person = site.sit(sitting, seats, rng) if sit else site.stand(standing, rng)
+        person = person or (site.stand(standing, rng) if sit else site.sit(sitting, seats, rng))
+        if person is not None:
+            people.append(dataclasses.replace(person, id=f"{CLASS}_{len(people) + 1}"))
     people = _passable(house, people)
     met = {
         n: _nearest(people, house.room_by_id[graph.room_of_node[n]], graph.positions[n, :2])
@@ -89,7 +89,7 @@ def add_people(house: House, met: Mapping[int, Placement], starts: Iterable[int]
 
 
 def stands(asset: Asset) -> bool:
-    """Whether a figure stands on its own feet; those that sit or lie need something to do it on."""
+    """True if a figure stands on its own feet; those that sit or lie need something to do it on."""
     return (
         asset.support == "floor"
         and "sitting" not in asset.tags
@@ -99,20 +99,20 @@ def stands(asset: Asset) -> bool:
 
 
 def sits(asset: Asset) -> bool:
-    """Whether a figure sits as one sits on a chair."""
+    """True if a figure sits as one sits on a chair."""
     return "sitting" in asset.tags
 
 
 @dataclasses.dataclass(frozen=True)
 class _Seat:
-    """Where somebody may sit down."""
+    """A place where somebody may sit down."""
 
     placement: Placement
     room: str
     spot: np.ndarray
     """(2,) where the back of somebody who sits upright on it is, metres."""
     deep: bool
-    """Whether grown people lean back on it."""
+    """True if grown people lean back on it."""
     lift: float
     """How much higher than LAP it is, metres; not below 0, feet do not go through floors."""
 
@@ -132,7 +132,7 @@ class _Site:
         ]
         self.open = house.floor(room).intersection(around)
         self.things = [p for p in house.placements if p.room == room.id and p.position[2] < 1.8 and p.size[2] > 0.05]
-        """What a body would run into: below head height, and higher than a rug."""
+        """Things that a body would run into: below head height, and higher than a rug."""
         doors = [o for o in house.openings if o.kind == "door" and o.rooms[0] == room.id]
         self.leaves = [leaf for o in doors for leaf in leaves(house, o)]
 

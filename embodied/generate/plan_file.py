@@ -179,6 +179,6 @@ def _rectangle(polygon: Corners) -> Rect | None:
 
 
 def _between(a: tuple[int, int], b: tuple[int, int], c: tuple[int, int]) -> bool:
-    """Whether b lies on the way straight from a to c."""
+    """True if b lies on the way straight from a to c."""
     (ux, uy), (vx, vy) = (b[0] - a[0], b[1] - a[1]), (c[0] - b[0], c[1] - b[1])
     return ux * vy == uy * vx and ux * vx + uy * vy > 0

@@ -36,8 +36,8 @@ def rearranged(house: House, graph: NavGraph, catalogue: Catalogue, starts: Iter
     if day == 0:
         return house
     rng = stream(house.seed, "another day", house.name, day)
-    gone = {p.id for p in _small(house) if rng.random() < GONE}
-    left = dataclasses.replace(house, placements=tuple(p for p in house.placements if p.id not in gone))
+    removed = {p.id for p in _small(house) if rng.random() < GONE}
+    left = dataclasses.replace(house, placements=tuple(p for p in house.placements if p.id not in removed))
     tidied = _moved(left, catalogue, rng)
     empty = dataclasses.replace(tidied, placements=tuple(p for p in tidied.placements if p.object_class != CLASS))
     if len(empty.placements) == len(tidied.placements):
@@ -85,10 +85,10 @@ def _moved(house: House, catalogue: Catalogue, rng: np.random.Generator) -> Hous
 def _surface(carrier: Placement, name: str | None, catalogue: Catalogue) -> shapely.Polygon | None:
     """The part of a carrier's surface that things may lie on, world; None where the catalogue does not know it."""
     asset = catalogue.assets.get(carrier.asset)
-    found = [s for s in asset.surfaces if s.name == name] if asset else []
-    if asset is None or not found:
+    surfaces = [s for s in asset.surfaces if s.name == name] if asset else []
+    if asset is None or not surfaces:
         return None
-    s, (kx, ky, _) = found[0], np.array(carrier.size) / np.array(asset.size)
+    s, (kx, ky, _) = surfaces[0], np.array(carrier.size) / np.array(asset.size)
     corners = np.array([(s.x0, s.y0), (s.x1, s.y0), (s.x1, s.y1), (s.x0, s.y1)]) * (kx, ky)
     area = shapely.Polygon(corners @ rotation(carrier.yaw).T + carrier.position[:2])
     return area.buffer(-EDGE)

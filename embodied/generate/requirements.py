@@ -1,4 +1,4 @@
-"""What a finished house lacks: nobody lives where the kitchen has no sink or the bedroom no bed."""
+"""Things that a finished house lacks: nobody lives where the kitchen has no sink or the bedroom no bed."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ NEAR = {
     **{tuple(sorted((k, "garage"))): -0.6 for k in BEDROOMS},
     **{tuple(sorted((k, "living_room"))): -0.15 for k in BEDROOMS},
 }
-"""What a shared wall between two kinds is worth."""
+"""Worth of a shared wall between two kinds."""
 
 
 def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:

@@ -60,7 +60,7 @@ Made = TypeVar("Made")
 
 
 def _made(value: Made | None, stage: str) -> Made:
-    """What a stage has filled in.
+    """The field that a stage has filled in.
 
     Raises:
       HouseError: it has not run.

@@ -47,13 +47,13 @@ def remove_blocking_objects(house: House) -> House:
 
 def without(house: House, names: tuple[str, ...]) -> House:
     """The house without some placements, all that rests on them, and their lights."""
-    gone = set(names)
+    removed = set(names)
     for _ in range(8):
-        gone |= {p.id for p in house.placements if p.parent in gone}
+        removed |= {p.id for p in house.placements if p.parent in removed}
     return dataclasses.replace(
         house,
-        placements=tuple(p for p in house.placements if p.id not in gone),
-        lights=tuple(x for x in house.lights if x.placement not in gone),
+        placements=tuple(p for p in house.placements if p.id not in removed),
+        lights=tuple(x for x in house.lights if x.placement not in removed),
     )
 
 

@@ -59,7 +59,7 @@ SMALL = 3
 
 
 class Graph(Protocol):
-    """What a plan shows of a navigation graph."""
+    """The part of a navigation graph that a plan shows."""
 
     @property
     def positions(self) -> np.ndarray:
@@ -250,8 +250,8 @@ def _arc(
 
 def _draw_furniture(sheet: _Sheet, house: House, ids: set[str]) -> None:
     """Footprints from low to high; floor coverings pale, small things tiny."""
-    mine = [p for p in house.placements if p.room in ids and p.position[2] < 1.7]
-    for p in sorted(mine, key=lambda p: (p.position[2] + p.size[2], p.id)):
+    things = [p for p in house.placements if p.room in ids and p.position[2] < 1.7]
+    for p in sorted(things, key=lambda p: (p.position[2] + p.size[2], p.id)):
         corners = rectangle(p.position[0], p.position[1], p.size[0], p.size[1], p.yaw)
         if p.object_class == "person":
             _draw_person(sheet, p)

@@ -40,7 +40,7 @@ DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_
 SMALLEST, LARGEST = 1e-4, 30.0
 """Shortest and longest side an object may have, metres."""
 ID = re.compile(r"[\w'.-]+")
-"""What an id looks like; walls and leaves are named '<id>/<part>', so that it holds no slash."""
+"""Form of an id; walls and leaves are named '<id>/<part>', so that it holds no slash."""
 
 
 class HouseError(RecordError):
@@ -216,7 +216,7 @@ class House:
         return self.storeys[room.storey]
 
     def floor(self, room: Room) -> shapely.Polygon:
-        """What one can stand on in `room` between bare walls, metres, world."""
+        """Floor between the bare walls of `room`, metres, world."""
         return shapely.Polygon(room.polygon).buffer(-self.inner_wall / 2, join_style="mitre")
 
     @functools.cached_property
@@ -287,7 +287,7 @@ def check(house: House) -> None:
 
 
 def _complaints(house: House) -> Iterator[str]:
-    """What is wrong with a house. Each check assumes that the earlier ones found nothing: only the first complaint may
+    """Complaints about a house. Each check assumes that the earlier ones found nothing: only the first complaint may
     be used."""
     yield from _check_numbers(house)
     yield from _check_ids(house)

@@ -1,4 +1,4 @@
-"""Whether a house speaks of things that exist: assets, classes, surfaces, parameters, materials, styles."""
+"""Checks that a house names things that exist: assets, classes, surfaces, parameters, materials, styles."""
 
 from __future__ import annotations
 

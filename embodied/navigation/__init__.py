@@ -1,1 +1,1 @@
-"""Where one can stand and walk: free space and the navigation graph."""
+"""Places to stand and to walk: free space and the navigation graph."""

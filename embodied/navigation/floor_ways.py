@@ -105,10 +105,10 @@ class DrivingWays:
 
     def cells(self, cell: int) -> list[int]:
         """The cells of the way from a cell to its goal, both included."""
-        found = [cell]
-        while self._after[found[-1]] >= 0:
-            found.append(int(self._after[found[-1]]))
-        return found
+        way = [cell]
+        while self._after[way[-1]] >= 0:
+            way.append(int(self._after[way[-1]]))
+        return way
 
     def length(self, cell: int) -> float:
         """Metres of the way when it is pulled tight: up to 8 % less than over the grid, which has eight directions."""

@@ -1,4 +1,4 @@
-"""Where a person can stand and what they can see: flat free-space polygons of one storey, metres, world."""
+"""Places where a person can stand and what they can see: flat free-space polygons of one storey, metres, world."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HEAD = 1.8
 LOW = 0.04
 """Things lower than this (rugs, mats, thresholds) are walked over."""
 JAMB = 0.03
-"""What a door's lining and the play of its leaf take from its hole on each side, metres."""
+"""Width that a door's lining and the play of its leaf take from its hole on each side, metres."""
 LEAF = 0.05
 """Thickness of an open leaf with its handle, metres."""
 
@@ -28,7 +28,7 @@ def free_floor(house: House, storey: int) -> shapely.Geometry:
 
 
 def sight_floor(house: House, storey: int) -> shapely.Geometry:
-    """Where a horizontal sight line at eye height may run."""
+    """Area in which a horizontal sight line at eye height may run."""
     return _floor_without(house, storey, EYE - 0.02, EYE + 0.02)
 
 
@@ -42,14 +42,14 @@ def obstacles(house: House, storey: int, low: float, high: float) -> list[shapel
     """Footprints of placements and leaves that occupy heights between low and high above the floor."""
     rooms = {r.id for r in house.rooms if r.storey == storey}
     floor = house.storeys[storey].elevation
-    found = []
+    polygons = []
     for p in house.placements:
         if p.room in rooms and p.position[2] - floor < high and p.position[2] + p.size[2] - floor > low:
-            found.append(footprint(p))
+            polygons.append(footprint(p))
     for o in house.openings:
         if o.kind == "door" and o.rooms[0] in rooms:
-            found += leaves(house, o)
-    return found
+            polygons += leaves(house, o)
+    return polygons
 
 
 def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:
@@ -59,14 +59,14 @@ def leaves(house: House, opening: Opening) -> list[shapely.Polygon]:
     normal = inward(house, opening)
     face = house.inner_wall / 2 * normal
     pairs = [(a, b), (b, a)] if width >= 1.25 else [(a, b) if opening.hinge == "a" else (b, a)]
-    found = []
+    polygons = []
     for hinge, other in pairs:
         across = (other - hinge) / width
         long = (width - 2 * JAMB) / len(pairs)
         start = hinge + JAMB * across + face
         tip = start + long * (math.cos(opening.angle) * across + math.sin(opening.angle) * normal)
-        found.append(shapely.LineString([start, tip]).buffer(LEAF / 2, cap_style="flat"))
-    return found
+        polygons.append(shapely.LineString([start, tip]).buffer(LEAF / 2, cap_style="flat"))
+    return polygons
 
 
 def doorway(house: House, opening: Opening) -> shapely.Polygon:

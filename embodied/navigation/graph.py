@@ -155,7 +155,7 @@ def build_graph(house: House, *, spacing: float = 2.25) -> NavGraph:
 
 
 def walkable(house: House, storey: int = 0) -> shapely.Geometry:
-    """Where the agent's centre may be: the free floor shrunk by its radius."""
+    """Area in which the agent's centre may be: the free floor shrunk by its radius."""
     return free_floor(house, storey).buffer(-(RADIUS + 0.005), quad_segs=6)
 
 
@@ -179,12 +179,12 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
 
 def unreachable_rooms(house: House) -> tuple[str, ...]:
     """Ids of rooms that a body of the agent's radius cannot enter from the rest of their storey."""
-    found = []
+    closed = []
     for storey in range(len(house.storeys)):
         rooms = [r for r in house.rooms if r.storey == storey]
         _, room_of_cell, reach = reachable(house, storey)
-        found += [rooms[k].id for k in closed_rooms(room_of_cell, reach, len(rooms))]
-    return tuple(found)
+        closed += [rooms[k].id for k in closed_rooms(room_of_cell, reach, len(rooms))]
+    return tuple(closed)
 
 
 def closed_rooms(room_of_cell: np.ndarray, reach: np.ndarray, rooms: int) -> list[int]:
@@ -518,7 +518,7 @@ def _named(items: list[Any], k: int) -> str:
 
 
 def _is_viewpoint(item: object, count: int) -> bool:
-    """Whether `item` is one of the `count` viewpoints of a connectivity file."""
+    """True if `item` is one of the `count` viewpoints of a connectivity file."""
     if not isinstance(item, dict):
         return False
     pose, open_ = item.get("pose"), item.get("unobstructed")

@@ -14,7 +14,7 @@ from embodied.navigation.graph import NavGraph, walkable
 
 
 class FreePoses:
-    """Where a body of the agent's radius can stand and walk to a viewpoint from."""
+    """Poses from which a body of the agent's radius can walk to a viewpoint."""
 
     def __init__(self, house: House, graph: NavGraph) -> None:
         self._levels = np.array([s.elevation for s in house.storeys])
@@ -29,7 +29,7 @@ class FreePoses:
         return reached
 
     def is_free(self, position: Sequence[float] | np.ndarray) -> bool:
-        """Whether the body can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
+        """True if the body can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
         x, y, z = (*position, EYE) if len(position) == 2 else position
         if not np.isfinite([x, y, z]).all():
             raise ValueError(f"a position should be finite numbers in metres, got {tuple(position)}")

@@ -56,7 +56,7 @@ def dome(house: House, rows: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def land_rng(seed: int) -> np.random.Generator:
-    """What the far landscape of a house is drawn from."""
+    """Scenery from which the far landscape of a house is drawn."""
     return stream(seed % VARIANTS, "outdoors", "land")
 
 
@@ -64,8 +64,8 @@ def kept_picture(place: Scenery, seed: int, cache: Path | None) -> np.ndarray:
     """`plain_picture`, kept in `cache` where one is given."""
     if cache is None:
         return plain_picture(place, seed)
-    told = (place.landscape, place.season, place.height, place.outlook if place.table.water else 0.0, seed % VARIANTS)
-    file = Path(cache) / "landscapes" / f"{digest(code_digest(__name__), *told)[:24]}.png"
+    facts = (place.landscape, place.season, place.height, place.outlook if place.table.water else 0.0, seed % VARIANTS)
+    file = Path(cache) / "landscapes" / f"{digest(code_digest(__name__), *facts)[:24]}.png"
     known = read_picture(file)
     if known is not None:
         return known[..., ::-1]

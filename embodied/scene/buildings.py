@@ -10,7 +10,7 @@ import numpy as np
 Add = Callable[..., None]
 """Takes what a face is made of, and its four corners."""
 WALL, ROOF, TRIM, DOOR, PANE, LIT = range(6)
-"""What a face is made of; LIT panes glow when it is dark."""
+"""Material of a face; LIT panes glow when it is dark."""
 EVENING = 0.42
 """Share of the windows that are lit after dusk."""
 

@@ -29,8 +29,8 @@ APART = (
     "embodied.house.house",
     "embodied.scene",
 )
-"""What the code of boxes does not count: packages' names, the catalogue's rows, and houses, which they know nothing
-of."""
+"""Modules that do not count as code of boxes: packages' names, the catalogue's rows, and houses, which boxes know
+nothing of."""
 CELLS = (20, 14, 10, 7, 5, 3, 2)
 """Cells along the longest side of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
 MOST_BOXES = 30
@@ -182,7 +182,7 @@ def levels(parts: Sequence[MeshPart]) -> tuple[float, ...]:
 
 
 def is_solid(points: np.ndarray) -> bool:
-    """Whether a thing all but fills its bounding box: a cupboard, a crate."""
+    """True if a thing all but fills its bounding box: a cupboard, a crate."""
     boxes = grid_boxes(points, 5)
     filled = sum(float(np.prod(high - low)) for low, high in boxes)
     return filled > 0.97 * float(np.prod(points.max(axis=0) - points.min(axis=0)))

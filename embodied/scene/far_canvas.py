@@ -22,7 +22,7 @@ Things = list[tuple[float, Callable[[], None]]]
 
 @dataclass(frozen=True, eq=False)
 class FarLight:
-    """What shines on far things."""
+    """Light on far things."""
 
     air: np.ndarray
     """(w, 3) light of the sky just above the horizon, which distance adds."""

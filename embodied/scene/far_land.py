@@ -140,10 +140,10 @@ def _field_tile(place: Scenery, *, rng: np.random.Generator, side: int = 256) ->
     colours = np.array(FIELDS[place.season])[rng.integers(5, size=len(points))]
     colours = colours * rng.uniform(0.85, 1.15, (len(points), 1))
     angle = rng.uniform(0, np.pi, len(points))
-    mine = which[:, 0] % len(points)
-    rows = 1 + 0.05 * np.sin((x.ravel() * np.cos(angle[mine]) + y.ravel() * np.sin(angle[mine])) * 2.2)
-    tile = colours[mine] * rows[:, None]
-    hedge = (near[:, 1] - near[:, 0] < 0.9) & (rng.random(len(points))[mine] < 0.8)
+    field = which[:, 0] % len(points)
+    rows = 1 + 0.05 * np.sin((x.ravel() * np.cos(angle[field]) + y.ravel() * np.sin(angle[field])) * 2.2)
+    tile = colours[field] * rows[:, None]
+    hedge = (near[:, 1] - near[:, 0] < 0.9) & (rng.random(len(points))[field] < 0.8)
     tile[hedge] = np.array(LEAVES[place.season][2]) * 0.8
     return tile.reshape(side, side, 3).astype(np.float32)
 

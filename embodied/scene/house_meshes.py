@@ -13,7 +13,7 @@ __all__ = ["Meshes", "Part", "house_parts", "instance_classes", "owners"]
 
 
 class Meshes(typing.Protocol):
-    """What this module needs of a catalogue."""
+    """The part of a catalogue that this module needs."""
 
     def mesh(
         self, key: str, size: tuple[float, float, float], params: tuple[tuple[str, str | float], ...] = ()

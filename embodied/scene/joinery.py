@@ -1,4 +1,4 @@
-"""What fills the openings: reveals, window frames with panes and sills, door linings, casings and leaves.
+"""Joinery of the openings: reveals, window frames with panes and sills, door linings, casings and leaves.
 
 An opening is built in its own frame: x from jamb p to jamb q along the wall's centre line, y into
 the first room, z up from the storey's floor; `_Hole.world` carries it into the house.

@@ -52,7 +52,7 @@ class Town:
 
 @dataclass(frozen=True)
 class Landscape:
-    """What surrounds a house."""
+    """A landscape around a house."""
 
     likely: float
     """How often it is drawn, against the others."""
@@ -63,7 +63,7 @@ class Landscape:
     ground: str
     """Beyond the plot: 'meadow', 'fields', 'town' or 'woodland'."""
     far: tuple[Ridge | Town, ...]
-    """What is painted, farthest first."""
+    """Painted layers, farthest first."""
     scatter: tuple[int, float, float] = (0, 50.0, 400.0)
     """Single trees painted: how many, nearest and farthest, metres."""
     firs: float = 0.15
@@ -125,7 +125,7 @@ LIKELY_SEASONS = (0.3, 0.35, 0.2, 0.15)
 
 @dataclass(frozen=True)
 class Scenery:
-    """Where a house stands."""
+    """Surroundings of a house."""
 
     landscape: str
     season: str
@@ -136,12 +136,12 @@ class Scenery:
 
     @property
     def table(self) -> Landscape:
-        """What its landscape is made of."""
+        """Pieces of its landscape."""
         return TABLE[self.landscape]
 
     @property
     def snow(self) -> bool:
-        """Whether snow lies."""
+        """True if snow lies."""
         return self.season == "winter"
 
     @property
@@ -151,7 +151,7 @@ class Scenery:
 
 
 def scenery_of(house: House) -> Scenery:
-    """What the house's sky names, the rest drawn from its seed; the same in every process.
+    """Scenery that the house's sky names, the rest drawn from its seed; the same in every process.
 
     High floors are drawn only for houses that could be flats: of one storey, without a garage.
     """
@@ -201,7 +201,7 @@ def side_frame(
 
 
 STREET = (1.6, 5.6)
-"""Where the carriageway begins and ends beyond the edge of the plot, metres."""
+"""Beginning and end of the carriageway beyond the edge of the plot, metres."""
 NEAREST = {"villas": 7.5, "cottages": 8.2, "terrace": 8.6}
 """From the edge of the plot to the face of the nearest building, metres."""
 

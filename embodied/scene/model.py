@@ -134,12 +134,12 @@ def loose(house: House, catalogue: Catalogue) -> frozenset[str]:
 
 
 def is_hung(house: House, p: Placement) -> bool:
-    """Whether it rests on nothing: a radiator or a wall cabinet, fixed to its wall."""
+    """True if it rests on nothing: a radiator or a wall cabinet, fixed to its wall."""
     return p.parent is None and p.position[2] > house.storey_of(house.room_by_id[p.room]).elevation + UNDERFOOT
 
 
 def is_underfoot(p: Placement) -> bool:
-    """Whether one walks over it: a rug, a mat."""
+    """True if one walks over it: a rug, a mat."""
     return p.parent is None and p.size[2] < UNDERFOOT
 
 

@@ -1,4 +1,4 @@
-"""What is seen through the windows: the house's own facade and roof, the ground, balconies, far things."""
+"""The outdoors seen through the windows: the house's own facade and roof, the ground, balconies, far things."""
 
 from __future__ import annotations
 
@@ -145,9 +145,9 @@ def _neighbours(house: House, place: Scenery, finish: Callable[[str], Finish]) -
         for kind in np.unique(faces.made_of).tolist():
             tag = tags.get(kind, "#panes")
             piece = "windows" if kind == LIT else "neighbours"
-            mine = faces.corners[seen & (faces.made_of == kind)]
-            if len(mine):
-                wears.setdefault(piece + tag, (piece, own[kind], []))[2].append(mine)
+            corners_of_kind = faces.corners[seen & (faces.made_of == kind)]
+            if len(corners_of_kind):
+                wears.setdefault(piece + tag, (piece, own[kind], []))[2].append(corners_of_kind)
     return [
         _part(piece, own, [quads(np.concatenate(corners))], key[len(piece) :])
         for key, (piece, own, corners) in sorted(wears.items())

@@ -21,6 +21,6 @@ class Part:
     mesh_key: str
     """Parts with equal keys have equal meshes and may share geometry."""
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where the mesh's origin stands, world, metres."""
+    """Position of the mesh's origin, world, metres."""
     yaw: float = 0.0
     """Turn about z, radians counter-clockwise."""

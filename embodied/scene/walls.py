@@ -87,7 +87,7 @@ def wall_face(
 
 
 def floor_turn(house: House) -> bool:
-    """Whether boards run along y: along the longer side of the house, the same in all rooms."""
+    """True if boards run along y: along the longer side of the house, the same in all rooms."""
     points = np.concatenate([np.asarray(r.polygon) for r in house.rooms])
     width, depth = np.ptp(points, axis=0)
     return bool(depth > width)

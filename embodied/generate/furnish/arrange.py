@@ -48,11 +48,11 @@ class Item:
     """Item whose surface carries it."""
     surface: str | None = None
     passage: bool = False
-    """Whether it may reach into keep-outs (rugs and curtains)."""
+    """True if it may reach into keep-outs (rugs and curtains)."""
     aside: bool = False
-    """Whether it may lie where one stands to use something else: shoes before the wardrobe."""
+    """True if it may lie where one stands to use something else: shoes before the wardrobe."""
     role: str = ""
-    """What the group calls it, so that later stages find it again."""
+    """Its name in the group, so that later stages find it again."""
 
     @property
     def extent(self) -> tuple[float, float, float]:
@@ -62,7 +62,7 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class ScoredPose:
-    """Where an arrangement's frame goes; the best score is tried first."""
+    """Pose of an arrangement's frame; the best score is tried first."""
 
     score: float
     x: float
@@ -72,7 +72,7 @@ class ScoredPose:
 
 
 def is_flat(size: tuple[float, float, float], z: float = 0.0) -> bool:
-    """Whether a thing on the floor is a rug or mat that furniture may stand on."""
+    """True if a thing on the floor is a rug or mat that furniture may stand on."""
     return size[2] <= 0.03 and z < 0.01
 
 
@@ -91,10 +91,10 @@ def pack(
         fit = _fit(space, items, pose, group)
         if fit is None:
             continue
-        found = len(fit.things) - len(space.things)
-        if best is None or found - rank / PATIENCE > best[0]:
-            best = found - rank / PATIENCE, fit
-        if found == len(items):
+        added = len(fit.things) - len(space.things)
+        if best is None or added - rank / PATIENCE > best[0]:
+            best = added - rank / PATIENCE, fit
+        if added == len(items):
             break
     return best[1] if best else None
 
@@ -129,9 +129,9 @@ class _Trial:
     boxes: list[Box | None] = field(default_factory=list)
     """Of what stands; None for rugs, for what rests on something and for what was left out."""
     zones: dict[int, Box] = field(default_factory=dict)
-    """What must stay clear before the fronts of items; what goes under an item may be in its zone."""
+    """Zones that must stay clear before the fronts of items; what goes under an item may be in its zone."""
     reach: list[tuple[float, float]] = field(default_factory=list)
-    """Where somebody must be able to stand."""
+    """Zones in which somebody must be able to stand."""
 
     def solids(self) -> list[Box]:
         return [b for b in self.boxes if b is not None]
@@ -180,7 +180,7 @@ class _Trial:
         )
 
     def _stands(self, item: Item, b: Box, flat: bool) -> bool:
-        """Whether an item finds room among what stands in the room and in the arrangement."""
+        """True if an item finds room among what stands in the room and in the arrangement."""
         if item.needs is not None and self.things[item.needs] is None:
             return False
         if flat:
@@ -194,7 +194,7 @@ class _Trial:
 
 
 def _clear_zone(item: Item, thing: Thing) -> Box:
-    """What must stay clear before an item's front, or behind its back."""
+    """The zone that must stay clear before an item's front, or behind its back."""
     w, d, h = item.extent
     fx, fy = thing.front
     if item.clear < 0:
@@ -228,12 +228,12 @@ def _without_optional(items: Sequence[Item], things: Sequence[Thing | None]) -> 
     """The arrangement stripped of its optional standing things, and of what rests on them."""
     kept: list[Thing | None] = []
     for item, thing in zip(items, things):
-        gone = (
+        left_out = (
             (item.optional and item.on is None and not is_flat(item.extent))
             or (item.on is not None and kept[item.on] is None)
             or (item.needs is not None and kept[item.needs] is None)
         )
-        kept.append(None if gone else thing)
+        kept.append(None if left_out else thing)
     return kept
 
 

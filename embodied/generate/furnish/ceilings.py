@@ -1,4 +1,4 @@
-"""What hangs from ceilings: lamps, smoke detectors, fans."""
+"""Things that hang from ceilings: lamps, smoke detectors, fans."""
 
 from __future__ import annotations
 
@@ -75,13 +75,13 @@ def _ceiling_lamp(ctx: Context) -> Asset | None:
     """One model for the whole room; flat ones where people walk close beneath."""
     height = ctx.space.height
     if ctx.kind in BRIGHT:
-        found = ctx.pick("fluorescent lamp", avoid=())
-        if found is not None:
-            return found
+        lamp = ctx.pick("fluorescent lamp", avoid=())
+        if lamp is not None:
+            return lamp
     if ctx.kind in TRACKS and ctx.chance(0.12):
-        found = ctx.pick("track light", most=(1.3, 1.3, 0.45), avoid=())
-        if found is not None:
-            return found
+        lamp = ctx.pick("track light", most=(1.3, 1.3, 0.45), avoid=())
+        if lamp is not None:
+            return lamp
     if ctx.kind in LOW or ctx.chance(0.45):
         return ctx.pick("ceiling lamp", most=(0.9, 0.9, 0.35), avoid=())
     return ctx.pick("ceiling light", most=(0.9, 0.9, height - 2.0), avoid=()) or ctx.pick("ceiling lamp", avoid=())

@@ -50,7 +50,7 @@ class Context:
 
     @property
     def things(self) -> tuple[Thing, ...]:
-        """What has found its place."""
+        """All that has found its place."""
         return self.space.things
 
     def chance(self, probability: float) -> bool:
@@ -72,7 +72,7 @@ class Context:
         return (("seed", float(self.rng.integers(SEEDS))),) if asset.object_class in VARIED else ()
 
     def put(self, items: Sequence[Item], poses: Iterable[ScoredPose], group: str, tries: int = 40) -> tuple[Thing, ...]:
-        """What found its place of an arrangement; nothing if it found none."""
+        """The things of an arrangement, placed; nothing if it found none."""
         before = len(self.things)
         space = pack(self.space, items, poses, f"{group}_{self._groups[group] + 1}", tries)
         if space is None:

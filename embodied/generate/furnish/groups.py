@@ -24,12 +24,12 @@ LARGE = 2.0
 ASIDE = (0.0, 0.35, -0.35)
 """How far aside a part that faces another is tried, metres."""
 AT_WALL = 0.5
-"""What is no farther from the wall counts in the width of a group, metres."""
+"""Distance from the wall up to which things count in the width of a group, metres."""
 FAR = 99.0
 
 
 def put_group(ctx: Context, group: Group, name: str, asset: Asset | None = None) -> tuple[Thing, ...]:
-    """What found its place of a group; nothing if it found none.
+    """The things of a group, placed; nothing if it found none.
 
     Args:
       name: what placements call the group, if it does not say so.
@@ -44,8 +44,8 @@ def put_group(ctx: Context, group: Group, name: str, asset: Asset | None = None)
             for part, model in chosen:
                 plan.add(part, model)
             plan.centre()
-            if found := ctx.put(plan.items, _poses(ctx, group, plan, k), group.name or name, group.tries):
-                return found
+            if things := ctx.put(plan.items, _poses(ctx, group, plan, k), group.name or name, group.tries):
+                return things
     return ()
 
 
@@ -98,9 +98,9 @@ def _model(ctx: Context, part: Part, k: int, of: Asset | None) -> Asset | None:
     for role in (part.role, *part.other):
         tagged = (lambda a: any(t in a.tags for t in part.tags)) if part.tags else None
         avoid = {"avoid": ()} if part.allow_duplicate else {}
-        found = ctx.pick(role, least=least, most=most, where=tagged, **avoid)
-        if found is not None:
-            return found
+        asset = ctx.pick(role, least=least, most=most, where=tagged, **avoid)
+        if asset is not None:
+            return asset
     return None
 
 
@@ -330,7 +330,7 @@ def jitter(rng: np.random.Generator, degrees: float) -> float:
 
 
 def _size(ctx: Context, part: Part, asset: Asset, of: _Spot | None) -> Size:
-    """What a thing measures: its model's size, or what the part or the room asks for."""
+    """Size of a thing: its model's size, or what the part or the room asks for."""
     w, d, h = asset.size
     if part.of_room is not None:
         long, short = sides(ctx.space.polygon)
@@ -370,8 +370,8 @@ def _distances(ctx: Context, group: Group, chosen: list[tuple[Part, Asset]]) -> 
     near, far = (first.size[1] + free + facing.size[1] for free in group.distance)
     at_wall = [d - 0.04 for d in depths if near <= d - 0.04 <= far]
     floating = [d for d in (near + 1.0, near + 0.5) if d < max(depths, default=0.0) - 0.75]
-    found = [*at_wall, *floating] or [d - 0.04 for d in depths if d > near - 0.5][:2]
-    yield from ((d, aside) for aside in ASIDE for d in found)
+    distances = [*at_wall, *floating] or [d - 0.04 for d in depths if d > near - 0.5][:2]
+    yield from ((d, aside) for aside in ASIDE for d in distances)
 
 
 def _poses(ctx: Context, group: Group, plan: _Plan, k: int) -> list[ScoredPose]:

@@ -1,4 +1,4 @@
-"""What hangs in a room besides pictures: curtains, radiators, lamps, switches, sockets; the rest is in smalls.toml."""
+"""Curtains, radiators, lamps, switches and sockets of a room; what else hangs is in smalls.toml."""
 
 from __future__ import annotations
 

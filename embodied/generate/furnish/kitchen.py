@@ -126,10 +126,10 @@ def kitchen_line(ctx: Context) -> bool:
     first = ctx.attempt in (3, 5)
     if first:
         _lone_fridge(ctx)
-    found = _line(ctx, fridge=not first)
+    has_line = _line(ctx, fridge=not first)
     if not ctx.roles("fridge"):
         _lone_fridge(ctx)
-    return found
+    return has_line
 
 
 def _line(ctx: Context, fridge: bool) -> bool:
@@ -141,10 +141,10 @@ def _line(ctx: Context, fridge: bool) -> bool:
     kits = kitchen_sets(ctx)
     for with_fridge in (True, False) if fridge else (False,):
         for clear, spare, aside in ((0.6, 1, 0.0), (0.5, 0, 0.0), (0.35, 0, 0.0), (0.5, 0, 0.2), (0.5, 0, 0.4)):
-            found = _line_at_a_wall(ctx, kits, with_fridge, clear, spare, aside)
-            if found is None:
+            line = _line_at_a_wall(ctx, kits, with_fridge, clear, spare, aside)
+            if line is None:
                 continue
-            kit, things = found
+            kit, things = line
             if fridge and not with_fridge and not _tall_block(ctx, kit, things):
                 _lone_fridge(ctx)
             _more_runs(ctx, kit, list(things))
@@ -207,9 +207,9 @@ def _tall_block(ctx: Context, kit: KitchenSet, done: Sequence[Thing]) -> tuple[T
             return -min(_gap(wall.point(s), t) for t in done) + 1.5 * at_corner(wall, s, width)
 
         poses = wall_poses(ctx.space, width, score=near, gap=0.005, step=0.1)
-        found = ctx.put(items, [p for p in poses if not _darkens(p, width)], "kitchen", tries=40)
-        if found:
-            return found
+        things = ctx.put(items, [p for p in poses if not _darkens(p, width)], "kitchen", tries=40)
+        if things:
+            return things
     return ()
 
 
@@ -218,7 +218,7 @@ def _has_worktop(done: Sequence[Thing]) -> bool:
 
 
 def _darkens(pose: ScoredPose, width: float) -> bool:
-    """Whether something tall and `width` wide would stand before a window there."""
+    """True if something tall and `width` wide would stand before a window there."""
     wall = pose.wall
     if wall is None:
         return False
@@ -280,16 +280,16 @@ def _run(
             s = (b - fridge.size[0] / 2 - 0.005) if at_end else (a + fridge.size[0] / 2 + 0.005)
             looks, clear = ctx.looks(fridge), free - 0.05
             items.append((s, Item(fridge, 0.0, -fridge.size[1] / 2, params=looks, clear=clear, role="fridge")))
-        found = _put_line(ctx, wall, items)
-        if found:
-            return found
+        things = _put_line(ctx, wall, items)
+        if things:
+            return things
     return ()
 
 
 def _fridge_ends(
     ctx: Context, windows: list[tuple[float, float]], a: float, b: float, fridge: Asset | None
 ) -> list[bool]:
-    """Whether the fridge goes to the end `b` of a run, in the order to try: to no end where it hides a window."""
+    """True if the fridge goes to the end `b` of a run, in the order to try: to no end where it hides a window."""
     if fridge is None:
         return [False, True]
     span = fridge.size[0]
@@ -401,12 +401,12 @@ def _upper_items(ctx: Context, line: UnitLine, slot: UnitSlot) -> list[tuple[flo
         blocks = [(pair[0], s, n * width)]
     else:
         blocks = [(single[int(ctx.rng.integers(len(single)))], s + (k - (n - 1) / 2) * width, width) for k in range(n)]
-    found = []
+    cabinets = []
     for asset, at, w in blocks:
         size = (w, asset.size[1], min(asset.size[2], ctx.space.height - UPPER - 0.02))
         item = Item(asset, 0.0, -asset.size[1] / 2, z=UPPER, size=size, optional=True, role="wall cabinet")
-        found.append((at, item))
-    return found
+        cabinets.append((at, item))
+    return cabinets
 
 
 def _more_runs(ctx: Context, kit: KitchenSet, done: list[Thing]) -> None:
@@ -449,8 +449,8 @@ def _add_run(
         width = min((b - a) / n, kit.unit) - 0.002
         at = a + 0.004 if starts_at_a else b - 0.004 - n * width
         slots = [UnitSlot("base", 1, at + (k + 0.5) * width) for k in range(n)]
-        found = _put_line(ctx, wall, _run_items(ctx, UnitLine(kit, wall, width, 0.55), slots))
-        if found:
-            done.extend(found)
+        things = _put_line(ctx, wall, _run_items(ctx, UnitLine(kit, wall, width, 0.55), slots))
+        if things:
+            done.extend(things)
             return n * width
     return 0.0

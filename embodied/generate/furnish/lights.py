@@ -1,4 +1,4 @@
-"""What shines: a light for every lamp that found its place."""
+"""Lights: one for every lamp that found its place."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WARM, NEUTRAL = (1.0, 0.72, 0.44), (1.0, 0.9, 0.78)
 
 def lights(placements: Sequence[Placement], style: Style, *, rng: np.random.Generator) -> tuple[Light, ...]:
     """One light per lamp, at its bulb; some table lamps are off."""
-    found: list[Light] = []
+    shining: list[Light] = []
     share = 0.35 * (1 - style.warmth)
     red, green, blue = (round((1 - share) * w + share * n, 3) for w, n in zip(WARM, NEUTRAL))
     for p in placements:
@@ -45,9 +45,9 @@ def lights(placements: Sequence[Placement], style: Style, *, rng: np.random.Gene
         cool = p.object_class == "fluorescent lamp"
         on = True if p.object_class in ALWAYS else bool(rng.random() < 0.7)
         scale = min(max(p.size[0] / 0.5, 0.6), 1.6) if hanging else 1.0
-        found.append(
+        shining.append(
             Light(
-                id=f"light_{len(found) + 1}",
+                id=f"light_{len(shining) + 1}",
                 room=p.room,
                 placement=p.id,
                 position=rounded((x, y, bulb)),
@@ -56,4 +56,4 @@ def lights(placements: Sequence[Placement], style: Style, *, rng: np.random.Gene
                 on=on,
             )
         )
-    return tuple(found)
+    return tuple(shining)

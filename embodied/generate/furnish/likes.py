@@ -1,4 +1,4 @@
-"""What makes a place good for a group: the words of Group.likes, each a number for a pose."""
+"""Scores of places for a group: the words of Group.likes, each a number for a pose."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def free_stretch(wall: Wall, s: float, windows: bool = False) -> tuple[float, fl
 
 
 def has_window(wall: Wall) -> bool:
-    """Whether light falls in through it."""
+    """True if light falls in through it."""
     return any(o.kind in WINDOWS for _, _, o in wall.openings)
 
 

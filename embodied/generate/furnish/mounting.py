@@ -12,11 +12,11 @@ from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.space import Thing, Wall, box, overlap
 
 DEEP, THIN = 0.12, 0.07
-"""What comes farther out of the wall must leave room to walk past: as furniture must, and a narrow way, metres."""
+"""Things that come farther out of the wall must leave room to walk past: as furniture must, and narrowly, metres."""
 Spot = tuple[Wall, float]
 """A wall and a position along it, metres."""
 Shares = Callable[[], Iterable[float]]
-"""Where along a wall or a stretch of it to try, from 0 to 1."""
+"""Positions to try along a wall or a stretch of it, from 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Hanging:
     margin: float = 0.0
     """Free strip that it wants around it, metres."""
     passage: bool = False
-    """Whether it may hang before openings."""
+    """True if it may hang before openings."""
     away: float = 0.0
     """Gap to the wall, metres."""
 

@@ -1,4 +1,4 @@
-"""What a user's own classes add to a room: no group asks for them, so each is placed by its weight for the room."""
+"""Things of a user's own classes: no group asks for them, so each is placed by its weight for the room."""
 
 from __future__ import annotations
 

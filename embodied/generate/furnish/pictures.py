@@ -129,7 +129,7 @@ def _art(ctx: Context) -> Asset | None:
 
 
 def _image(key: str) -> str:
-    """What a picture shows: the poster and the framed print of one image are alike."""
+    """The image that a picture shows: the poster and the framed print of one image are alike."""
     return key.rsplit("/", 1)[-1].removeprefix("paper_")
 
 
@@ -149,7 +149,7 @@ def mirrors(ctx: Context) -> None:
 
 
 def _mirror_size(mirror: Asset, width: float, height: float) -> Size:
-    """What a mirror is asked to be; those from packs keep their own size."""
+    """Parameters that a mirror is made with; those from packs keep their own size."""
     if mirror.key.startswith("built/"):
         side = min(width, height, 0.8)
         return (side, mirror.size[1], side) if "round" in mirror.tags else (width, mirror.size[1], height)

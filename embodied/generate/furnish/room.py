@@ -17,9 +17,9 @@ def furnish_room(ctx: Context) -> None:
     fulfilled: dict[str, bool] = {}
     for rule in (*spec.rules, *spec.extras):
         if not (rule.unless and fulfilled.get(rule.unless, False)):
-            found = apply_rule(rule, ctx)
+            has_place = apply_rule(rule, ctx)
             if rule.name:
-                fulfilled[rule.name] = found
+                fulfilled[rule.name] = has_place
     for _ in range(RETRIES.fillers if spec.fillers else 0):
         if coverage(ctx) >= spec.fill:
             return
@@ -28,15 +28,15 @@ def furnish_room(ctx: Context) -> None:
 
 def apply_rule(rule: PlacementRule, ctx: Context) -> bool:
     """Try a rule, as often as it says; whether something found its place the last time."""
-    found = False
+    has_place = False
     for role in rule.roles or ("",):
         if not _is_tried(rule, ctx):
             continue
         low, high = rule.times
         times = low if low == high else int(ctx.rng.integers(low, high + 1))
         for _ in range(times + (int(ctx.space.area / rule.per_area) if rule.per_area else 0)):
-            found = _once(dataclasses.replace(rule, role=role) if role else rule, ctx)
-    return found
+            has_place = _once(dataclasses.replace(rule, role=role) if role else rule, ctx)
+    return has_place
 
 
 def _is_tried(rule: RuleCondition, ctx: Context) -> bool:

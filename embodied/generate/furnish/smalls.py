@@ -102,7 +102,7 @@ class CarrierSurface:
 
 @dataclass
 class SurfaceOccupancy:
-    """What already lies on the surfaces of one room."""
+    """Things that already lie on the surfaces of one room."""
 
     ctx: Context
     taken: dict[tuple[int, str], list[tuple[float, float, float, float]]] = field(default_factory=dict)
@@ -204,7 +204,7 @@ class SurfaceOccupancy:
         return self.ctx.add(thing, own)
 
     def allows(self, asset: Asset, most: int = 2) -> bool:
-        """Whether the room may hold one more of its class, of which `most` are few."""
+        """True if the room may hold one more of its class, of which `most` are few."""
         return self.alike[asset.object_class] < max(self.ctx.tables.at_most.get(asset.object_class, 2), most)
 
 
@@ -220,7 +220,7 @@ def _reach(size: tuple[float, float, float], yaw: float) -> tuple[float, float]:
 
 
 def _in_frame(carrier: Thing, thing: Thing) -> tuple[float, float]:
-    """Where a thing is in the frame of another, metres."""
+    """Position of a thing in the frame of another, metres."""
     dx, dy = thing.x - carrier.x, thing.y - carrier.y
     c, s = math.cos(carrier.yaw), math.sin(carrier.yaw)
     return c * dx + s * dy, -s * dx + c * dy
@@ -242,7 +242,7 @@ def clutter(ctx: Context) -> None:
 
 
 def _hollow(asset: Asset) -> bool:
-    """Whether its one surface is the opening of a bowl rather than a rim."""
+    """True if its one surface is the opening of a bowl rather than a rim."""
     return (
         asset.object_class in BOWLS
         and max((s.x1 - s.x0) * (s.y1 - s.y0) for s in asset.surfaces) > 0.5 * asset.size[0] * asset.size[1]
@@ -430,10 +430,10 @@ def _leave(occupancy: SurfaceOccupancy, small: SmallObject, carriers: list[Thing
     if small.wall is not None:
         z = min(small.wall, ctx.space.height - 0.1) - asset.size[2]
         hanging = Hanging(asset, z, "left", asset.object_class, margin=0.012)
-        found = hang_first(ctx, hanging, _wall_spots(ctx, small, asset)) is not None
+        is_placed = hang_first(ctx, hanging, _wall_spots(ctx, small, asset)) is not None
     else:
-        found = _put_down(ctx, small, asset)
-    occupancy.alike[asset.object_class] += found
+        is_placed = _put_down(ctx, small, asset)
+    occupancy.alike[asset.object_class] += is_placed
 
 
 def _lay_on(occupancy: SurfaceOccupancy, small: SmallObject, asset: Asset, carriers: list[Thing]) -> None:
@@ -446,8 +446,8 @@ def _lay_on(occupancy: SurfaceOccupancy, small: SmallObject, asset: Asset, carri
     for carrier in carriers[:3]:
         boards = [main_board(carrier)]
         if carrier.asset.object_class in (*SHELVES, "shoe rack"):
-            found = [CarrierSurface(carrier, s) for s in carrier.asset.surfaces]
-            boards = [found[int(k)] for k in rng.permutation(len(found))[:4]]
+            surfaces = [CarrierSurface(carrier, s) for s in carrier.asset.surfaces]
+            boards = [surfaces[int(k)] for k in rng.permutation(len(surfaces))[:4]]
         for board in boards:
             if occupancy.put(asset, board, small.spot, small.turn, _fitting(asset, board)) is not None:
                 return

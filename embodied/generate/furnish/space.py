@@ -25,7 +25,7 @@ Params = tuple[tuple[str, str | float], ...]
 CELL = 0.05
 """Side of a cell of the walking plan, metres."""
 NARROW = 0.4
-"""What one still gets through sideways, metres."""
+"""Narrowest gap that one still gets through sideways, metres."""
 TOUCH = 1e-3
 """Boxes that overlap by less than this only touch, metres."""
 
@@ -47,7 +47,7 @@ class Box:
     """Half sizes of the axis-aligned rectangle around it, metres."""
     reach_y: float
     square: bool
-    """Whether its sides run along the world's axes."""
+    """True if its sides run along the world's axes."""
 
     def corners(self, grow: float = 0.0) -> np.ndarray:
         """(4, 2) corners counter-clockwise, metres; `grow` widens it on all sides."""
@@ -67,7 +67,7 @@ def box(x: float, y: float, width: float, depth: float, yaw: float, bottom: floa
 
 
 def overlap(p: Box, q: Box, gap: float = -TOUCH) -> bool:
-    """Whether two boxes come closer than `gap` (separating axes); a negative gap forgives touching, upwards, too."""
+    """True if two boxes come closer than `gap` (separating axes); a negative gap forgives touching, upwards, too."""
     touch = max(TOUCH, -gap)
     if p.bottom >= q.top - touch or q.bottom >= p.top - touch:
         return False
@@ -88,7 +88,7 @@ def overlap(p: Box, q: Box, gap: float = -TOUCH) -> bool:
 
 
 def same_box(p: Box, q: Box) -> bool:
-    """Whether two boxes are the box of one thing."""
+    """True if two boxes are the box of one thing."""
     return abs(p.x - q.x) < 1e-9 and abs(p.y - q.y) < 1e-9 and p.bottom == q.bottom and p.top == q.top
 
 
@@ -105,11 +105,11 @@ class Wall:
     inward: tuple[float, float]
     length: float
     outer: bool
-    """Whether the outdoors is on its other side (it has a window or front door)."""
+    """True if the outdoors is on its other side (it has a window or front door)."""
     openings: tuple[tuple[float, float, Opening], ...]
     """(from, to, opening) along the wall."""
     corners: tuple[bool, bool]
-    """Whether the room turns inwards (an ordinary corner) at its start and at its end."""
+    """True if the room turns inwards (an ordinary corner) at its start and at its end."""
 
     @property
     def yaw(self) -> float:
@@ -174,9 +174,9 @@ class RoomSpace:
     walls: tuple[Wall, ...]
     openings: tuple[Opening, ...]
     entries: tuple[tuple[float, float], ...]
-    """Where one stands after each door, metres."""
+    """Spots where one stands after each door, metres."""
     keepouts: tuple[Box, ...]
-    """Where nothing may stand: door swings, approaches, the light of windows, stairs."""
+    """Areas in which nothing may stand: door swings, approaches, the light of windows, stairs."""
     radius: float
     """Of the walker, metres."""
     walk: np.ndarray
@@ -207,7 +207,7 @@ class RoomSpace:
         return sorted(self.walls, key=lambda w: -w.length)
 
     def inside(self, b: Box) -> bool:
-        """Whether the box stays between the walls, a millimetre forgiven."""
+        """True if the box stays between the walls, a millimetre forgiven."""
         if self.rectangle is not None:
             x0, y0, x1, y1 = self.rectangle
             return x0 <= b.x - b.reach_x and b.x + b.reach_x <= x1 and y0 <= b.y - b.reach_y and b.y + b.reach_y <= y1
@@ -216,7 +216,7 @@ class RoomSpace:
         )
 
     def fits(self, b: Box, *, ignore: Sequence[Box] = (), passage: bool = False, aside: bool = False) -> bool:
-        """Whether a solid may be put at `b`.
+        """True if a solid may be put at `b`.
 
         Args:
           ignore: solids it may overlap (the table a chair is pushed under).
@@ -235,7 +235,7 @@ class RoomSpace:
         return passage or aside or not any(overlap(b, c) for c in self.clearances)
 
     def is_clear(self, b: Box) -> bool:
-        """Whether no solid reaches into the clearance `b`."""
+        """True if no solid reaches into the clearance `b`."""
         return not any(overlap(b, other) for other in self.solids)
 
     def walkable(self, added: Iterable[Box], reach: Iterable[tuple[float, float]]) -> np.ndarray | None:
@@ -264,7 +264,7 @@ class RoomSpace:
         return plan
 
     def leaves_a_way_past(self, b: Box) -> bool:
-        """Whether someone `NARROW` wide still gets from every door to every other past the box `b`.
+        """True if someone `NARROW` wide still gets from every door to every other past the box `b`.
 
         What is hung last is asked this instead of `walkable`: cloth gives way where one would not put a chest.
         """
@@ -410,7 +410,7 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
     walls = []
     for i in range(n):
         along, inward = units[i], np.array([-units[i][1], units[i][0]])
-        found = []
+        holes = []
         for o in openings:
             a, b = np.asarray(o.a) - ring[i], np.asarray(o.b) - ring[i]
             if abs(a @ inward + thickness / 2) > 0.02 or abs(b @ inward + thickness / 2) > 0.02:
@@ -418,9 +418,9 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
             s0, s1 = sorted((float(a @ along), float(b @ along)))
             if s1 < 0 or s0 > lengths[i]:
                 continue
-            found.append((s0, s1, o))
-        found.sort(key=lambda f: (f[0], f[2].id))
-        outer = any(None in o.rooms for _, _, o in found)
+            holes.append((s0, s1, o))
+        holes.sort(key=lambda f: (f[0], f[2].id))
+        outer = any(None in o.rooms for _, _, o in holes)
         walls.append(
             Wall(
                 index=i,
@@ -429,7 +429,7 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
                 inward=(float(inward[0]), float(inward[1])),
                 length=float(lengths[i]),
                 outer=outer,
-                openings=tuple(found),
+                openings=tuple(holes),
                 corners=(lefts[i], lefts[(i + 1) % n]),
             )
         )
@@ -452,11 +452,11 @@ def _opening_keepouts(wall: Wall, s0: float, s1: float, o: Opening, room: Room, 
     depth = usual.get(o.kind, 0.6 if area > 3.0 else 0.4)
     if swings_here:
         depth = max(depth, width + 0.05)
-    found = [before(s0 - 0.1, s1 + 0.1, depth, 0.0, o.head + 0.08)]
+    boxes = [before(s0 - 0.1, s1 + 0.1, depth, 0.0, o.head + 0.08)]
     if swings_here and o.angle > 0.6 * math.pi:  # folded back against the wall beside the door
         leaf = _leaf(wall, s0, s1, o)
-        found.append(box(leaf.x, leaf.y, width, 0.12, leaf.yaw, z, z + o.head))
-    return found
+        boxes.append(box(leaf.x, leaf.y, width, 0.12, leaf.yaw, z, z + o.head))
+    return boxes
 
 
 def _leaf(wall: Wall, s0: float, s1: float, o: Opening) -> Box:

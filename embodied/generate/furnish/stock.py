@@ -1,4 +1,4 @@
-"""What there is to choose from: assets by the role they play in a group, weighted by style."""
+"""Assets to choose from, by the role they play in a group, weighted by style."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CHILDISH = ("high chair", "stroller", "kick scooter", "tricycle", "bicycle")
 
 
 class AssetLimits(TypedDict, total=False):
-    """What may be asked of an asset besides its role."""
+    """Limits on an asset besides its role."""
 
     most: Size
     least: Size
@@ -47,8 +47,8 @@ class Stock:
     def of_role(self, role: str) -> tuple[Asset, ...]:
         """All assets that can play `role`."""
         if role not in self._by_role:
-            found = {a.key: a for name in self.tables.classes(role) for a in self.catalogue.of_class(name)}
-            self._by_role[role] = tuple(found.values())
+            assets = {a.key: a for name in self.tables.classes(role) for a in self.catalogue.of_class(name)}
+            self._by_role[role] = tuple(assets.values())
         return self._by_role[role]
 
     def pick(

@@ -49,9 +49,9 @@ class PartModel:
     """The thing itself. Tuples of numbers have a value for each round, the last one for all that follow."""
 
     role: str
-    """What it is: a role, or a class of object; empty where the rule says it."""
+    """A role, or a class of object; empty where the rule says it."""
     name: str = ""
-    """What rules and small things call it, besides its class; its class if empty. Other parts call it so or, if it
+    """Its name for rules and small things, besides its class; its class if empty. Other parts call it so or, if it
     is empty, by its role."""
     other: tuple[str, ...] = ()
     """Roles to choose from where the catalogue has none of `role` that fits."""
@@ -96,7 +96,7 @@ class PartPose:
     """Its place in the group, and its turn."""
 
     at: str = "wall"
-    """Where it goes: the first part to the "wall"; others "on", "under", "before", "beside" or "over" (above it, at
+    """Its place: the first part to the "wall"; others "on", "under", "before", "beside" or "over" (above it, at
     the wall) the part `of`, "about" on its area, "facing" it from across the room, on "seats" around it, or in a
     "row" before it."""
     of: str = ""
@@ -183,12 +183,12 @@ class Group:
     parts: tuple[Part, ...]
     """The first one is at its heart."""
     name: str = ""
-    """What placements call it; its key in the table if empty."""
+    """Its name in placements; its key in the table if empty."""
     place: str = "wall"
     """Its back to the "wall"; anywhere on the "floor"; "open": in the middle if it is large, else at a wall; in the
     "middle"; inside the front "door"; "ahead" of the things `near`, facing the way they do."""
     likes: Mapping[str, float] = field(default_factory=dict)
-    """What makes a place good, with weights: "corner", "centre" of a free stretch of wall, before a "window", in its
+    """Reasons for a place, with weights: "corner", "centre" of a free stretch of wall, before a "window", in its
     "shade" (something tall before a window), a "window_wall", a wall with a "door", "near" the things `near`,
     "near_window", "near_door", "far_from_door", a "neighbour" of the same name, the part that faces it "across" the
     room at the opposite wall, much "room_before" it, "facing_door" (a door opposite), the "middle" of the room, along
@@ -256,7 +256,7 @@ class PlacementRule(RuleCondition):
 
     group: str = ""
     role: str = ""
-    """What the first part is."""
+    """Role of the first part."""
     roles: tuple[str, ...] = ()
     """Roles for each of which the rule is made."""
     clear: float | None = None
@@ -264,7 +264,7 @@ class PlacementRule(RuleCondition):
     most: Size | None = None
     allow_duplicate: bool = False
     near: tuple[str, ...] = ()
-    """What the group is near."""
+    """Names or classes that the group is near."""
     first: tuple[PlacementRule, ...] = ()
     """Rules of which the first that finds a place is fulfilled."""
     all: tuple[PlacementRule, ...] = ()
@@ -290,7 +290,7 @@ class PlacementRule(RuleCondition):
 
 @dataclass(frozen=True)
 class Need:
-    """What a room should not lack."""
+    """A thing that a room should not lack."""
 
     roles: tuple[str, ...]
     """Things of any of these names meet it."""
@@ -304,15 +304,15 @@ class RoomSpec:
     """How one kind of room is furnished."""
 
     rules: tuple[PlacementRule, ...] = ()
-    """What makes the room what it is, in the order in which it claims its place; those of a user's own file follow."""
+    """Furniture that makes the room, in the order in which it claims its place; those of a user's own file follow."""
     extras: tuple[PlacementRule, ...] = ()
-    """What it gets after that."""
+    """Furniture that it gets after that."""
     needs: tuple[Need, ...] = ()
     """Most important first: a room is tried again, in its house, while it lacks one."""
     fill: float = 0.0
     """Share of the floor that furniture should stand on."""
     fillers: tuple[PlacementRule, ...] = ()
-    """What is drawn from, evenly, until `fill` is reached."""
+    """Rules of which one is drawn, evenly, until `fill` is reached."""
 
 
 @dataclass(frozen=True)
@@ -320,19 +320,19 @@ class SmallObject:
     """One kind of small thing, and where the people of a house put it or leave it."""
 
     put: str
-    """What it is: a role, or a class of object."""
+    """A role, or a class of object."""
     on: tuple[str, ...] = ()
     """Names or classes of what carries it; on none it lies on the floor."""
     count: float = 1.0
     """How many, in the mean."""
     per: str = "room"
-    """What `count` is of: "room", "carrier", "person" who uses the room, "adult", "child", "young" (under seven)."""
+    """Unit of `count`: "room", "carrier", "person" who uses the room, "adult", "child", "young" (under seven)."""
     mess: bool = False
     """Left where it was used: more of it in untidy houses, none in the tidiest."""
     habit: str = ""
     """Only who has this habit has it (embodied.generate.household)."""
     spot: str = "any"
-    """Where on its carrier: "any", "back", "front", "side" or "centre"."""
+    """Place on its carrier: "any", "back", "front", "side" or "centre"."""
     turn: float = 0.4
     """It is turned by up to so much either way, radians; 3 or more for any way."""
     near: tuple[str, ...] = ()
@@ -369,9 +369,9 @@ class Tables:
     at_most: Mapping[str, int] = field(default_factory=dict)
     """Object class to how many of it one room may hold on its surfaces; 2 for the others."""
     grown_up: tuple[str, ...] = ()
-    """What children's rooms lack."""
+    """Classes that children's rooms lack."""
     hung: tuple[SmallObject, ...] = ()
-    """What hangs on walls before pictures do."""
+    """Things that hang on walls before pictures do."""
     centrepieces: tuple[str, ...] = ()
     """Roles of what stands in the middle of dining tables."""
 
@@ -401,13 +401,13 @@ def tables(own: tuple[Path, ...] = ()) -> Tables:
         try:
             plain = _joined(plain, added)
             plain = {section: _alike(section, entries) for section, entries in plain.items()}
-            found = from_plain(Tables, plain, "furniture") if path.name == FILES[-1] or path in own else None
-            if found is not None:
-                _check(found)
+            furniture = from_plain(Tables, plain, "furniture") if path.name == FILES[-1] or path in own else None
+            if furniture is not None:
+                _check(furniture)
         except (ValueError, OSError) as e:  # what TOML and the decoder find wrong are ValueErrors
             raise RecordError(f"{path}: {e}") from e
-    assert found is not None  # FILES is not empty
-    return found
+    assert furniture is not None  # FILES is not empty
+    return furniture
 
 
 def tables_of(catalogue: Catalogue) -> Tables:
@@ -416,15 +416,15 @@ def tables_of(catalogue: Catalogue) -> Tables:
     Raises:
       RecordError: a user's own file is none, or asks for what the catalogue does not have.
     """
-    found = tables(catalogue.groups)
+    furniture = tables(catalogue.groups)
     for path in catalogue.groups:
-        known, plain = {*found.roles, *catalogue.classes}, read_toml(path)
+        known, plain = {*furniture.roles, *catalogue.classes}, read_toml(path)
         for name in plain.get("groups", {}):
-            for role in (r for p in found.groups[name].parts for r in (p.role, *p.other) if r):
+            for role in (r for p in furniture.groups[name].parts for r in (p.role, *p.other) if r):
                 if role not in known:
                     near = difflib.get_close_matches(role, sorted(known), 3) or "a role of [roles] or a class"
                     raise RecordError(f"{path}: groups.{name} asks for {role!r}, which is not there; use {near}")
-    return found
+    return furniture
 
 
 def _joined(plain: dict[str, Any], added: dict[str, Any], depth: int = 0) -> dict[str, Any]:
@@ -442,20 +442,20 @@ def _joined(plain: dict[str, Any], added: dict[str, Any], depth: int = 0) -> dic
     return whole
 
 
-def _check(found: Tables) -> None:
-    known = tuple(sorted({*found.groups, *found.choices, *BUILT}))
-    if twice := sorted({*found.groups} & {*found.choices}):
+def _check(furniture: Tables) -> None:
+    known = tuple(sorted({*furniture.groups, *furniture.choices, *BUILT}))
+    if twice := sorted({*furniture.groups} & {*furniture.choices}):
         raise RecordError(f"{twice} are both groups and choices; give them names of their own")
-    rules = {f"rooms.{kind}": (*p.rules, *p.extras, *p.fillers) for kind, p in found.rooms.items()}
-    rules |= {f"choices.{name}": (rule,) for name, rule in found.choices.items()}
+    rules = {f"rooms.{kind}": (*p.rules, *p.extras, *p.fillers) for kind, p in furniture.rooms.items()}
+    rules |= {f"choices.{name}": (rule,) for name, rule in furniture.choices.items()}
     for place, some in rules.items():
         for name in (name for rule in some for name in groups_of(rule)):
             _one_of(f"the group of a rule of {place}", name, known)
-    for name in found.choices:
-        _refuse_circle(found, name, ())
-    for kind, names in found.lies_in.items():
+    for name in furniture.choices:
+        _refuse_circle(furniture, name, ())
+    for kind, names in furniture.lies_in.items():
         for name in names:
-            _one_of(f"a list in lies_in.{kind}", name, tuple(found.smalls))
+            _one_of(f"a list in lies_in.{kind}", name, tuple(furniture.smalls))
 
 
 def groups_of(rule: PlacementRule) -> Iterator[str]:
@@ -466,11 +466,11 @@ def groups_of(rule: PlacementRule) -> Iterator[str]:
         yield from groups_of(other)
 
 
-def _refuse_circle(found: Tables, name: str, above: tuple[str, ...]) -> None:
+def _refuse_circle(furniture: Tables, name: str, above: tuple[str, ...]) -> None:
     if name in above:
         raise RecordError(f"the choice {name!r} leads back to itself")
-    for other in groups_of(found.choices[name]) if name in found.choices else ():
-        _refuse_circle(found, other, (*above, name))
+    for other in groups_of(furniture.choices[name]) if name in furniture.choices else ():
+        _refuse_circle(furniture, other, (*above, name))
 
 
 def _alike(section: str, entries: Any) -> Any:
