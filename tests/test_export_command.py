@@ -16,7 +16,11 @@ from embodied import cli
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.features import feature_path, save_features
+from embodied.cli import export, exports
+from embodied.cli.common import Printed
+from embodied.cli.exports import Export, register_export, registered_exports
 from embodied.datasets.folders import names_of
+from embodied.options import OutputFolder
 from embodied.render.pictures import Unlit
 from embodied.world import open_world
 
@@ -97,3 +101,20 @@ def test_drives_are_written_in_every_house_of_a_split(data, tmp_path, monkeypatc
     assert cli.main([*order, "--drives", "2"]) == 0
     episodes = pq.read_table(tmp_path / "out/meta/episodes/chunk-000/file-000.parquet").to_pydict()
     assert episodes["embodied/house"] == ["left", "right"]
+
+
+def test_an_export_is_known_by_its_registered_record_alone(tmp_path, monkeypatch, capsys):
+    @dataclasses.dataclass(frozen=True, kw_only=True)
+    class Options(Printed):
+        """A greeting."""
+
+        out: OutputFolder
+        """Folder to greet."""
+
+    register_export(Export("greeting", Options, lambda args: print("hello", args.out)))
+    monkeypatch.setattr(export, "COMMANDS", {name: (e.options, e.run) for name, e in registered_exports().items()})
+    try:
+        assert cli.main(["export", "greeting", "--out", str(tmp_path)]) == 0
+        assert capsys.readouterr().out == f"hello {tmp_path}\n"
+    finally:
+        exports._REGISTERED.pop("greeting")

@@ -1,75 +1,167 @@
-"""Writing a house as binary glTF, for Blender and the web."""
+"""A house as binary glTF, for Blender and the web: its materials, or its baked light, which any viewer shows as it is.
+
+Every node is named after its owner (a placement id, or '<room>/floor' and the like) and says in its extras what it is:
+`class`, `kind`, `room`, `room_kind`. What a texel of a lit page says is what a pixel shows, so their materials carry
+KHR_materials_unlit (Khronos, ratified 2018); viewers without it see the page as the base colour of a rough material.
+"""
 
 from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import PIL.Image
 import trimesh
+from trimesh.visual.material import PBRMaterial
 
 from embodied.assets.cache import write_bytes
 from embodied.assets.records import Finish
 from embodied.house.house import House
 from embodied.scene.house_meshes import Part, house_parts
+from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.model import load_texture
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
 
+UNLIT = "KHR_materials_unlit"
+PAGE_QUALITY = 92
+"""JPEG quality of lit pages."""
+ROOF, SKY = "outdoor/roof", "outdoor/sky"
+VERTICES, INDICES = 34962, 34963
+"""What a buffer view holds, in OpenGL's numbers."""
+UPRIGHT = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
+"""z up to y up, as the format asks."""
 
-def export_glb(house: House, catalogue: Catalogue, path: Path, *, ceilings: bool = True) -> Path:
-    """Write the house as one binary glTF file with its textures; y is up there, as the format asks.
 
-    Every node is named after its owner: a placement id, or '<room>/floor' and the like.
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """One node of the file."""
+
+    about: Part | LitMesh
+    geometry: str
+    """Pieces of equal names share their geometry."""
+    pose: np.ndarray
+    """(4, 4), z up."""
+    mesh: Callable[[], trimesh.Trimesh]
+
+
+def export_glb(
+    house: House,
+    catalogue: Catalogue,
+    path: Path,
+    *,
+    lit: LitPages | None = None,
+    ceilings: bool = True,
+    sky: bool = False,
+) -> Path:
+    """Write the house as one binary glTF file with its textures.
 
     Args:
+      lit: write the house with its baked light instead of its materials.
       ceilings: False leaves ceilings and roof out, for a look from above.
+      sky: True keeps the dome of far scenery that is lit, for a look from inside; viewers frame all there is, and it is
+        140 m wide.
     """
-    parts = house_parts(house, catalogue)
-    if not ceilings:
-        parts = tuple(p for p in parts if p.kind != "ceiling" and p.owner != "outdoor/roof")
-    scene = glb_scene(parts)
-    write_bytes(Path(path), scene.export(file_type="glb"))
+    scene, extras, count = trimesh.Scene(), {}, Counter[str]()
+    for piece in _unlit_pieces(house_parts(house, catalogue)) if lit is None else _lit_pieces(lit):
+        owner, kind = piece.about.owner, piece.about.kind
+        if (not ceilings and (kind == "ceiling" or owner == ROOF)) or (not sky and owner == SKY):
+            continue
+        node = f"{owner}#{count[owner]}" if count[owner] else owner
+        count[owner] += 1
+        extras[node], pose = about(house, piece.about), UPRIGHT @ piece.pose
+        if piece.geometry in scene.geometry:
+            scene.graph.update(frame_to=node, matrix=pose, geometry=piece.geometry)
+        else:
+            scene.add_geometry(piece.mesh(), node_name=node, geom_name=piece.geometry, transform=pose)
+
+    def finish(tree: dict) -> None:
+        if lit is not None:
+            for material in tree["materials"]:
+                material["extensions"] = {UNLIT: {}}
+            tree["extensionsUsed"] = [UNLIT]
+        _say_what_buffers_hold(tree)
+        tree["asset"]["extras"] = {"house": house.name, "house_digest": house.digest}
+        tree["asset"]["extras"] |= {"light": lit.digest} if lit is not None else {}
+        for node in tree["nodes"]:
+            if node.get("name") in extras:
+                node["extras"] = extras[node["name"]]
+
+    data = trimesh.exchange.gltf.export_glb(scene, include_normals=lit is None, tree_postprocessor=finish)
+    write_bytes(Path(path), data)
     return Path(path)
 
 
-def glb_scene(parts: Sequence[Part]) -> trimesh.Scene:
-    """The parts as a trimesh scene, y up; equal mesh keys share one geometry."""
-    scene = trimesh.Scene()
-    upright = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
-    materials: dict[Finish, trimesh.visual.material.PBRMaterial] = {}
-    count: dict[str, int] = {}
-    for part in parts:
-        if not len(part.mesh.faces):
-            continue
-        pose = trimesh.transformations.rotation_matrix(part.yaw, [0, 0, 1])
-        pose[:3, 3] = part.position
-        k = count[part.owner] = count.get(part.owner, -1) + 1
-        node = part.owner if k == 0 else f"{part.owner}#{k}"
-        if part.mesh_key in scene.geometry:
-            scene.graph.update(frame_to=node, matrix=upright @ pose, geometry=part.mesh_key)
-            continue
-        finish = part.mesh.finish
-        if finish not in materials:
-            materials[finish] = pbr_material(finish)
-        visual = trimesh.visual.TextureVisuals(uv=part.mesh.uv, material=materials[finish])
+def about(house: House, mesh: Part | LitMesh) -> dict[str, str]:
+    """What a mesh is: its class (for the house itself, its kind), its kind, its room and the room's kind."""
+    placed = {p.id: p.object_class for p in house.placements}
+    room = house.room_by_id.get(mesh.room)
+    facts = {
+        "class": placed.get(mesh.owner, mesh.kind),
+        "kind": mesh.kind,
+        "room": mesh.room,
+        "room_kind": room.kind if room else "",
+    }
+    return {name: value for name, value in facts.items() if value}
+
+
+def _say_what_buffers_hold(tree: dict) -> None:
+    """Mark buffer views as vertices or indices, which the format recommends and trimesh leaves out."""
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            for accessor, target in (
+                (primitive["indices"], INDICES),
+                *((a, VERTICES) for a in primitive["attributes"].values()),
+            ):
+                tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
+
+
+def _unlit_pieces(parts: tuple[Part, ...]) -> Iterator[_Piece]:
+    materials: dict[Finish, PBRMaterial] = {}
+
+    def made(part: Part) -> trimesh.Trimesh:
         m = part.mesh
-        mesh = trimesh.Trimesh(m.vertices, m.faces, vertex_normals=m.normals, visual=visual, process=False)
-        scene.add_geometry(mesh, node_name=node, geom_name=part.mesh_key, transform=upright @ pose)
-    return scene
+        if m.finish not in materials:
+            materials[m.finish] = pbr_material(m.finish)
+        visual = trimesh.visual.TextureVisuals(uv=m.uv, material=materials[m.finish])
+        return trimesh.Trimesh(m.vertices, m.faces, vertex_normals=m.normals, visual=visual, process=False)
+
+    for part in parts:
+        if len(part.mesh.faces):
+            pose = trimesh.transformations.rotation_matrix(part.yaw, [0, 0, 1])
+            pose[:3, 3] = part.position
+            yield _Piece(part, part.mesh_key, pose, lambda part=part: made(part))
 
 
-def pbr_material(finish: Finish) -> trimesh.visual.material.PBRMaterial:
+def _lit_pieces(lit: LitPages) -> Iterator[_Piece]:
+    materials: dict[tuple[int, float], PBRMaterial] = {}
+
+    def made(mesh: LitMesh) -> trimesh.Trimesh:
+        key = mesh.page, mesh.alpha
+        if key not in materials:
+            materials[key] = _page_material(lit, *key)
+        uv = np.column_stack([mesh.uv[:, 0], 1 - mesh.uv[:, 1]])  # trimesh counts v upwards
+        visual = trimesh.visual.TextureVisuals(uv=uv, material=materials[key])
+        return trimesh.Trimesh(mesh.vertices, mesh.faces, visual=visual, process=False)
+
+    for k, mesh in enumerate(lit.meshes):
+        yield _Piece(mesh, f"mesh_{k}", np.eye(4), lambda mesh=mesh: made(mesh))
+
+
+def pbr_material(finish: Finish) -> PBRMaterial:
     """`finish` in glTF's metallic-roughness model; textures as JPEG unless they have holes."""
-    image = None if finish.texture is None else _picture(finish.texture)
+    image = None if finish.texture is None else PIL.Image.fromarray(load_texture(finish.texture))
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in finish.color[:3]]
     has_holes = image is not None and image.mode == "RGBA"
-    return trimesh.visual.material.PBRMaterial(
-        baseColorTexture=image,
+    return PBRMaterial(
+        baseColorTexture=image and (_encoded(image, "PNG") if has_holes else _encoded(image, "JPEG", quality=90)),
         baseColorFactor=[1.0, 1.0, 1.0, finish.color[3]] if image else [*linear, finish.color[3]],
         roughnessFactor=finish.roughness,
         metallicFactor=finish.metallic,
@@ -79,11 +171,19 @@ def pbr_material(finish: Finish) -> trimesh.visual.material.PBRMaterial:
     )
 
 
-def _picture(path: str) -> PIL.Image.Image:
-    image = PIL.Image.fromarray(load_texture(path))
+def _page_material(lit: LitPages, page: int, alpha: float) -> PBRMaterial:
+    return PBRMaterial(
+        name=f"page_{page}" if alpha == 1 else f"page_{page}_{alpha:g}",
+        baseColorTexture=_encoded(PIL.Image.fromarray(lit.pages[page]), "JPEG", quality=PAGE_QUALITY, subsampling=0),
+        baseColorFactor=[1.0, 1.0, 1.0, alpha],
+        metallicFactor=0.0,
+        roughnessFactor=1.0,
+        alphaMode="OPAQUE" if alpha == 1 else "BLEND",
+    )
+
+
+def _encoded(image: PIL.Image.Image, kind: str, **how: int) -> PIL.Image.Image:
+    """The picture as PNG or JPEG, which the file embeds as it is."""
     buffer = io.BytesIO()
-    if image.mode == "RGBA":
-        image.save(buffer, "PNG")
-    else:
-        image.save(buffer, "JPEG", quality=90)
+    image.save(buffer, kind, **how)
     return PIL.Image.open(buffer)

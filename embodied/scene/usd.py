@@ -2,7 +2,7 @@
 
 Needs OpenUSD (`pip install embodied-houses[usd]`). There is no maintained converter from glTF to USD for Python, so
 the stage is written by OpenUSD's own library. z is up and the unit the metre, as USD allows; custom data of each mesh
-says what it is, as the extras of the glTF do (embodied.scene.web).
+says what it is, as the extras of the glTF do (embodied.scene.glb).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ import PIL.Image
 from embodied.assets.cache import atomic_path
 from embodied.errors import UnableError
 from embodied.house.house import House
+from embodied.scene.glb import PAGE_QUALITY, about
 from embodied.scene.lit_pages import LitMesh, LitPages
-from embodied.scene.web import JPEG_QUALITY, about
 
 
 def check_usd(path: Path) -> None:
@@ -53,7 +53,7 @@ def export_usd(house: House, lit: LitPages, path: Path) -> Path:
         stage.SetDefaultPrim(root.GetPrim())
         root.GetPrim().SetCustomData({"house": house.name, "house_digest": house.digest, "light": lit.digest})
         for k, page in enumerate(lit.pages):
-            PIL.Image.fromarray(page).save(Path(folder) / f"page_{k}.jpg", quality=JPEG_QUALITY, subsampling=0)
+            PIL.Image.fromarray(page).save(Path(folder) / f"page_{k}.jpg", quality=PAGE_QUALITY, subsampling=0)
         materials: dict[tuple[int, float], Any] = {}
         for k, mesh in enumerate(lit.meshes):
             key = (mesh.page, mesh.alpha)

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import trimesh
 from conftest import two_rooms
+from handmade import HandCatalogue
 
 from embodied.errors import UnableError
+from embodied.scene.glb import export_glb
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.scene.usd import export_usd, prim_name
-from embodied.scene.web import export_lit_glb
 
 
 def lit_pages() -> LitPages:
@@ -40,7 +41,7 @@ def tree(path):
 
 def test_pages_are_shown_unlit_and_every_node_says_what_it_is(tmp_path):
     house = two_rooms()
-    made = tree(export_lit_glb(house, lit_pages(), tmp_path / "house.glb"))
+    made = tree(export_glb(house, HandCatalogue(), tmp_path / "house.glb", lit=lit_pages()))
     assert made["extensionsUsed"] == ["KHR_materials_unlit"]
     assert all(m["extensions"] == {"KHR_materials_unlit": {}} for m in made["materials"])
     assert sorted(m.get("alphaMode", "OPAQUE") for m in made["materials"]) == ["BLEND", "OPAQUE", "OPAQUE"]
@@ -53,7 +54,7 @@ def test_pages_are_shown_unlit_and_every_node_says_what_it_is(tmp_path):
 
 
 def test_the_upper_part_of_a_page_stays_the_upper_part_and_z_becomes_y(tmp_path):
-    path = export_lit_glb(two_rooms(), lit_pages(), tmp_path / "house.glb")
+    path = export_glb(two_rooms(), HandCatalogue(), tmp_path / "house.glb", lit=lit_pages())
     scene = trimesh.load_scene(path)
     rug = scene.geometry[scene.graph["rug_1"][1]]
     picture = np.asarray(rug.visual.material.baseColorTexture.convert("RGB"))
@@ -67,7 +68,7 @@ def test_the_upper_part_of_a_page_stays_the_upper_part_and_z_becomes_y(tmp_path)
 
 
 def test_ceilings_can_be_left_out(tmp_path):
-    made = tree(export_lit_glb(two_rooms(), lit_pages(), tmp_path / "house.glb", ceilings=False))
+    made = tree(export_glb(two_rooms(), HandCatalogue(), tmp_path / "house.glb", lit=lit_pages(), ceilings=False))
     assert not [n for n in made["nodes"] if "ceiling" in n.get("name", "")]
 
 
@@ -76,7 +77,7 @@ def test_far_scenery_is_there_when_asked_for_only(tmp_path):
     dome = dataclasses.replace(lit.meshes[0], owner="outdoor/sky", kind="outdoor", room="")
     lit = dataclasses.replace(lit, meshes=(*lit.meshes, dome))
     for sky in (False, True):
-        made = tree(export_lit_glb(two_rooms(), lit, tmp_path / "house.glb", sky=sky))
+        made = tree(export_glb(two_rooms(), HandCatalogue(), tmp_path / "house.glb", lit=lit, sky=sky))
         assert ("outdoor/sky" in [n.get("name") for n in made["nodes"]]) == sky
 
 

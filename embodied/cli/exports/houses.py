@@ -1,0 +1,109 @@
+"""A house as GLB, MJCF or USD, in its baked light or without."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from embodied.cli.common import Furnished, Printed, catalogue_of, show
+from embodied.cli.exports import Export, register_export
+from embodied.options import HouseFolder, Option, OutputFolder, file_ending_in
+
+if TYPE_CHECKING:
+    from embodied.assets.catalogue import Catalogue
+    from embodied.house.house import House
+    from embodied.scene.lit_pages import LitPages
+
+QUALITIES = ("fast", "normal", "high")
+
+
+@dataclass(frozen=True, kw_only=True)
+class HouseOptions(Furnished, Printed):
+    """The house."""
+
+    house: HouseFolder
+    """Folder that `embodied house` wrote."""
+    light: Annotated[str, Option(words=("none", *QUALITIES))] = "normal"
+    """Quality of the baked light; none: export the unlit house."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GlbOptions(HouseOptions):
+    """A house as GLB, for web viewers and Blender."""
+
+    out: Annotated[Path, Option(file_ending_in(".glb"), "FILE")]
+    """File to write."""
+    no_ceilings: bool = False
+    """Leave ceilings and roof out, to look in from above."""
+    sky: bool = False
+    """Keep the backdrop of distant scenery, to look out of the windows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MjcfOptions(HouseOptions):
+    """A house as MJCF, for MuJoCo's viewer."""
+
+    out: OutputFolder
+    """Folder to write."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class UsdOptions(HouseOptions):
+    """A house as USDZ, for USD programs."""
+
+    out: Annotated[Path, Option(file_ending_in(".usdz"), "FILE")]
+    """File to write."""
+    light: Annotated[str, Option(words=QUALITIES)] = "normal"
+    """Quality of the baked light."""
+
+
+def run_glb(args: GlbOptions) -> None:
+    from embodied.scene.glb import export_glb
+
+    house, catalogue, lit = lit_house(args)
+    path = export_glb(house, catalogue, args.out, lit=lit, ceilings=not args.no_ceilings, sky=args.sky)
+    show_written(args, "glb", house, lit, path)
+
+
+def run_mjcf(args: MjcfOptions) -> None:
+    from embodied.locks import locked
+    from embodied.scene.export import export_mjcf
+
+    house, catalogue, lit = lit_house(args)
+    with locked(args.out):
+        path = export_mjcf(house, catalogue, args.out, lit=lit)
+    show_written(args, "mjcf", house, lit, path)
+
+
+def run_usd(args: UsdOptions) -> None:
+    from embodied.scene.usd import check_usd, export_usd
+
+    check_usd(args.out)
+    house, _, lit = lit_house(args)
+    assert lit is not None, "--light cannot be none"
+    show_written(args, "usd", house, lit, export_usd(house, lit, args.out))
+
+
+def lit_house(args: HouseOptions) -> tuple[House, Catalogue, LitPages | None]:
+    """The house, its furniture and its baked light, from the cache where it is there; None for no light."""
+    from embodied.house.lighting import load_lit_house
+
+    catalogue = catalogue_of(args)
+    house = load_lit_house(args.house, catalogue)
+    if args.light == "none":
+        return house, catalogue, None
+    from embodied.light import bake, progress_bar
+
+    with progress_bar() as progress:
+        return house, catalogue, bake(house, catalogue, args.cache, args.light, progress=progress).lit
+
+
+def show_written(args: HouseOptions, form: str, house: House, lit: LitPages | None, path: Path) -> None:
+    facts = {"house": house.digest, "format": form, "light": lit.digest if lit else None, "path": str(path)}
+    show(args, facts, f"{house.name} as {form}: {path}, {path.stat().st_size / 1e6:.1f} MB")
+
+
+register_export(Export("glb", GlbOptions, run_glb))
+register_export(Export("mjcf", MjcfOptions, run_mjcf))
+register_export(Export("usd", UsdOptions, run_usd))

@@ -1,0 +1,88 @@
+"""Folders to copy into published programs."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from embodied.cli.common import note, show
+from embodied.cli.exports import Export, OfData, register_export
+from embodied.cli.learning import Encoded
+from embodied.datasets.folders import PROGRAMS
+from embodied.options import Count
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from embodied.datasets.store import Dataset
+
+WIDTH = 2048
+"""The length of a feature that the published programs are written for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProgramOptions(OfData, Encoded):
+    """A folder to copy into the published program.
+
+    `duet` is for VLN-DUET and HAMT, `r2r` for EnvDrop and Recurrent-VLN-BERT, too; `matterport` holds graphs and
+    skyboxes for the Matterport3D simulator. README-embodied.md in the folder says which version, what goes where, and
+    which lines a current PyTorch needs changed. `python -m embodied.mattersim` then runs the programs without a
+    compiled simulator.
+    """
+
+    features: bool = False
+    """Also write the features of `embodied features`."""
+    pad: Count = WIDTH
+    """Pad features with zeros to N numbers, the length that the programs expect."""
+
+
+def run_program(program: str, args: ProgramOptions) -> None:
+    from embodied.datasets.folders import export_folder
+    from embodied.datasets.store import Dataset
+    from embodied.locks import locked
+
+    data = Dataset(args.data)
+    features = feature_rows(data, args) if args.features else None
+    if features is None and program != "matterport":
+        note("no features are written; the program needs them: add --features")
+    with locked(args.out):
+        files = export_folder(program, data, args.out, features)
+    facts = {"program": program, "files": len(files), "out": str(args.out), "readme": str(files[-1])}
+    show(args, facts, f"{len(files)} files for {program} in {args.out}; read {files[-1].name} there")
+
+
+def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str, np.ndarray]]:
+    """(house, viewpoint id, (36, D) features in our order) of every viewpoint, filled up to --pad.
+
+    Raises:
+      FileNotFoundError: a house has no features of this encoder.
+      ValueError: features are longer than --pad.
+    """
+    import numpy as np
+
+    from embodied.agents.vision.drawn import pictures_of
+    from embodied.agents.vision.features import feature_path, load_features
+    from embodied.agents.vision.run import encoder_of
+    from embodied.datasets.folders import names_of
+
+    encoder = encoder_of(args.encoder, args.network)
+    drawn = {name: pictures_of(data, name, args.pictures) for name in names_of(data)}
+    files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
+
+    def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:
+        place, pictures = data.place(name), drawn[name]
+        features, _ = load_features(files[name], encoder=encoder.digest, source=place.house.digest, pictures=pictures)
+        n = features.shape[2]
+        if n > args.pad:
+            raise ValueError(f"{files[name]} holds features of {n} numbers, --pad is {args.pad}; raise it")
+        return place.graph.ids, np.pad(features.astype(np.float32), ((0, 0), (0, 0), (0, args.pad - n)))
+
+    for name in [n for n, file in files.items() if not file.exists()][:1] or list(files)[:1]:
+        read(name)
+    return ((name, key, rows) for name in files for key, rows in zip(*read(name), strict=True))
+
+
+for _name in PROGRAMS:
+    register_export(Export(_name, ProgramOptions, functools.partial(run_program, _name)))
