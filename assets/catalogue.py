@@ -19,7 +19,7 @@ from types import MappingProxyType
 from tqdm import tqdm
 
 from embodied.assets import materials
-from embodied.assets.built import BASICS, MAKERS
+from embodied.assets.built import BASICS, BUILT_ASSETS
 from embodied.assets.cache import default_cache
 from embodied.assets.importing.importer import import_model, scaled
 from embodied.assets.importing.own import OwnModel, import_own, read_own, source_digest
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 GROUPS = "groups.toml"
 """The name of a file of furniture groups in a user's folder."""
 Params = tuple[tuple[str, str | float], ...]
-"""What a maker of built things is told, by name."""
+"""What a built thing is asked for, by name."""
 
 
 class Catalogue:
@@ -120,13 +120,13 @@ class Catalogue:
         return self._scaled(key, (x, y, z), tuple(params))
 
     def parameters(self, key: str) -> Mapping[str, str | float]:
-        """What the maker of a built asset can be told, with its usual values; empty for models.
+        """The params that a built asset takes, with its usual values; empty for models.
 
         Raises:
           CatalogueError: unknown key.
         """
         self._asset(key)
-        return MAKERS[key].look if key not in self._recipes else {}
+        return BUILT_ASSETS[key].params if key not in self._recipes else {}
 
     def own_digests(self, keys: Iterable[str]) -> dict[str, str]:
         """Hex digests of the files of those of `keys` that are a user's own models, which may change any day.
@@ -169,7 +169,7 @@ class Catalogue:
 
     def _scale(self, key: str, size: tuple[float, float, float], params: Params) -> tuple[MeshPart, ...]:
         if key not in self._recipes:
-            return MAKERS[key].make(size, params, self.finish)
+            return BUILT_ASSETS[key].make(size, params, self.finish)
         own = self.assets[key].size
         return scaled(self._imported(key), (size[0] / own[0], size[1] / own[1], size[2] / own[2]))
 
@@ -204,7 +204,7 @@ def load_catalogue(cache: Path | None = None, *, own: Sequence[Path] | Path | st
     classes = check_classes("classes.json", read_json(DATA / "classes.json"))
     licences = {name: pack.get("licence", "") for name, pack in read_json(DATA / "packs.json").items()}
     assets, recipes = read_models("catalogue.json", read_json(DATA / "catalogue.json"), classes, licences)
-    assets |= {key: maker.asset for key, maker in MAKERS.items()}
+    assets |= {key: parametric.asset for key, parametric in BUILT_ASSETS.items()}
     models: dict[str, OwnModel] = {}
     groups: list[Path] = []
     for folder in map(Path, own_folders):

@@ -13,7 +13,7 @@ from contact import contact
 from handmade_models import CUBE, write_own, write_pack
 
 from embodied.assets.attribution import attribution
-from embodied.assets.built import MAKERS
+from embodied.assets.built import BUILT_ASSETS
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.importing import packs
 from embodied.assets.importing.importer import finish_parts, read_obj
@@ -61,7 +61,7 @@ def test_every_word_of_the_catalogue_is_legal():
         assert a.name and a.object_class == a.object_class.lower().strip(), a.key
         assert all(0.0003 < s < 4 for s in a.size), a.key
         assert len(set(a.tags)) == len(a.tags), a.key
-        assert bool(a.creator) != (a.key in MAKERS) and a.licence, a.key
+        assert bool(a.creator) != (a.key in BUILT_ASSETS) and a.licence, a.key
         if not a.key.startswith("built/"):
             assert (a.support == "surface") == bool(a.on), f"{a.key} needs `on` exactly if it rests on surfaces"
             assert a.rooms or {"person", "built_in"} & set(a.tags), a.key
@@ -90,9 +90,9 @@ def test_attribution_names_every_maker(catalogue):
     text = attribution(catalogue)
     listed = {n for line in text.splitlines() if line.startswith("- ") for n in line.split(": ", 1)[1].split(", ")}
     for a in catalogue.assets.values():
-        if a.key in MAKERS and not a.key.startswith("built/"):
+        if a.key in BUILT_ASSETS and not a.key.startswith("built/"):
             assert a.key.split("/", 1)[1] not in listed, f"{a.key} is built, and nobody else made it"
-        elif a.key not in MAKERS:
+        elif a.key not in BUILT_ASSETS:
             assert a.creator in text and a.key.split("/", 1)[1].split("+")[0] in text
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import shapely
 
-from embodied.assets.built import MAKERS, soft, storage, tableware
+from embodied.assets.built import BUILT_ASSETS, soft, storage, tableware
 from embodied.assets.built.primitives import (
     ball,
     bar,
@@ -28,7 +28,7 @@ from embodied.assets.built.primitives import (
     sheet,
     tube,
 )
-from embodied.assets.built.table import BUILDS, read_makers, remade
+from embodied.assets.built.table import BUILDS, read_built_assets, remade
 from embodied.assets.materials import MATERIALS
 from embodied.assets.materials.registry import read_materials
 from embodied.assets.records import ROOM_KINDS, SUPPORTS, Finish
@@ -44,7 +44,7 @@ def finish(key: str) -> Finish:
 def builders() -> list[str]:
     """One key for each builder function and set of arguments."""
     seen, keys = set(), []
-    for key, m in MAKERS.items():
+    for key, m in BUILT_ASSETS.items():
         _, build, look = m.make.args
         path = (build.__name__, tuple(sorted(look)), tuple(sorted(str(v) for k, v in look.items() if k == "kind")))
         if path not in seen:
@@ -146,7 +146,7 @@ def test_uv_is_in_metres_so_that_one_tile_covers_one_tile():
 
 @pytest.mark.parametrize("key", builders())
 def test_a_built_thing_is_as_large_as_asked_and_faces_outward(key):
-    maker = MAKERS[key]
+    maker = BUILT_ASSETS[key]
     for factor in ((1, 1, 1), (1.1, 1.0, 0.93)):
         size = tuple(s * f for s, f in zip(maker.asset.size, factor, strict=True))
         parts = maker.make(size, (), finish)
@@ -165,10 +165,10 @@ def test_a_built_thing_is_as_large_as_asked_and_faces_outward(key):
 
 
 def test_assets_are_what_the_catalogue_expects():
-    assert len(MAKERS) >= 60 and len(builders()) >= 60
-    classes = {m.asset.object_class for m in MAKERS.values()}
+    assert len(BUILT_ASSETS) >= 60 and len(builders()) >= 60
+    classes = {m.asset.object_class for m in BUILT_ASSETS.values()}
     assert {"rug", "curtain", "picture", "mirror", "base cabinet", "kitchen sink", "towel", "cushion"} <= classes
-    for key, m in MAKERS.items():
+    for key, m in BUILT_ASSETS.items():
         a = m.asset
         assert a.key == key and a.pack == key.split("/")[0]
         assert a.support in SUPPORTS and set(a.rooms) <= set(ROOM_KINDS) and min(a.size) > 0
@@ -179,24 +179,26 @@ def test_assets_are_what_the_catalogue_expects():
 
 
 def test_params_override_the_look_and_the_seed_changes_only_the_details():
-    m = MAKERS["built/book_row_0"]
+    m = BUILT_ASSETS["built/book_row_0"]
     one, same, other = (m.make(m.asset.size, p, finish) for p in ((), (), (("seed", 5),)))
     assert all(np.array_equal(a.vertices, b.vertices) for a, b in zip(one, same, strict=True))
     assert len(one[0].vertices) != len(other[0].vertices) or not np.array_equal(one[0].vertices, other[0].vertices)
     asked = []
-    MAKERS["built/rug"].make((2, 1, 0.01), (("pattern", "rug_kilim/0"),), lambda key: asked.append(key) or finish(key))
+    BUILT_ASSETS["built/rug"].make(
+        (2, 1, 0.01), (("pattern", "rug_kilim/0"),), lambda key: asked.append(key) or finish(key)
+    )
     assert asked == ["rug_kilim/0"]
     with pytest.raises(ValueError, match="must be positive"):
-        MAKERS["built/rug"].make((2, 0, 0.01), (), finish)
+        BUILT_ASSETS["built/rug"].make((2, 0, 0.01), (), finish)
 
 
 DIGEST = """
 import hashlib, numpy as np
-from embodied.assets.built import MAKERS, soft, storage, tableware
+from embodied.assets.built import BUILT_ASSETS, soft, storage, tableware
 from embodied.assets.records import Finish
 h = hashlib.sha256()
 for key in ("built/curtain_linen_0", "built/book_row_2", "built/coat_hooks_0", "built/potted_plant_broad_grey"):
-    for p in MAKERS[key].make(MAKERS[key].asset.size, (), lambda k: Finish(tile=0.5)):
+    for p in BUILT_ASSETS[key].make(BUILT_ASSETS[key].asset.size, (), lambda k: Finish(tile=0.5)):
         h.update(np.round(p.vertices * 1e5).astype("int64").tobytes() + p.faces.tobytes())
 print(h.hexdigest())
 """
@@ -212,13 +214,13 @@ def test_another_process_builds_the_same_things():
 
 
 def test_a_curtain_hangs_in_folds_and_a_mirror_is_one():
-    m = MAKERS["built/curtain_linen_0"]
+    m = BUILT_ASSETS["built/curtain_linen_0"]
     cloth = m.make(m.asset.size, (), finish)[0]
     left = cloth.vertices[cloth.vertices[:, 0] < 0]
     low = left[left[:, 2] < 0.1]
     order = low[np.argsort(low[:, 0])][:, 1]
     assert np.abs(np.diff(np.sign(order - order.mean()))).sum() >= 8, "fewer than four folds"
-    mirrors = [m for m in MAKERS.values() if m.asset.object_class == "mirror"]
+    mirrors = [m for m in BUILT_ASSETS.values() if m.asset.object_class == "mirror"]
     for m in mirrors:
         glass = [p for p in m.make(m.asset.size, (), finish) if p.finish.mirror]
         assert len(glass) == 1 and (glass[0].normals[:, 1] < -0.99).all(), "the glass looks along -y"
@@ -226,7 +228,7 @@ def test_a_curtain_hangs_in_folds_and_a_mirror_is_one():
 
 @pytest.mark.parametrize("key", builders())
 def test_what_glows_is_known_as_a_lamp_and_lamps_glow(key):
-    maker = MAKERS[key]
+    maker = BUILT_ASSETS[key]
     glows = any(p.finish.emission is not None for p in maker.make(maker.asset.size, (), finish))
     assert glows == (maker.asset.emits is not None)
 
@@ -240,11 +242,11 @@ def things(**row) -> dict:
 
 
 def test_a_new_row_is_a_new_thing():
-    made = read_makers("table", things(name="{} vase", rows={"a": {"set": "sky"}, "b": {"name": "plain vase"}}))
+    made = read_built_assets("table", things(name="{} vase", rows={"a": {"set": "sky"}, "b": {"name": "plain vase"}}))
     a, b = made["built/a"], made["built/b"]
     assert (a.asset.name, a.asset.colours, a.asset.licence) == ("blue vase", ("blue",), "Apache-2.0")
-    assert a.look == {"seed": 0.0, "glaze": "blue"} and b.look == {"seed": 0.0} and b.asset.name == "plain vase"
-    assert len(a.make(a.asset.size, (), finish)) == len(MAKERS["built/vase_blue"].make(a.asset.size, (), finish))
+    assert a.params == {"seed": 0.0, "glaze": "blue"} and b.params == {"seed": 0.0} and b.asset.name == "plain vase"
+    assert len(a.make(a.asset.size, (), finish)) == len(BUILT_ASSETS["built/vase_blue"].make(a.asset.size, (), finish))
 
 
 def test_what_stands_for_a_poor_model_keeps_its_key_words_and_variants():
@@ -266,7 +268,7 @@ def test_what_stands_for_a_poor_model_keeps_its_key_words_and_variants():
     makers = remade("table", rows, assets)
     assert set(recipes) == {"pack/b"} and set(makers) == {"pack/a", "pack/a+red"}
     assert makers["pack/a"].asset.name == "tall vase" and makers["pack/a"].asset.on == ("desk",)
-    assert makers["pack/a+red"].look == {"seed": 2, "glaze": "blue"}
+    assert makers["pack/a+red"].params == {"seed": 2, "glaze": "blue"}
     assert (assets["pack/a"].licence, assets["pack/b"].licence) == ("Apache-2.0", "CC0-1.0")
     with pytest.raises(CatalogueError, match="decor.vase"):
         remade("table", {"pack/a": row | {"build": "decor.vases"}}, assets)
@@ -275,7 +277,7 @@ def test_what_stands_for_a_poor_model_keeps_its_key_words_and_variants():
 def test_a_thing_after_a_material_takes_its_words():
     rows = {"a": {"look": {"cloth": "linen/0"}}}
     row = {"class": "cushion", "build": "soft.cushion", "name": "{} cushion", "after": "cloth"}
-    (maker,) = read_makers("table", things(rows=rows, **row)).values()
+    (maker,) = read_built_assets("table", things(rows=rows, **row)).values()
     linen = MATERIALS["linen/0"]
     assert maker.asset.name == f"{linen.name} cushion" and maker.asset.materials == linen.materials
 
@@ -296,17 +298,17 @@ def test_a_thing_after_a_material_takes_its_words():
 )
 def test_a_wrong_row_is_named_with_what_it_should_hold(row, match):
     with pytest.raises(CatalogueError, match=match) as caught:
-        read_makers("table", things(rows={"a": row}))
+        read_built_assets("table", things(rows={"a": row}))
     assert "'a'" in str(caught.value)
 
 
 def test_every_builder_and_every_rug_of_the_materials_is_in_the_table():
-    built = {m.make.args[1] for m in MAKERS.values()}
+    built = {m.make.args[1] for m in BUILT_ASSETS.values()}
     helpers = {storage.shelf_surfaces, storage.top_surface, soft.layers, tableware.cup}
     assert set(BUILDS.values()) - helpers == built
-    rugs = {str(m.look["pattern"]) for m in MAKERS.values() if "pattern" in m.look}
+    rugs = {str(m.params["pattern"]) for m in BUILT_ASSETS.values() if "pattern" in m.params}
     assert {key for key, m in MATERIALS.items() if m.family == "rug"} <= rugs
-    shown = {str(m.look["art"]) for m in MAKERS.values() if "art" in m.look}
+    shown = {str(m.params["art"]) for m in BUILT_ASSETS.values() if "art" in m.params}
     assert {key for key, m in MATERIALS.items() if m.family == "art"} <= shown
 
 
@@ -314,6 +316,6 @@ def test_the_rows_that_the_documentation_shows_are_good_rows():
     text = (Path(__file__).parent.parent / "docs" / "assets.md").read_text()
     groups = [json.loads(block.split("```")[0]) for block in text.split("```json\n")[2:]]
     things, materials = groups
-    assert list(read_makers("docs", {"sets": {}, "groups": [things]})) == ["built/vase_blue", "built/vase_white"]
+    assert list(read_built_assets("docs", {"sets": {}, "groups": [things]})) == ["built/vase_blue", "built/vase_white"]
     (lime,) = read_materials("docs", {"groups": [materials]}).values()
     assert lime.recipe(64, lime.tile, rng=np.random.default_rng(0)).color.shape == (64, 64, 3)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from embodied.assets.built import MAKERS
+from embodied.assets.built import BUILT_ASSETS
 from embodied.assets.materials import MATERIALS
 from embodied.assets.records import Finish
 from embodied.house.house import House, Opening, Room, Stair, Storey
@@ -26,7 +26,7 @@ KEYS = {
 }
 CATALOGUE = SimpleNamespace(
     finish=lambda key: Finish(tile=MATERIALS[key].tile),
-    mesh=lambda key, size, params=(): MAKERS[key].make(size, params, lambda k: Finish(tile=MATERIALS[k].tile)),
+    mesh=lambda key, size, params=(): BUILT_ASSETS[key].make(size, params, lambda k: Finish(tile=MATERIALS[k].tile)),
 )
 
 

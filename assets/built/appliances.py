@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.maker import BLACK, CHROME, GAP, STEEL, Order, parts_of, plain
+from embodied.assets.built.parametric import BLACK, CHROME, GAP, STEEL, BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import box, cylinder, lathe
 from embodied.assets.records import Finish, MeshPart
 
@@ -13,9 +13,9 @@ DOOR = Finish(color=(0.16, 0.19, 0.21, 0.45), roughness=0.04)
 """Dark glass."""
 
 
-def washer(order: Order) -> list[MeshPart]:
+def washer(spec: BuildRequest) -> list[MeshPart]:
     """A washing machine that is filled from before; dial, keys and display on a panel that rises behind its top."""
-    w, d, h = order.size
+    w, d, h = spec.size
     top, panel_y = 0.84 * h, 0.25 * d
     y = -d / 2 + 0.03
     body = [

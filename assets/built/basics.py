@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.maker import BLACK, PORCELAIN, Order, handle, parts_of, plain
+from embodied.assets.built.parametric import BLACK, PORCELAIN, BuildRequest, handle, parts_of, plain
 from embodied.assets.built.primitives import Shape, bar, box, cylinder, lathe, pillow
 from embodied.assets.records import MeshPart
 
 
-def bed(order: Order) -> list[MeshPart]:
+def bed(spec: BuildRequest) -> list[MeshPart]:
     """A frame with a headboard at the back, a mattress and one pillow for each 0.8 m of its width."""
-    w, d, h = order.size
-    top = float(order.look.get("lying", 0.48))
+    w, d, h = spec.size
+    top = float(spec.params.get("lying", 0.48))
     rail, thick = top - 0.24, 0.035
     frame = [
         box([-w / 2, d / 2 - thick, 0], [w / 2, d / 2, h], 0.006),
@@ -29,16 +29,16 @@ def bed(order: Order) -> list[MeshPart]:
     one = pillow(each * 0.86, 0.42, 0.15)
     pillows = [one.moved(-inner / 2 + each * (k + 0.5), d / 2 - 0.3, top + 0.04) for k in range(count)]
     return parts_of(
-        (order.material("wood", "oak/0"), frame),
-        (order.finish("cotton/0"), [mattress, *pillows]),
-        (order.material("cloth", "linen/2"), cover),
+        (spec.material("wood", "oak/0"), frame),
+        (spec.finish("cotton/0"), [mattress, *pillows]),
+        (spec.material("cloth", "linen/2"), cover),
     )
 
 
-def sofa(order: Order) -> list[MeshPart]:
+def sofa(spec: BuildRequest) -> list[MeshPart]:
     """Seat, back and arms with loose cushions, one for each 0.75 m; an armchair when it is narrow."""
-    w, d, h = order.size
-    arm, back, seat = min(0.18, w * 0.2), 0.22, float(order.look.get("seat", 0.43))
+    w, d, h = spec.size
+    arm, back, seat = min(0.18, w * 0.2), 0.22, float(spec.params.get("seat", 0.43))
     inner = w - 2 * arm
     body = [
         box([-w / 2, -d / 2 + 0.02, 0.1], [w / 2, d / 2, seat - 0.14], 0.02),
@@ -55,13 +55,13 @@ def sofa(order: Order) -> list[MeshPart]:
         lean = pillow(each * 0.95, h - seat + 0.02, 0.17).turned(np.pi / 2 + 0.18, "x")
         cushions.append(lean.moved(x, d / 2 - back - 0.04, (h + seat) / 2))
     feet = [cylinder(0.022, 0, 0.1).moved(x, y) for x in _edges(w, 0.12) for y in _edges(d, 0.12)]
-    return parts_of((order.material("cloth", "tweed/0"), [*body, *cushions]), (order.finish("walnut/0"), feet))
+    return parts_of((spec.material("cloth", "tweed/0"), [*body, *cushions]), (spec.finish("walnut/0"), feet))
 
 
-def table(order: Order) -> list[MeshPart]:
-    """A top on four legs with an apron; look['drawers'] puts drawers under the right side, as desks have."""
-    w, d, h = order.size
-    leg = float(order.look.get("leg", 0.055))
+def table(spec: BuildRequest) -> list[MeshPart]:
+    """A top on four legs with an apron; params['drawers'] puts drawers under the right side, as desks have."""
+    w, d, h = spec.size
+    leg = float(spec.params.get("leg", 0.055))
     wood = [box([-w / 2, -d / 2, h - 0.03], [w / 2, d / 2, h], 0.004)]
     wood += [
         box([x - leg / 2, y - leg / 2, 0], [x + leg / 2, y + leg / 2, h - 0.03], 0.003)
@@ -73,7 +73,7 @@ def table(order: Order) -> list[MeshPart]:
         box([-w / 2 + leg, y - 0.009, h - 0.03 - apron], [w / 2 - leg, y + 0.009, h - 0.03]) for y in _edges(d, leg)
     ]
     grips = []
-    count = int(order.look.get("drawers", 0))
+    count = int(spec.params.get("drawers", 0))
     if count:
         x0, x1, low = w / 2 - leg - 0.42, w / 2 - leg, h - 0.04 - 0.15 * count
         wood.append(box([x0, -d / 2 + 0.04, low], [x1, d / 2 - 0.03, h - 0.03], 0.002))
@@ -81,12 +81,12 @@ def table(order: Order) -> list[MeshPart]:
             z = low + 0.15 * k
             wood.append(box([x0 + 0.004, -d / 2 + 0.02, z + 0.004], [x1 - 0.004, -d / 2 + 0.04, z + 0.146], 0.002))
             grips.append(handle((x0 + x1) / 2, z + 0.075, -d / 2 + 0.02))
-    return parts_of((order.material("wood", "oak/0"), wood), (order.metal("steel"), grips))
+    return parts_of((spec.material("wood", "oak/0"), wood), (spec.metal("steel"), grips))
 
 
-def chair(order: Order) -> list[MeshPart]:
+def chair(spec: BuildRequest) -> list[MeshPart]:
     """A seat at 0.45 m on four legs, and a back of slats."""
-    w, d, h = order.size
+    w, d, h = spec.size
     seat, leg = 0.45, 0.034
     wood = [box([-w / 2, -d / 2, seat - 0.028], [w / 2, d / 2 - 0.02, seat - 0.004], 0.008)]
     wood += [bar([x, -d / 2 + leg, 0], [x, -d / 2 + leg, seat - 0.02], leg, leg, 0.003) for x in _edges(w, leg)]
@@ -97,12 +97,12 @@ def chair(order: Order) -> list[MeshPart]:
     ]
     wood += [bar([x, -d / 2 + leg, 0.2], [x, d / 2 - leg, 0.2], 0.02, 0.02) for x in _edges(w, leg)]
     cushion = pillow(w * 0.92, (d - 0.03) * 0.92, 0.06).moved(0, -0.012, seat + 0.012)
-    return parts_of((order.material("wood", "oak/0"), wood), (order.material("cloth", "linen/3"), cushion))
+    return parts_of((spec.material("wood", "oak/0"), wood), (spec.material("cloth", "linen/3"), cushion))
 
 
-def office_chair(order: Order) -> list[MeshPart]:
+def office_chair(spec: BuildRequest) -> list[MeshPart]:
     """A padded seat and back on a column with five wheels."""
-    w, d, h = order.size
+    w, d, h = spec.size
     seat, reach = 0.47, min(w, d) / 2 - 0.03
     dark: list[Shape] = [cylinder(0.028, 0.09, seat - 0.06)]
     for angle in np.arange(5) * 2 * np.pi / 5 + np.pi / 10:
@@ -113,12 +113,12 @@ def office_chair(order: Order) -> list[MeshPart]:
         pillow(w * 0.8, d * 0.78, 0.11).moved(0, -d * 0.05, seat - 0.01),
         pillow(w * 0.74, h - seat - 0.1, 0.1).turned(np.pi / 2, "x").moved(0, d / 2 - 0.06, (h + seat) / 2 + 0.05),
     ]
-    return parts_of((BLACK, dark), (order.material("cloth", "tweed/0"), pads))
+    return parts_of((BLACK, dark), (spec.material("cloth", "tweed/0"), pads))
 
 
-def toilet(order: Order) -> list[MeshPart]:
+def toilet(spec: BuildRequest) -> list[MeshPart]:
     """A bowl with its lid closed before a cistern, the back of which stands at the wall."""
-    w, d, h = order.size
+    w, d, h = spec.size
     rim, tank = 0.40, 0.18
     bowl = lathe([(0, 0), (0.11, 0), (0.1, 0.05), (0.1, 0.16), (0.19, 0.34), (0.2, rim - 0.03), (0, rim - 0.03)], 28)
     lid = lathe([(0, rim - 0.03), (0.2, rim - 0.03), (0.2, rim - 0.008), (0.19, rim), (0, rim)], 28)
@@ -131,12 +131,12 @@ def toilet(order: Order) -> list[MeshPart]:
         box([-0.1, d / 2 - tank - 0.08, 0], [0.1, d / 2, rim - 0.02], 0.02),
     ]
     button = cylinder(0.025, h - 0.006, h).moved(0, d / 2 - tank / 2)
-    return parts_of((PORCELAIN, [*oval, *cistern]), (order.metal("chrome"), button))
+    return parts_of((PORCELAIN, [*oval, *cistern]), (spec.metal("chrome"), button))
 
 
-def bathtub(order: Order) -> list[MeshPart]:
+def bathtub(spec: BuildRequest) -> list[MeshPart]:
     """A panelled tub: a rim around a basin that narrows towards its ground, and a tap at the head."""
-    w, d, h = order.size
+    w, d, h = spec.size
     rim = 0.07
     inside, deep = [(-w / 2 + rim, -d / 2 + rim), (w / 2 - rim, d / 2 - rim)], 0.1
     (x0, y0), (x1, y1) = inside
@@ -151,12 +151,12 @@ def bathtub(order: Order) -> list[MeshPart]:
         bar([x0 - 0.02, 0, h], [x0 - 0.02, 0, h + 0.12], 0.03, 0.03),
         bar([x0 - 0.02, 0, h + 0.12], [x0 + 0.12, 0, h + 0.1], 0.026, 0.02),
     ]
-    return parts_of((PORCELAIN, shell), (order.metal("chrome"), tap))
+    return parts_of((PORCELAIN, shell), (spec.metal("chrome"), tap))
 
 
-def television(order: Order) -> list[MeshPart]:
+def television(spec: BuildRequest) -> list[MeshPart]:
     """A dark screen in a narrow frame on a foot."""
-    w, d, h = order.size
+    w, d, h = spec.size
     y = -0.015
     case = [box([-w / 2, y, 0.06], [w / 2, y + 0.03, h], 0.004), box([-0.04, y + 0.005, 0.01], [0.04, y + 0.03, 0.1])]
     foot = box([-w * 0.2, -d / 2, 0], [w * 0.2, d / 2, 0.012], 0.003)
@@ -164,9 +164,9 @@ def television(order: Order) -> list[MeshPart]:
     return parts_of((BLACK, [*case, foot]), (plain((0.02, 0.02, 0.025), 0.08), screen))
 
 
-def low_cabinet(order: Order) -> list[MeshPart]:
+def low_cabinet(spec: BuildRequest) -> list[MeshPart]:
     """A sideboard or television stand: doors side by side under a top, on short legs."""
-    w, d, h = order.size
+    w, d, h = spec.size
     foot = 0.1
     wood = [box([-w / 2, -d / 2 + 0.02, foot], [w / 2, d / 2, h], 0.003)]
     wood += [cylinder(0.018, 0, foot).moved(x, y) for x in _edges(w, 0.12) for y in _edges(d, 0.12)]
@@ -175,7 +175,7 @@ def low_cabinet(order: Order) -> list[MeshPart]:
     for k, (a, b) in enumerate(zip(edges, edges[1:])):
         wood.append(box([a + 0.003, -d / 2, foot + 0.012], [b - 0.003, -d / 2 + 0.02, h - 0.02], 0.002))
         grips.append(handle(b - 0.05 if k % 2 == 0 else a + 0.05, (h + foot) / 2, -d / 2, upright=True))
-    return parts_of((order.material("wood", "oak/0"), wood), (order.metal("black"), grips))
+    return parts_of((spec.material("wood", "oak/0"), wood), (spec.metal("black"), grips))
 
 
 def _edges(length: float, inset: float) -> tuple[float, float]:

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.maker import CHROME, GLASS, PAPER, PORCELAIN, Order, carcass, front, handle, parts_of, plain
+from embodied.assets.built.parametric import (
+    CHROME,
+    GLASS,
+    PAPER,
+    PORCELAIN,
+    BuildRequest,
+    carcass,
+    front,
+    handle,
+    parts_of,
+    plain,
+)
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -24,15 +35,15 @@ from embodied.assets.built.soft import layers
 from embodied.assets.records import Finish, MeshPart
 
 
-def vanity(order: Order) -> list[MeshPart]:
+def vanity(spec: BuildRequest) -> list[MeshPart]:
     """A drawer cabinet hung off the floor, a ceramic top with an oval basin, a mixer tap."""
-    w, d, h = order.size
+    w, d, h = spec.size
     tap = 0.14
     top = h - tap
     z0, z1, y = 0.28, top - 0.05, -d / 2 + 0.01
     body = carcass((-w / 2 + 0.01, y + 0.02, z0), (w / 2 - 0.01, d / 2, z1), top=False)
     mid = (z0 + z1) / 2
-    style, x = order.word("style", "flat"), w / 2 - 0.01
+    style, x = spec.word("style", "flat"), w / 2 - 0.01
     doors = [front(-x, x, a, b, y, style) for a, b in ((z0, mid), (mid, z1))]
     grips = [handle(0, b - 0.05, y, "bar", False, w * 0.3) for b in (mid, z1)]
     t = np.linspace(0, 2 * np.pi, 41)[:-1]
@@ -49,18 +60,18 @@ def vanity(order: Order) -> list[MeshPart]:
     spout = tube(neck, 0.011, 10)
     lever = tube([(0, ty, top + 0.09), (0, ty + 0.005, top + 0.13), (0, ty - 0.05, top + tap)], 0.006, 8)
     base = cylinder(0.022, 0, 0.012, 0.003, 14).moved(0, ty, top)
-    wood = order.material("front", "oak/0")
+    wood = spec.material("front", "oak/0")
     return parts_of(
         (wood, [body, *doors]),
-        (order.metal("black"), grips),
+        (spec.metal("black"), grips),
         (PORCELAIN, [slab, bowl]),
         (CHROME, [drain, spout, lever, base]),
     )
 
 
-def shower(order: Order) -> list[MeshPart]:
+def shower(spec: BuildRequest) -> list[MeshPart]:
     """A corner shower: tray, two glass screens (one with a way in), mixer, rail and head on the back wall."""
-    w, d, h = order.size
+    w, d, h = spec.size
     rim, t = 0.045, 0.05
     tray = [
         box([-w / 2, -d / 2, 0], [w / 2, d / 2, 0.02]),
@@ -118,24 +129,24 @@ def _draped(w: float, h: float, d: float, *, rng: np.random.Generator) -> Shape:
     return sheet(np.stack([xx, yy, z[:, None] + 0 * xx], -1), 0.006)
 
 
-def towel_rail(order: Order) -> list[MeshPart]:
+def towel_rail(spec: BuildRequest) -> list[MeshPart]:
     """A rail on two posts with a towel over it."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     y, z = -d * 0.1, h - 0.035
     rail = tube([(-w / 2, y, z), (w / 2, y, z)], 0.008, 10)
     posts = [
         joined(tube([(x, y, z), (x, d / 2, z)], 0.007, 8), cylinder(0.022, 0, 0.006, 0.002, 14).hung(x, d / 2, z))
         for x in (-w / 2 + 0.02, w / 2 - 0.02)
     ]
-    tw = w * float(order.look.get("share", 0.72))
+    tw = w * float(spec.params.get("share", 0.72))
     towel = _draped(tw, h - 0.012, min(d * 0.7, 0.06), rng=rng).shifted_uv(*rng.random(2))
     towel = towel.moved(rng.uniform(-0.05, 0.05) * w, y, 0)
-    return parts_of((order.metal("chrome"), [rail, *posts]), (order.material("cloth", "terry/0"), towel))
+    return parts_of((spec.metal("chrome"), [rail, *posts]), (spec.material("cloth", "terry/0"), towel))
 
 
-def hanging_towel(order: Order) -> list[MeshPart]:
+def hanging_towel(spec: BuildRequest) -> list[MeshPart]:
     """A towel on a hook by the loop in the middle of its edge: the corners fall, folds run down from the hook."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     rows, cols = 22, 34
     half, long = 0.42 * h, 0.94 * h
     u, t = np.linspace(-1, 1, cols + 1)[None], np.linspace(1, 0, rows + 1)[:, None]
@@ -151,40 +162,40 @@ def hanging_towel(order: Order) -> list[MeshPart]:
         tube([(0, d / 2, h - 0.03), (0, -d * 0.1, h - 0.035), (0, -d * 0.25, h - 0.005)], 0.006, 8),
         cylinder(0.02, 0, 0.006, 0.002, 14).hung(0, d / 2, h - 0.03),
     )
-    terry, low, high = order.material("cloth", "terry/0"), 2, 4  # rows of the woven border
+    terry, low, high = spec.material("cloth", "terry/0"), 2, 4  # rows of the woven border
     pile = [sheet(cloth[: low + 1], 0.006), sheet(cloth[high:], 0.006)]
     red, green, blue = (0.45 + 0.5 * c for c in terry.color[:3])
     border = plain((red, green, blue), 0.85, specular=0.1)
     return parts_of((CHROME, hook), (terry, pile), (border, sheet(cloth[low : high + 1], 0.004)))
 
 
-def towels(order: Order) -> list[MeshPart]:
+def towels(spec: BuildRequest) -> list[MeshPart]:
     """Folded towels on one another."""
     return parts_of(
-        (order.material("cloth", "terry/0"), layers(order.size, int(order.look.get("layers", 3)), rng=order.rng))
+        (spec.material("cloth", "terry/0"), layers(spec.size, int(spec.params.get("layers", 3)), rng=spec.rng))
     )
 
 
-def bath_mat(order: Order) -> list[MeshPart]:
+def bath_mat(spec: BuildRequest) -> list[MeshPart]:
     """A thick terry mat with a flat hem."""
-    w, d, h = order.size
+    w, d, h = spec.size
     hem = [box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.55], 0.003)]
     pile = box([-w / 2 + 0.03, -d / 2 + 0.03, 0], [w / 2 - 0.03, d / 2 - 0.03, h], 0.006)
-    return parts_of((order.material("cloth", "terry/0"), [*hem, pile]))
+    return parts_of((spec.material("cloth", "terry/0"), [*hem, pile]))
 
 
-def toilet_brush(order: Order) -> list[MeshPart]:
-    w, _, h = order.size
+def toilet_brush(spec: BuildRequest) -> list[MeshPart]:
+    w, _, h = spec.size
     r = w / 2
     cup = lathe([(0, 0), (r, 0), (r, h * 0.42), (r * 0.86, h * 0.42), (r * 0.84, h * 0.1), (0, h * 0.1)], 24)
     grip = [(0.007, h * 0.8), (0.011, h * 0.84), (0.011, h * 0.98), (0.006, h), (0, h)]
     stick = lathe([(0, h * 0.2), (0.007, h * 0.2), *grip], 12, 0.9)
     lid = lathe([(0, h * 0.42), (r * 0.8, h * 0.42), (r * 0.5, h * 0.46), (0, h * 0.47)], 24, 0.9)
-    return parts_of((order.metal("white"), cup), (CHROME, [stick, lid]))
+    return parts_of((spec.metal("white"), cup), (CHROME, [stick, lid]))
 
 
-def soap_dispenser(order: Order) -> list[MeshPart]:
-    w, d, h = order.size
+def soap_dispenser(spec: BuildRequest) -> list[MeshPart]:
+    w, d, h = spec.size
     r = min(w, d) * 0.5
     shoulder = [(r, h * 0.62), (r * 0.85, h * 0.70), (r * 0.35, h * 0.72), (0, h * 0.72)]
     body = lathe([(0, 0), (r * 0.94, 0), (r, 0.006), *shoulder], 24, 0.6)
@@ -199,14 +210,14 @@ def soap_dispenser(order: Order) -> list[MeshPart]:
         "black": plain((0.06, 0.06, 0.065), 0.35),
         "amber": plain((0.35, 0.17, 0.06), 0.1),
         "green": plain((0.36, 0.46, 0.38), 0.3),
-    }[order.word("colour", "white")]
+    }[spec.word("colour", "white")]
     return parts_of(
-        (colour, body), (CHROME if order.look.get("colour") != "black" else plain((0.1, 0.1, 0.1), 0.4), pump)
+        (colour, body), (CHROME if spec.params.get("colour") != "black" else plain((0.1, 0.1, 0.1), 0.4), pump)
     )
 
 
-def toothbrush_cup(order: Order) -> list[MeshPart]:
-    (w, _, h), rng = order.size, order.rng
+def toothbrush_cup(spec: BuildRequest) -> list[MeshPart]:
+    (w, _, h), rng = spec.size, spec.rng
     r, cup = w / 2, h * 0.5
     body = lathe([(0, 0), (r * 0.9, 0), (r * 0.97, cup), (r * 0.87, cup), (r * 0.8, 0.008), (0, 0.008)], 22)
     brushes = []
@@ -220,9 +231,9 @@ def toothbrush_cup(order: Order) -> list[MeshPart]:
     return parts_of((PORCELAIN, body), *brushes)
 
 
-def paper_roll(order: Order) -> list[MeshPart]:
+def paper_roll(spec: BuildRequest) -> list[MeshPart]:
     """A toilet roll on a wall bracket, its end hanging."""
-    w, d, h = order.size
+    w, d, h = spec.size
     r = min(h * 0.42, d * 0.42)
     x, y, z = w / 2 - 0.008, -d / 2 + r, h - r - 0.012
     roll = lathe([(0.02, -0.05), (r, -0.05), (r, 0.05), (0.02, 0.05), (0.02, -0.05)], 28)
@@ -233,12 +244,12 @@ def paper_roll(order: Order) -> list[MeshPart]:
     return parts_of((plain((0.94, 0.94, 0.93), 0.95, specular=0.05), [roll, loose]), (CHROME, [arm, plate]))
 
 
-def bin_(order: Order) -> list[MeshPart]:
-    """A round bin: waste basket with crumpled paper in it, or pedal bin where look['lid'] is 1."""
-    (w, d, h), rng = order.size, order.rng
+def bin_(spec: BuildRequest) -> list[MeshPart]:
+    """A round bin: waste basket with crumpled paper in it, or pedal bin where params['lid'] is 1."""
+    (w, d, h), rng = spec.size, spec.rng
     r = w / 2
-    main = order.material("skin", "brushed_steel/0") if "skin" in order.look else order.metal("white")
-    if order.look.get("lid"):
+    main = spec.material("skin", "brushed_steel/0") if "skin" in spec.params else spec.metal("white")
+    if spec.params.get("lid"):
         return parts_of(*_pedal_bin(w, d, h, main))
     wall, low = 0.004, 0.82
     sheet_steel = [(0, 0), (r * low, 0), (r, h - 0.004), (r - wall, h - 0.004), (r * low - wall, 0.006), (0, 0.006)]
@@ -290,9 +301,9 @@ def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[tuple[Finish,
     ]
 
 
-def laundry_basket(order: Order) -> list[MeshPart]:
+def laundry_basket(spec: BuildRequest) -> list[MeshPart]:
     """Wickerwork with a rolled rim and clothes looking out."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     body = shapely.box(-w / 2, -d / 2, w / 2, d / 2).buffer(-0.06).buffer(0.06, quad_segs=4)
     ring = np.asarray(shapely.geometry.polygon.orient(body).exterior.coords)[:-1]
     top = h * 0.93
@@ -309,5 +320,5 @@ def laundry_basket(order: Order) -> list[MeshPart]:
     z = top * 0.9 + (h - top * 0.9) * np.clip(0.55 + 0.25 * bump, 0, 1) * (1 - np.maximum(np.abs(x), np.abs(y)) ** 4)
     heap = sheet(np.stack([x * w * 0.43, y * d * 0.43, z], -1))
     return parts_of(
-        (order.material("skin", "wicker/0"), [*lay, bottom, edge]), (order.material("cloth", "cotton/3"), heap)
+        (spec.material("skin", "wicker/0"), [*lay, bottom, edge]), (spec.material("cloth", "cotton/3"), heap)
     )

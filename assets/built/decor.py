@@ -8,7 +8,17 @@ import numpy as np
 import shapely
 from scipy.interpolate import PchipInterpolator
 
-from embodied.assets.built.maker import BLACK, BRASS, MIRROR, PAPER, WHITE, Order, parts_of, plain, whole_image
+from embodied.assets.built.parametric import (
+    BLACK,
+    BRASS,
+    MIRROR,
+    PAPER,
+    WHITE,
+    BuildRequest,
+    parts_of,
+    plain,
+    whole_image,
+)
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -34,13 +44,13 @@ GLAZES = {
 FRAMES = {"black": BLACK, "white": WHITE, "brass": BRASS}
 
 
-def picture(order: Order) -> list[MeshPart]:
-    """Framed art: a moulded frame, a mat where look['mat'] > 0, the picture, glass over paper."""
-    w, d, h = order.size
-    name = order.word("frame", "oak/0")
-    wood = FRAMES[name] if name in FRAMES else order.finish(name)
-    f = float(order.look.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
-    m = float(order.look.get("mat", 0.0)) * min(w, h)
+def picture(spec: BuildRequest) -> list[MeshPart]:
+    """Framed art: a moulded frame, a mat where params['mat'] > 0, the picture, glass over paper."""
+    w, d, h = spec.size
+    name = spec.word("frame", "oak/0")
+    wood = FRAMES[name] if name in FRAMES else spec.finish(name)
+    f = float(spec.params.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
+    m = float(spec.params.get("mat", 0.0)) * min(w, h)
     y0, y1 = -d / 2, d / 2
     moulding = []
     lines = [(0.0, y1), (0.0, y0 + 0.004), (0.25 * f, y0), (0.8 * f, y0 + 0.001), (f, y0 + 0.006), (f, y0 + 0.012)]
@@ -50,7 +60,7 @@ def picture(order: Order) -> list[MeshPart]:
         uv = np.where(upright_grain, strip.uv[:, ::-1], strip.uv)
         moulding.append(Shape(strip.vertices, strip.faces, strip.normals, uv))
     back = upright(w / 2, -w / 2, 0, h, y1)
-    art = order.material("art", "art_hills/0")
+    art = spec.material("art", "art_hills/0")
     g = f + m
     x0, x1, z0, z1 = -w / 2 + g, w / 2 - g, g, h - g
     image = whole_image(upright(x0, x1, z0, z1, y0 + 0.0125), art, x0, x1, z0, z1)
@@ -64,30 +74,30 @@ def _inset(w: float, h: float, by: float, y: float) -> list[tuple[float, float, 
     return [(x0, y, z0), (x1, y, z0), (x1, y, z1), (x0, y, z1)]
 
 
-def canvas(order: Order) -> list[MeshPart]:
+def canvas(spec: BuildRequest) -> list[MeshPart]:
     """A painting on a stretched canvas without a frame."""
-    w, d, h = order.size
-    art = order.material("art", "art_brushwork/0")
+    w, d, h = spec.size
+    art = spec.material("art", "art_brushwork/0")
     return parts_of((art, whole_image(box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002), art, -w / 2, w / 2, 0, h)))
 
 
-def poster(order: Order) -> list[MeshPart]:
+def poster(spec: BuildRequest) -> list[MeshPart]:
     """Unframed paper on the wall, its corners coming off a little."""
-    w, d, h = order.size
+    w, d, h = spec.size
     x, z = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(0, h, 9))
     curl = (np.abs(x) / (w / 2)) ** 6 * (np.abs(z - h / 2) / (h / 2)) ** 6
-    y = d / 2 - 0.001 - curl * (d - 0.001) * order.rng.uniform(0.5, 1.0, (9, 9))
-    art = order.material("art", "art_poster/0")
+    y = d / 2 - 0.001 - curl * (d - 0.001) * spec.rng.uniform(0.5, 1.0, (9, 9))
+    art = spec.material("art", "art_poster/0")
     return parts_of((art, whole_image(sheet(np.stack([x, y, z], -1), 0.0004), art, -w / 2, w / 2, 0, h)))
 
 
-def mirror(order: Order) -> list[MeshPart]:
-    """A looking-glass in a slim frame; round where look['round'] is 1."""
-    w, d, h = order.size
-    y0, f = -d / 2, float(order.look.get("width", 0.016))
-    name = order.word("frame", "black")
-    rim = FRAMES[name] if name in FRAMES else order.finish(name)
-    if order.look.get("round"):
+def mirror(spec: BuildRequest) -> list[MeshPart]:
+    """A looking-glass in a slim frame; round where params['round'] is 1."""
+    w, d, h = spec.size
+    y0, f = -d / 2, float(spec.params.get("width", 0.016))
+    name = spec.word("frame", "black")
+    rim = FRAMES[name] if name in FRAMES else spec.finish(name)
+    if spec.params.get("round"):
         ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)], 48)
         ring = ring.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
         disc = lathe([(0.5 - f / w, 0), (0, 0)], 48)
@@ -100,23 +110,23 @@ def mirror(order: Order) -> list[MeshPart]:
     return parts_of((rim, boards), (BLACK, back), (MIRROR, glass))
 
 
-def wall_clock(order: Order) -> list[MeshPart]:
+def wall_clock(spec: BuildRequest) -> list[MeshPart]:
     """A round case with a printed dial behind glass."""
-    w, d, h = order.size
+    w, d, h = spec.size
     case = lathe([(0, 0), (0.5, 0), (0.5, 0.7 * d), (0.485, d), (0.455, d), (0.45, 0.75 * d), (0.45, 0.72 * d)], 40)
     case = case.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
     t = np.linspace(0, 2 * np.pi, 41)[:-1]
     disc = flat(shapely.Polygon(np.stack([0.452 * np.cos(t), 0.452 * np.sin(t)], 1)), 0.0).turned(np.pi / 2, "x")
     disc = disc.scaled(w, 1, h).moved(0, d / 2 - 0.72 * d, h / 2)
-    face = order.material("face", "clock_face/0")
+    face = spec.material("face", "clock_face/0")
     disc = whole_image(disc, face, -w * 0.452, w * 0.452, h * 0.048, h * 0.952)
-    return parts_of((order.metal("black"), case), (face, disc))
+    return parts_of((spec.metal("black"), case), (face, disc))
 
 
-def vase(order: Order) -> list[MeshPart]:
-    """A turned vase, with dry branches where look['branches'] is 1."""
-    (w, _, h), rng = order.size, order.rng
-    branches = bool(order.look.get("branches"))
+def vase(spec: BuildRequest) -> list[MeshPart]:
+    """A turned vase, with dry branches where params['branches'] is 1."""
+    (w, _, h), rng = spec.size, spec.rng
+    branches = bool(spec.params.get("branches"))
     body = h * 0.42 if branches else h
     belly, neck, at = rng.uniform(0.42, 0.5), rng.uniform(0.16, 0.28), rng.uniform(0.3, 0.55)
     t = np.linspace(0, 1, 22)
@@ -132,7 +142,7 @@ def vase(order: Order) -> list[MeshPart]:
         *[(a * w, b * (body - 0.004)) for a, b in zip(inner[:8:-1], t[:8:-1])],
         (0, body * 0.4),
     ]
-    clay = GLAZES[order.word("glaze", "white")]
+    clay = GLAZES[spec.word("glaze", "white")]
     twigs, buds = [], []
     if branches:
         for _ in range(7):

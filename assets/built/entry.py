@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.maker import Order, parts_of, plain
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, bar, box, extruded, joined, lathe, sheet, tube
 from embodied.assets.records import MeshPart
 
 
-def shoes(order: Order) -> list[MeshPart]:
+def shoes(spec: BuildRequest) -> list[MeshPart]:
     """A pair of low shoes, one a little askew."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     colour = {
         "black": (0.07, 0.065, 0.06),
         "brown": (0.32, 0.19, 0.11),
         "white": (0.86, 0.85, 0.82),
         "blue": (0.16, 0.22, 0.34),
-    }[order.word("colour", "brown")]
+    }[spec.word("colour", "brown")]
     length, width = d * 0.97, w * 0.44
     uppers: list[Shape] = []
     soles: list[Shape] = []
@@ -42,7 +42,7 @@ def shoes(order: Order) -> list[MeshPart]:
         turn, at = side * 0.04 + rng.normal(0, 0.05), side * w * 0.25
         for shape, group in lay:
             group.append(shape.scaled(side, 1, 1).turned(turn).moved(at, rng.normal(0, 0.003)))
-    pale = (0.88, 0.87, 0.84) if order.look.get("colour") in ("white", "blue") else (0.09, 0.08, 0.075)
+    pale = (0.88, 0.87, 0.84) if spec.params.get("colour") in ("white", "blue") else (0.09, 0.08, 0.075)
     dark = (0.7 * colour[0], 0.7 * colour[1], 0.7 * colour[2])
     return parts_of((plain(colour, 0.45), uppers), (plain(pale, 0.7), soles), (plain(dark, 0.8), laces))
 
@@ -52,16 +52,16 @@ def _sole(outline: np.ndarray, y: np.ndarray) -> Shape:
     return extruded(shapely.Polygon(ring).buffer(0), 0, 0.026)
 
 
-def coat_hooks(order: Order) -> list[MeshPart]:
+def coat_hooks(spec: BuildRequest) -> list[MeshPart]:
     """A board with hooks, some of them with coats, a bag or a scarf."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     top = h - 0.10
     plank = box([-w / 2, d / 2 - 0.02, top], [w / 2, d / 2, h], 0.004)
     count = max(3, round(w / 0.17))
     hooks, clothes = [], []
     cloths = ("tweed/0", "linen/4", "denim/0", "linen/3", "velvet/3", "linen/6", "tweed/1")
     turns = rng.permutation(len(cloths))
-    full = {int(k) for k in rng.choice(count, min(int(order.look.get("coats", 3)), count), replace=False)}
+    full = {int(k) for k in rng.choice(count, min(int(spec.params.get("coats", 3)), count), replace=False)}
     for k, x in enumerate(np.linspace(-w / 2 + 0.07, w / 2 - 0.07, count)):
         y = d / 2 - 0.02
         hooks.append(tube([(x, y, h - 0.03), (x, y - 0.045, h - 0.035), (x, y - 0.06, h - 0.012)], 0.006, 8))
@@ -70,8 +70,8 @@ def coat_hooks(order: Order) -> list[MeshPart]:
             drop = (h - 0.04) * (1.0 if k == min(full) else rng.uniform(0.72, 0.98))
             garment = _coat(min(0.40, w / count * 2.0), d * 0.62, drop, rng=rng)
             garment = garment.moved(x, d / 2 - 0.02 - d * 0.40, h - 0.035 - drop)
-            clothes.append((order.finish(cloths[turns[k % len(cloths)]]), garment))
-    return parts_of((order.material("wood", "oak/0"), plank), (order.metal("black"), hooks), *clothes)
+            clothes.append((spec.finish(cloths[turns[k % len(cloths)]]), garment))
+    return parts_of((spec.material("wood", "oak/0"), plank), (spec.metal("black"), hooks), *clothes)
 
 
 def _coat(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
@@ -109,17 +109,17 @@ def _coat(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shape:
     return joined(*shapes)
 
 
-def coat(order: Order) -> list[MeshPart]:
+def coat(spec: BuildRequest) -> list[MeshPart]:
     """A coat on a hook."""
-    w, d, h = order.size
+    w, d, h = spec.size
     hook = tube([(0, d / 2, h - 0.02), (0, d / 2 - 0.04, h - 0.025), (0, d / 2 - 0.05, h)], 0.005, 8)
-    body = _coat(w, d * 0.7, h - 0.02, rng=order.rng).moved(0, d / 2 - 0.01 - d * 0.42, 0)
-    return parts_of((order.metal("black"), hook), (order.material("cloth", "tweed/0"), body))
+    body = _coat(w, d * 0.7, h - 0.02, rng=spec.rng).moved(0, d / 2 - 0.01 - d * 0.42, 0)
+    return parts_of((spec.metal("black"), hook), (spec.material("cloth", "tweed/0"), body))
 
 
-def shoe_rack(order: Order) -> list[MeshPart]:
+def shoe_rack(spec: BuildRequest) -> list[MeshPart]:
     """Two slatted boards between two sides."""
-    w, d, h = order.size
+    w, d, h = spec.size
     board = 0.018
     sides = [box([x0, -d / 2, 0], [x0 + board, d / 2, h], 0.002) for x0 in (-w / 2, w / 2 - board)]
     slats = [
@@ -127,12 +127,12 @@ def shoe_rack(order: Order) -> list[MeshPart]:
         for z in (h * 0.22 - 0.016, h - 0.016)
         for y in np.linspace(-d / 2 + 0.005, d / 2 - 0.055, 4)
     ]
-    return parts_of((order.material("wood", "oak/0"), [*sides, *slats]))
+    return parts_of((spec.material("wood", "oak/0"), [*sides, *slats]))
 
 
-def umbrella_stand(order: Order) -> list[MeshPart]:
+def umbrella_stand(spec: BuildRequest) -> list[MeshPart]:
     """A tall pot with two umbrellas."""
-    w, _, h = order.size
+    w, _, h = spec.size
     r, pot = w / 2, h * 0.58
     stand = lathe([(0, 0), (r * 0.92, 0), (r * 0.96, pot), (r * 0.9, pot), (r * 0.86, 0.012), (0, 0.012)], 28)
     shafts, cloths = [], []
@@ -146,15 +146,15 @@ def umbrella_stand(order: Order) -> list[MeshPart]:
         along = foot + (crook - foot) * np.array([0.12, 0.3, 0.55, 0.75])[:, None]
         cloths.append(tube(along, [0.008, 0.026, 0.032, 0.012], 10))
     return parts_of(
-        (order.metal("black"), stand),
+        (spec.metal("black"), stand),
         (plain((0.30, 0.20, 0.12), 0.4), shafts),
         (plain((0.10, 0.12, 0.18), 0.7), cloths[0]),
         (plain((0.45, 0.12, 0.12), 0.7), cloths[1]),
     )
 
 
-def doormat(order: Order) -> list[MeshPart]:
-    w, d, h = order.size
+def doormat(spec: BuildRequest) -> list[MeshPart]:
+    w, d, h = spec.size
     edge = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.6], 0.002)
     mat = box([-w / 2 + 0.02, -d / 2 + 0.02, 0], [w / 2 - 0.02, d / 2 - 0.02, h], 0.004)
-    return parts_of((plain((0.06, 0.06, 0.06), 0.8), edge), (order.material("skin", "sisal/0"), mat))
+    return parts_of((plain((0.06, 0.06, 0.06), 0.8), edge), (spec.material("skin", "sisal/0"), mat))

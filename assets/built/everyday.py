@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.maker import BLACK, GLASS, PAPER, STEEL, Order, parts_of, plain
+from embodied.assets.built.parametric import BLACK, GLASS, PAPER, STEEL, BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -37,8 +37,8 @@ TINTS = {
 """Colours of mass-made things, sRGB."""
 
 
-def _tint(order: Order, name: str = "colour", default: str = "white") -> tuple[float, float, float]:
-    return TINTS[order.word(name, default)]
+def _tint(spec: BuildRequest, name: str = "colour", default: str = "white") -> tuple[float, float, float]:
+    return TINTS[spec.word(name, default)]
 
 
 def _leaf(x: float, y: float, z: float, w: float, d: float, turn: float, thick: float) -> Shape:
@@ -49,9 +49,9 @@ def _leaf(x: float, y: float, z: float, w: float, d: float, turn: float, thick: 
 # ------------------------------------------------------------------ paper
 
 
-def post(order: Order) -> list[MeshPart]:
+def post(spec: BuildRequest) -> list[MeshPart]:
     """Letters in a loose heap, some with a window, one brown."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     count = 4
     letters: list[Shape] = []
     windows: list[Shape] = []
@@ -76,9 +76,9 @@ def post(order: Order) -> list[MeshPart]:
     )
 
 
-def note(order: Order) -> list[MeshPart]:
-    """A sheet on a wall under a pin, its foot coming forward; a child's drawing (look['drawing']) or writing."""
-    (w, d, h), rng = order.size, order.rng
+def note(spec: BuildRequest) -> list[MeshPart]:
+    """A sheet on a wall under a pin, its foot coming forward; a child's drawing (params['drawing']) or writing."""
+    (w, d, h), rng = spec.size, spec.rng
 
     def curl(share: float) -> float:
         """How far the sheet comes forward at a share of its height."""
@@ -94,7 +94,7 @@ def note(order: Order) -> list[MeshPart]:
         return quads([[(a, *low), (b, *low), (b, *high), (a, *high)]])
 
     marks: list[tuple[Finish, list[Shape]]]
-    if order.look.get("drawing"):
+    if spec.params.get("drawing"):
         crayons = [(0.35, 0.6, 0.85), (0.7, 0.2, 0.18), (0.85, 0.6, 0.3), (0.6, 0.35, 0.65), (0.2, 0.45, 0.7)]
         wall, roof, sky = (crayons[k] for k in rng.permutation(5)[:3])
         grass, sun = (0.3, 0.6, 0.25), (0.95, 0.8, 0.2)
@@ -113,13 +113,13 @@ def note(order: Order) -> list[MeshPart]:
         marks = [(plain((0.2, 0.2, 0.28), 0.9), ink)]
     pin = ball(0.006, 8, 5).scaled(1, 0.6, 1).moved(0, d / 2 - 0.004, h * 0.965)
     head = plain(TINTS[("red", "blue", "green", "yellow")[int(rng.integers(4))]], 0.35)
-    paper = plain(_tint(order, "paper"), 0.9, specular=0.2)
+    paper = plain(_tint(spec, "paper"), 0.9, specular=0.2)
     return parts_of((paper, leaf), (head, pin), *marks)
 
 
-def notice_board(order: Order) -> list[MeshPart]:
+def notice_board(spec: BuildRequest) -> list[MeshPart]:
     """A framed cork board with notes and cards pinned to it."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     f, y = 0.022, d / 2
     left, right, top, bottom = frame(-w / 2, w / 2, 0, h, (y - 0.02, y), f, 0.002)
     cork = box([-w / 2 + f, y - 0.01, f], [w / 2 - f, y, h - f])
@@ -138,19 +138,19 @@ def notice_board(order: Order) -> list[MeshPart]:
         leaves.setdefault(names[int(rng.integers(len(names)))], []).append(leaf.moved(cx, y - 0.0105, cz))
         pins.append(ball(0.005, 8, 5).moved(cx, y - 0.014, cz + ph * 0.42))
     return parts_of(
-        (order.material("wood", "oak/0"), [left, right, bottom, top]),
+        (spec.material("wood", "oak/0"), [left, right, bottom, top]),
         (plain((0.62, 0.45, 0.28), 0.95, specular=0.1), cork),
         *((plain(TINTS[n], 0.9), s) for n, s in sorted(leaves.items())),
         (plain((0.66, 0.16, 0.13), 0.35), pins),
     )
 
 
-def wall_calendar(order: Order) -> list[MeshPart]:
+def wall_calendar(spec: BuildRequest) -> list[MeshPart]:
     """A picture above, the days of a month below, on a nail."""
-    w, d, h = order.size
+    w, d, h = spec.size
     y = d / 2
     leaf = box([-w / 2, y - 0.004, 0], [w / 2, y, h * 0.97])
-    art = order.material("art", "art_sea/0")
+    art = spec.material("art", "art_sea/0")
     a, b, c, e = -w / 2 + 0.01, w / 2 - 0.01, h * 0.52, h * 0.94
     picture = quads(
         [[(a, y - 0.0045, c), (b, y - 0.0045, c), (b, y - 0.0045, e), (a, y - 0.0045, e)]],
@@ -165,9 +165,9 @@ def wall_calendar(order: Order) -> list[MeshPart]:
     return parts_of((PAPER, leaf), (art, picture), (plain((0.3, 0.3, 0.33), 0.8), days), (STEEL, nail))
 
 
-def folders(order: Order) -> list[MeshPart]:
+def folders(spec: BuildRequest) -> list[MeshPart]:
     """Ring binders side by side, each with a label on its spine."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     count = max(2, round(w / 0.07))
     t = w / count
     names = ("grey", "black", "blue", "red", "green", "grey")
@@ -186,9 +186,9 @@ def folders(order: Order) -> list[MeshPart]:
 # ------------------------------------------------------------------ electric
 
 
-def cable(order: Order) -> list[MeshPart]:
+def cable(spec: BuildRequest) -> list[MeshPart]:
     """A charger with its cable in loops."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     t = np.linspace(0, 1, 40)
     turns = 2 * np.pi * (1.6 + rng.uniform(0, 0.6))
     r = 0.5 - 0.33 * t + 0.04 * np.sin(9 * t + rng.uniform(0, 6))
@@ -197,7 +197,7 @@ def cable(order: Order) -> list[MeshPart]:
     end = path[-1]
     plug = box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004).moved(end[0], end[1])
     tip = box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001).moved(*path[0, :2])
-    skin = plain(_tint(order), 0.45)
+    skin = plain(_tint(spec), 0.45)
     return parts_of((skin, [tube(path, 0.0022, 6), plug]), (STEEL, tip))
 
 
@@ -225,19 +225,19 @@ def _crumpled(size: Size, cells: int, roundness: float, *, rng: np.random.Genera
     return joined(top, low.reversed(), between(up * [1, 1, 0], up)).shifted_uv(*rng.random(2))
 
 
-def thrown_clothes(order: Order) -> list[MeshPart]:
+def thrown_clothes(spec: BuildRequest) -> list[MeshPart]:
     """Clothes as they were taken off: two pieces, one over the other."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     under = _crumpled((w, d, h * 0.7), 14, 0.8, rng=rng)
     over = _crumpled((w * 0.6, d * 0.6, h * 0.55), 12, 0.6, rng=rng).turned(rng.uniform(0, 3))
     over = over.moved(0.06 * w, -0.05 * d, h * 0.45)
-    cloth, other = order.material("cloth", "denim/0"), order.material("other", "linen/4")
+    cloth, other = spec.material("cloth", "denim/0"), spec.material("other", "linen/4")
     return parts_of((cloth, under), (other, over))
 
 
-def duvet(order: Order) -> list[MeshPart]:
+def duvet(spec: BuildRequest) -> list[MeshPart]:
     """A duvet pushed back in the morning: feathers in cotton, in a few long, round folds across the bed."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     cells = 34
     t = np.linspace(-1, 1, cells + 1)
     t = np.sign(t) * (1 - (1 - np.abs(t)) ** 1.5)  # close together at the rim, which is round
@@ -258,15 +258,15 @@ def duvet(order: Order) -> list[MeshPart]:
     rise = puff * h * (0.36 + 0.64 * lie.clip(-0.2, 1.0)) + 0.004
     top, low = sheet(np.stack([px, py, rise], -1)), sheet(np.stack([px, py, 0 * rise], -1))
     cloth = joined(top, low.reversed()).shifted_uv(*rng.random(2))
-    return parts_of((order.material("cloth", "cotton/0"), cloth))
+    return parts_of((spec.material("cloth", "cotton/0"), cloth))
 
 
 # ------------------------------------------------------------------ kitchen and bath
 
 
-def dish_rack(order: Order) -> list[MeshPart]:
+def dish_rack(spec: BuildRequest) -> list[MeshPart]:
     """A wire rack with plates on edge and two cups upside down."""
-    w, d, h = order.size
+    w, d, h = spec.size
     wire = 0.003
     a, b, rim = w / 2 - wire, d / 2 - wire, h * 0.4
     wires = [tube([(-a, s * b, z), (a, s * b, z)], wire, 6) for s in (-1, 1) for z in (0.02, rim)]
@@ -280,16 +280,16 @@ def dish_rack(order: Order) -> list[MeshPart]:
     cup = lathe([(0.0, 0.08), (0.03, 0.08), (0.038, 0.0), (0.034, 0.0), (0.026, 0.076), (0, 0.076)], 18)
     cups = [cup.moved(0.32 * w, y, 0.024) for y in (-0.2 * d, 0.2 * d)]
     return parts_of(
-        (order.metal("chrome"), wires),
+        (spec.metal("chrome"), wires),
         (BLACK, feet),
         (plain((0.92, 0.91, 0.89), 0.15), stand),
-        (plain(_tint(order, "cup", "blue"), 0.2), cups),
+        (plain(_tint(spec, "cup", "blue"), 0.2), cups),
     )
 
 
-def jar(order: Order) -> list[MeshPart]:
+def jar(spec: BuildRequest) -> list[MeshPart]:
     """A storage jar with a lid, full to three quarters."""
-    w, _, h = order.size
+    w, _, h = spec.size
     r, body = w / 2, h * 0.86
     outside = [(0, 0), (r * 0.94, 0), (r, 0.006), (r, body * 0.88), (r * 0.86, body)]
     within = [(r * 0.82, body), (r * 0.96, body * 0.86), (r * 0.96, 0.008), (0, 0.006)]
@@ -304,46 +304,46 @@ def jar(order: Order) -> list[MeshPart]:
     lid = cylinder(r * 0.9, 0, h - body, 0.004, 20).moved(0, 0, body)
     return parts_of(
         (GLASS, shell),
-        (plain(grain[order.word("holds", "pasta")], 0.9), inside),
-        (order.metal("steel") if "metal" in order.look else order.material("wood", "oak/0"), lid),
+        (plain(grain[spec.word("holds", "pasta")], 0.9), inside),
+        (spec.metal("steel") if "metal" in spec.params else spec.material("wood", "oak/0"), lid),
     )
 
 
-def tin(order: Order) -> list[MeshPart]:
+def tin(spec: BuildRequest) -> list[MeshPart]:
     """A tin of food with a paper label."""
-    w, _, h = order.size
+    w, _, h = spec.size
     r = w / 2
     can = lathe([(0, 0), (r, 0), (r, h), (r * 0.93, h), (r * 0.92, h - 0.004), (0, h - 0.004)], 20, 0.6)
     label = lathe([(r + 0.0005, h * 0.06), (r + 0.0005, h * 0.94)], 20)
     band = lathe([(r + 0.0009, h * 0.3), (r + 0.0009, h * 0.55)], 20)
-    return parts_of((STEEL, can), (plain(_tint(order), 0.5), label), (PAPER, band))
+    return parts_of((STEEL, can), (plain(_tint(spec), 0.5), label), (PAPER, band))
 
 
-def packet(order: Order) -> list[MeshPart]:
+def packet(spec: BuildRequest) -> list[MeshPart]:
     """A cardboard packet, printed: a field, a stripe and a picture's patch on its front."""
-    w, d, h = order.size
+    w, d, h = spec.size
     y = -d / 2 - 0.0004
     stripe = box([-w / 2, y, h * 0.72], [w / 2, y + 0.001, h * 0.88])
     patch = box([-w * 0.34, y, h * 0.14], [w * 0.34, y + 0.001, h * 0.56])
     return parts_of(
-        (plain(_tint(order), 0.55), box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.0015)),
+        (plain(_tint(spec), 0.55), box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.0015)),
         (PAPER, stripe),
-        (plain(_tint(order, "patch", "yellow"), 0.55), patch),
+        (plain(_tint(spec, "patch", "yellow"), 0.55), patch),
     )
 
 
-def toilet_roll(order: Order) -> list[MeshPart]:
+def toilet_roll(spec: BuildRequest) -> list[MeshPart]:
     """A roll of toilet paper standing on end."""
-    w, _, h = order.size
+    w, _, h = spec.size
     r = w / 2
     roll = lathe([(r * 0.36, 0), (r, 0), (r, h), (r * 0.36, h), (r * 0.36, 0)], 24, 0.7)
     card = lathe([(r * 0.35, h), (r * 0.35, 0)], 20)
     return parts_of((plain((0.93, 0.93, 0.92), 0.95, specular=0.05), roll), (plain((0.6, 0.5, 0.38), 0.9), card))
 
 
-def duck(order: Order) -> list[MeshPart]:
+def duck(spec: BuildRequest) -> list[MeshPart]:
     """A bath duck."""
-    w, d, h = order.size
+    w, d, h = spec.size
     body = ball(0.5, 14, 9).scaled(w, d, h * 0.62).moved(0, 0, h * 0.31)
     head = ball(h * 0.24, 12, 8).moved(0, -d * 0.2, h * 0.74)
     tail = ball(0.5, 8, 6).scaled(w * 0.3, d * 0.24, h * 0.3).moved(0, d * 0.42, h * 0.5)
@@ -357,9 +357,9 @@ def duck(order: Order) -> list[MeshPart]:
 # ------------------------------------------------------------------ toys and games
 
 
-def blocks(order: Order) -> list[MeshPart]:
+def blocks(spec: BuildRequest) -> list[MeshPart]:
     """Building blocks where a child left them: some on one another, the rest about."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     side = min(h / 2.02, 0.045)
     by: dict[str, list[Shape]] = {}
     names = ("red", "blue", "yellow", "green", "beige", "orange")
@@ -379,10 +379,10 @@ def blocks(order: Order) -> list[MeshPart]:
     return parts_of(*((plain(TINTS[n], 0.5), s) for n, s in sorted(by.items())))
 
 
-def board_game(order: Order) -> list[MeshPart]:
+def board_game(spec: BuildRequest) -> list[MeshPart]:
     """Flat boxes of games on one another."""
-    (w, d, h), rng = order.size, order.rng
-    count = int(order.look.get("count", 2))
+    (w, d, h), rng = spec.size, spec.rng
+    count = int(spec.params.get("count", 2))
     made: list[tuple[Finish, list[Shape] | Shape]] = []
     names = ("red", "blue", "green", "orange", "black")
     turns = rng.permutation(len(names))
@@ -396,9 +396,9 @@ def board_game(order: Order) -> list[MeshPart]:
     return parts_of(*made)
 
 
-def crayons(order: Order) -> list[MeshPart]:
+def crayons(spec: BuildRequest) -> list[MeshPart]:
     """Pencils of many colours on a sheet with a scribble."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     leaf = box([-w / 2, -d / 2, 0], [w / 2, d / 2, 0.0012])
     by: dict[str, list[Shape]] = {}
     for k, name in enumerate(("red", "blue", "green", "yellow", "orange", "pink")):

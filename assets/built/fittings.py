@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.maker import BLACK, CHROME, WHITE, Order, parts_of, plain
+from embodied.assets.built.parametric import BLACK, CHROME, WHITE, BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, box, cylinder, lathe, quads, tube
 from embodied.assets.records import MeshPart
 
 
-def switch(order: Order) -> list[MeshPart]:
-    w, d, h = order.size
+def switch(spec: BuildRequest) -> list[MeshPart]:
+    w, d, h = spec.size
     plate = box([-w / 2, -d * 0.1, 0], [w / 2, d / 2, h], 0.002)
     rocker = box([-w * 0.33, -d * 0.35, -h * 0.33], [w * 0.33, d * 0.2, h * 0.33], 0.0015).turned(0.05, "x")
     return parts_of((WHITE, [plate, rocker.moved(0, -d * 0.1, h / 2)]))
 
 
-def socket(order: Order) -> list[MeshPart]:
-    w, d, h = order.size
+def socket(spec: BuildRequest) -> list[MeshPart]:
+    w, d, h = spec.size
     plate = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.002)
     around = [(0.0195, 0), (0.021, 0.0), (0.021, 0.0012), (0.0195, 0.0012), (0.0195, 0)]
     ring = lathe(around, 24).hung(0, -d / 2, h / 2)
@@ -26,13 +26,13 @@ def socket(order: Order) -> list[MeshPart]:
     return parts_of((WHITE, [plate, ring]), (plain((0.78, 0.77, 0.75), 0.5), well), (BLACK, holes))
 
 
-def radiator(order: Order) -> list[MeshPart]:
-    """Panel radiator with ribs, grille and valve; or columns where look['kind'] is 'columns'."""
-    w, d, h = order.size
+def radiator(spec: BuildRequest) -> list[MeshPart]:
+    """Panel radiator with ribs, grille and valve; or columns where params['kind'] is 'columns'."""
+    w, d, h = spec.size
     made: list[Shape] = []
     grille: list[Shape] = []
     pipe: list[Shape] = []
-    if order.look.get("kind") == "columns":
+    if spec.params.get("kind") == "columns":
         count = max(4, round(w / 0.055))
         for x in np.linspace(-w / 2 + 0.022, w / 2 - 0.022, count):
             for y in (-d * 0.28, d * 0.28):
@@ -56,7 +56,7 @@ def radiator(order: Order) -> list[MeshPart]:
         ]
         knob, pipe = _valve(w / 2 - 0.03, right, d, h)
     return parts_of(
-        (order.material("skin", "lacquer_white/0"), made),
+        (spec.material("skin", "lacquer_white/0"), made),
         (CHROME, pipe),
         (plain((0.35, 0.35, 0.35), 0.6), grille),
         (WHITE, knob),

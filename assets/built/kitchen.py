@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from embodied.assets.built.maker import (
+from embodied.assets.built.parametric import (
     BLACK,
     CHROME,
     GLASS,
     STEEL,
     WHITE,
-    Order,
+    BuildRequest,
     carcass,
     front,
     handle,
@@ -31,14 +31,14 @@ PLINTH = (0.10, 0.06)
 
 
 def _base(
-    order: Order,
+    spec: BuildRequest,
     h: float,
     doors: list[Shape],
     grips: list[Shape],
     top: list[Shape] | None = None,
     extra: Sequence[tuple[Finish, list[Shape] | Shape]] = (),
 ) -> list[MeshPart]:
-    w, d, _ = order.size
+    w, d, _ = spec.size
     body = carcass((-w / 2, -d / 2 + 0.022, PLINTH[0]), (w / 2, d / 2, h - TOP), top=top is None)
     plinth = box([-w / 2, -d / 2 + 0.022 + PLINTH[1], 0], [w / 2, -d / 2 + 0.04 + PLINTH[1], PLINTH[0]])
     worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)] if top is None else top
@@ -46,18 +46,18 @@ def _base(
         (WHITE, body),
         (BLACK, plinth),
         joints(doors),
-        (order.material("front", "lacquer_white/0"), doors),
-        (order.metal(), grips),
-        (order.material("worktop", "oak_worktop/0"), worktop),
+        (spec.material("front", "lacquer_white/0"), doors),
+        (spec.metal(), grips),
+        (spec.material("worktop", "oak_worktop/0"), worktop),
         *extra,
     )
 
 
-def base(order: Order) -> list[MeshPart]:
-    """Doors, or drawers where look['drawers'] > 0, under a worktop."""
-    w, d, h = order.size
+def base(spec: BuildRequest) -> list[MeshPart]:
+    """Doors, or drawers where params['drawers'] > 0, under a worktop."""
+    w, d, h = spec.size
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
-    drawers, style, grip = int(order.look.get("drawers", 0)), order.word("style", "flat"), order.word("handle", "bar")
+    drawers, style, grip = (int(spec.params.get("drawers", 0)), spec.word("style", "flat"), spec.word("handle", "bar"))
     columns = max(1, round(w / 0.6))
     edges = np.linspace(-w / 2, w / 2, columns + 1)
     doors, grips = [], []
@@ -73,22 +73,22 @@ def base(order: Order) -> list[MeshPart]:
             doors.append(front(a, b, z0, z1, y, style))
             left = (b + a) / 2 > 0 or columns == 1
             grips.append(handle(a + 0.04 if left else b - 0.04, z1 - 0.12, y, _on_door(grip), True))
-    return _base(order, h, doors, grips)
+    return _base(spec, h, doors, grips)
 
 
-def corner(order: Order) -> list[MeshPart]:
+def corner(spec: BuildRequest) -> list[MeshPart]:
     """A blind corner unit: one door, one fixed filler."""
-    w, d, h = order.size
+    w, d, h = spec.size
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
-    style = order.word("style", "flat")
+    style = spec.word("style", "flat")
     doors = [front(-w / 2, 0, z0, z1, y, style), box([0.0, y, z0], [w / 2, y + 0.02, z1], 0.001)]
-    grips = [handle(-0.05, z1 - 0.12, y, _on_door(order.word("handle", "bar")), True)]
-    return _base(order, h, doors, grips)
+    grips = [handle(-0.05, z1 - 0.12, y, _on_door(spec.word("handle", "bar")), True)]
+    return _base(spec, h, doors, grips)
 
 
-def sink(order: Order) -> list[MeshPart]:
+def sink(spec: BuildRequest) -> list[MeshPart]:
     """A base unit with a steel basin let into the worktop, and a mixer tap behind it."""
-    w, d, h = order.size
+    w, d, h = spec.size
     tap_rise = 0.30
     h = h - tap_rise
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
@@ -124,17 +124,17 @@ def sink(order: Order) -> list[MeshPart]:
         cylinder(0.025, 0, 0.02, 0.004, 14).moved(0, ty, h),
         tube([(0.012, ty, h + 0.06), (0.05, ty, h + 0.075), (0.085, ty - 0.01, h + 0.10)], 0.007, 8),
     ]
-    style, grip = order.word("style", "flat"), order.word("handle", "bar")
+    style, grip = spec.word("style", "flat"), spec.word("handle", "bar")
     pair = w > 0.7
     edges = [-w / 2, 0, w / 2] if pair else [-w / 2, w / 2]
     doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges)]
     grips = [handle(x, z1 - 0.12, y, _on_door(grip), True) for x in ((-0.05, 0.05) if pair else (w / 2 - 0.045,))]
-    return _base(order, h, doors, grips, worktop, ((STEEL, [*rim, basin, drain]), (CHROME, tap)))
+    return _base(spec, h, doors, grips, worktop, ((STEEL, [*rim, basin, drain]), (CHROME, tap)))
 
 
-def cooker(order: Order) -> list[MeshPart]:
+def cooker(spec: BuildRequest) -> list[MeshPart]:
     """Built-in oven with a glass door under a ceramic hob in the worktop."""
-    w, d, h = order.size
+    w, d, h = spec.size
     y, z0, z1 = -d / 2 + 0.002, PLINTH[0], h - TOP - 0.003
     panel, drawer = 0.11, 0.12
     ow = min(w, 0.6)
@@ -171,7 +171,7 @@ def cooker(order: Order) -> list[MeshPart]:
         (plain((0.55, 0.55, 0.56), 0.3), rings),
     )
     worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)]
-    return _base(order, h, [*sides, kick], [], worktop, extra)
+    return _base(spec, h, [*sides, kick], [], worktop, extra)
 
 
 def _level_grip(x: float, z: float, y: float, length: float) -> Shape:
@@ -189,17 +189,17 @@ def _knob() -> Shape:
     return Shape(m, t.faces, n, t.uv)
 
 
-def wall_cabinet(order: Order) -> list[MeshPart]:
-    """Doors on a box; where look['glazed'] is 1 two of glass with bars, crockery on the boards behind them."""
-    w, d, h = order.size
+def wall_cabinet(spec: BuildRequest) -> list[MeshPart]:
+    """Doors on a box; where params['glazed'] is 1 two of glass with bars, crockery on the boards behind them."""
+    w, d, h = spec.size
     y = -d / 2 + 0.002
-    style, grip = order.word("style", "flat"), order.word("handle", "bar")
-    columns = max(2, round(w / 0.4)) if order.look.get("glazed") and w > 0.45 else max(1, round(w / 0.5))
+    style, grip = spec.word("style", "flat"), spec.word("handle", "bar")
+    columns = max(2, round(w / 0.4)) if spec.params.get("glazed") and w > 0.45 else max(1, round(w / 0.5))
     edges = np.linspace(-w / 2, w / 2, columns + 1)
     doors, grips, panes, inside = [], [], [], []
     crockery: list[tuple[Finish, list[Shape] | Shape]] = []
     for k, (a, b) in enumerate(itertools.pairwise(edges)):
-        if order.look.get("glazed"):
+        if spec.params.get("glazed"):
             r = 0.05
             doors += [
                 box([a + 0.0015, y, 0.0015], [a + r, y + 0.02, h - 0.0015], 0.0015),
@@ -213,15 +213,15 @@ def wall_cabinet(order: Order) -> list[MeshPart]:
             doors.append(front(a, b, 0, h, y, style))
         left = columns > 1 and k % 2 == 1
         grips.append(handle(a + 0.035 if left else b - 0.035, 0.12, y, _on_door(grip), True))
-    if order.look.get("glazed"):
+    if spec.params.get("glazed"):
         heights = np.linspace(0, h, 4)[1:-1]
         inside = [box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018]) for z in heights]
-        crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=order.rng)
+        crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=spec.rng)
     return parts_of(
         (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
-        joints([] if order.look.get("glazed") else doors),
-        (order.material("front", "lacquer_white/0"), doors),
-        (order.metal(), grips),
+        joints([] if spec.params.get("glazed") else doors),
+        (spec.material("front", "lacquer_white/0"), doors),
+        (spec.metal(), grips),
         *crockery,
         (GLASS, panes),
     )
@@ -252,11 +252,11 @@ def _crockery(
     return [(white, light), (colour, tinted), (GLASS, clear)]
 
 
-def tall_cabinet(order: Order) -> list[MeshPart]:
+def tall_cabinet(spec: BuildRequest) -> list[MeshPart]:
     """Larder unit: a tall door over a short one."""
-    w, d, h = order.size
+    w, d, h = spec.size
     y = -d / 2 + 0.002
-    style, grip = order.word("style", "flat"), order.word("handle", "bar")
+    style, grip = spec.word("style", "flat"), spec.word("handle", "bar")
     cut = PLINTH[0] + 0.72
     columns = max(1, round(w / 0.6))
     edges = np.linspace(-w / 2, w / 2, columns + 1)
@@ -264,15 +264,15 @@ def tall_cabinet(order: Order) -> list[MeshPart]:
     doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges) for z0, z1 in rows]
     grips = [handle(b - 0.04, z, y, _on_door(grip), True) for b in edges[1:] for z in (cut - 0.12, cut + 0.2)]
     side = box([-w / 2, y + 0.022, 0], [w / 2, d / 2, h], 0.002)
-    return parts_of((order.material("front", "lacquer_white/0"), [*doors, side]), joints(doors), (order.metal(), grips))
+    return parts_of((spec.material("front", "lacquer_white/0"), [*doors, side]), joints(doors), (spec.metal(), grips))
 
 
-def fridge(order: Order) -> list[MeshPart]:
+def fridge(spec: BuildRequest) -> list[MeshPart]:
     """Two doors over one another, a dark seal between them, upright grips that meet there.
 
-    On the upper door look['notes'] papers hang under magnets; where look['water'] is 1 it gives water and ice.
+    On the upper door params['notes'] papers hang under magnets; where params['water'] is 1 it gives water and ice.
     """
-    w, d, h = order.size
+    w, d, h = spec.size
     front_y, thick, split, foot = -d / 2 + 0.052, 0.062, h * 0.36, 0.07
     back_of_doors = front_y + thick
     body = box([-w / 2 + 0.003, back_of_doors + 0.012, foot - 0.02], [w / 2 - 0.003, d / 2, h], 0.004)
@@ -291,8 +291,8 @@ def fridge(order: Order) -> list[MeshPart]:
     x = -w / 2 + 0.055
     grips = [_long_grip(x, front_y, z0, z1) for z0, z1 in ((split - 0.46, split - 0.04), (split + 0.04, split + 0.70))]
     badge = box([-0.045, front_y - 0.0015, h - 0.085], [0.045, front_y + 0.001, h - 0.066], 0.0005)
-    papers, magnets = _notes(int(order.look.get("notes", 0)), w, h, front_y, rng=order.rng)
-    skin = order.material("front", "lacquer_white/0")
+    papers, magnets = _notes(int(spec.params.get("notes", 0)), w, h, front_y, rng=spec.rng)
+    skin = spec.material("front", "lacquer_white/0")
     sides = plain((0.42, 0.42, 0.43), 0.5) if skin.metallic else skin
     return parts_of(
         (skin, doors),
@@ -300,8 +300,8 @@ def fridge(order: Order) -> list[MeshPart]:
         (BLACK, [base]),
         (plain((0.09, 0.09, 0.095), 0.7), seal),
         (plain((0.3, 0.3, 0.31), 0.5), [*slats, *hinges]),
-        (order.metal("steel"), [*grips, badge]),
-        *(_water(front_y, split + 0.30) if order.look.get("water") else _display(front_y, split + 0.56 * (h - split))),
+        (spec.metal("steel"), [*grips, badge]),
+        *(_water(front_y, split + 0.30) if spec.params.get("water") else _display(front_y, split + 0.56 * (h - split))),
         *papers,
         (plain((0.62, 0.16, 0.14), 0.4), magnets),
     )
@@ -369,12 +369,12 @@ def _long_grip(x: float, y: float, z0: float, z1: float) -> Shape:
     return joined(bar, *feet)
 
 
-def island(order: Order) -> list[MeshPart]:
+def island(spec: BuildRequest) -> list[MeshPart]:
     """Cabinets on one side, a panelled back, a thick overhanging top for stools."""
-    w, d, h = order.size
+    w, d, h = spec.size
     bw, back = w - 0.06, d / 2 - min(0.28, d * 0.3)
     y, z0, z1 = -d / 2 + 0.03, PLINTH[0], h - 0.045
-    style, grip = order.word("style", "flat"), order.word("handle", "bar")
+    style, grip = spec.word("style", "flat"), spec.word("handle", "bar")
     columns = max(2, round(bw / 0.55))
     edges = np.linspace(-bw / 2, bw / 2, columns + 1)
     doors, grips = [], []
@@ -390,17 +390,17 @@ def island(order: Order) -> list[MeshPart]:
     plinth = box([-bw / 2 + 0.03, y + 0.07, 0], [bw / 2 - 0.03, back - 0.03, z0])
     top = box([-w / 2, -d / 2, z1], [w / 2, d / 2, h], 0.004)
     return parts_of(
-        (order.material("front", "lacquer_white/0"), [*doors, body]),
+        (spec.material("front", "lacquer_white/0"), [*doors, body]),
         (BLACK, plinth),
         joints(doors),
-        (order.metal(), grips),
-        (order.material("worktop", "oak_worktop/0"), top),
+        (spec.metal(), grips),
+        (spec.material("worktop", "oak_worktop/0"), top),
     )
 
 
-def hood(order: Order) -> list[MeshPart]:
+def hood(spec: BuildRequest) -> list[MeshPart]:
     """Chimney hood: a flat canopy, a slope, a shaft up the wall."""
-    w, d, h = order.size
+    w, d, h = spec.size
     rim, slope = 0.05, min(0.16, h * 0.3)
     sw, sd = min(0.30, w * 0.5), min(0.26, d * 0.55)
     low = [(-w / 2, -d / 2, rim), (w / 2, -d / 2, rim), (w / 2, d / 2, rim), (-w / 2, d / 2, rim)]
@@ -413,7 +413,7 @@ def hood(order: Order) -> list[MeshPart]:
     ]
     lamps = [cylinder(0.025, -0.002, 0.003, 0.0, 12).moved(x, -d / 2 + 0.035, 0) for x in (-w * 0.25, w * 0.25)]
     return parts_of(
-        (order.metal(), [box([-w / 2, -d / 2, 0], [w / 2, d / 2, rim], 0.002), between(low, high), shaft]),
+        (spec.metal(), [box([-w / 2, -d / 2, 0], [w / 2, d / 2, rim], 0.002), between(low, high), shaft]),
         (plain((0.45, 0.45, 0.45), 0.4, 1.0), filters),
         (plain((0.95, 0.93, 0.88), 0.3), lamps),
     )

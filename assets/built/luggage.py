@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.maker import BLACK, CHROME, STEEL, Order, parts_of, plain
+from embodied.assets.built.parametric import BLACK, CHROME, STEEL, BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, box, flat, joined, sheet, tube
 from embodied.assets.records import MeshPart
 
@@ -13,9 +13,9 @@ SEAM = plain((0.06, 0.055, 0.05), 0.8, specular=0.1)
 """Zips and edgings."""
 
 
-def rucksack(order: Order) -> list[MeshPart]:
+def rucksack(spec: BuildRequest) -> list[MeshPart]:
     """A rucksack that stands: a stuffed body with a zip over it, a pocket before it, straps behind, a loop on top."""
-    w, d, h = order.size
+    w, d, h = spec.size
     y, bw, bd = 0.02 * d, 0.80 * w, 0.60 * d
     body = _stuffed(bw, bd, 0.94 * h, 0.24 * h).moved(0, y)
     front_y = y - bd / 2
@@ -36,8 +36,8 @@ def rucksack(order: Order) -> list[MeshPart]:
     loop = tube(arch, 0.008, 7)
     straps = [_strap(s * 0.19 * w, y + bd / 2, d / 2, h) for s in (-1, 1)]
     label = box([-0.05 * w, front_y - 0.178 * d, 0.17 * h], [0.05 * w, front_y - 0.160 * d, 0.25 * h], 0.003)
-    cloth = order.material("cloth", "denim/0")
-    trim = order.material("trim", "leather/0")
+    cloth = spec.material("cloth", "denim/0")
+    trim = spec.material("trim", "leather/0")
     return parts_of(
         (cloth, [body, pocket.shifted_uv(0.1, 0.3), *sides]),
         (trim, [foot, loop, *straps, label]),
@@ -69,9 +69,9 @@ def _strap(x: float, y: float, back: float, h: float) -> Shape:
     return sheet(np.stack([path - across, path, path + across], 1)[:, ::-1], 0.012)
 
 
-def suitcase(order: Order) -> list[MeshPart]:
+def suitcase(spec: BuildRequest) -> list[MeshPart]:
     """A hard suitcase on its long edge: two ribbed shells, a metal seam, corners, two locks and a grip above."""
-    w, d, h = order.size
+    w, d, h = spec.size
     low, high = 0.018, h - 0.055
     outline = shapely.box(-w / 2 + 0.004, low, w / 2 - 0.004, high)
     tall, wide = high - low, w - 0.008
@@ -103,7 +103,7 @@ def suitcase(order: Order) -> list[MeshPart]:
         for y in (-0.06, 0.06)
     ]
     return parts_of(
-        (order.material("shell", "leather/0") if "shell" in order.look else plain((0.15, 0.29, 0.46), 0.35), halves),
+        (spec.material("shell", "leather/0") if "shell" in spec.params else plain((0.15, 0.29, 0.46), 0.35), halves),
         (CHROME, [seam, *locks, *posts]),
         (BLACK, [grip, *feet]),
         (plain((0.55, 0.55, 0.56), 0.35, 1.0), corners),

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.maker import (
+from embodied.assets.built.parametric import (
     BLACK,
     BRASS,
     CHROME,
     PAPER,
     PORCELAIN,
     STEEL,
-    Order,
+    BuildRequest,
     parts_of,
     plain,
     whole_image,
@@ -115,9 +115,9 @@ def _ink(cloth: int) -> Finish:
     return INK if sum(CLOTH[cloth]) > PALE else GILT
 
 
-def book_row(order: Order) -> list[MeshPart]:
+def book_row(spec: BuildRequest) -> list[MeshPart]:
     """Books side by side, of many heights and colours; the last ones may lean."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     by_color: dict[int, list[Shape]] = {}
     titles: dict[Finish, list[Shape]] = {GILT: [], INK: []}
     pages, bands = [], []
@@ -149,12 +149,12 @@ def book_row(order: Order) -> list[MeshPart]:
     )
 
 
-def book_stack(order: Order) -> list[MeshPart]:
-    """Books lying on one another, each turned a little; one book where look['count'] is 1."""
-    (w, d, h), rng = order.size, order.rng
-    count = int(order.look.get("count", 3))
+def book_stack(spec: BuildRequest) -> list[MeshPart]:
+    """Books lying on one another, each turned a little; one book where params['count'] is 1."""
+    (w, d, h), rng = spec.size, spec.rng
+    count = int(spec.params.get("count", 3))
     heights = rng.uniform(0.7, 1.3, count)
-    z, made, pages = 0.0, [], []
+    z, covers, pages = 0.0, [], []
     (prints,) = rng.spawn(1)
     colours = rng.permutation(len(CLOTH))
     for k, t in enumerate(heights / heights.sum() * h):
@@ -170,27 +170,27 @@ def book_stack(order: Order) -> list[MeshPart]:
             for s in (cover, leaves, print_)
         ]
         cloth = int(colours[k % len(CLOTH)])
-        made += [(plain(CLOTH[cloth], 0.6, specular=0.3), place[0]), (_ink(cloth), place[2])]
+        covers += [(plain(CLOTH[cloth], 0.6, specular=0.3), place[0]), (_ink(cloth), place[2])]
         pages.append(place[1])
         z += t
-    return parts_of(*made, (PAPER, pages))
+    return parts_of(*covers, (PAPER, pages))
 
 
-def magazine(order: Order) -> list[MeshPart]:
+def magazine(spec: BuildRequest) -> list[MeshPart]:
     """A magazine lying flat, its leaves rising a little at the open side."""
-    w, d, h = order.size
+    w, d, h = spec.size
     x, y = np.meshgrid(np.linspace(-w / 2, w / 2, 9), np.linspace(-d / 2, d / 2, 5))
     grid = np.stack([x, y, h * (0.55 + 0.45 * ((x + w / 2) / w) ** 2)], -1)
-    cover = order.material("cover", "magazine_cover/0")
+    cover = spec.material("cover", "magazine_cover/0")
     top = whole_image(sheet(grid), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
     edge = between(rim(grid) * [1, 1, 0], rim(grid))
     base = quads([[(-w / 2, d / 2, 0), (w / 2, d / 2, 0), (w / 2, -d / 2, 0), (-w / 2, -d / 2, 0)]])
     return parts_of((cover, top), (PAPER, [edge, base]))
 
 
-def papers(order: Order) -> list[MeshPart]:
+def papers(spec: BuildRequest) -> list[MeshPart]:
     """Sheets of paper in a loose pile."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     leaves = []
     for k, z in enumerate(np.linspace(0, h * 0.92, 6)):
         leaf = box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16])
@@ -199,31 +199,31 @@ def papers(order: Order) -> list[MeshPart]:
     return parts_of((PAPER, leaves))
 
 
-def photo_frame(order: Order) -> list[MeshPart]:
+def photo_frame(spec: BuildRequest) -> list[MeshPart]:
     """A small standing frame with a photograph."""
-    w, _, h = order.size
+    w, _, h = spec.size
     f, tilt = 0.016, 0.22
     boards = frame(-w / 2, w / 2, 0, h, (0, 0.012), f, 0.002)
-    art = order.material("art", "art_sea/0")
+    art = spec.material("art", "art_sea/0")
     inside = -w / 2 + f, w / 2 - f, f, h - f
     image = whole_image(upright(*inside, 0.004), art, *inside)
     back = box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
     leg = bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
-    wood = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(order.word("frame", "oak")) or order.finish("oak/0")
+    wood = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(spec.word("frame", "oak")) or spec.finish("oak/0")
     lean = [s.turned(-tilt, "x") for s in (joined(*boards), image, back)]
     return parts_of((wood, lean[0]), (art, lean[1]), (BLACK, [lean[2], leg]))
 
 
-def alarm_clock(order: Order) -> list[MeshPart]:
+def alarm_clock(spec: BuildRequest) -> list[MeshPart]:
     """A round bedside clock on two feet: two bells with a hammer between them under a bow, a rim around the dial."""
-    w, d, h = order.size
+    w, d, h = spec.size
     r = w * 0.46
     zc = h * 0.43
     back = [(0, 0), (r * 0.86, 0), (r * 0.97, d * 0.12), (r, d * 0.3)]
     case = [*back, (r, d * 0.62), (r * 0.94, d * 0.7), (r * 0.9, d * 0.62)]
     around = [(r * 0.90, d * 0.62), (r * 0.90, d * 0.73), (r * 0.96, d * 0.75), (r * 1.0, d * 0.7), (r * 1.0, d * 0.62)]
     shell, ring = (lathe(profile, 36, 0.9).hung(0, d * 0.4, zc) for profile in (case, around[::-1]))
-    face = order.finish("clock_face/0")
+    face = spec.finish("clock_face/0")
     disc = cylinder(r * 0.9, 0, 0.001, 0, 36).hung(0, d * 0.4 - d * 0.66, zc)
     disc = whole_image(disc, face, -r * 0.9, r * 0.9, zc - r * 0.9, zc + r * 0.9)
     t = np.linspace(0, np.pi / 2, 6)
@@ -246,13 +246,13 @@ def alarm_clock(order: Order) -> list[MeshPart]:
         )
         for s in (-1, 1)
     ]
-    skin = {"brass": BRASS, "black": BLACK, "chrome": CHROME}[order.word("metal", "brass")]
+    skin = {"brass": BRASS, "black": BLACK, "chrome": CHROME}[spec.word("metal", "brass")]
     bright = BRASS if skin is BRASS else CHROME
     return parts_of((skin, shell), (bright, [ring, *bells, *hammer, bow, *feet]), (face, disc))
 
 
-def remote(order: Order) -> list[MeshPart]:
-    w, d, h = order.size
+def remote(spec: BuildRequest) -> list[MeshPart]:
+    w, d, h = spec.size
     body = box([-w / 2, -d / 2, 0], [w / 2, d / 2, h * 0.88], h * 0.25)
     keys = [
         box([x - 0.004, y - 0.003, h * 0.85], [x + 0.004, y + 0.003, h], 0.0008)
@@ -267,9 +267,9 @@ def remote(order: Order) -> list[MeshPart]:
     )
 
 
-def keys(order: Order) -> list[MeshPart]:
+def keys(spec: BuildRequest) -> list[MeshPart]:
     """A ring with three keys fanned out and a leather tag."""
-    _, d, h = order.size
+    _, d, h = spec.size
     around = [(0.016 * np.cos(t), 0.016 * np.sin(t), 0) for t in np.linspace(0, 6.283, 19)[:-1]]
     ring = tube(around, 0.0011, 6, closed=True).moved(0, d * 0.3, h * 0.5)
     made = []
@@ -284,22 +284,22 @@ def keys(order: Order) -> list[MeshPart]:
     return parts_of((STEEL, [ring, made[0], made[2]]), (BRASS, made[1]), (plain((0.36, 0.22, 0.13), 0.6), tag))
 
 
-def tissue_box(order: Order) -> list[MeshPart]:
-    w, d, h = order.size
+def tissue_box(spec: BuildRequest) -> list[MeshPart]:
+    w, d, h = spec.size
     top = h * 0.62
     x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
     rise = (1 - np.maximum(np.abs(x), np.abs(y)) ** 2) * (0.75 + 0.25 * np.sin(4 * x + 3 * y)) * (h - top)
     tissue = sheet(np.stack([x * 0.05 + 0.01 * np.sin(5 * y), y * 0.022, top - 0.004 + np.clip(rise, 0, None)], -1))
     slot = lathe([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0008), (0.0, 0.0008)], 24)
     return parts_of(
-        (order.material("skin", "cotton/3"), box([-w / 2, -d / 2, 0], [w / 2, d / 2, top], 0.003)),
+        (spec.material("skin", "cotton/3"), box([-w / 2, -d / 2, 0], [w / 2, d / 2, top], 0.003)),
         (BLACK, slot.scaled(w * 0.32, d * 0.2, 1).moved(0, 0, top - 0.0004)),
         (plain((0.95, 0.95, 0.95), 0.95, specular=0.05), tissue.two_sided()),
     )
 
 
-def pencil_cup(order: Order) -> list[MeshPart]:
-    (w, _, h), rng = order.size, order.rng
+def pencil_cup(spec: BuildRequest) -> list[MeshPart]:
+    (w, _, h), rng = spec.size, spec.rng
     r, high = w / 2, h * 0.55
     tints = ((0.80, 0.60, 0.16), (0.18, 0.32, 0.55), (0.68, 0.17, 0.15), (0.10, 0.10, 0.11), (0.22, 0.45, 0.28))
     pens = []
@@ -309,6 +309,6 @@ def pencil_cup(order: Order) -> list[MeshPart]:
         foot = np.array([-0.5 * r * np.cos(a), -0.5 * r * np.sin(a), 0.006])
         pens.append((plain(tints[k % 5], 0.4), tube([foot, tip], 0.0037, 6)))
         pens.append((plain((0.82, 0.68, 0.48), 0.7), tube([tip, tip + (tip - foot) * 0.07], [0.0037, 0.0006], 6)))
-    skin = order.material("skin", "leather/2") if "skin" in order.look else plain((0.10, 0.10, 0.105), 0.5)
+    skin = spec.material("skin", "leather/2") if "skin" in spec.params else plain((0.10, 0.10, 0.105), 0.5)
     wall = [(0, 0), (r * 0.98, 0), (r, high), (r - 0.003, high), (r * 0.98 - 0.003, 0.004), (0, 0.004)]
     return parts_of((skin, lathe(wall, 24)), *pens)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.maker import SOIL, Order, parts_of, plain
+from embodied.assets.built.parametric import SOIL, BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, lathe, sheet, tube
 from embodied.assets.records import MeshPart, Size
 
@@ -23,18 +23,18 @@ POTS = {
 }
 
 
-def plant(order: Order) -> list[MeshPart]:
+def plant(spec: BuildRequest) -> list[MeshPart]:
     """A pot with leaves: 'broad', 'grass', 'trailing' or 'rubber'."""
-    w, _, h = order.size
-    kind = order.word("kind", "broad")
+    w, _, h = spec.size
+    kind = spec.word("kind", "broad")
     pr, ph = (0.26 * w, 0.30 * h) if kind != "rubber" else (0.24 * w, 0.22 * h)
     pot = lathe([(0, 0), (pr * 0.78, 0), (pr, ph), (pr * 0.92, ph), (pr * 0.9, ph * 0.86), (0, ph * 0.86)], 28, 0.6)
     soil = lathe([(pr * 0.9, ph * 0.87), (0, ph * 0.87)], 20)
     soil = Shape(soil.vertices, soil.faces, np.tile([0.0, 0, 1.0], (len(soil.vertices), 1)), soil.uv)
-    leaves, stems = _leaves(kind, order.size, ph, rng=order.rng)
+    leaves, stems = _leaves(kind, spec.size, ph, rng=spec.rng)
     dark, light = GREENS[kind]
     return parts_of(
-        (POTS[order.word("pot", "white")], pot),
+        (POTS[spec.word("pot", "white")], pot),
         (SOIL, soil),
         (plain((0.28, 0.30, 0.16), 0.8), stems),
         (plain(dark, 0.4), leaves[::2]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.maker import WHITE, Order, parts_of, plain, whole_image
+from embodied.assets.built.parametric import WHITE, BuildRequest, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -24,12 +24,12 @@ PLEAT = 0.095
 """Width of a fold of a drawn curtain, metres."""
 
 
-def rug(order: Order) -> list[MeshPart]:
-    """A rectangular rug with its pattern; fringes at the short ends where look['fringe'] is 1."""
-    (w, d, h), rng = order.size, order.rng
-    name = order.word("pattern", "rug_bordered/0")
-    pattern = order.finish(name)
-    fringe = 0.045 if order.look.get("fringe") else 0.0
+def rug(spec: BuildRequest) -> list[MeshPart]:
+    """A rectangular rug with its pattern; fringes at the short ends where params['fringe'] is 1."""
+    (w, d, h), rng = spec.size, spec.rng
+    name = spec.word("pattern", "rug_bordered/0")
+    pattern = spec.finish(name)
+    fringe = 0.045 if spec.params.get("fringe") else 0.0
     w0 = w / 2 - fringe
     body = box([-w0, -d / 2, 0], [w0, d / 2, h], min(0.004, h * 0.4))
     if name.startswith("rug_"):
@@ -53,21 +53,21 @@ def rug(order: Order) -> list[MeshPart]:
     return parts_of((pattern, body), (plain((0.80, 0.75, 0.64), 0.95, specular=0.05), tassels))
 
 
-def round_rug(order: Order) -> list[MeshPart]:
+def round_rug(spec: BuildRequest) -> list[MeshPart]:
     """A round (or oval) rug."""
-    w, d, h = order.size
-    pattern = order.material("pattern", "rug_rings/0")
+    w, d, h = spec.size
+    pattern = spec.material("pattern", "rug_rings/0")
     disc = lathe([(0, 0), (0.49, 0), (0.5, h * 0.4), (0.495, h * 0.85), (0.485, h), (0, h)], 56, 0.8)
     disc = disc.scaled(w, d, 1.0)
     return parts_of((pattern, whole_image(disc, pattern, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)))
 
 
-def curtain(order: Order) -> list[MeshPart]:
+def curtain(spec: BuildRequest) -> list[MeshPart]:
     """A pair of curtains drawn back to the sides of a window, on a rod with rings and finials."""
-    (w, d, h), rng = order.size, order.rng
-    cloth = order.material("cloth", "linen/0")
+    (w, d, h), rng = spec.size, spec.rng
+    cloth = spec.material("cloth", "linen/0")
     rod_z = h - 0.03
-    open_to = float(order.look.get("drawn", 0.30))
+    open_to = float(spec.params.get("drawn", 0.30))
     panel = w * open_to * 0.5 + 0.10
     parts, hooks = [], []
     around = [(0, 0.019 * np.cos(t), 0.019 * np.sin(t)) for t in np.linspace(0, 2 * np.pi, 12, endpoint=False)]
@@ -90,20 +90,20 @@ def curtain(order: Order) -> list[MeshPart]:
         )
         for x in (-w / 2 + 0.09, w / 2 - 0.09)
     ]
-    return parts_of((cloth, parts), (order.metal("black"), [rod, *ends, *brackets, *hooks]))
+    return parts_of((cloth, parts), (spec.metal("black"), [rod, *ends, *brackets, *hooks]))
 
 
-def sheer(order: Order) -> list[MeshPart]:
+def sheer(spec: BuildRequest) -> list[MeshPart]:
     """One light curtain over the whole window."""
-    w, d, h = order.size
-    grid = folds(w * 0.97, h - 0.03, max(6, round(w / 0.09)), min(d * 0.35, 0.035), rng=order.rng, rows=5)
+    w, d, h = spec.size
+    grid = folds(w * 0.97, h - 0.03, max(6, round(w / 0.09)), min(d * 0.35, 0.035), rng=spec.rng, rows=5)
     rail = box([-w / 2, -0.012, h - 0.03], [w / 2, 0.02, h], 0.002)
     return parts_of((plain((0.93, 0.93, 0.92), 0.9, specular=0.05), sheet(grid, 0.001)), (WHITE, rail))
 
 
-def roller_blind(order: Order) -> list[MeshPart]:
+def roller_blind(spec: BuildRequest) -> list[MeshPart]:
     """Cloth from a roll, a bar at its foot, a bead chain."""
-    w, d, h = order.size
+    w, d, h = spec.size
     r = min(d / 2, 0.028)
     roll = cylinder(r * 0.85, -w / 2 + 0.02, w / 2 - 0.02, 0, 16).turned(np.pi / 2, "y").moved(0, 0, h - r)
     cloth = box([-w / 2 + 0.025, -0.001, 0.014], [w / 2 - 0.025, 0.001, h - r])
@@ -111,12 +111,12 @@ def roller_blind(order: Order) -> list[MeshPart]:
     spans = ((-w / 2, -w / 2 + 0.02), (w / 2 - 0.02, w / 2))
     ends = [box([a, -d / 2, h - 2 * r], [b, d / 2, h], 0.003) for a, b in spans]
     chain = tube([(w / 2 - 0.01, -d / 2 + 0.006, h - r), (w / 2 - 0.01, -d / 2 + 0.006, h * 0.35)], 0.002, 5)
-    return parts_of((order.material("cloth", "screen/0"), [roll, cloth]), (WHITE, [foot, *ends, chain]))
+    return parts_of((spec.material("cloth", "screen/0"), [roll, cloth]), (WHITE, [foot, *ends, chain]))
 
 
-def cushion(order: Order) -> list[MeshPart]:
+def cushion(spec: BuildRequest) -> list[MeshPart]:
     """A cushion lying flat, dented by use."""
-    (w, d, h), rng = order.size, order.rng
+    (w, d, h), rng = spec.size, spec.rng
     cells = 14
     waves = np.zeros((cells + 1, cells + 1))
     x, y = np.meshgrid(np.linspace(-1, 1, cells + 1), np.linspace(-1, 1, cells + 1))
@@ -124,14 +124,14 @@ def cushion(order: Order) -> list[MeshPart]:
         a, k = rng.uniform(0, np.pi), rng.uniform(1.5, 3.5)
         waves += 0.045 * h * np.sin(k * (x * np.cos(a) + y * np.sin(a)) * 2 + rng.uniform(0, 6))
     waves -= 0.10 * h * np.exp(-((x - rng.normal(0, 0.2)) ** 2 + (y - rng.normal(0, 0.2)) ** 2) * 3)
-    cloth = order.material("cloth", "linen/7")
+    cloth = spec.material("cloth", "linen/7")
     return parts_of((cloth, pillow(w, d, h, cells, 0.36, waves).shifted_uv(*rng.random(2)).moved(0, 0, h / 2)))
 
 
-def throw(order: Order) -> list[MeshPart]:
+def throw(spec: BuildRequest) -> list[MeshPart]:
     """A blanket folded to a stack of soft layers, fringe at one side."""
     return parts_of(
-        (order.material("cloth", "tweed/0"), layers(order.size, int(order.look.get("layers", 1)), rng=order.rng))
+        (spec.material("cloth", "tweed/0"), layers(spec.size, int(spec.params.get("layers", 1)), rng=spec.rng))
     )
 
 

@@ -1,4 +1,4 @@
-"""The table of built things, assets/data/built.json, read into Makers. docs/assets.md says what a row may hold."""
+"""The table of built things, assets/data/built.json, read into assets. docs/assets.md says what a row may hold."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from embodied.assets.built import (
     storage,
     tableware,
 )
-from embodied.assets.built.maker import LIGHTS, Build, Look, Maker, made, surface
+from embodied.assets.built.parametric import LIGHTS, Build, ParametricAsset, ParamValues, built_parts, surface
 from embodied.assets.materials import MATERIALS
 from embodied.assets.records import Asset, SupportSurface
 from embodied.assets.rows import CatalogueError, Field, Row
@@ -73,8 +73,8 @@ BUILT_FIELDS = {
 SET_FIELDS = {name: BUILT_FIELDS[name] for name in ("colours", "materials", "tags", "look")} | {"word": rows.WORD}
 
 
-def read_makers(where: str, table: Row) -> Mapping[str, Maker]:
-    """The makers of a table {"sets": {...}, "groups": [...]} by key 'built/<name>', keys sorted.
+def read_built_assets(where: str, table: Row) -> Mapping[str, ParametricAsset]:
+    """The assets of a table {"sets": {...}, "groups": [...]} by key 'built/<name>', keys sorted.
 
     Args:
       where: name of the file, for error messages.
@@ -83,19 +83,19 @@ def read_makers(where: str, table: Row) -> Mapping[str, Maker]:
       CatalogueError: a field that is unknown or holds what it should not, a key twice.
     """
     sets = {name: rows.check_row(f"{where}: set {name!r}", row, SET_FIELDS) for name, row in table["sets"].items()}
-    makers: dict[str, Maker] = {}
+    assets_by_key: dict[str, ParametricAsset] = {}
     for group in table["groups"]:
         shared = {name: value for name, value in group.items() if name != "rows"}
         for name, row in group["rows"].items():
             thing, key = f"{where}: {name!r}", f"built/{name}"
-            if key in makers:
+            if key in assets_by_key:
                 raise CatalogueError(f"{thing} stands there twice; give one of them another name")
-            makers[key] = _maker(thing, key, _whole(thing, shared, row, sets))
-    return MappingProxyType(dict(sorted(makers.items())))
+            assets_by_key[key] = _parametric_asset(thing, key, _whole(thing, shared, row, sets))
+    return MappingProxyType(dict(sorted(assets_by_key.items())))
 
 
-def remade(where: str, table: Mapping[str, Row], assets: Mapping[str, Asset]) -> Mapping[str, Maker]:
-    """The makers of those rows of the packs' catalogue that name a builder, by key.
+def remade(where: str, table: Mapping[str, Row], assets: Mapping[str, Asset]) -> Mapping[str, ParametricAsset]:
+    """The assets of those rows of the packs' catalogue that name a builder, by key.
 
     Such a thing keeps its key, words, size and surfaces, so that houses stay as they are; its mesh is built.
 
@@ -106,15 +106,15 @@ def remade(where: str, table: Mapping[str, Row], assets: Mapping[str, Asset]) ->
     Raises:
       CatalogueError: a builder that does not exist.
     """
-    makers = {}
+    assets_by_key = {}
     for key, given in table.items():
         row = rows.variant(f"{where}: model {key!r}", given, table) if "of" in given else given
         if "build" in row:
             rows.check_row(f"{where}: model {key!r}", {"build": row["build"]}, {"build": BUILT_FIELDS["build"]})
-            look: Look = row.get("look", {})
-            make = functools.partial(made, key, BUILDS[row["build"]], look)
-            makers[key] = Maker(assets[key], make, {"seed": 0.0, **look})
-    return makers
+            params: ParamValues = row.get("look", {})
+            make = functools.partial(built_parts, key, BUILDS[row["build"]], params)
+            assets_by_key[key] = ParametricAsset(assets[key], make, {"seed": 0.0, **params})
+    return assets_by_key
 
 
 def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
@@ -139,11 +139,13 @@ def _whole(where: str, shared: Row, row: Row, sets: Mapping[str, Row]) -> Row:
     return out
 
 
-def _maker(where: str, key: str, row: Row) -> Maker:
-    look: Look = row.get("look", {})
+def _parametric_asset(where: str, key: str, row: Row) -> ParametricAsset:
+    params: ParamValues = row.get("look", {})
     plain = {name: value for name, value in row.items() if name not in ("surfaces", "emits")}
     asset = rows.asset_of(where, key, plain | {"licence": rows.REMADE_LICENCE})
     given = row.get("surfaces", [])
-    surfaces = SURFACES[given](asset.size, look) if isinstance(given, str) else tuple(surface(**s) for s in given)
+    surfaces = SURFACES[given](asset.size, params) if isinstance(given, str) else tuple(surface(**s) for s in given)
     asset = dataclasses.replace(asset, surfaces=surfaces, emits=LIGHTS[row["emits"]] if "emits" in row else None)
-    return Maker(asset, functools.partial(made, key, BUILDS[row["build"]], look), {"seed": 0.0, **look})
+    return ParametricAsset(
+        asset, functools.partial(built_parts, key, BUILDS[row["build"]], params), {"seed": 0.0, **params}
+    )

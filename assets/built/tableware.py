@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.maker import BLACK, BRASS, GLASS, STEEL, Order, parts_of, plain
+from embodied.assets.built.parametric import BLACK, BRASS, GLASS, STEEL, BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, tube
 from embodied.assets.records import MeshPart
 
@@ -24,54 +24,56 @@ def cup(r: float, h: float, taper: float = 0.92, wall: float = 0.004) -> Shape:
     return lathe([*outside, (r - wall, h - 0.002), (r * taper - wall, 0.008), (0, 0.007)], 28, 0.6)
 
 
-def mug(order: Order) -> list[MeshPart]:
-    """A mug with a handle, coffee inside where look['coffee'] is 1."""
-    w, d, h = order.size
+def mug(spec: BuildRequest) -> list[MeshPart]:
+    """A mug with a handle, coffee inside where params['coffee'] is 1."""
+    w, d, h = spec.size
     r = d / 2
     cx = -(w - d) / 2
     t = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 10)
     bow = np.stack([cx + r * 0.94 + (w / 2 - cx - r - 0.005) * np.cos(t), 0 * t, h * 0.5 + h * 0.30 * np.sin(t)], 1)
     ear = tube(bow, 0.0055, 8)
-    drink = [lathe([(r * 0.9, 0), (0, 0.0001)], 24).moved(cx, 0, h * 0.8)] if order.look.get("coffee") else []
+    drink = [lathe([(r * 0.9, 0), (0, 0.0001)], 24).moved(cx, 0, h * 0.8)] if spec.params.get("coffee") else []
     return parts_of(
-        (MUGS[order.word("colour", "white")], [cup(r, h).moved(cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink)
+        (MUGS[spec.word("colour", "white")], [cup(r, h).moved(cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink)
     )
 
 
-def tumbler(order: Order) -> list[MeshPart]:
-    """A drinking glass, with water where look['water'] is 1."""
-    w, _, h = order.size
+def tumbler(spec: BuildRequest) -> list[MeshPart]:
+    """A drinking glass, with water where params['water'] is 1."""
+    w, _, h = spec.size
     r = w / 2
     drink = (
-        [lathe([(0, 0.01), (r * 0.78, 0.01), (r * 0.88, h * 0.6), (0, h * 0.6)], 24)] if order.look.get("water") else []
+        [lathe([(0, 0.01), (r * 0.78, 0.01), (r * 0.88, h * 0.6), (0, h * 0.6)], 24)]
+        if spec.params.get("water")
+        else []
     )
     return parts_of((GLASS, cup(r, h, 0.84, 0.0025)), (plain((0.75, 0.85, 0.88), 0.03), drink))
 
 
-def plates(order: Order) -> list[MeshPart]:
-    """Plates piled up (look['count'])."""
-    w, _, h = order.size
-    r, count = w / 2, int(order.look.get("count", 5))
+def plates(spec: BuildRequest) -> list[MeshPart]:
+    """Plates piled up (params['count'])."""
+    w, _, h = spec.size
+    r, count = w / 2, int(spec.params.get("count", 5))
     step = (h - 0.022) / max(count - 1, 1)
     below = [(0, 0), (r * 0.58, 0), (r * 0.62, 0.004), (r * 0.98, 0.018), (r, 0.021)]
     one = lathe([*below, (r * 0.985, 0.022), (r * 0.64, 0.008), (r * 0.56, 0.005), (0, 0.005)], 36, 0.6)
     tints = {"white": (0.92, 0.91, 0.89), "blue": (0.32, 0.43, 0.52), "sand": (0.80, 0.73, 0.63)}
-    color = plain(tints[order.word("colour", "white")], 0.15)
+    color = plain(tints[spec.word("colour", "white")], 0.15)
     return parts_of((color, [one.moved(0, 0, k * step) for k in range(count)]))
 
 
-def bowl(order: Order) -> list[MeshPart]:
-    """A bowl, with fruit where look['fruit'] is 1."""
-    (w, _, h), rng = order.size, order.rng
+def bowl(spec: BuildRequest) -> list[MeshPart]:
+    """A bowl, with fruit where params['fruit'] is 1."""
+    (w, _, h), rng = spec.size, spec.rng
     r = w / 2
-    fruit = bool(order.look.get("fruit"))
+    fruit = bool(spec.params.get("fruit"))
     rise = h * 0.72 if fruit else h
     t = np.linspace(0.15, 1, 9)
     outer = np.stack([r * np.sin(t * np.pi / 2) ** 0.9, rise * (1 - np.cos(t * np.pi / 2)) + 0.003], 1)
     inner = outer[::-1] * [0.955, 1.0] + [0, 0.004]
     inner[0] = outer[-1] * [0.965, 1.0]
     shell = lathe([(0, 0), (r * 0.3, 0), *outer, *inner, (0, inner[-1, 1])], 36, 0.8)
-    skin = order.material("skin", "walnut/0") if "skin" in order.look else plain((0.88, 0.86, 0.82), 0.2)
+    skin = spec.material("skin", "walnut/0") if "skin" in spec.params else plain((0.88, 0.86, 0.82), 0.2)
     heap = []
     if fruit:
         tints = ((0.72, 0.20, 0.12), (0.82, 0.48, 0.12), (0.58, 0.62, 0.18), (0.85, 0.70, 0.22))
@@ -85,9 +87,9 @@ def bowl(order: Order) -> list[MeshPart]:
     return parts_of((skin, shell), *heap)
 
 
-def bottle(order: Order) -> list[MeshPart]:
+def bottle(spec: BuildRequest) -> list[MeshPart]:
     """A bottle with a label and a cap."""
-    (w, _, h), rng = order.size, order.rng
+    (w, _, h), rng = spec.size, spec.rng
     r = w / 2
     glass = {
         "green": plain((0.10, 0.22, 0.12), 0.05),
@@ -95,8 +97,8 @@ def bottle(order: Order) -> list[MeshPart]:
         "clear": GLASS,
         "white": plain((0.90, 0.90, 0.89), 0.3),
         "blue": plain((0.24, 0.42, 0.60), 0.3),
-    }[order.word("colour", "green")]
-    neck = float(order.look.get("neck", 0.36))
+    }[spec.word("colour", "green")]
+    neck = float(spec.params.get("neck", 0.36))
     shoulder = [(r, h * 0.58), (r * 0.86, h * 0.66), (r * neck, h * 0.78), (r * neck, h * 0.95), (0, h * 0.95)]
     body = lathe([(0, 0), (r * 0.94, 0), (r, 0.006), *shoulder], 26, 0.75)
     label = lathe([(r * 1.004, h * 0.2), (r * 1.004, h * 0.48)], 26)
@@ -109,9 +111,9 @@ def bottle(order: Order) -> list[MeshPart]:
     )
 
 
-def candle(order: Order) -> list[MeshPart]:
+def candle(spec: BuildRequest) -> list[MeshPart]:
     """A pillar candle on a saucer, its rim melted."""
-    w, _, h = order.size
+    w, _, h = spec.size
     r, top = w / 2, h * 0.93
     melted = [(r * 0.72, top - 0.004), (r * 0.68, top), (r * 0.58, top - 0.005), (0, top - 0.008)]
     wax = lathe([(0, 0.006), (r * 0.72, 0.006), *melted], 24, 0.8)
@@ -119,34 +121,34 @@ def candle(order: Order) -> list[MeshPart]:
     wick = tube([(0, 0, top - 0.01), (0.001, 0, h)], 0.0012, 5)
     return parts_of(
         (plain((0.91, 0.87, 0.77), 0.55), wax),
-        (BLACK if order.look.get("dish") == "black" else BRASS, dish),
+        (BLACK if spec.params.get("dish") == "black" else BRASS, dish),
         (BLACK, wick),
     )
 
 
-def paper_towel(order: Order) -> list[MeshPart]:
-    w, _, h = order.size
+def paper_towel(spec: BuildRequest) -> list[MeshPart]:
+    w, _, h = spec.size
     r = w / 2
     foot = cylinder(r, 0, 0.014, 0.003, 32)
     rod = lathe([(0, 0.01), (0.007, 0.01), (0.007, h - 0.012), (0.012, h - 0.008), (0.010, h), (0, h)], 12, 0.8)
     roll = lathe([(0.02, 0.015), (r * 0.78, 0.015), (r * 0.78, h * 0.84), (0.02, h * 0.84), (0.02, 0.015)], 32)
     return parts_of(
-        (order.finish("oak/0") if order.look.get("wood") else STEEL, [foot, rod]),
+        (spec.finish("oak/0") if spec.params.get("wood") else STEEL, [foot, rod]),
         (plain((0.94, 0.94, 0.93), 0.95, specular=0.05), roll),
     )
 
 
-def board(order: Order) -> list[MeshPart]:
+def board(spec: BuildRequest) -> list[MeshPart]:
     """A chopping board with a grip hole, lying flat."""
-    w, d, h = order.size
+    w, d, h = spec.size
     plate = shapely.box(-w / 2, -d / 2, w / 2, d / 2).buffer(-0.02).buffer(0.02, quad_segs=4)
     hole = shapely.Point(w / 2 - 0.035, 0).buffer(0.012, quad_segs=4)
-    return parts_of((order.material("wood", "beech/0"), extruded(plate.difference(hole), 0, h)))
+    return parts_of((spec.material("wood", "beech/0"), extruded(plate.difference(hole), 0, h)))
 
 
-def knife_block(order: Order) -> list[MeshPart]:
+def knife_block(spec: BuildRequest) -> list[MeshPart]:
     """A leaning block of wood with knife handles standing out."""
-    w, d, h = order.size
+    w, d, h = spec.size
     lean = 0.32
     body = box([-w / 2, -d * 0.35, 0.0], [w / 2, d * 0.30, h * 0.70], 0.004).turned(-lean, "x")
     handles, bolsters = [], []
@@ -157,4 +159,4 @@ def knife_block(order: Order) -> list[MeshPart]:
             handles.append(handle.turned(-lean, "x"))
             bolsters.append(bolster.turned(-lean, "x"))
     foot = box([-w / 2, -d * 0.28, 0], [w / 2, d * 0.55, 0.018], 0.003)
-    return parts_of((order.material("wood", "beech/0"), [body, foot]), (BLACK, handles), (STEEL, bolsters))
+    return parts_of((spec.material("wood", "beech/0"), [body, foot]), (BLACK, handles), (STEEL, bolsters))

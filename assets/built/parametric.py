@@ -1,4 +1,4 @@
-"""Maker: an asset that code builds; finishes, cabinet work and other things that builders share."""
+"""Assets that code builds to measure; finishes, cabinet work and other things that builders share."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from embodied.assets.built.primitives import Shape, between, box, fitted, frame,
 from embodied.assets.records import Asset, Color, Finish, MeshPart, Size, SupportSurface
 
 FinishOf = Callable[[str], Finish]
-Look = Mapping[str, str | float]
+ParamValues = Mapping[str, str | float]
+"""What a builder is asked for beside a size: the row's `look`, over which a placement lays its own params."""
 
 WHITE = Finish(color=(0.88, 0.87, 0.85, 1.0), roughness=0.35)
 PORCELAIN = Finish(color=(0.91, 0.90, 0.88, 1.0), roughness=0.12)
 BLACK = Finish(color=(0.045, 0.045, 0.05, 1.0), roughness=0.4)
 GAP = Finish(color=(0.05, 0.048, 0.045, 1.0), roughness=1.0, specular=0.05)
-"""What stands behind the joints of doors and drawers: they look dark, and are finer than the baked light."""
+"""The dark behind the joints of doors and drawers: they look dark, and are finer than the baked light."""
 GLASS = Finish(color=(0.88, 0.93, 0.92, 0.16), roughness=0.03)
 MIRROR = Finish(color=(0.82, 0.84, 0.84, 1.0), roughness=0.02, metallic=1.0, mirror=True)
 CHROME = Finish(color=(0.83, 0.83, 0.84, 1.0), roughness=0.09, metallic=1.0)
@@ -32,65 +33,65 @@ BULB = (16.0, 13.4, 10.2)
 SHADE = (5.0, 4.0, 2.9)
 """Linear radiance of a lit fabric shade."""
 LIGHTS = {"bulb": BULB, "shade": SHADE, "panel": (6.0, 5.6, 5.0), "downlight": (26.0, 22.5, 18.0)}
-"""What lamps emit, by name: linear relative radiance."""
+"""Linear relative radiance of lamps, by name."""
 METALS = {"chrome": CHROME, "steel": STEEL, "brass": BRASS, "black": BLACK, "white": WHITE}
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
-    """What one thing should be."""
+class BuildRequest:
+    """The size, material and details that one thing should have."""
 
     size: Size
-    look: Look
+    params: ParamValues
     finish: FinishOf
     rng: np.random.Generator
 
     def word(self, name: str, default: str) -> str:
-        """What the look says under a name."""
-        return str(self.look.get(name, default))
+        """The word that the params have under a name."""
+        return str(self.params.get(name, default))
 
     def metal(self, default: str = "steel") -> Finish:
-        """The metal that look['metal'] names: one of METALS or a material key."""
+        """The metal that params['metal'] names: one of METALS or a material key."""
         name = self.word("metal", default)
         return METALS[name] if name in METALS else self.finish(name)
 
     def material(self, name: str, default: str) -> Finish:
-        """The finish of the material key in look[name]."""
+        """The finish of the material key in params[name]."""
         return self.finish(self.word(name, default))
 
 
-Build = Callable[[Order], list[MeshPart]]
+Build = Callable[[BuildRequest], list[MeshPart]]
 """Parts in the asset's frame, base at z = 0, front along -y."""
 
 
 @dataclass(frozen=True, eq=False)
-class Maker:
-    """What is built under one key."""
+class ParametricAsset:
+    """An asset that code builds to measure."""
 
     asset: Asset
-    """What it makes when nobody asks for anything else."""
+    """As it is with its own size and params."""
     make: Callable[[tuple[float, float, float], tuple[tuple[str, str | float], ...], FinishOf], tuple[MeshPart, ...]]
     """make(size, params, finish): parts whose bounding box is exactly `size`."""
-    look: Look
+    params: ParamValues
     """The parameters it takes, with the values they have where nobody names others."""
 
 
-def made(
-    key: str, build: Build, look: Look, size: Size, params: Sequence[tuple[str, str | float]], finish: FinishOf
+def built_parts(
+    key: str, build: Build, usual: ParamValues, size: Size, params: Sequence[tuple[str, str | float]], finish: FinishOf
 ) -> tuple[MeshPart, ...]:
-    """The thing `key` at `size`, `params` laid over its `look`; what is drawn depends on the key and the look's seed.
+    """The thing `key` at `size`, `params` laid over its `usual` ones; details depend on the key and the param `seed`.
 
     Raises:
       ValueError: a length that is not positive.
     """
     if min(size) <= 0:
         raise ValueError(f"{key} cannot be made {size} m large; all three lengths must be positive")
-    told = {**look, **dict(params)}
-    text = f"{key}|{told.get('seed', 0)}"
+    values = {**usual, **dict(params)}
+    text = f"{key}|{values.get('seed', 0)}"
     words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4")
     rng = np.random.Generator(np.random.PCG64(np.random.SeedSequence(words.tolist())))
     x, y, z = size
-    return fitted(build(Order((float(x), float(y), float(z)), told, finish, rng)), size)
+    return fitted(build(BuildRequest((float(x), float(y), float(z)), values, finish, rng)), size)
 
 
 def plain(
