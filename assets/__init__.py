@@ -1,1 +1,1 @@
-"""What the world is made of: asset packs, the catalogue over them, procedural materials."""
+"""Furniture and materials: asset packs, the catalogue over them, procedural materials."""

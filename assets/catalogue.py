@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 GROUPS = "groups.toml"
 """The name of a file of furniture groups in a user's folder."""
 Params = tuple[tuple[str, str | float], ...]
-"""What a built thing is asked for, by name."""
+"""Details of a built thing by name."""
 
 
 class Catalogue:
@@ -63,7 +63,7 @@ class Catalogue:
         self._scaled = functools.lru_cache(maxsize=1024)(self._scale)
 
     def __reduce__(self) -> tuple[type[Catalogue], tuple[object, ...]]:
-        """What another process needs to make it again; meshes are read from the cache there."""
+        """The arguments from which another process makes it again; meshes are read from the cache there."""
         return Catalogue, (dict(self.assets), self._recipes, self.cache, self._own, self.groups)
 
     @functools.cached_property
@@ -79,10 +79,10 @@ class Catalogue:
 
     @functools.cached_property
     def _by_class(self) -> dict[str, tuple[Asset, ...]]:
-        found: dict[str, list[Asset]] = {}
+        assets_by_class: dict[str, list[Asset]] = {}
         for asset in self.assets.values():
-            found.setdefault(asset.object_class, []).append(asset)
-        return {name: tuple(group) for name, group in found.items()}
+            assets_by_class.setdefault(asset.object_class, []).append(asset)
+        return {name: tuple(group) for name, group in assets_by_class.items()}
 
     def of_class(self, name: str) -> tuple[Asset, ...]:
         """The assets of one class in key order; empty for a class that has none."""
@@ -99,7 +99,7 @@ class Catalogue:
 
     @functools.cached_property
     def furnishing(self) -> Catalogue:
-        """What new houses are furnished with: everything but the simple furniture of `assets.built.basics`; where no
+        """The catalogue of new houses: everything but the simple furniture of `assets.built.basics`; where no
         furniture models are installed, only what code builds, the simple furniture included."""
         if self._recipes.keys() <= self._own.keys() or find_packs():
             return self.only(self.assets.keys() - BASICS) if BASICS & self.assets.keys() else self

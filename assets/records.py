@@ -52,7 +52,7 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 DETAILS = ("weave", "nap", "pores", "pebbles", "plaster", "stipple")
-"""What matters show from nearby, by number: cloth its threads; carpets, towels and velvet; wood, along u; leather;
+"""Details of matter from nearby, by number: cloth its threads; carpets, towels and velvet; wood, along u; leather;
 plaster and stone; rolled paint."""
 
 
@@ -76,7 +76,7 @@ class Finish:
     """Side in metres of the square that the maps of a tileable material cover; whoever builds a
     mesh with such a finish divides metres by it to get uv. None for maps of imported models."""
     detail: str | None = None
-    """What it shows from nearby, one of DETAILS; None for what is smooth."""
+    """The detail that it shows from nearby, one of DETAILS; None for what is smooth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ class Asset:
     emits: tuple[float, float, float] | None = None
     """Linear relative radiance of its lamp when on; None for things that give no light."""
     lamp: tuple[float, float, float] | None = None
-    """Where that light comes from, in the asset frame, metres."""
+    """Middle of that light, in the asset frame, metres."""
     pack: str = ""
     creator: str = ""
     licence: str = ""

@@ -26,7 +26,7 @@ class CatalogueError(RecordError):
 
 @dataclass(frozen=True)
 class Field:
-    """What a field of a row may hold."""
+    """A field of a row, and the values that it may have."""
 
     what: str
     """In words, for the error message."""
@@ -34,17 +34,17 @@ class Field:
 
 
 def is_number(value: object, low: float = -1e6, high: float = 1e6) -> bool:
-    """Whether a JSON value is a number from `low` to `high`; neither NaN nor true nor 400 digits long."""
+    """True if a JSON value is a number from `low` to `high`; neither NaN nor true nor 400 digits long."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high
 
 
 def is_text(value: object, most: int = 200) -> bool:
-    """Whether a JSON value is one line of text that can be printed and encoded."""
+    """True if a JSON value is one line of text that can be printed and encoded."""
     return isinstance(value, str) and value.isprintable() and len(value) <= most
 
 
 def is_list(value: object, holds: Callable[[Any], bool], count: int | None = None) -> bool:
-    """Whether a JSON value is a list (of `count` entries, if given) of values that `holds` accepts."""
+    """True if a JSON value is a list (of `count` entries, if given) of values that `holds` accepts."""
     return isinstance(value, list) and count in (None, len(value)) and all(holds(v) for v in value)
 
 
@@ -106,9 +106,9 @@ FIELDS = {
     "faces": Field("a whole number from 0 up", lambda v: is_number(v, 0) and v == int(v)),
     "of": WORD,
 }
-"""What a line of a catalogue may hold; from `yaw` on it tells the importer."""
+"""Fields of a line of a catalogue; from `yaw` on it tells the importer."""
 REMADE_FIELDS = {"build": WORD, "look": LOOK}
-"""What a line of data/catalogue.json holds besides, where code builds what the pack's model is too poor for."""
+"""Further fields of a line of data/catalogue.json, where code builds what the pack's model is too poor for."""
 REMADE_LICENCE = "Apache-2.0"
 """Of meshes that code builds."""
 CLASS_FIELDS = ("support", "rooms", "synonyms", "on", "clearance", "tags")
@@ -230,7 +230,7 @@ def asset_of(where: str, key: str, row: Mapping[str, Any]) -> Asset:
 
 
 def made_in(*modules: ModuleType) -> Mapping[str, Any]:
-    """What rows may name of modules, as '<module>.<name>': the functions and classes that they define and show."""
+    """Objects of modules that rows may name, as '<module>.<name>': their public functions and classes."""
     return MappingProxyType(
         {
             f"{module.__name__.rpartition('.')[2]}.{name}": maker

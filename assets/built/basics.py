@@ -179,5 +179,5 @@ def low_cabinet(spec: BuildRequest) -> list[MeshPart]:
 
 
 def _edges(length: float, inset: float) -> tuple[float, float]:
-    """Where the middles of two things of size `inset` lie at either end of `length`, around zero."""
+    """Middles of two things of size `inset` at either end of `length`, around zero."""
     return (inset - length) / 2, (length - inset) / 2

@@ -1,4 +1,4 @@
-"""What hangs and stands by the door: coats, shoes, umbrellas, mats."""
+"""Things by the door: coats, shoes, umbrellas, mats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people leave about: post, notes, cables, clothes thrown down, unmade bedding, tins, jars, toys, folders."""
+"""Things left about: post, notes, cables, clothes thrown down, unmade bedding, tins, jars, toys, folders."""
 
 from __future__ import annotations
 

@@ -315,7 +315,7 @@ def _display(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
 
 
 def _water(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
-    """What gives water and ice, in a fridge's door at y: a steel frame, a dark niche, keys over it, a spout, a tray."""
+    """Water and ice from a fridge's door at y: a steel frame, a dark niche, keys over it, a spout, a tray."""
     wide, high, rim, x = 0.20, 0.36, 0.012, 0.04
     x0, x1, sill = x - wide / 2, x + wide / 2, z + 0.26
     frame = [

@@ -20,7 +20,7 @@ def _bulb(z: float, r: float = 0.03) -> Shape:
 
 
 def _canopy(h: float) -> Shape:
-    """What hides the hook in the ceiling, at h."""
+    """The cap that hides the hook in the ceiling, at h."""
     return lathe([(0, h - 0.03), (0.05, h - 0.03), (0.055, h - 0.02), (0.055, h), (0, h)], 20)
 
 
@@ -169,7 +169,7 @@ def standing(spec: BuildRequest) -> list[MeshPart]:
 
 
 def _stem(kind: str, r: float, top: float, tall: bool) -> Shape:
-    """What carries a shade of radius `r` that begins at the height `top`: 'tripod', 'ceramic' or 'stem' on a foot."""
+    """The stand of a shade of radius `r` that begins at the height `top`: 'tripod', 'ceramic' or 'stem' on a foot."""
     if kind == "tripod":
         ways = [(np.cos(a), np.sin(a)) for a in (2 * np.pi * k / 3 + 0.5 for k in range(3))]
         feet = [[(0.02 * c, 0.02 * s, top + 0.02), (r * 0.92 * c, r * 0.92 * s, 0.0)] for c, s in ways]

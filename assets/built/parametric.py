@@ -14,7 +14,7 @@ from embodied.assets.records import Asset, Color, Finish, MeshPart, Size, Suppor
 
 FinishOf = Callable[[str], Finish]
 ParamValues = Mapping[str, str | float]
-"""What a builder is asked for beside a size: the row's `look`, over which a placement lays its own params."""
+"""Details of a thing beside its size: the row's `look`, over which a placement lays its own params."""
 
 WHITE = Finish(color=(0.88, 0.87, 0.85, 1.0), roughness=0.35)
 PORCELAIN = Finish(color=(0.91, 0.90, 0.88, 1.0), roughness=0.12)

@@ -40,7 +40,7 @@ class Shape:
         return Shape(self.vertices @ m.T, self.faces, self.normals @ m.T, self.uv)
 
     def hung(self, x: float, y: float, z: float) -> Shape:
-        """What stands on the floor, standing on a front at y instead: what was up looks along -y."""
+        """The shape standing on a front at y instead of the floor: what was up looks along -y."""
         return self.turned(np.pi / 2, "x").moved(x, y, z)
 
     def scaled(self, x: float, y: float, z: float) -> Shape:

@@ -29,7 +29,7 @@ WOOD = re.compile(
     re.IGNORECASE,
 )
 BODY = re.compile(r"hair|skin", re.IGNORECASE)
-"""What is matt as cloth is, and not woven."""
+"""Covers that are matt as cloth is, and not woven."""
 PIXELS = 512
 """Side of a tile: what textures of models are shrunk to."""
 THREADS = 5.0
@@ -53,7 +53,7 @@ class Covering:
     draw: Callable[[Canvas], np.ndarray]
     """(n, n, 3) or (n, n, 1) factors, mean about 1."""
     detail: str
-    """What it shows from nearby (embodied.assets.materials.detail)."""
+    """The detail that it shows from nearby (embodied.assets.materials.detail)."""
     grained: bool = False
     """Runs along the longest side of every board."""
 
@@ -126,11 +126,11 @@ def cover_of(name: str, color: tuple[float, ...], look: str, clear: bool) -> str
     words = look.split()
     if clear or "plain" in words:
         return None
-    said = _said(look)
-    if said is None and not set(words) & OTHER:
-        said = _named(name)
-    if said != "wood":
-        return said
+    matter = _said(look)
+    if matter is None and not set(words) & OTHER:
+        matter = _named(name)
+    if matter != "wood":
+        return matter
     red, green, blue = color[:3]
     if red - blue < WOODEN * max(color[:3]) or not red >= green >= blue:
         return None

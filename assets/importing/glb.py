@@ -119,7 +119,7 @@ class _Texture:
 
 @dataclass(frozen=True)
 class _Surface:
-    """What a primitive's material says."""
+    """The material of a primitive."""
 
     name: str | None
     factor: np.ndarray
@@ -141,7 +141,7 @@ class _Reader:
     def __init__(self, header: dict[str, Any], body: bytes, tell: Tell) -> None:
         self.header, self.body, self.tell = header, body, tell
         self.left_out: list[str] = []
-        """What of the scene is not drawn, in words."""
+        """Parts of the scene that are not drawn, in words."""
         self._check_extensions()
         self._pictures: dict[int, Image.Image] = {}
         self._surfaces: dict[int, _Surface] = {}

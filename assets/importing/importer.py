@@ -40,10 +40,10 @@ log = logging.getLogger(__name__)
 READER = "embodied.assets.importing.own"
 """The module that imports models of all formats: its code is part of every cache key."""
 APART = ("embodied.assets", "embodied.assets.data", "embodied.assets.importing")
-"""What the code of imported models does not count: packages' names, and the catalogue's rows, whose recipes are in the
-keys."""
+"""Modules and data that the code of imported models does not count: packages' names, and the catalogue's rows, whose
+recipes are in the keys."""
 FORMATS = ("PNG", "JPEG", "BMP", "TGA")
-"""What textures are opened as. Pillow knows many more; some of them start other programs (PostScript)."""
+"""Formats of textures. Pillow knows many more; some of them start other programs (PostScript)."""
 MAX_TEXTURE = 512
 MAX_PIXELS = 64_000_000
 FACE_BUDGETS = ((0.3, 3_000), (0.8, 6_000), (30.0, 10_000))
@@ -56,7 +56,7 @@ SOFT_CREASE = np.radians(62.0)
 HOLES = 2
 """Times the budget that the triangles of one part may be after the holes of its texture are cut."""
 CLEAR = 0.3
-"""What keeps texels fainter than this is blended, not masked: its opacity is the mean over them."""
+"""A part that keeps texels fainter than this is blended, not masked: its opacity is the mean over them."""
 NO_AREA = "its faces have no area: they are points or lines, or flattened by a scale of 0"
 FOLDS = 9_000
 """Faces by which the bedding of a model may grow to hold its folds, each part by its area."""
@@ -82,7 +82,7 @@ class RawPart:
     finish: Finish
     image: Image.Image | None = None
     cover: str | None = None
-    """What it wears, folds alone where it has an image (embodied.assets.importing.covers)."""
+    """The cover that it is given, folds alone where it has an image (embodied.assets.importing.covers)."""
     two_sided: bool = False
     """Seen from behind, too, where it is open."""
     least: float | None = 0.5
@@ -110,9 +110,9 @@ def cached(
     stem = recipe.key.replace("/", "__") + "-" + digest(code_digest(READER, without=APART), facts)[:12]
     parts = _load(folder, stem)
     if parts is None:
-        told: dict[str, None] = {}
-        finished = finish_parts(read(told.setdefault), recipe, told.setdefault)
-        _save(folder, stem, finished, list(told))
+        messages: dict[str, None] = {}
+        finished = finish_parts(read(messages.setdefault), recipe, messages.setdefault)
+        _save(folder, stem, finished, list(messages))
         parts = _load(folder, stem)
     if parts is None:
         raise PackError(f"{folder / stem} cannot be read back after writing; check the disk and delete {folder}")
@@ -140,10 +140,10 @@ def read_obj(
     materials: dict[str, MtlMaterial] = {}
     for statement in obj.libraries:
         whole, *several = (_read_if_there(read, n) for n in _library_names(folder, statement))
-        found = [data for data in (several if whole is None else [whole]) if data is not None]
-        if not found:
+        contents = [data for data in (several if whole is None else [whole]) if data is not None]
+        if not contents:
             say(f"its material library {statement!r} is not there; put it beside the model")
-        for data in found:
+        for data in contents:
             materials |= parse_mtl(decoded(data))
     for words in obj.left_out:
         say(words)
@@ -241,13 +241,13 @@ class _Pictures:
 
 def obj_files(read: Reader, name: str) -> tuple[str, ...]:
     """The MTL files and textures that the OBJ file `name` names, whether they are there or not."""
-    folder, found = PurePosixPath(name).parent, []
+    folder, files = PurePosixPath(name).parent, []
     for statement in libraries(decoded(read(name))):
         for library in _library_names(folder, statement):
-            found.append(library)
+            files.append(library)
             for m in parse_mtl(decoded(_read_if_there(read, library) or b"")).values():
-                found += [_texture_name(folder, t.name) for t in (m.texture, m.opacity_map) if t is not None]
-    return tuple(dict.fromkeys(found))
+                files += [_texture_name(folder, t.name) for t in (m.texture, m.opacity_map) if t is not None]
+    return tuple(dict.fromkeys(files))
 
 
 def _library_names(folder: PurePosixPath, statement: str) -> tuple[str, ...]:
@@ -343,7 +343,7 @@ def _drawn(
 
 
 def _has_area(part: RawPart) -> bool:
-    """Whether any face is more than a point or a line."""
+    """True if any face is more than a point or a line."""
     doubled = np.linalg.norm(face_normals(part.vertices, part.faces), axis=1)
     sides = part.vertices[part.faces] - part.vertices[np.roll(part.faces, 1, axis=1)]
     return bool((doubled > 1e-6 * np.square(sides).sum(axis=2).max(axis=1)).any())
@@ -472,7 +472,7 @@ def _image(read: Reader, name: str, remedy: str) -> Image.Image | None:
             raise PackError(f"texture {name} cannot be read ({e}); {remedy}") from e
 
 
-def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | None]], told: list[str]) -> None:
+def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | None]], words: list[str]) -> None:
     """Write textures, then the arrays, then the manifest that makes both believed."""
     sums: dict[str, str] = {}
     arrays: dict[str, np.ndarray] = {}
@@ -493,7 +493,7 @@ def _save(folder: Path, stem: str, parts: list[tuple[MeshPart, Image.Image | Non
     with atomic_path(folder / f"{stem}.npz") as temporary:
         np.savez(temporary, allow_pickle=False, **arrays)
         sums[f"{stem}.npz"] = digest(temporary.read_bytes())
-    write_json(folder / f"{stem}.json", {"finishes": finishes, "told": told, "sha256": sums})
+    write_json(folder / f"{stem}.json", {"finishes": finishes, "words": words, "sha256": sums})
 
 
 def _load(folder: Path, stem: str) -> tuple[tuple[MeshPart, ...], list[str]] | None:
@@ -509,7 +509,7 @@ def _load(folder: Path, stem: str) -> tuple[tuple[MeshPart, ...], list[str]] | N
                 MeshPart(arrays[f"v{i}"], arrays[f"f{i}"], arrays[f"n{i}"], arrays[f"t{i}"], finish)
                 for i, finish in enumerate(finishes)
             )
-        return parts, [str(words) for words in manifest["told"]]
+        return parts, [str(words) for words in manifest["words"]]
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
         return None
 

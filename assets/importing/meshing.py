@@ -91,12 +91,12 @@ def _corner_sums(
 ) -> np.ndarray:
     """(c, 3) weighted sums of face normals around `corners` (c,), over the faces whose cosine is over `least`."""
     counts = around.counts[around.vertex[corners]]
-    mine = np.repeat(np.arange(len(corners)), counts)
-    rank = np.arange(len(mine)) - np.repeat(np.cumsum(counts) - counts, counts)
-    other = around.order[around.starts[around.vertex[corners[mine]]] + rank]
-    cosine = np.einsum("ij,ij->i", unit[corners[mine] // 3], unit[other // 3])
-    mine, other = mine[cosine > least], other[cosine > least]
-    sums = [np.bincount(mine, unit[other // 3, k] * weight[other], minlength=len(corners)) for k in range(3)]
+    row = np.repeat(np.arange(len(corners)), counts)
+    rank = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    other = around.order[around.starts[around.vertex[corners[row]]] + rank]
+    cosine = np.einsum("ij,ij->i", unit[corners[row] // 3], unit[other // 3])
+    row, other = row[cosine > least], other[cosine > least]
+    sums = [np.bincount(row, unit[other // 3, k] * weight[other], minlength=len(corners)) for k in range(3)]
     return np.stack(sums, axis=1)
 
 

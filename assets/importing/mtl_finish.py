@@ -1,4 +1,4 @@
-"""What an imported material looks like to a physically based renderer: guesses from names and numbers."""
+"""Imported materials as a physically based renderer needs them: guesses from names and numbers."""
 
 from __future__ import annotations
 

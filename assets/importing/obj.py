@@ -54,7 +54,7 @@ class MtlMap:
 
 @dataclass(frozen=True)
 class MtlMaterial:
-    """What an MTL file says about one material; colours are sRGB in [0, 1]."""
+    """One material of an MTL file; colours are sRGB in [0, 1]."""
 
     name: str
     diffuse: tuple[float, float, float] = (0.8, 0.8, 0.8)
@@ -102,11 +102,11 @@ class Obj:
     """(k, 2) float64."""
     groups: tuple[Group, ...]
     libraries: tuple[str, ...]
-    """What its mtllib statements say: the names of one or more MTL files each."""
+    """Texts of its mtllib statements: the names of one or more MTL files each."""
     colours: np.ndarray | None = None
     """(n, 3) sRGB of the vertices, where the file gives them."""
     left_out: tuple[str, ...] = ()
-    """What of its geometry is not drawn, in words."""
+    """Parts of its geometry that are not drawn, in words."""
 
 
 def parse_obj(text: str, where: str) -> Obj:
@@ -156,7 +156,7 @@ def parse_obj(text: str, where: str) -> Obj:
 
 
 def libraries(text: str) -> tuple[str, ...]:
-    """What the mtllib statements of an OBJ file say, without reading its mesh."""
+    """Texts of the mtllib statements of an OBJ file, without reading its mesh."""
     return tuple(dict.fromkeys(rest for _, head, rest in _statements(text) if head == "mtllib"))
 
 
@@ -228,7 +228,7 @@ def _finite(word: str) -> float:
 
 def _map(text: str) -> MtlMap:
     """A picture's options and its name, which may hold blanks."""
-    found: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     while option := re.match(r"-(\w+)\s+", text):
         text, number = text[option.end() :], re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s+", re.ASCII)
         values: list[float] = []
@@ -236,13 +236,13 @@ def _map(text: str) -> MtlMap:
             values.append(_finite(m[1]))
             text = text[m.end() :]
         if option[1] == "clamp":
-            found["clamped"] = text.split(None, 1)[0] == "on"
+            options["clamped"] = text.split(None, 1)[0] == "on"
         elif option[1] in ("s", "o") and values:
             first = 1.0 if option[1] == "s" else 0.0
-            found["scale" if option[1] == "s" else "shift"] = (values[0], values[1] if len(values) > 1 else first)
+            options["scale" if option[1] == "s" else "shift"] = (values[0], values[1] if len(values) > 1 else first)
         if not values and " " in text:  # a word: on, off, l
             text = text.split(None, 1)[1]
-    return MtlMap(text.strip().strip('"'), **found)
+    return MtlMap(text.strip().strip('"'), **options)
 
 
 def _colours(lines: list[Line], where: str) -> np.ndarray | None:

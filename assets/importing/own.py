@@ -24,14 +24,14 @@ OWN_FIELDS = {
     "classes": Field("an object of classes", lambda v: isinstance(v, dict)),
     "models": Field("an object of models", lambda v: isinstance(v, dict)),
 }
-"""What a user's catalogue.json may hold."""
+"""Fields of a user's catalogue.json."""
 ROW_FIELDS = rows.FIELDS | {"file": rows.TEXT, "model": rows.TEXT}
-"""What a model of it may hold."""
+"""Fields of a model in it."""
 
 
 @dataclass(frozen=True)
 class OwnModel:
-    """Where a user's model lies."""
+    """The file of a user's model."""
 
     file: Path
     entry: str = ""
@@ -54,7 +54,7 @@ def read_own(
     added = rows.check_classes(str(path), body.get("classes", {}))
     models = rows.objects(str(path), "models", body.get("models", {}))
     pack = body.get("pack", folder.name)
-    found, own = {}, {}
+    rows_by_key, own = {}, {}
     for name, given in models.items():
         where = f"{path}: model {name!r}"
         key, row = f"{pack}/{name}", dict(rows.check_row(where, given, ROW_FIELDS))
@@ -65,8 +65,8 @@ def read_own(
         row.setdefault("creator", body.get("creator", ""))
         if own[key].entry and "size" not in row:
             row["size"] = list(open_pack(own[key].file).entries[own[key].entry].size)
-        found[key] = row
-    assets, recipes = rows.read_models(str(path), found, {**classes, **added}, {pack: body.get("licence", "")})
+        rows_by_key[key] = row
+    assets, recipes = rows.read_models(str(path), rows_by_key, {**classes, **added}, {pack: body.get("licence", "")})
     for recipe in recipes.values():
         for material, words in recipe.looks:
             try:

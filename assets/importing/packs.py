@@ -1,4 +1,4 @@
-"""Where furniture libraries are, and what each of ours is called."""
+"""Folders of furniture libraries, and the library that holds a model."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from embodied.assets.cache import write_bytes
 from embodied.assets.importing.sh3f import Pack, PackError, open_pack
 
 SYSTEM_FOLDER = Path("/usr/share/sweethome3d/furniture")
-"""Where Debian's and Ubuntu's package sweethome3d-furniture puts its five libraries."""
+"""Folder of the five libraries of Debian's and Ubuntu's package sweethome3d-furniture."""
 OWN_FOLDER = Path(sys.prefix, "share", "sweethome3d", "furniture")
-"""Where `embodied doctor --fix` puts those of that package, and libraries that --pack names."""
+"""Folder into which `embodied doctor --fix` puts those of that package, and libraries that --pack names."""
 WHEEL = "embodied_furniture"
 """The package of `pip install embodied-houses[furniture]`: the models of those libraries that the catalogue uses."""
 
@@ -25,16 +25,16 @@ def find_packs(packs: Sequence[Path] = ()) -> tuple[Path, ...]:
     Raises:
       PackError: a path in `packs` does not exist.
     """
-    found: list[Path] = []
+    libraries: list[Path] = []
     for path in packs or _installed():
         path = Path(path)
         if path.is_dir():
-            found.extend(sorted(path.glob("*.sh3f")))
+            libraries.extend(sorted(path.glob("*.sh3f")))
         elif path.is_file():
-            found.append(path)
+            libraries.append(path)
         elif packs:
             raise PackError(f"furniture library {path} does not exist; name a .sh3f file or a folder of them")
-    return tuple(found)
+    return tuple(libraries)
 
 
 def _installed() -> tuple[Path, ...]:
@@ -60,17 +60,17 @@ def pack_of(key: str) -> Pack:
     Raises:
       PackError: no library is installed, or none of them holds it.
     """
-    found = find_packs()
-    for path in found:
+    libraries = find_packs()
+    for path in libraries:
         pack = open_pack(path)
         if key in pack.entries:
             return pack
-    if not found:
+    if not libraries:
         raise PackError(
             f"no furniture models are installed, so {key!r} cannot be imported; embodied doctor --fix, "
             "or apt-get install sweethome3d-furniture, or embodied doctor --fix --pack FILE.sh3f"
         )
     raise PackError(
-        f"no furniture library holds {key!r}, looked in {[p.name for p in found]}; "
+        f"no furniture library holds {key!r}, looked in {[p.name for p in libraries]}; "
         "apt-get install sweethome3d-furniture (version 1.8 or later), or embodied doctor --fix --pack FILE.sh3f"
     )

@@ -77,7 +77,7 @@ def refined(
 
 
 def is_coarse(vertices: np.ndarray, faces: np.ndarray) -> bool:
-    """Whether the triangles of a cloth are too large to hold folds: a tenth of the edges are longer than COARSE."""
+    """True if the triangles of a cloth are too large to hold folds: a tenth of the edges are longer than COARSE."""
     along = vertices[np.roll(faces, -1, axis=1)] - vertices[faces]
     return bool(np.percentile(np.linalg.norm(along, axis=-1), 90) > COARSE)
 
@@ -167,10 +167,10 @@ def _split(
     pattern = (new >= 0) @ np.array([1, 2, 4])
     rows, corners = [], []
     for code, triangles in _PATTERNS.items():
-        mine = np.flatnonzero(pattern == code)
+        halved = np.flatnonzero(pattern == code)
         for triangle in triangles:
-            rows.append(mine)
-            corners.append(np.tile(triangle, (len(mine), 1)))
+            rows.append(halved)
+            corners.append(np.tile(triangle, (len(halved), 1)))
     row, corner = np.concatenate(rows), np.concatenate(corners)
     order = np.argsort(row, kind="stable")
     row, corner = row[order], corner[order]

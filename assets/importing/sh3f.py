@@ -212,7 +212,7 @@ def _keys(rows: Mapping[int, Mapping[str, str]]) -> dict[int, str]:
 
 
 def _names(number: int, row: Mapping[str, str]) -> tuple[str, str, str, str]:
-    """What a row's model may be called, the shortest first."""
+    """Names for a row's model, the shortest first."""
     model = row.get("model", "").lstrip("/")
     stem = str(PurePosixPath(model).with_suffix("")) if PurePosixPath(model).name else ""
     name = row.get("id", "").rpartition("#")[2]

@@ -85,13 +85,13 @@ def palette(colours: np.ndarray) -> tuple[Image.Image, np.ndarray]:
     levels = 256
     while True:
         steps = np.round(np.clip(colours, 0, 1) * (levels - 1)).astype(np.int64)
-        found, which = np.unique(steps, axis=0, return_inverse=True)
-        if len(found) <= PALETTE:
+        levels_used, which = np.unique(steps, axis=0, return_inverse=True)
+        if len(levels_used) <= PALETTE:
             break
         levels //= 2
-    side = int(np.ceil(np.sqrt(len(found))))
+    side = int(np.ceil(np.sqrt(len(levels_used))))
     pixels = np.zeros((side * side, 3), np.uint8)
-    pixels[: len(found)] = np.round(found * 255 / (levels - 1))
+    pixels[: len(levels_used)] = np.round(levels_used * 255 / (levels - 1))
     which = which.reshape(-1)
     uv = np.stack([(which % side + 0.5) / side, 1 - (which // side + 0.5) / side], axis=1)
     image = Image.fromarray(pixels.reshape(side, side, 3)).resize((8 * side, 8 * side), Image.Resampling.NEAREST)
@@ -156,7 +156,7 @@ def cut(
 
 
 def _covered(outline: shapely.Geometry, triangle: np.ndarray) -> shapely.Geometry | None:
-    """What of a triangle (3, 2) of a repeating texture lies in `outline`, empty for nothing; None for all of it."""
+    """The share of a triangle (3, 2) of a repeating texture that lies in `outline`, maybe empty; None for all of it."""
     low, high = np.floor(triangle.min(0) + 1e-9), np.ceil(triangle.max(0) - 1e-9)
     across, down = (int(max(1, n)) for n in high - low)
     whole = shapely.Polygon(triangle)

@@ -90,7 +90,7 @@ def fingerprint(key: str) -> str:
 
 
 def _read_mean(folder: Path) -> dict | None:
-    """What `_write` noted, or None unless all three maps are whole."""
+    """The note of `_write`, or None unless all three maps are whole."""
     note = folder / "maps.json"
     try:
         mean = read_json(note)

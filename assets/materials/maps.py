@@ -117,7 +117,7 @@ def mix(a: np.ndarray, b: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """What a material is drawn on: n pixels wide, over a square of `tile` metres."""
+    """A square to draw a material on: n pixels wide, over a square of `tile` metres."""
 
     n: int
     tile: float
@@ -146,7 +146,7 @@ class Canvas:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where on endless stone each pixel of a canvas is cut from."""
+    """Places on endless stone from which the pixels of a canvas are cut."""
 
     on: Canvas
     x: np.ndarray
@@ -218,11 +218,11 @@ def planks(
         last = start
         parts = np.ones(count) if regular else rng.uniform(0.65, 1.35, count)
         joints = (start + np.concatenate([[0], np.cumsum(parts / parts.sum())])) * tile
-        mine = row == r
-        x = (u[mine] - joints[0]) % tile
+        in_row = row == r
+        x = (u[in_row] - joints[0]) % tile
         k = np.clip(np.searchsorted(joints - joints[0], x, side="right") - 1, 0, count - 1)
-        code[mine], along[mine] = r * 64 + k, x - (joints[k] - joints[0])
-        length[mine] = joints[k + 1] - joints[k]
+        code[in_row], along[in_row] = r * 64 + k, x - (joints[k] - joints[0])
+        length[in_row] = joints[k + 1] - joints[k]
     y = v - row * width
     edge = np.minimum(np.minimum(y, width - y), np.minimum(along, length - along))
     return _layout(code, along, y - width / 2, edge)

@@ -41,7 +41,7 @@ ROLES = (
     "label",
     "outdoor",
 )
-"""What a material may be used for."""
+"""Uses of a material."""
 
 
 DETAIL_OF_FAMILY = {
@@ -56,11 +56,11 @@ DETAIL_OF_FAMILY = {
     "brick": "plaster",
     "paint": "stipple",
 }
-"""What materials of a family show; others are smooth."""
+"""Detail of the materials of a family; others are smooth."""
 
 
 DETAIL_OF_PAINTER = {"textile.felt": "nap", "textile.Pile": "nap"}
-"""What cloth without threads shows, whatever its family."""
+"""Detail of cloth without threads, whatever its family."""
 
 
 class Recipe(Protocol):
@@ -76,9 +76,9 @@ class Material:
     key: str
     """'<maker>/<variant>'."""
     family: str
-    """What it is: 'wood', 'tile', 'carpet', 'paint', 'wallpaper', 'stone', 'fabric', 'metal', ..."""
+    """Its matter: 'wood', 'tile', 'carpet', 'paint', 'wallpaper', 'stone', 'fabric', 'metal', ..."""
     roles: tuple[str, ...]
-    """Where it belongs, from ROLES."""
+    """Its uses, from ROLES."""
     name: str
     """'oak planks', 'sage green paint'."""
     colours: tuple[str, ...]
@@ -95,5 +95,5 @@ class Material:
 
 
 def detail_of(material: Material) -> str | None:
-    """What a material shows from nearby, one of embodied.assets.records.DETAILS."""
+    """The detail that a material shows from nearby, one of embodied.assets.records.DETAILS."""
     return DETAIL_OF_PAINTER.get(material.told["by"], DETAIL_OF_FAMILY.get(material.family))

@@ -17,7 +17,7 @@ from embodied.assets.materials.material import ROLES, Material
 from embodied.assets.rows import CatalogueError, Field, Row
 
 PAINTERS = rows.made_in(art, maps, mineral, surface, textile, wood)
-"""What a row may name with "by", as '<module>.<name>': recipes, and the layouts, faces, motifs and cloths they take."""
+"""Painters that a row may name with "by", as '<module>.<name>': recipes, and layouts, motifs and cloths for them."""
 MATERIAL_FIELDS = {
     "family": rows.WORD,
     "name": rows.WORD,
@@ -73,14 +73,14 @@ def _material(where: str, key: str, row: Row) -> Material:
     )
 
 
-def recipe_of(where: str, told: Row) -> Callable[..., Any]:
-    """What {"by": painter, argument: value, ...} stands for: a function that knows these arguments, or the record of
+def recipe_of(where: str, described: Row) -> Callable[..., Any]:
+    """The meaning of {"by": painter, argument: value, ...}: a function that knows these arguments, or the record of
     a class; values may be such objects themselves, lists become tuples.
 
     Raises:
       CatalogueError: an unknown painter, an argument it does not take.
     """
-    arguments = dict(told)
+    arguments = dict(described)
     name = arguments.pop("by", None)
     if name not in PAINTERS:
         raise CatalogueError(f'{where} should have a "by" out of {", ".join(sorted(PAINTERS))}, got {name!r}')
@@ -96,10 +96,10 @@ def _drawn(painter: Callable[[Canvas], Maps], n: int, tile: float, *, rng: np.ra
     return painter(Canvas(n, tile, rng))
 
 
-def painters_of(told: object) -> set[str]:
+def painters_of(recipe: object) -> set[str]:
     """Every painter that a recipe of the table names."""
-    if isinstance(told, dict):
-        return {told["by"]}.union(*(painters_of(value) for value in told.values()))
+    if isinstance(recipe, dict):
+        return {recipe["by"]}.union(*(painters_of(value) for value in recipe.values()))
     return set()
 
 

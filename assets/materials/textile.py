@@ -11,7 +11,7 @@ from embodied.assets.materials.maps import Canvas, Colors, Maps, maps_of, mix, r
 from embodied.assets.records import Color
 
 LIGHT_FROM = (0.55, 0.83)
-"""Where light on folds comes from, in a tile, right and up: on upright cloth from above."""
+"""Direction to the light on folds, in a tile, right and up: on upright cloth from above."""
 
 
 def folds(on: Canvas, width: float, strength: float) -> np.ndarray:

@@ -135,7 +135,7 @@ class _Grain:
     """How the wood of every board runs; arrays (n, n) but for `plain`."""
 
     x: np.ndarray
-    """Where noise is looked up along the boards, tiles."""
+    """Places along the boards at which noise is looked up, tiles."""
     y: np.ndarray
     dark: np.ndarray
     """Summer wood, 0 to 1."""
@@ -187,8 +187,8 @@ def _knots(color: np.ndarray, layout: Layout, species: Species, tile: float, *, 
             at = inside[rng.integers(len(inside))]
             a0, c0 = layout.along.reshape(-1)[at], layout.across.reshape(-1)[at]
             size = rng.uniform(0.006, 0.014)
-            mine = layout.piece == k
+            on_board = layout.piece == k
             d = np.hypot((layout.along - a0) / 1.5, layout.across - c0) / size
-            mask = np.maximum(mask, np.where(mine, np.exp(-(d**2) * 1.2), 0))
+            mask = np.maximum(mask, np.where(on_board, np.exp(-(d**2) * 1.2), 0))
     swirl = 1 - 0.25 * np.sin(mask * 22) * (mask > 0.05)
     return mix(color, rgb(species.pore) * 0.75, np.clip(mask * 0.95 * swirl, 0, 1))

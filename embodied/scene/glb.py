@@ -35,7 +35,7 @@ PAGE_QUALITY = 92
 """JPEG quality of lit pages."""
 ROOF, SKY = "outdoor/roof", "outdoor/sky"
 VERTICES, INDICES = 34962, 34963
-"""What a buffer view holds, in OpenGL's numbers."""
+"""Contents of a buffer view, in OpenGL's numbers."""
 UPRIGHT = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
 """z up to y up, as the format asks."""
 
@@ -100,7 +100,7 @@ def export_glb(
 
 
 def about(house: House, mesh: Part | LitMesh) -> dict[str, str]:
-    """What a mesh is: its class (for the house itself, its kind), its kind, its room and the room's kind."""
+    """The facts about a mesh: its class (for the house itself, its kind), its kind, its room and the room's kind."""
     placed = {p.id: p.object_class for p in house.placements}
     room = house.room_by_id.get(mesh.room)
     facts = {

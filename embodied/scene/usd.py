@@ -24,7 +24,7 @@ from embodied.scene.lit_pages import LitMesh, LitPages
 
 
 def check_usd(path: Path) -> None:
-    """Whether USD can be written to `path`; to be asked before a house is lit for it.
+    """See that USD can be written to `path`, before a house is lit for it.
 
     Raises:
       UnableError: OpenUSD is not installed.

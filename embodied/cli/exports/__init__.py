@@ -1,4 +1,4 @@
-"""What `embodied export` writes: each file of this folder registers a format, or formats that share their options."""
+"""Formats that `embodied export` writes; each file of this folder registers one, or some that share their options."""
 
 from __future__ import annotations
 
