@@ -26,14 +26,12 @@ from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint, 
 from embodied.agents.common.session import Session
 from embodied.agents.common.tensor_file import save_tensors
 from embodied.assets.cache import DRAFTS
-from embodied.assets.catalogue import CatalogueError, load_catalogue
 from embodied.assets.closure import ROOT
 from embodied.bench.timing import Measure, Report
 from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
-from embodied.generate import generate_house
 from embodied.house.house import HouseError
 from embodied.interface import Episode
 from embodied.light import LightError, backend
@@ -300,17 +298,6 @@ def test_graphs_of_the_simulator_are_read_as_strictly_as_all_others(body, messag
         load_graphs(str(tmp_path), ("s",))
 
 
-@pytest.mark.parametrize("wrong", ["3", 3.0, None, float("nan")])
-def test_a_seed_that_is_none_is_refused_before_any_work(wrong):
-    for made in (lambda: generate_house(wrong), lambda: stream(wrong, "x")):
-        with pytest.raises(TypeError, match="a seed should be an integer, got"):
-            made()
-
-
-def test_numpys_integers_are_seeds():
-    assert stream(np.int64(3), "x").random() == stream(3, "x").random()
-
-
 def test_a_radius_that_no_house_has_is_refused(played):
     body = json.loads(played.read_text().splitlines()[0])
     body["task"]["radius"] = 5e11
@@ -359,11 +346,6 @@ def test_degrees_and_what_is_no_angle_are_no_radians(angle):
             look(angle)
     with pytest.raises(ValueError, match="in radians"):
         faces.view_rgb(0.0, angle)
-
-
-def test_one_folder_of_own_models_may_be_named_as_a_text(tmp_path):
-    with pytest.raises(CatalogueError, match="mymodels/catalogue.json does not exist"):
-        load_catalogue(tmp_path, own=str(tmp_path / "mymodels"))
 
 
 # Machines -----------------------------------------------------------------------------------------

@@ -238,6 +238,15 @@ def test_a_wrong_catalogue_says_what_it_should_hold(tmp_path, text, match):
     assert "catalogue.json" in str(caught.value) and len(str(caught.value)) < 1500
 
 
+def test_a_correction_of_a_material_that_is_not_there_is_told(tmp_path, caplog):
+    own = write_own(
+        tmp_path / "own", {"box": {"file": "a.obj", **MUG, "looks": {"wood": "#ff0000"}, "two_sided": ["*"]}}
+    )
+    (own / "a.obj").write_text(PAINTED)
+    load_catalogue(tmp_path, own=[own]).mesh("mine/box")
+    assert "its row names the materials ['wood'], which it has not; it has ['paint']" in caplog.text
+
+
 @pytest.mark.slow
 def test_a_symbolic_link_to_itself_is_refused(tmp_path):
     own = write_own(tmp_path / "own", {"box": {"file": "a.obj", **MUG}})
