@@ -84,7 +84,7 @@ def read_glb(path: Path, tell: Tell) -> tuple[RawPart, ...]:
         raise MeshError(f"{path} cannot be read as .glb ({why[:200]}); {ANEW}") from e
     if not parts:
         why = "; ".join(reader.left_out[:3]) or "its scene shows no mesh"
-        raise MeshError(f"{path} has nothing to draw: {why}")
+        raise MeshError(f"{path} has nothing to draw: {why}; export the model with faces that can be seen")
     return parts
 
 
@@ -370,7 +370,7 @@ class _Reader:
         factor, picture = core.get("baseColorFactor", [1, 1, 1, 1]), core.get("baseColorTexture")
         roughness, metallic = self._share(core, "roughnessFactor", 1.0), self._share(core, "metallicFactor", 1.0)
         both = core.get("metallicRoughnessTexture")
-        name = material.get("name") or None
+        name = str(material["name"]) if material.get("name") else None
         if older := more.get("KHR_materials_pbrSpecularGlossiness"):
             factor, picture = older.get("diffuseFactor", [1, 1, 1, 1]), older.get("diffuseTexture")
             roughness, metallic, both = 1 - self._share(older, "glossinessFactor", 1.0), 0.0, None
@@ -416,7 +416,7 @@ class _Reader:
         texture = self.header["textures"][info["index"]]
         if "source" not in texture:
             known = (f"{REFUSED[n]} ({n})" for n in sorted(texture.get("extensions", ())) if n in REFUSED)
-            raise RefusedError(next(known, f"a texture of {called} has no picture"))
+            raise RefusedError(next(known, f"a texture of {called} has no picture; give it one, or none at all"))
         sampler = self.header["samplers"][texture["sampler"]] if "sampler" in texture else {}
         wraps = sampler.get("wrapS"), sampler.get("wrapT")
         if self.header["images"][texture["source"]].get("mimeType") in FOREIGN:

@@ -7,6 +7,7 @@ KHR_materials_unlit (Khronos, ratified 2018); viewers without it see the page as
 
 from __future__ import annotations
 
+import functools
 import io
 import math
 from collections import Counter
@@ -137,7 +138,7 @@ def _unlit_pieces(parts: tuple[Part, ...]) -> Iterator[_Piece]:
         if len(part.mesh.faces):
             pose = trimesh.transformations.rotation_matrix(part.yaw, [0, 0, 1])
             pose[:3, 3] = part.position
-            yield _Piece(part, part.mesh_key, pose, lambda part=part: made(part))
+            yield _Piece(part, part.mesh_key, pose, functools.partial(made, part))
 
 
 def _lit_pieces(lit: LitPages) -> Iterator[_Piece]:
@@ -152,7 +153,7 @@ def _lit_pieces(lit: LitPages) -> Iterator[_Piece]:
         return trimesh.Trimesh(mesh.vertices, mesh.faces, visual=visual, process=False)
 
     for k, mesh in enumerate(lit.meshes):
-        yield _Piece(mesh, f"mesh_{k}", np.eye(4), lambda mesh=mesh: made(mesh))
+        yield _Piece(mesh, f"mesh_{k}", np.eye(4), functools.partial(made, mesh))
 
 
 def pbr_material(finish: Finish) -> PBRMaterial:
