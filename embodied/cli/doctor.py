@@ -202,7 +202,7 @@ def path_tracer(_: Options) -> Finding:
 def body(_: Options) -> Finding:
     """dm-control, which the driven body needs; its dependency labmaze has no wheel for Python 3.13."""
     installed, missing = _installed(("dm-control",))
-    remedy = "only environments with wheels=True need it: pip install --no-deps dm-control"
+    remedy = "only embodied/Drive-v0 needs it: pip install --no-deps dm-control"
     return Finding("driven body", not missing, (*installed, "no dm-control")[0], remedy, False)
 
 

@@ -1,15 +1,13 @@
-"""A body with wheels that drives the edges of the graph physically (dm_control's composer).
+"""A body with wheels in the physics of a house, driven by velocities (dm_control's composer).
 
-The house is its arena (the collision boxes of embodied.scene.model), and the same tasks are played: a
-Move is driven by a simple controller, collisions are counted, and a way that turns out to be blocked
-leaves the agent where it came from.
+The house is its arena: the collision boxes of embodied.scene.model.
 """
 
 from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
@@ -21,15 +19,10 @@ try:
 except ImportError as e:
     raise ImportError(f"a driven body needs dm-control ({e}); pip install --no-deps dm-control") from e
 
-from embodied.envs.base import HelpEnv
-from embodied.envs.hanna import HannaEnv
-from embodied.geometry import wrap
-from embodied.interface import Assistant, Place, Reply
 from embodied.navigation.free_space import EYE
 from embodied.scene.model import build_spec, owner_of_name
 
 if TYPE_CHECKING:
-    from embodied.action_spaces import Moves
     from embodied.assets.catalogue import Catalogue
     from embodied.house.house import House
 
@@ -41,14 +34,8 @@ FASTEST, TURNING = 1.0, 2.5
 """Metres per second and radians per second."""
 CONTROL = 0.02
 """Seconds between two commands."""
-NEAR = 0.06
-"""A node is reached within this many metres."""
-AHEAD = 0.4
-"""The body steers for a point of its line this many metres ahead, so that it stays on the line."""
 APART = 0.5
 """Seconds without touch after which touching the same thing is another collision (Driver.roll): bodies rebound."""
-PATIENCE = 4.0
-"""Seconds allowed beyond four times what the way takes at full speed."""
 
 
 SLIPPERY = {"friction": [0.02, 0.001, 0.0001], "priority": 1}
@@ -99,18 +86,6 @@ class RollingBody(composer.Entity):
     @property
     def mjcf_model(self) -> mjcf.RootElement:
         return self._root
-
-
-@dataclass(frozen=True)
-class Drive:
-    """One edge, driven."""
-
-    arrived: bool
-    seconds: float
-    metres: float
-    """Way of the body's centre."""
-    collisions: tuple[str, ...]
-    """What it touched besides floors, in order, once per contact."""
 
 
 @dataclass(frozen=True)
@@ -222,35 +197,6 @@ class Driver:
         velocity = self.data.qvel[self._moves]
         return float(velocity[0] * math.cos(self.yaw) + velocity[1] * math.sin(self.yaw)), float(velocity[5])
 
-    def drive(self, target: np.ndarray) -> Drive:
-        """Turn towards (x, y) and go there along the straight line; give up after a while."""
-        start, origin, goal = self.data.time, self.position, np.asarray(target)[:2]
-        way = float(np.linalg.norm(goal - origin))
-        along = (goal - origin) / max(way, 1e-9)
-        limit = 4.0 * (way / FASTEST + math.pi / TURNING) + PATIENCE
-        metres = 0.0
-        collisions: list[str] = []
-        touching: frozenset[str] = frozenset()
-        while self.data.time - start < limit:
-            before = self.position
-            distance = float(np.linalg.norm(goal - before))
-            if distance < NEAR:
-                self._command(0.0, 0.0)
-                return Drive(True, self.data.time - start, metres, tuple(collisions))
-            ahead = origin + along * min(way, float((before - origin) @ along) + AHEAD)
-            offset = ahead - before
-            error = float(wrap(math.atan2(offset[1], offset[0]) - self.yaw))
-            turn = float(np.clip(5.0 * error, -TURNING, TURNING))
-            speed = 0.0 if abs(error) > 0.2 else min(FASTEST, 2.0 * distance + 0.05)
-            self._command(speed, turn)
-            mujoco.mj_step(self.model, self.data, self.substeps)
-            metres += float(np.linalg.norm(self.position - before))
-            now = self._touched()
-            collisions += sorted(now - touching)
-            touching = now
-        self._command(0.0, 0.0)
-        return Drive(False, self.data.time - start, metres, tuple(collisions))
-
     def _command(self, speed: float, turn: float) -> None:
         for motor, side in zip(self._motors, (-1.0, 1.0), strict=True):
             self.data.ctrl[motor] = (speed + side * turn * TRACK / 2) / WHEEL
@@ -299,64 +245,3 @@ def is_overhead(low: float, high: float, floors: Sequence[float]) -> bool:
     """Whether what reaches from one height to another hangs above a body on any of the floors, and under the next."""
     above = [*floors[1:], math.inf]
     return any(low > floor + HEIGHT + 0.1 and high < upper - 0.05 for floor, upper in zip(floors, above, strict=True))
-
-
-class _Driven(HelpEnv):
-    """Drives what the agent decides; mixed into a rule of play.
-
-    After a blocked way the agent is where it was, facing as before. `drives` lists the current
-    episode's, one per Move that was not blocked at once.
-    """
-
-    def __init__(
-        self,
-        catalogue: Catalogue,
-        worlds: Mapping[str, Place],
-        assistant: Assistant | None = None,
-        moves: Moves | None = None,
-    ) -> None:
-        """`catalogue` gives the collision shapes; the rest as in HelpEnv."""
-        super().__init__(worlds, assistant, moves)
-        self._catalogue = catalogue
-        self._drivers: dict[str, Driver] = {}
-
-    def facts(self) -> dict[str, float]:
-        """Collisions of the current episode."""
-        return {"collisions": sum(len(d.collisions) for d in self.drives)}
-
-    def _begin(self) -> None:
-        super()._begin()
-        self.drives: list[Drive] = []
-        name = self.world.house.name
-        if name not in self._drivers:
-            self._drivers[name] = Driver(self.world.house, self._catalogue)
-        self._driver = self._drivers[name]
-        self._driver.place(self.world.graph.positions[self.pose.node], self.pose.yaw)
-        self._reached = self.pose
-
-    def _moved(self) -> None:
-        self._go()
-        super()._moved()
-
-    def _replied(self, reply: Reply) -> None:
-        super()._replied(reply)
-        if self.pose.node != self._reached.node:
-            self._go()
-        self._reached = self.pose
-
-    def _go(self) -> None:
-        drive = self._driver.drive(self.world.graph.positions[self.pose.node])
-        self.drives.append(drive)
-        if drive.arrived:
-            self._reached = self.pose
-        else:
-            self.pose = self._reached
-            self._driver.place(self.world.graph.positions[self.pose.node], self.pose.yaw)
-
-
-class DrivenEnv(_Driven, HelpEnv):
-    """Plain navigation on wheels."""
-
-
-class DrivenHannaEnv(_Driven, HannaEnv):
-    """HANNA on wheels, with the same tasks."""

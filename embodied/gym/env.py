@@ -187,7 +187,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         if self._shaping:
             reward += before - self._env.potential()
         self._o = o if o is not None else self._o
-        info |= self._env.facts() | self._words()
+        info |= self._words()
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
 
     def render(self) -> np.ndarray | None:
@@ -389,15 +389,13 @@ class EnvironmentSettings:
     """False: requests in a generated flat name no room (VNLA); those of a data set are as it was built."""
     assistant: Assistant | str | None = None
     """Who answers requests instead of the kind's own assistant: an Assistant, or 'module:Class' to import one."""
-    wheels: bool = False
-    """A body drives along every edge (find, VLN and HANNA); info["collisions"] counts what it runs into."""
 
 
 def open_resources(kind: str, **settings: Any) -> SharedResources:
     """Everything that environments of a kind of task share; `settings` are fields of EnvironmentSettings.
 
     Raises:
-      ValueError: unknown `sees`, pixels where there are none, or wheels for a kind that cannot have them.
+      ValueError: unknown `sees`, or pixels where there are none.
     """
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
@@ -415,10 +413,9 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
         play = split_playground(kind, Path(wanted.data), wanted.split, asked)
     else:
         play = flat_playground(kind, wanted.seed, asked)
-    make_env = _on_wheels(kind, play.make_env, where) if wanted.wheels else play.make_env
     layout = wanted.layout or SpaceLayout.of(kind_named(kind), wanted.rules)
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
-    return SharedResources(make_env, play.tasks, _sensor_of(play, seen, wanted), layout, opened)
+    return SharedResources(play.make_env, play.tasks, _sensor_of(play, seen, wanted), layout, opened)
 
 
 def _sensor_of(play: Playground, seen: Sequence[str], wanted: EnvironmentSettings) -> Sensor:
@@ -445,20 +442,3 @@ def require_rendered(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]
         raise ValueError(
             f"there are no pictures of {blind[:3]}: only an embodied.World can be seen; choose sees='oracle'"
         )
-
-
-def _on_wheels(kind: str, make_env: Callable[[], HelpEnv], cache: Path) -> Callable[[], HelpEnv]:
-    """The same rule of play with a body."""
-    from embodied.assets.catalogue import load_catalogue
-    from embodied.envs.driven import DrivenEnv, DrivenHannaEnv  # physics, only where wanted
-
-    kinds = {"find": DrivenEnv, "vln": DrivenEnv, "hanna": DrivenHannaEnv}
-    if kind not in kinds:
-        raise ValueError(f"{kind!r} cannot be played on wheels, only {sorted(kinds)}")
-    catalogue = load_catalogue(cache)
-
-    def make_driven() -> HelpEnv:
-        env = make_env()
-        return kinds[kind](catalogue, env.worlds, env.assistant, env.moves)
-
-    return make_driven
