@@ -15,7 +15,7 @@ from embodied.agents.common.session import Session, descend
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
 from embodied.agents.iliad.describing import by_the_program, by_the_text, kept
 from embodied.agents.iliad.learners import (
-    Asked,
+    RequestBatch,
     RunningMean,
     adel,
     adel_loss,
@@ -161,14 +161,14 @@ def test_reinforce_by_hand():
 def test_the_baseline_is_the_mean_of_all_rewards_this_batch_included():
     mean, student = RunningMean(3.0, 3), flat([0.25] * 4)
     reward = lambda task, execution: 0.0
-    lesson = reinforce(Asked([Wish(0)], ["0"], stream(0, "r")), reward, mean, student, 0.0)
+    lesson = reinforce(RequestBatch([Wish(0)], ["0"], stream(0, "r")), reward, mean, student, 0.0)
     assert mean.value == pytest.approx(3 / 4)
     assert lesson.loss.item() == pytest.approx((0 - 3 / 4) * math.log(4))
 
 
 def test_dagger_shows_the_best_action_in_states_that_the_student_came_to():
     student = flat([0.1, 0.7, 0.1, 0.1])
-    lesson = dagger(Asked([Wish(0)], ["0"], stream(0, "d")), Buttons(), student)
+    lesson = dagger(RequestBatch([Wish(0)], ["0"], stream(0, "d")), Buttons(), student)
     assert list(lesson.executions) == [1] and lesson.loss.item() == pytest.approx(-math.log(0.1))
     lesson.loss.backward()
     assert student.table.weight.grad[0, 0] < 0, "what was shown becomes likelier"
@@ -185,7 +185,7 @@ class Button2:
 def test_the_mixture_executes_the_marginal_as_often_as_lambda_says(mixing, least, most):
     """Eq 3.14: the student here always presses 0, the marginal 2; what is described as it is, is learned as it is."""
     student = flat([1 - 3e-9, 1e-9, 1e-9, 1e-9])
-    asked = Asked([Wish(0)] * 1000, ["0"] * 1000, stream(0, "mixture"))
+    asked = RequestBatch([Wish(0)] * 1000, ["0"] * 1000, stream(0, "mixture"))
     lesson = mixture(asked, Watcher(), Button2(), student, mixing)
     lesson.loss.backward()
     assert least <= sum(e == 2 for e in lesson.executions) / 1000 <= most
@@ -293,7 +293,7 @@ def test_adel_comes_to_the_true_marginal():
     rng, explorer, student = stream(0, "t"), Presser(1), Presser(0)
     weights = [*explorer.table.parameters(), *student.table.parameters()]
     optimizer = torch.optim.Adam(weights, 0.1)
-    asked = Asked([Wish(0)] * 16, ["0"] * 16, rng)
+    asked = RequestBatch([Wish(0)] * 16, ["0"] * 16, rng)
     for _ in range(80):
         descend(adel(asked, Watcher(), AnyButton(), explorer, student, 0.25).loss, optimizer, "ADEL", 9.0)
     with torch.no_grad():

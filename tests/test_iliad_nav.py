@@ -15,7 +15,7 @@ from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.stages import new_follower
 from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track
-from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, performance, said, walked
+from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, encoded_walks, performance, texts_of
 from embodied.agents.iliad.nav.world import (
     HORIZON,
     NavMarginal,
@@ -194,8 +194,8 @@ def test_walks_are_read_and_described_whoever_is_beside():
     describer = WalkDescriber(len(look.vocabulary), 32, 2, look.size, HORIZON)
     trips = [Trip("grid", Pose(n), (n,), ("go",)) for n in (5, 0)]
     walks = [walk_along([5, 6, 7]), walk_along([0])]
-    both = said(look.vocabulary, describer.write(*walked(look, trips, walks), greedy_choice, 6))
-    alone = said(look.vocabulary, describer.write(*walked(look, trips[1:], walks[1:]), greedy_choice, 6))
+    both = texts_of(look.vocabulary, describer.write(*encoded_walks(look, trips, walks), greedy_choice, 6))
+    alone = texts_of(look.vocabulary, describer.write(*encoded_walks(look, trips[1:], walks[1:]), greedy_choice, 6))
     assert both[1:] == alone
     teacher = LearnedNavTeacher(NavWorld({"grid": GRID}), describer, student(look), 2, "text")
     found = teacher.describe(trips, walks, rng=stream(0, "t"))

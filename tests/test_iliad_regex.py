@@ -322,7 +322,7 @@ WORDS = ("banana", "nut", "tea", "pen", "oven")
 ITEM = WordTask(("cut n", "no n"), "()(n)()@", WORDS, outputs("()(n)()@", WORDS))
 
 
-def said(teacher, rule: str, count: int = 1) -> list:
+def descriptions_of(teacher, rule: str, count: int = 1) -> list:
     return teacher.describe([ITEM] * count, [carried_out(rule, ITEM)] * count, rng=stream(0, "said"))
 
 
@@ -340,8 +340,8 @@ def test_what_the_marginal_writes_is_carried_out_so_that_it_can_be_described():
 
 def test_a_teacher_is_silent_where_nothing_happened_or_could():
     teacher = Scripted("()(z)()@", [], "program")
-    assert said(teacher, "()(z)()@y") == [None], "no word was changed"
-    assert said(teacher, "((") == [None], "no rule"
+    assert descriptions_of(teacher, "()(z)()@y") == [None], "no word was changed"
+    assert descriptions_of(teacher, "((") == [None], "no rule"
 
 
 def test_the_programs_teacher_prefers_the_likeliest_description_that_passes():

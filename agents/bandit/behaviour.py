@@ -1,4 +1,4 @@
-"""How a translator behaves on a split: what of a change of BLEU is length, what sureness, what words."""
+"""Behaviour of a translator on a split: the shares of length, sureness and words in a change of BLEU."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ BLEU of sampled translations whose last third of words is cut off: where that is
 def behaviour(translator: Translator, m: NumberedCorpus, split: str) -> Mapping[str, float]:
     """All COLUMNS on a split; learners draw alike."""
     data = m.splits[split]
-    said = greedy(translator, data, m.lexicons[1], m.config.longest)
-    parts = corpus_parts(said, data.references)
+    translations = greedy(translator, data, m.lexicons[1], m.config.longest)
+    parts = corpus_parts(translations, data.references)
     words = sum(map(len, data.references))
     scores, shortened, lengths, surprise, drawn = [], [], 0, 0.0, 0
     for chosen in in_order([len(s) for s in data.source], 128):
@@ -56,8 +56,8 @@ def behaviour(translator: Translator, m: NumberedCorpus, split: str) -> Mapping[
         "brevity penalty": parts.brevity,
         "1-gram precision": parts.precisions[0],
         "4-gram precision": parts.precisions[3],
-        "length": sum(map(len, said)) / words,
-        "greedy per-sentence BLEU": 100 * float(np.mean([sentence_bleu(*p) for p in zip(said, data.references)])),
+        "length": sum(map(len, translations)) / words,
+        "greedy per-sentence BLEU": 100 * float(np.mean(list(map(sentence_bleu, translations, data.references)))),
         "sampled per-sentence BLEU": 100 * float(np.mean(scores)),
         "without the last third": 100 * float(np.mean(shortened)),
         "sampled length": lengths / words,

@@ -35,8 +35,8 @@ def sentence_bleu(words: Sequence[str], reference: Sequence[str]) -> float:
     """
     logs = 0.0
     for n in ORDERS:
-        mine, theirs = _ngrams(words, n), _ngrams(reference, n)
-        logs += math.log((sum((mine & theirs).values()) + 1) / (sum(mine.values()) + 1))
+        counts, theirs = _ngrams(words, n), _ngrams(reference, n)
+        logs += math.log((sum((counts & theirs).values()) + 1) / (sum(counts.values()) + 1))
     shortfall = 1 - (len(reference) + 1) / (len(words) + 1)
     return math.exp(logs / len(ORDERS) + min(0.0, shortfall))
 
@@ -49,8 +49,8 @@ def corpus_bleu(translations: Sequence[Sequence[str]], references: Sequence[Sequ
 def corpus_parts(translations: Sequence[Sequence[str]], references: Sequence[Sequence[str]]) -> CorpusBleu:
     """The same with its parts."""
     lines = [" ".join(t) for t in translations], [[" ".join(r) for r in references]]
-    found = sacrebleu.corpus_bleu(*lines, tokenize="none", force=True)
-    return CorpusBleu(found.score, found.bp, tuple(found.precisions))
+    score = sacrebleu.corpus_bleu(*lines, tokenize="none", force=True)
+    return CorpusBleu(score.score, score.bp, tuple(score.precisions))
 
 
 def _ngrams(words: Sequence[str], n: int) -> collections.Counter:

@@ -35,7 +35,7 @@ class Pair:
     source: str
     target: str
     document: str
-    """What it was taken from; documents are never shared between splits that must not know each other."""
+    """The document that it was taken from; documents are never shared between splits that must not know each other."""
 
 
 Corpus = Mapping[str, Sequence[tuple[tuple[str, ...], tuple[str, ...]]]]
@@ -78,28 +78,28 @@ def split(pairs: Sequence[Pair], sizes: Sizes, *, seed: int) -> dict[str, list[P
     names = sorted(documents)
     rng = stream(seed, "corpus", "documents")
     order = iter([names[i] for i in rng.permutation(len(names))])
-    found: dict[str, list[Pair]] = {}
+    pairs_by_document: dict[str, list[Pair]] = {}
     for name, wanted in (
         ("test", sizes.test),
         ("dev", sizes.dev),
         ("supervised", sizes.supervised),
         ("bandit_disjoint", sizes.bandit),
     ):
-        found[name] = []
-        while len(found[name]) < wanted:
+        pairs_by_document[name] = []
+        while len(pairs_by_document[name]) < wanted:
             document = next(order, None)
             if document is None:
                 raise CorpusError(
                     f"{len(pairs)} pairs in {len(names)} documents are too few for {sizes}; ask for smaller splits"
                 )
-            found[name] += documents[document]
+            pairs_by_document[name] += documents[document]
     for name, wanted in (("supervised", sizes.supervised), ("bandit_disjoint", sizes.bandit)):
-        found[name] = found[name][:wanted]
+        pairs_by_document[name] = pairs_by_document[name][:wanted]
     known = min(round(sizes.overlap * sizes.bandit), sizes.supervised)
     rng = stream(seed, "corpus", "overlap")
-    chosen = [found["supervised"][i] for i in sorted(rng.permutation(sizes.supervised)[:known])]
-    found["bandit_overlap"] = chosen + found["bandit_disjoint"][: sizes.bandit - known]
-    return {name: found[name] for name in SPLITS}
+    chosen = [pairs_by_document["supervised"][i] for i in sorted(rng.permutation(sizes.supervised)[:known])]
+    pairs_by_document["bandit_overlap"] = chosen + pairs_by_document["bandit_disjoint"][: sizes.bandit - known]
+    return {name: pairs_by_document[name] for name in SPLITS}
 
 
 def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) -> None:
@@ -153,9 +153,9 @@ def load(folder: Path, names: Sequence[str], *, longest: int = 50) -> Corpus:
       CorpusError: the folder mixes two corpora; a file is missing, empty, not UTF-8, or its two sides differ in length;
         or a side of a pair is empty.
     """
-    found = {name: _load(Path(folder), name, longest) for name in names}
+    splits = {name: _load(Path(folder), name, longest) for name in names}
     refuse_mixed(folder, names)
-    return found
+    return splits
 
 
 def _load(folder: Path, name: str, longest: int) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
@@ -215,7 +215,7 @@ def read_moses(source: Path, target: Path, block: int = 100) -> list[Pair]:
 
 
 def corpus_digest(folder: Path, names: Sequence[str]) -> str:
-    """What the files of these splits hold, as a fingerprint."""
+    """A fingerprint of the files of these splits."""
     return digest(*(Path(folder) / f"{name}.{language}" for name in names for language in (SOURCE, TARGET)))
 
 

@@ -78,7 +78,7 @@ def versions(folder: Path) -> list[str]:
 
 
 def _unpacked(folder: Path) -> Path:
-    """Where the content of the packages lies: `folder` itself, or below it after unpacking."""
+    """The folder with the content of the packages: `folder` itself, or below it after unpacking."""
     packages = [p for name in PACKAGES for p in sorted(folder.glob(f"{name}_*.deb"))[-1:]]
     if not packages:
         return folder

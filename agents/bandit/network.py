@@ -39,7 +39,7 @@ class EncodedSentences(Rows):
 
 @dataclass(frozen=True, eq=False)
 class Decoding(Rows):
-    """What the decoder carries from word to word."""
+    """The decoder's state from word to word."""
 
     hidden: Tensor
     cell: Tensor
@@ -82,7 +82,7 @@ class EncoderDecoder(nn.Module):
         return Decoding(hidden, cell, torch.tanh(self.combine(torch.cat([hidden, context], -1))))  # A.3
 
     def word_before(self, words: Tensor) -> Tensor:
-        """What known words (...) int64 add to the gates, (..., 4h); END stands before the first one."""
+        """The part that known words (...) int64 add to the gates, (..., 4h); END stands before the first one."""
         return self.word_gates(self.target(words))
 
     def read(self, source: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
@@ -156,7 +156,7 @@ REMEDY = "delete it and train it again with `embodied study bandit`"
 
 @dataclass(frozen=True)
 class BanditAbout:
-    """What stands beside the weights in a file."""
+    """Metadata beside the weights in a file."""
 
     config: BanditConfig
     source: tuple[str, ...]

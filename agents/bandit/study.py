@@ -187,7 +187,7 @@ class BanditStudy(StudyLearner):
         return _material(self.data, dataclasses.replace(self.config, seed=seed))
 
     def _begun(self, seed: int, folder: Path) -> Path:
-        """Where the references and critics of a seed are."""
+        """The folder of the references and critics of a seed."""
         return folder / f"pretrain_{key_of(identity_of(settings=self.config, corpus=self._corpus()))}" / f"seed_{seed}"
 
 

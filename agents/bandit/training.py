@@ -83,7 +83,7 @@ class NumberedCorpus:
         return begin(Critic(len(source), len(target), self.config.hidden_size), self._generator("critic"))
 
     def identity(self, stage: str, *fields: str, **more: object) -> dict[str, object]:
-        """What a stage depends on: settings by name, and the corpus."""
+        """The identity of a stage: settings by name, and the corpus."""
         settings = {name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)}
         return identity_of(
             "embodied.agents.bandit.training", stage=stage, settings=settings, corpus=self.digest, **more
@@ -128,18 +128,18 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
         return {"loss": float(loss.detach()) * len(chosen), "sentences": len(chosen)}
 
     def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
-        found = perplexity(translator, m.splits["dev"])
+        dev_perplexity = perplexity(translator, m.splits["dev"])
         before = [h["dev perplexity"] for h in history]
         if turn == 0:
             save_network(translator, m.config, m.lexicons, folder / "weak.safetensors", identity)
-        if found < min(before, default=math.inf):
+        if dev_perplexity < min(before, default=math.inf):
             save_network(translator, m.config, m.lexicons, folder / "full.safetensors", identity)
-        if turn + 1 >= DECAY_FROM and before and found > before[-1]:
+        if turn + 1 >= DECAY_FROM and before and dev_perplexity > before[-1]:
             for group in optimizer.param_groups:
                 group["lr"] /= 2
         return {
             "loss": sums["loss"] / sums["sentences"],
-            "dev perplexity": found,
+            "dev perplexity": dev_perplexity,
             "dev BLEU": judged(translator, m, "dev"),
             "learning rate": optimizer.param_groups[0]["lr"],
         }
@@ -162,8 +162,8 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
         source = rows(data.source, chosen)
-        said, scores = rated_samples(translator, m, data, chosen, "critic", turn)
-        target = padded(said)
+        samples, scores = rated_samples(translator, m, data, chosen, "critic", turn)
+        target = padded(samples)
         values = critic(source, target)
         rated = Decisions(torch.zeros_like(values), values, torch.tensor(scores), target != 0)
         loss = critic_loss(rated)
@@ -213,7 +213,7 @@ def bandit(
     identity = m.identity("bandit", "critic_passes", "bandit_rate", ratings=m.bandit_digest, **about)
 
     def step(chosen: np.ndarray, turn: int, update: int) -> dict[str, float]:
-        said, scores = rated_samples(translator, m, data, chosen, "bandit", turn)
+        samples, scores = rated_samples(translator, m, data, chosen, "bandit", turn)
         numbers = {"score": float(sum(scores)), "sentences": len(chosen)}
         source, where = rows(data.source, chosen), f"{learner}, update {update}"
         if learner == "supervised":
@@ -222,7 +222,7 @@ def bandit(
         if learner == "a2c":  # lines 5 and 6 of Algorithm 2
             rngs = [stream(config.seed, "rating", turn, int(i)) for i in chosen]
             ratings = [rater.rate(s, rng=rng) for s, rng in zip(scores, rngs)]
-            target, returns = padded(said), torch.tensor(ratings, dtype=torch.float32)
+            target, returns = padded(samples), torch.tensor(ratings, dtype=torch.float32)
             rated = Decisions(translator(source, target), critic(source, target), returns, target != 0)
             descend(actor_loss(rated), optimizers["translator"], f"{where}, translator", config.clip)
             descend(critic_loss(rated), optimizers["critic"], f"{where}, critic", config.clip)
@@ -230,13 +230,13 @@ def bandit(
         return numbers
 
     def finish(turn: int, sums: Mapping[str, float], history: History) -> dict[str, float]:
-        found = {"per-sentence BLEU": 100 * sums["score"] / sums["sentences"]}
-        found |= {"held-out BLEU": judged(translator, m, "test"), "dev BLEU": judged(translator, m, "dev")}
-        return found | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
+        run = {"per-sentence BLEU": 100 * sums["score"] / sums["sentences"]}
+        run |= {"held-out BLEU": judged(translator, m, "test"), "dev BLEU": judged(translator, m, "dev")}
+        return run | ({"rating": 100 * sums["rating"] / sums["sentences"]} if "rating" in sums else {})
 
-    found = _run("bandit", passes, step, finish, folder, identity, parts, config, data, note)
+    run = _run("bandit", passes, step, finish, folder, identity, parts, config, data, note)
     save_network(translator, m.config, m.lexicons, folder / "best.safetensors", identity)
-    return found
+    return run
 
 
 def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> Tensor:
@@ -257,9 +257,9 @@ def rated_samples(
     translator: Translator, m: NumberedCorpus, data: Numbered, chosen: np.ndarray, purpose: str, turn: int
 ) -> tuple[list[list[int]], list[float]]:
     """Sampled translations, and what a perfect rater would say: smoothed sentence BLEU of the words."""
-    said = sampled(translator, m, data, chosen, purpose, turn)
-    words = map(m.lexicons[1].decode, said)
-    return said, [sentence_bleu(w, data.references[i]) for w, i in zip(words, chosen, strict=True)]
+    samples = sampled(translator, m, data, chosen, purpose, turn)
+    words = map(m.lexicons[1].decode, samples)
+    return samples, [sentence_bleu(w, data.references[i]) for w, i in zip(words, chosen, strict=True)]
 
 
 def judged(translator: Translator, m: NumberedCorpus, split: str) -> float:

@@ -49,8 +49,8 @@ def batches(lengths: Sequence[int], size: int, rng: np.random.Generator) -> list
     order, measured = rng.permutation(len(lengths)), np.asarray(lengths)
     pools = [order[i : i + POOL * size] for i in range(0, len(order), POOL * size)]
     pools = [pool[np.argsort(measured[pool], kind="stable")] for pool in pools]
-    found = [pool[i : i + size] for pool in pools for i in range(0, len(pool), size)]
-    return [found[i] for i in rng.permutation(len(found))]
+    batches = [pool[i : i + size] for pool in pools for i in range(0, len(pool), size)]
+    return [batches[i] for i in rng.permutation(len(batches))]
 
 
 def in_order(lengths: Sequence[int], size: int) -> Iterator[np.ndarray]:
@@ -67,33 +67,33 @@ def decode(translator: Translator, source: Tensor, choose: Choice, longest: int)
     """
     encoded, now = translator.body.encode(source)
     rows = torch.arange(len(source))
-    said = torch.full((len(source), longest), PAD_NUMBER)
+    written = torch.full((len(source), longest), PAD_NUMBER)
     word = torch.full((len(source),), END_NUMBER)
     for t in range(longest):
         now = translator.body.step(encoded, now, translator.body.word_before(word))
         logits = translator.out(now.output)
         logits[:, PAD_NUMBER] = -torch.inf
         word = choose(logits, rows, t)
-        said[rows, t] = word
+        written[rows, t] = word
         going = (word != END_NUMBER).nonzero()[:, 0]
         if len(going) == 0:
             break
         if len(going) < len(rows):
             rows, word, now, encoded = rows[going], word[going], now.select(going), encoded.select(going)
-    return [[n for n in row if n != PAD_NUMBER] for row in said.tolist()]
+    return [[n for n in row if n != PAD_NUMBER] for row in written.tolist()]
 
 
 def greedy(
     translator: Translator, data: Numbered, lexicon: Vocabulary, longest: int, batch: int = 128
 ) -> list[tuple[str, ...]]:
     """The words of all sentences' likeliest translations (A.6), in their order."""
-    found: list[tuple[str, ...]] = [()] * len(data)
+    translations: list[tuple[str, ...]] = [()] * len(data)
     for chosen in in_order([len(s) for s in data.source], batch):
         for i, numbers in zip(
             chosen, decode(translator, padded([data.source[i] for i in chosen]), greedy_choice, longest), strict=True
         ):
-            found[i] = lexicon.decode(numbers)
-    return found
+            translations[i] = lexicon.decode(numbers)
+    return translations
 
 
 @torch.no_grad()

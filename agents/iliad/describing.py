@@ -42,7 +42,7 @@ class DescribingNetworks(ABC):
 
     @abstractmethod
     def spoken_of(self, task: Any, execution: Any) -> bool:
-        """Whether there is anything to say."""
+        """True where there is anything to say."""
 
     @abstractmethod
     def near_optimal(self, task: Any, execution: Any) -> bool:
@@ -60,33 +60,33 @@ class DescribingNetworks(ABC):
 
     def describe(self, tasks: Tasks, executions: Executions, *, rng: np.random.Generator) -> list[str | None]:
         uniforms = rng.random((len(tasks), self.candidates - 1, self.longest))
-        said: list[str | None] = [None] * len(tasks)
+        descriptions: list[str | None] = [None] * len(tasks)
         left = []
         for i, (task, execution) in enumerate(zip(tasks, executions, strict=True)):
             if self.spoken_of(task, execution):
                 if self.near_optimal(task, execution):
-                    said[i] = one_request(task, rng=rng)
+                    descriptions[i] = one_request(task, rng=rng)
                 else:
                     left.append(i)
-        found = self._pragmatic([tasks[i] for i in left], [executions[i] for i in left], uniforms[left])
-        for i, pragmatic in zip(left, found, strict=True):
+        pragmatic_of_left = self._pragmatic([tasks[i] for i in left], [executions[i] for i in left], uniforms[left])
+        for i, pragmatic in zip(left, pragmatic_of_left, strict=True):
             text = by_the_text(pragmatic, rng=rng) if self.pragmatics == "text" else by_the_program(pragmatic)
-            said[i] = text or None
-        return said
+            descriptions[i] = text or None
+        return descriptions
 
     def _pragmatic(self, tasks: Tasks, executions: Executions, uniforms: np.ndarray) -> list[list[str]]:
         """D_prag of each execution, the likeliest description first; of the program's rule, which wants the first one
         only, no more than that."""
         if not tasks:
             return []
-        found = self._kept(tasks, executions, self.candidates_of(tasks, executions))
-        rest = [i for i in range(len(tasks)) if self.pragmatics == "text" or not found[i]]
+        accepted = self._kept(tasks, executions, self.candidates_of(tasks, executions))
+        rest = [i for i in range(len(tasks)) if self.pragmatics == "text" or not accepted[i]]
         if rest and self.candidates > 1:
             some, those = [tasks[i] for i in rest], [executions[i] for i in rest]
             several = self._kept(some, those, self.candidates_of(some, those, uniforms[rest]))
             for i, more in zip(rest, several):
-                found[i] = list(dict.fromkeys([*found[i], *more]))
-        return found
+                accepted[i] = list(dict.fromkeys([*accepted[i], *more]))
+        return accepted
 
     def _kept(self, tasks: Tasks, executions: Executions, several: Sequence[Sequence[str]]) -> list[list[str]]:
         """Those that the executor carries out as the execution went."""
@@ -100,7 +100,7 @@ class EachDescribed(ABC):
 
     @abstractmethod
     def one(self, task: Any, execution: Any, *, rng: np.random.Generator) -> str | None:
-        """What was done; None where there is nothing to say."""
+        """A description of what was done; None where there is nothing to say."""
 
     def describe(self, tasks: Tasks, executions: Executions, *, rng: np.random.Generator) -> list[str | None]:
         return [self.one(q, e, rng=rng) for q, e in zip(tasks, executions, strict=True)]

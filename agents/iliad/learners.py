@@ -28,42 +28,47 @@ from embodied.agents.iliad.protocol import (
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class RequestBatch:
     """One batch: what is to be done, in what words."""
 
     tasks: Tasks
     requests: Sequence[str]
     rng: np.random.Generator
-    """What is drawn of this batch."""
+    """The generator of this batch."""
 
 
 @dataclass(frozen=True, eq=False)
 class IliadLesson:
-    """What came of one batch."""
+    """The outcome of one batch."""
 
     loss: Tensor
-    """Whose gradient is followed; a scalar."""
+    """The loss to descend; a scalar."""
     executions: Executions
-    """What the agent did for the requests."""
+    """The agent's executions of the requests."""
     descriptions: Sequence[str | None] = ()
-    """What the teacher said of it, where there is one."""
+    """The teacher's descriptions of them, where there is one."""
 
 
 def adel(
-    asked: Asked, teacher: DescribingTeacher, marginal: Marginal, explorer: Student, student: Student, mixing: float
+    asked: RequestBatch,
+    teacher: DescribingTeacher,
+    marginal: Marginal,
+    explorer: Student,
+    student: Student,
+    mixing: float,
 ) -> IliadLesson:
     """Lines 6 to 10 of Algorithm 9; `explorer` is pi_beta, `student` pi_theta, the loss is of both."""
     done = explorer.sample(asked.tasks, asked.requests, rng=asked.rng)  # line 6
-    said = teacher.describe(asked.tasks, done, rng=asked.rng)  # line 7
+    descriptions = teacher.describe(asked.tasks, done, rng=asked.rng)  # line 7
     unlabeled = marginal.draw(asked.tasks, rng=asked.rng)  # line 8
-    loss = adel_loss(asked.tasks, done, said, unlabeled, explorer, student, mixing)  # lines 9 and 10
-    return IliadLesson(loss, done, said)
+    loss = adel_loss(asked.tasks, done, descriptions, unlabeled, explorer, student, mixing)  # lines 9 and 10
+    return IliadLesson(loss, done, descriptions)
 
 
 def adel_loss(
     tasks: Tasks,
     done: Executions,
-    said: Sequence[str | None],
+    descriptions: Sequence[str | None],
     unlabeled: Executions,
     explorer: Student,
     student: Student,
@@ -74,31 +79,31 @@ def adel_loss(
     An execution that got no description teaches neither policy; the unlabeled one is then learned
     with the empty description, as in the authors' program (docs/sources.md, S94).
     """
-    heard = [i for i, d in enumerate(said) if d]
+    heard = [i for i, d in enumerate(descriptions) if d]
     own_tasks, own = [tasks[i] for i in heard], [done[i] for i in heard]
-    descriptions = [d or NOTHING for d in said]
-    own_descriptions = [descriptions[i] for i in heard]
-    loss = described_loss(tasks, done, said, student)  # -L(theta)
+    texts = [d or NOTHING for d in descriptions]
+    own_texts, count = [texts[i] for i in heard], len(texts)
+    loss = described_loss(tasks, done, descriptions, student)  # -L(theta)
     if heard and mixing < 1:
-        tasks, descriptions, unlabeled = [*own_tasks, *tasks], [*own_descriptions, *descriptions], [*own, *unlabeled]
+        tasks, texts, unlabeled = [*own_tasks, *tasks], [*own_texts, *texts], [*own, *unlabeled]
     if (heard and mixing < 1) or mixing > 0:  # -L(beta), both of its terms at once
-        weights = torch.tensor([1 - mixing] * (len(tasks) - len(said)) + [mixing] * len(said))
-        loss = loss - (weights @ explorer.scores(tasks, descriptions, unlabeled).objective).sum()
-    return loss / len(said)
+        weights = torch.tensor([1 - mixing] * (len(tasks) - count) + [mixing] * count)
+        loss = loss - (weights @ explorer.scores(tasks, texts, unlabeled).objective).sum()
+    return loss / count
 
 
-def described_loss(tasks: Tasks, done: Executions, said: Sequence[str | None], student: Student) -> Tensor:
+def described_loss(tasks: Tasks, done: Executions, descriptions: Sequence[str | None], student: Student) -> Tensor:
     """-log pi_theta of the executions that were described, summed over actions; 0 where nothing was said."""
     loss = 0 * next(iter(student.network.parameters())).sum()
-    heard = [i for i, d in enumerate(said) if d]
+    heard = [i for i, d in enumerate(descriptions) if d]
     if heard:
         some, executions = [tasks[i] for i in heard], [done[i] for i in heard]
-        loss = loss - student.scores(some, [said[i] or NOTHING for i in heard], executions).objective.sum()
+        loss = loss - student.scores(some, [descriptions[i] or NOTHING for i in heard], executions).objective.sum()
     return loss
 
 
 def mixture(
-    asked: Asked, teacher: DescribingTeacher, marginal: Marginal, student: Student, mixing: float
+    asked: RequestBatch, teacher: DescribingTeacher, marginal: Marginal, student: Student, mixing: float
 ) -> IliadLesson:
     """Algorithm 5: the execution of each task comes from the mixture of Eq 3.14, and the student learns what was said.
 
@@ -108,11 +113,11 @@ def mixture(
     tasks, rng = asked.tasks, asked.rng
     own, unlabeled = student.sample(tasks, asked.requests, rng=rng), marginal.draw(tasks, rng=rng)
     done = [u if rng.random() < mixing else o for u, o in zip(unlabeled, own, strict=True)]
-    said = teacher.describe(tasks, done, rng=rng)
-    return IliadLesson(described_loss(tasks, done, said, student) / len(tasks), done, said)
+    descriptions = teacher.describe(tasks, done, rng=rng)
+    return IliadLesson(described_loss(tasks, done, descriptions, student) / len(tasks), done, descriptions)
 
 
-def dagger(asked: Asked, world: RequestWorld, student: Student) -> IliadLesson:
+def dagger(asked: RequestBatch, world: RequestWorld, student: Student) -> IliadLesson:
     """Imitation: the student acts and is shown the best action in every state that it came to."""
     done = student.practise(asked.tasks, asked.requests, rng=asked.rng)
     shown = [world.demonstrate(q, e) for q, e in zip(asked.tasks, done, strict=True)]
@@ -121,7 +126,7 @@ def dagger(asked: Asked, world: RequestWorld, student: Student) -> IliadLesson:
 
 
 def reinforce(
-    asked: Asked, reward: Callable[[Any, Any], float], mean: RunningMean, student: Student, entropy: float
+    asked: RequestBatch, reward: Callable[[Any, Any], float], mean: RunningMean, student: Student, entropy: float
 ) -> IliadLesson:
     """REINFORCE against the mean of all rewards so far, those of this batch included."""
     done = student.sample(asked.tasks, asked.requests, rng=asked.rng)

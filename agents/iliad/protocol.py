@@ -1,4 +1,4 @@
-"""What the learners of ILIAD need of a problem (Algorithm 3): a world, a teacher, a marginal and a student.
+"""The parts of a problem that ILIAD's learners need (Algorithm 3): a world, a teacher, a marginal and a student.
 
 Tasks and executions are the problem's own records; everything is done a batch at a time, because
 networks are quicker that way.
@@ -28,7 +28,7 @@ def one_request(task: Any, *, rng: np.random.Generator) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ExecutionScores:
-    """What a policy thinks of B executions of at most T actions; zero behind the end of each."""
+    """A policy's scores of B executions of at most T actions; zero behind the end of each."""
 
     log_probabilities: Tensor
     """(B, T) log pi(a_t | s_t, d); carries the gradient."""
@@ -46,13 +46,13 @@ class ExecutionScores:
 
 
 class RequestWorld(Protocol):
-    """Where requests are fulfilled. Only imitation asks for `demonstrate`, only REINFORCE for `reward`."""
+    """The world in which requests are fulfilled. Only imitation asks for `demonstrate`, only REINFORCE for `reward`."""
 
     def request(self, task: Any, *, rng: np.random.Generator) -> str:
         """d*: one of the task's requests."""
 
     def success(self, task: Any, execution: Any) -> bool:
-        """Whether the task is fulfilled."""
+        """True where the task is fulfilled."""
 
     def reward(self, task: Any, execution: Any) -> float:
         """Nearness to the goal, at most 1 (C.1, C.2)."""
@@ -65,7 +65,7 @@ class DescribingTeacher(Protocol):
     """P_T(d | e)."""
 
     def describe(self, tasks: Tasks, executions: Executions, *, rng: np.random.Generator) -> list[str | None]:
-        """What was done; None where the teacher has nothing to say."""
+        """A description of what was done; None where the teacher has nothing to say."""
 
 
 class Marginal(Protocol):
@@ -85,7 +85,7 @@ class Student(Protocol):
         """The likeliest action in every state."""
 
     def practise(self, tasks: Tasks, requests: Sequence[str], *, rng: np.random.Generator) -> list[Any]:
-        """What it does to be shown better in every state that it comes to."""
+        """Executions that visit the states in which it will be shown better actions."""
 
     def scores(
         self, tasks: Tasks, requests: Sequence[str], executions: Executions, actions: Executions | None = None
@@ -94,4 +94,4 @@ class Student(Protocol):
 
     @property
     def network(self) -> nn.Module:
-        """What is trained."""
+        """The network that is trained."""

@@ -1,4 +1,4 @@
-"""What one described episode teaches a student of ILIAD, shown on a copy of it."""
+"""The effect of one described episode on a student of ILIAD, shown on a copy of it."""
 
 from __future__ import annotations
 
@@ -14,24 +14,27 @@ RATE, CLIP = 1e-3, 5.0
 """Of the one update that shows what is learned from a description."""
 
 
-def learned_from(student: Any, task: Any, said: str | None, done: Any) -> tuple[float, float] | tuple[None, None]:
+def learned_from(
+    student: Any, task: Any, description: str | None, done: Any
+) -> tuple[float, float] | tuple[None, None]:
     """Probability of an execution, given its description, before and after learning from it; None without one.
 
     The student itself, which may be of any world, stays as it is.
     """
-    if not said:
+    if not description:
         return None, None
     learner = copy.copy(student)
     network = learner.network = copy.deepcopy(student.network).train()
     optimizer = torch.optim.Adam(network.parameters(), RATE)
-    before = _probability(student, task, said, done)
+    before = _probability(student, task, description, done)
     with seeded(0):  # for dropout
-        descend(-learner.scores([task], [said], [done]).log_probabilities.sum(), optimizer, "shown episode", CLIP)
-    return before, _probability(learner, task, said, done)
+        loss = -learner.scores([task], [description], [done]).log_probabilities.sum()
+        descend(loss, optimizer, "shown episode", CLIP)
+    return before, _probability(learner, task, description, done)
 
 
 def lines_of(description: str | None, before: float | None, after: float | None) -> list[str]:
-    """What was said and learned, for people to read."""
+    """The description and its effect, for people to read."""
     if before is None or after is None:
         return ["teacher       (nothing to say)", "learned       nothing"]
     return [
@@ -40,6 +43,6 @@ def lines_of(description: str | None, before: float | None, after: float | None)
     ]
 
 
-def _probability(student: Any, task: Any, said: str, done: Any) -> float:
+def _probability(student: Any, task: Any, description: str, done: Any) -> float:
     with torch.no_grad():
-        return float(student.scores([task], [said], [done]).log_probabilities.sum().exp())
+        return float(student.scores([task], [description], [done]).log_probabilities.sum().exp())

@@ -1,4 +1,4 @@
-"""What is trained before a student learns, whatever the world: one network, by maximum likelihood or imitation.
+"""Training before a student learns, whatever the world: of one network, by maximum likelihood or imitation.
 
 Batches are drawn by (seed, update), so a stage is resumable and exact after a kill.
 """

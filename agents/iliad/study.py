@@ -79,7 +79,7 @@ TABLES: Mapping[str, StudyTable] = {
 
 @dataclass(frozen=True)
 class RegexStudyWorld:
-    """What the study needs of REGEX; small, so that it can be sent to other processes."""
+    """The study's view of REGEX; small, so that it can be sent to other processes."""
 
     config: RegexConfig
     words: Path | None = None
@@ -91,23 +91,23 @@ class RegexStudyWorld:
     (docs/sources.md, S99)."""
 
     def source(self) -> Mapping[str, object]:
-        """What its data come from, as part of an identity."""
+        """The origin of its data, as part of an identity."""
         own = {"words": self.words, "templates": self.templates}
         return {"teacher": self.config, **{k: digest(path) for k, path in own.items() if path}}
 
-    def prepare(self, folder: Path, note: Note) -> regex.Grounds:
+    def prepare(self, folder: Path, note: Note) -> regex.RegexGrounds:
         """Data and teacher, made into `folder` unless they are there."""
         return regex.prepare(self.config, folder, words=self.words, templates=self.templates, note=note)
 
-    def begin(self, grounds: regex.Grounds, seed: int, folder: Path, note: Note) -> None:
+    def begin(self, grounds: regex.RegexGrounds, seed: int, folder: Path, note: Note) -> None:
         """Make what all students of a seed begin with."""
         regex.problem_of(grounds, seed, folder, note=note)
 
-    def learn(self, grounds: regex.Grounds, learner: LearnerConfig, home: Path, begun: Path, note: Note) -> None:
+    def learn(self, grounds: regex.RegexGrounds, learner: LearnerConfig, home: Path, begun: Path, note: Note) -> None:
         """Train a student, or go on."""
         regex.learn(grounds, learner, home, begun, note=note)
 
-    def judge(self, grounds: regex.Grounds, best: Path, split: str) -> Samples:
+    def judge(self, grounds: regex.RegexGrounds, best: Path, split: str) -> Samples:
         """Which requests of a split a trained student fulfils."""
         good = successes(RegexWorld(), regex.load_student(best)[0], grounds.data.splits[split])
         return Samples(tuple(map(float, good)), share=True)
@@ -124,7 +124,7 @@ class RegexStudyWorld:
 
 @dataclass(frozen=True)
 class NavStudyWorld:
-    """What the study needs of NAV, as RegexStudyWorld."""
+    """The study's view of NAV, as RegexStudyWorld."""
 
     config: NavConfig
     houses: nav.NavSource
@@ -150,7 +150,7 @@ class NavStudyWorld:
         good = successes(NavWorld(grounds.data.eyes.places), student, trips)
         return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 
-    def said(self, grounds: nav.NavGrounds, judge: Mapping[str, Any], best: Path) -> nav.NavGrounds:
+    def with_judged_wording(self, grounds: nav.NavGrounds, judge: Mapping[str, Any], best: Path) -> nav.NavGrounds:
         """With the test requests as a row has them said to a trained student."""
         cache, how = self.houses.cache, judge.get(WORDING)
         if speakers := judge.get(SPEAKERS):
@@ -212,7 +212,7 @@ class IliadStudy(StudyLearner):
             world.prepare(_shared(world, folder), note)
 
     def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
-        """What students are pretrained to be."""
+        """Settings of the students' pre-training."""
         for world in {self._world(row.train): None for row in rows}:
             world.begin(_grounds(world, folder), seed, _shared(world, folder) / f"seed_{seed}", note)
 
@@ -246,12 +246,12 @@ class IliadStudy(StudyLearner):
         needed = episodes_to(history, self.config.threshold) / 1000
         world, grounds = self._world(row.train), _grounds(self._world(row.train), folder)
         if isinstance(world, NavStudyWorld):
-            grounds = world.said(grounds, row.judge, weights)
-        found = {"success": world.judge(grounds, weights, split)}
-        return found | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
+            grounds = world.with_judged_wording(grounds, row.judge, weights)
+        values = {"success": world.judge(grounds, weights, split)}
+        return values | ({NEEDED: Samples((math.nan if math.isinf(needed) else needed,))} if split == "test" else {})
 
     def _world(self, train: Mapping[str, Any] | None) -> StudyWorld:
-        """What a row learns in."""
+        """The data that a row learns in."""
         world = self.world
         if not train or not isinstance(world, NavStudyWorld):
             return world
@@ -271,7 +271,7 @@ def _reader(label: str, **train: Any) -> StudyRow:
 
 
 def _of(train: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
-    """What a row says of these settings."""
+    """The changes that a row makes to these settings."""
     return {name: value for name, value in train.items() if name in names}
 
 

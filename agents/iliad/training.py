@@ -12,7 +12,7 @@ import torch
 
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.learners import Asked, IliadLesson, RunningMean, adel, dagger, mixture, reinforce
+from embodied.agents.iliad.learners import IliadLesson, RequestBatch, RunningMean, adel, dagger, mixture, reinforce
 from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
 from embodied.identity import Identity
 from embodied.seeds import stream
@@ -35,7 +35,7 @@ class IliadProblem:
     training: Tasks
     validation: Tasks
     identity: Identity
-    """What a run depends on besides the learner's settings."""
+    """Parts of a run's identity besides the learner's settings."""
 
 
 def train(
@@ -74,9 +74,9 @@ def train(
         for update in session:
             session.add(learner.update(update))
             if session.due(config.validate_every):
-                found = success_rate(problem.world, problem.student, problem.validation)
-                session.record(_found(session.done, found, config, session.sums))
-                if found > session.progress.best and session.improved(found):
+                success = success_rate(problem.world, problem.student, problem.validation)
+                session.record(_found(session.done, success, config, session.sums))
+                if success > session.progress.best and session.improved(success):
                     keep(session.folder / "best.safetensors", identity)
                 session.sums = {k: v for k, v in session.sums.items() if k in ("episodes", "fulfilled", "reward")}
     return session.history
@@ -125,7 +125,7 @@ class _Learner:
         set_learning_rate(self.optimizer, c.rate, update, c.iterations, c.cooldown)
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
-        asked = Asked(tasks, [world.request(q, rng=rng) for q in tasks], rng)
+        asked = RequestBatch(tasks, [world.request(q, rng=rng) for q in tasks], rng)
         before = self.mean.total
         with seeded_dropout(c.seed, update):
             lesson = self._learn(asked, mixing_at(c, update))
@@ -137,7 +137,7 @@ class _Learner:
             numbers["described"] = sum(d is not None for d in lesson.descriptions) / len(tasks)
         return numbers | ({"reward": self.mean.total - before} if self.mean.count else {})
 
-    def _learn(self, asked: Asked, mixing: float) -> IliadLesson:
+    def _learn(self, asked: RequestBatch, mixing: float) -> IliadLesson:
         p, c = self.problem, self.config
         if c.learner == "adel":
             return adel(asked, p.teacher, p.marginal, p.explorer, p.student, mixing)
@@ -150,10 +150,10 @@ class _Learner:
 
 
 def _found(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:
-    found = {
+    body = {
         "episodes": float(done * config.batch),
         "success": success,
         "training success": sums["fulfilled"] / sums["episodes"],
         "loss": sums["loss"] / sums["updates"],
     }
-    return found | ({"described": sums["described"] / sums["updates"]} if "described" in sums else {})
+    return body | ({"described": sums["described"] / sums["updates"]} if "described" in sums else {})

@@ -1,4 +1,4 @@
-"""What writes, word by word or letter by letter, in the networks of ILIAD: an LSTM that attends to what was read.
+"""Networks of ILIAD that write, word by word or letter by letter: an LSTM that attends to what was read.
 
 B data points, S places of what was read, T numbers that are written, h hidden size, V numbers to
 choose from; 0 is padding everywhere.
@@ -19,7 +19,7 @@ PAD = 0
 
 @dataclass(frozen=True, eq=False)
 class Remembered(Rows):
-    """What is attended to: B rows of S vectors."""
+    """Memory that is attended to: B rows of S vectors."""
 
     values: Tensor
     """(B, S, h)."""
@@ -46,7 +46,7 @@ class Attention(nn.Module):
         return torch.bmm(weights, memory.values)
 
 
-class Writer(nn.Module):
+class AttentiveWriter(nn.Module):
     """An LSTM that writes numbers one by one and attends to memories after every step."""
 
     def __init__(self, numbers: int, width: int, size: int, memories: int) -> None:
@@ -58,7 +58,7 @@ class Writer(nn.Module):
         self.out = nn.Linear(size, numbers)
 
     def remember(self, which: int, values: Tensor, mask: Tensor) -> Remembered:
-        """What memory number `which` holds: (B, S, h) values, (B, S) bool which of them are there."""
+        """The content of memory number `which`: (B, S, h) values, (B, S) bool which of them are there."""
         attention = self.attend[which]
         assert isinstance(attention, Attention)
         return attention.remember(values, mask)
@@ -84,7 +84,7 @@ class Bridge(nn.Module):
 
 @torch.no_grad()
 def write(
-    writer: Writer,
+    writer: AttentiveWriter,
     state: tuple[Tensor, Tensor],
     memories: list[Remembered],
     choose: Choice,
@@ -101,7 +101,7 @@ def write(
         rows = torch.arange(len(memories[0].mask)).repeat_interleave(copies)
         state, memories = (state[0][:, rows], state[1][:, rows]), [m.select(rows) for m in memories]
     count = memories[0].mask.shape[0]
-    said = torch.zeros((count, longest), dtype=torch.int64)
+    written = torch.zeros((count, longest), dtype=torch.int64)
     rows, number = torch.arange(count), torch.full((count,), stop)
     going = torch.ones(count, dtype=torch.bool)
     for t in range(longest):
@@ -109,28 +109,28 @@ def write(
         logits = logits[:, 0]
         logits[:, PAD] = -torch.inf
         number = choose(logits, rows, t)
-        said[rows[going], t] = number[going]
+        written[rows[going], t] = number[going]
         going = going & (number != stop)
         left = int(going.sum())
         if left == 0:
-            return said[:, : t + 1]
+            return written[:, : t + 1]
         if 2 * left <= len(rows):
             kept = going.nonzero()[:, 0]
             rows, number, going = rows[kept], number[kept], going[kept]
             state = state[0][:, kept].contiguous(), state[1][:, kept].contiguous()
             memories = [m.select(kept) for m in memories]
-    return said
+    return written
 
 
 def log_likelihood(logits: Tensor, written: Tensor) -> Tensor:
     """(B, T) log p of the numbers written, zero on padding."""
-    said = written != PAD
-    loss = nn.functional.cross_entropy(logits[said], written[said], reduction="none")
-    return torch.zeros(written.shape).masked_scatter(said, -loss)
+    present = written != PAD
+    loss = nn.functional.cross_entropy(logits[present], written[present], reduction="none")
+    return torch.zeros(written.shape).masked_scatter(present, -loss)
 
 
 def before(written: Tensor, start: int) -> Tensor:
-    """What stands before each number."""
+    """The number before each number."""
     return torch.cat([torch.full_like(written[:, :1], start), written[:, :-1]], 1)
 
 

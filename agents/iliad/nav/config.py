@@ -62,9 +62,9 @@ class NavConfig:
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
     speakers: str = EVERYBODY
-    """Whose requests are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
+    """Speakers of the training requests: 'everybody', or 'familiar' to hear some people only when evaluated."""
     word_vectors: str = LEARNED_WORDS
-    """What followers know of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
+    """Knowledge of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
     varied_words: bool = False
     """Students hear requests of training as they are and as other writers would say them (docs/sources.md, S184)."""
     data_seed: int = 0

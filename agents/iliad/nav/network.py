@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from embodied.agents.common.choosing import Choice
 from embodied.agents.common.vocabulary import END_NUMBER
 from embodied.agents.hanna.attention import DotAttend, FeedForward, MultiAttend
-from embodied.agents.iliad.writing import Bridge, Remembered, Writer, before, write
+from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, write
 
 
 class WalkDescriber(nn.Module):
@@ -23,7 +23,7 @@ class WalkDescriber(nn.Module):
         self.enter, self.time = nn.Linear(2 * seen, size), nn.Embedding(horizon, size)
         self.relate, self.feed = MultiAttend(size, heads, 0.0), FeedForward(size, 0.0)
         self.first = Bridge(size)
-        self.writer = Writer(words, size, size, memories=1)
+        self.writer = AttentiveWriter(words, size, size, memories=1)
 
     def read(self, views: Tensor, actions: Tensor, mask: Tensor) -> tuple[tuple[Tensor, Tensor], list[Remembered]]:
         """(B, T, 36, E) panoramas, (B, T, E) actions taken there, (B, T) which there are: what is written from."""

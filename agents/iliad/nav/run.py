@@ -1,4 +1,4 @@
-"""What the commands of NAV do: a data set becomes eyes, teacher and student, and these a problem of ILIAD."""
+"""The steps of NAV's commands: a data set becomes eyes, teacher and student, and these a problem of ILIAD."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ VALIDATION = 300
 
 @dataclass(frozen=True)
 class NavSource:
-    """Where the houses and what is seen of them come from."""
+    """Sources of the houses and of what is seen of them."""
 
     folder: Path
     """A data set of `embodied dataset vln` (or hanna, whose assistants know such paths) with features."""
@@ -55,13 +55,13 @@ class NavSource:
 
 @dataclass(frozen=True, eq=False)
 class NavGrounds:
-    """What all students of a study share."""
+    """Data and networks that all students of a study share."""
 
     config: NavConfig
     data: NavData
     teacher: DescribingTeacher
     cache: Path
-    """Where the catalogue is."""
+    """The cache with the catalogue."""
 
 
 def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = print) -> NavGrounds:

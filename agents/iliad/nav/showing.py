@@ -34,7 +34,7 @@ class NavTold:
     """Metres from its end to the intended one."""
     success: bool
     description: str | None
-    """What the teacher said of it."""
+    """The teacher's description of it."""
     before: float | None
     after: float | None
     """Probability of the walk, given the description, before and after learning from this episode alone."""
@@ -51,14 +51,14 @@ def tell(
     rng = stream(seed, "nav", "shown", trip.world, *trip.path)
     request, world = trip.requests[0], NavWorld(student.eyes.places)
     (done,) = student.sample([trip], [request], rng=rng) if sample else student.greedy([trip], [request])
-    (said,) = teacher.describe([trip], [done], rng=rng)
-    before, after = learned_from(student, trip, said, done)
+    (description,) = teacher.describe([trip], [done], rng=rng)
+    before, after = learned_from(student, trip, description, done)
     missed = float(world.graph(trip).distance[done.nodes[-1], trip.path[-1]])
-    told = NavTold(
+    shown = NavTold(
         trip.world, request, trip.path, done.nodes, rooms(world, trip, trip.path), rooms(world, trip, done.nodes),
-        missed, world.success(trip, done), said, before, after,
+        missed, world.success(trip, done), description, before, after,
     )  # fmt: skip
-    return told, done
+    return shown, done
 
 
 def rooms(world: NavWorld, trip: Trip, nodes: Sequence[int]) -> tuple[str, ...]:
@@ -67,16 +67,16 @@ def rooms(world: NavWorld, trip: Trip, nodes: Sequence[int]) -> tuple[str, ...]:
     return tuple(room for room, _ in groupby(str(room_of[n]).replace("_", " ") for n in nodes))
 
 
-def lines_of(told: NavTold) -> list[str]:
+def lines_of(shown: NavTold) -> list[str]:
     """The episode for people to read."""
-    found = [
-        f"house         {told.world}",
-        f"request       {told.request}",
-        f"meant         {' > '.join(told.meant)}   ({len(told.path) - 1} moves)",
-        f"student       {' > '.join(told.gone)}   ({len(told.walk) - 1} moves)",
-        f"fulfilled     {'yes' if told.success else 'no'}, {told.missed:.1f} m from the intended end",
+    lines = [
+        f"house         {shown.world}",
+        f"request       {shown.request}",
+        f"meant         {' > '.join(shown.meant)}   ({len(shown.path) - 1} moves)",
+        f"student       {' > '.join(shown.gone)}   ({len(shown.walk) - 1} moves)",
+        f"fulfilled     {'yes' if shown.success else 'no'}, {shown.missed:.1f} m from the intended end",
     ]
-    return [*found, *learned_lines(told.description, told.before, told.after)]
+    return [*lines, *learned_lines(shown.description, shown.before, shown.after)]
 
 
 def episode_of(student: NavStudent, trip: Trip, walk: NavWalk, description: str | None) -> Episode:

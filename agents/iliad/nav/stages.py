@@ -1,4 +1,4 @@
-"""What is trained before a NAV student learns: the teacher's executor and describer; and followers on disk."""
+"""Training before a NAV student learns: of the teacher's executor and describer; and followers on disk."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.data import NavData
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent
-from embodied.agents.iliad.nav.teacher import LONGEST, arrival, said, walked
+from embodied.agents.iliad.nav.teacher import LONGEST, arrival, encoded_walks, texts_of
 from embodied.agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
 from embodied.agents.iliad.stages import TeachingStage
 from embodied.agents.iliad.training import success_rate
@@ -36,7 +36,7 @@ JUDGED = 128
 
 @dataclass(frozen=True)
 class NavAbout:
-    """What stands beside the weights in a file."""
+    """Metadata beside the weights in a file."""
 
     config: NavConfig
     words: tuple[str, ...]
@@ -89,7 +89,7 @@ def teach_describer(
     def loss_of(rng: np.random.Generator) -> Tensor:
         chosen, requests = _batch(trips, config.teacher_batch, rng)
         wanted = eyes.words(requests)[:, :LONGEST]
-        logits = describer(*walked(eyes, chosen, [walk_along(t.path) for t in chosen]), wanted)
+        logits = describer(*encoded_walks(eyes, chosen, [walk_along(t.path) for t in chosen]), wanted)
         return -log_likelihood(logits, wanted).sum() / len(wanted)
 
     judge = lambda: {"followed": followed(world, describer, executor, _sample(data))}
@@ -100,8 +100,8 @@ def teach_describer(
 def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, trips: Sequence[Trip]) -> float:
     """Share of paths whose likeliest description leads the executor to their end."""
     walks = [walk_along(t.path) for t in trips]
-    numbers = describer.write(*walked(executor.eyes, trips, walks), greedy_choice, LONGEST)
-    done = executor.greedy(trips, said(executor.eyes.vocabulary, numbers))
+    numbers = describer.write(*encoded_walks(executor.eyes, trips, walks), greedy_choice, LONGEST)
+    done = executor.greedy(trips, texts_of(executor.eyes.vocabulary, numbers))
     return float(np.mean([arrival(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
 
 

@@ -32,7 +32,7 @@ LONGEST_REQUEST = 80
 
 @dataclass(frozen=True, eq=False)
 class Ways:
-    """What can be done in a pose: stopping is action 0."""
+    """The actions that are possible in a pose: stopping is action 0."""
 
     poses: tuple[Pose, ...]
     """That the actions after stop lead to."""
@@ -74,7 +74,7 @@ class NavEyes:
         return torch.from_numpy(self.vocabulary.batch(requests, LONGEST_REQUEST))
 
     def ways(self, world: str, pose: Pose) -> Ways:
-        """What can be done there."""
+        """The actions that are possible there."""
         known: dict[tuple[str, int, int], Ways] = self._ways  # type: ignore[attr-defined]
         key = world, pose.node, pose.turn
         if key not in known:
@@ -82,7 +82,7 @@ class NavEyes:
         return known[key]
 
     def see(self, tracks: Sequence[Track], channels: Tensor | None = None) -> Seen:
-        """What agents see where they are.
+        """The views of agents where they are.
 
         Args:
           channels: (B, D) what each of them sees of every feature channel.
@@ -143,7 +143,7 @@ class NavStudent:
         self.network.train(learning)
         channels = F.dropout(torch.ones(len(tasks), self.eyes.bank.size), self.config.environment_dropout, learning)
         heard, rows = self.network.begin(self.eyes.words(requests)), list(range(len(tasks)))
-        found: list[tuple[Tensor, Tensor, Tensor]] = []  # of the steps of all who still act
+        scores_of_steps: list[tuple[Tensor, Tensor, Tensor]] = []  # of the steps of all who still act
         where: list[tuple[int, int]] = []  # row and step of each
         for t in range(max(len(w.steps) for w in wanted)):
             going = [k for k, i in enumerate(rows) if t < len(wanted[i].steps)]
@@ -151,31 +151,31 @@ class NavStudent:
                 heard, rows = heard.select(torch.tensor(going)), [rows[k] for k in going]
             now = [tracks[i] for i in rows]
             seen = self.eyes.see(now, channels[rows] if learning else None)
-            said, heard = self.network(heard, seen)
-            log = said.moves.log_softmax(-1).masked_fill(~seen.mask, 0.0)
+            outputs, heard = self.network(heard, seen)
+            log = outputs.moves.log_softmax(-1).masked_fill(~seen.mask, 0.0)
             right = torch.tensor([k.number(wanted[i].steps[t]) for k, i in zip(now, rows)])
             entropy = -(log.exp() * log * seen.mask).sum(-1)
-            besides = self._besides(said, now, [ends[i] for i in rows])
-            found.append((log.gather(1, right[:, None])[:, 0], entropy, besides))
+            besides = self._besides(outputs, now, [ends[i] for i in rows])
+            scores_of_steps.append((log.gather(1, right[:, None])[:, 0], entropy, besides))
             where += [(i, t) for i in rows]
             taken = [k.number(executions[i].steps[t]) for k, i in zip(now, rows)]
-            heard = dataclasses.replace(heard, taken=said.tokens[torch.arange(len(rows)), torch.tensor(taken)])
+            heard = dataclasses.replace(heard, taken=outputs.tokens[torch.arange(len(rows)), torch.tensor(taken)])
             for track, number in zip(now, taken):
                 track.go(number)
         at, steps = tuple(torch.tensor(where).T), max(t for _, t in where) + 1
         spread = lambda parts: torch.zeros(len(tasks), steps).index_put(at, torch.cat(parts))
-        log_probabilities, entropies, besides = map(spread, zip(*found))
+        log_probabilities, entropies, besides = map(spread, zip(*scores_of_steps))
         mask = torch.zeros(len(tasks), steps, dtype=torch.bool).index_put(at, torch.tensor(True))
         return ExecutionScores(log_probabilities, entropies, mask, besides)
 
-    def _besides(self, said: Said, tracks: Sequence[Track], ends: Sequence[int]) -> Tensor:
+    def _besides(self, outputs: Said, tracks: Sequence[Track], ends: Sequence[int]) -> Tensor:
         """(k,) losses of the guesses which share of the way to `ends` is left, and what kinds of rooms are near."""
         c = self.config
         left = [share_left(self.eyes.places[k.world].graph, k.nodes, end) for k, end in zip(tracks, ends)]
-        lost = c.progress_weight * (said.left - torch.tensor(left)) ** 2
+        lost = c.progress_weight * (outputs.left - torch.tensor(left)) ** 2
         if c.room_weight:
             rooms = nn.utils.rnn.pad_sequence([k.ways.rooms for k in tracks], batch_first=True, padding_value=IGNORE)
-            each = negative_log_likelihood(said.rooms.flatten(0, 1), rooms.flatten()).view(rooms.shape)
+            each = negative_log_likelihood(outputs.rooms.flatten(0, 1), rooms.flatten()).view(rooms.shape)
             lost = lost + c.room_weight * each.sum(1) / (rooms != IGNORE).sum(1)
         return lost
 
@@ -192,11 +192,11 @@ class NavStudent:
         heard = self.network.begin(self.eyes.words(requests))
         for t in range(MOVES):
             now = [tracks[i] for i in rows]
-            said, heard = self.network(heard, self.eyes.see(now))
-            numbers = choose(said.moves, torch.tensor(rows), t).tolist()
+            outputs, heard = self.network(heard, self.eyes.see(now))
+            numbers = choose(outputs.moves, torch.tensor(rows), t).tolist()
             if guided is not None:
                 numbers = [self._shown(tasks[i], k) if guided[i, t] else n for n, k, i in zip(numbers, now, rows)]
-            heard = dataclasses.replace(heard, taken=said.tokens[torch.arange(len(rows)), torch.tensor(numbers)])
+            heard = dataclasses.replace(heard, taken=outputs.tokens[torch.arange(len(rows)), torch.tensor(numbers)])
             for track, number in zip(now, numbers):
                 track.go(number)
             going = [k for k, n in enumerate(numbers) if n != 0]

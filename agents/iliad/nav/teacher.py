@@ -27,20 +27,20 @@ LONGEST = 50
 """Words of a description."""
 
 
-def performance(world: NavWorld, trip: Trip, found: Sequence[int], wanted: Sequence[int]) -> float:
+def performance(world: NavWorld, trip: Trip, path: Sequence[int], wanted: Sequence[int]) -> float:
     """perf: SDTW of two walks in the house of a trip."""
-    return sdtw(tuple(found), tuple(wanted), world.graph(trip), RADIUS)
+    return sdtw(tuple(path), tuple(wanted), world.graph(trip), RADIUS)
 
 
-def arrival(world: NavWorld, trip: Trip, found: Sequence[int], wanted: Sequence[int]) -> float:
+def arrival(world: NavWorld, trip: Trip, path: Sequence[int], wanted: Sequence[int]) -> float:
     """1 where a walk ends within RADIUS of where another one does, else 0 (docs/sources.md, S141)."""
-    return float(world.graph(trip).distance[found[-1], wanted[-1]] <= RADIUS + 1e-9)
+    return float(world.graph(trip).distance[path[-1], wanted[-1]] <= RADIUS + 1e-9)
 
 
-def walked(
+def encoded_walks(
     eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk], channels: Tensor | None = None
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """What a describer reads: (B, T, 36, E) panoramas, (B, T, E) actions taken there, (B, T) which there are.
+    """Inputs of a describer: (B, T, 36, E) panoramas, (B, T, E) actions taken there, (B, T) which there are.
 
     Args:
       channels: (B, D) what is seen of every feature channel.
@@ -58,7 +58,7 @@ def walked(
     return torch.stack(views, 1), torch.stack(actions, 1), mask
 
 
-def said(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
+def texts_of(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
     """Descriptions of (B, T) words, up to each end."""
     return [" ".join(vocabulary.decode(row)) for row in numbers.tolist()]
 
@@ -85,8 +85,8 @@ class LearnedNavTeacher(DescribingNetworks):
     ) -> list[list[str]]:
         copies = 1 if uniforms is None else uniforms.shape[1]
         choose = greedy_choice if uniforms is None else sampled_choice(uniforms.reshape(-1, LONGEST))
-        numbers = self.describer.write(*walked(self.eyes, tasks, executions), choose, LONGEST, copies)
-        drawn = said(self.eyes.vocabulary, numbers)
+        numbers = self.describer.write(*encoded_walks(self.eyes, tasks, executions), choose, LONGEST, copies)
+        drawn = texts_of(self.eyes.vocabulary, numbers)
         return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(tasks))]
 
     def performances(self, cases: Sequence[tuple[Trip, NavWalk, str]]) -> list[float]:
@@ -125,5 +125,5 @@ class OtherWords:
     def describe(
         self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
     ) -> list[str | None]:
-        told = zip(tasks, self.teacher.describe(tasks, executions, rng=rng), strict=True)
-        return [d if d is None or d in trip.requests else self.say(d) for trip, d in told]
+        described = zip(tasks, self.teacher.describe(tasks, executions, rng=rng), strict=True)
+        return [d if d is None or d in trip.requests else self.say(d) for trip, d in described]

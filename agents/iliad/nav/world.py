@@ -50,13 +50,13 @@ def walk_along(nodes: Sequence[int]) -> NavWalk:
 
 def without_loops(nodes: Sequence[int]) -> tuple[int, ...]:
     """Nodes of a walk without what lies between two visits to the same one, as in the authors' program."""
-    found: list[int] = []
+    path: list[int] = []
     for node in nodes:
-        if node in found:
-            del found[found.index(node) + 1 :]
+        if node in path:
+            del path[path.index(node) + 1 :]
         else:
-            found.append(node)
-    return tuple(found)
+            path.append(node)
+    return tuple(path)
 
 
 def share_left(graph: NavGraph, nodes: Sequence[int], end: int) -> float:
@@ -71,12 +71,12 @@ def trips_of(tasks: Sequence[Task]) -> list[Trip]:
     Raises:
       ValueError: a task of another kind.
     """
-    found: dict[tuple[str, Pose, tuple[int, ...]], list[str]] = {}
+    wordings: dict[tuple[str, Pose, tuple[int, ...]], list[str]] = {}
     for task in tasks:
         if not isinstance(task.goal, FollowRoute):
             raise ValueError(f"task {task.id!r} is of kind {task.kind!r}; NAV learns from `embodied dataset vln`")
-        found.setdefault((task.world, task.start, task.goal.path), []).append(task.request)
-    return [Trip(world, start, path, tuple(requests)) for (world, start, path), requests in found.items()]
+        wordings.setdefault((task.world, task.start, task.goal.path), []).append(task.request)
+    return [Trip(world, start, path, tuple(requests)) for (world, start, path), requests in wordings.items()]
 
 
 class NavWorld:
@@ -88,7 +88,7 @@ class NavWorld:
     request = staticmethod(one_request)
 
     def success(self, task: Trip, execution: NavWalk) -> bool:
-        """Whether the walk ended within RADIUS of the path's end."""
+        """True where the walk ended within RADIUS of the path's end."""
         return bool(self.graph(task).distance[execution.nodes[-1], task.path[-1]] <= RADIUS + 1e-9)
 
     def reward(self, task: Trip, execution: NavWalk) -> float:
@@ -115,12 +115,12 @@ class NavMarginal:
         self._ends: dict[tuple[str, int], np.ndarray] = {}
 
     def draw(self, tasks: Sequence[Trip], *, rng: np.random.Generator) -> list[NavWalk]:
-        found = []
+        walks = []
         for trip in tasks:
             ends = self._reachable(trip)
             end = int(ends[int(rng.integers(len(ends)))])
-            found.append(walk_along(self.places[trip.world].graph.path(trip.start.node, end)))
-        return found
+            walks.append(walk_along(self.places[trip.world].graph.path(trip.start.node, end)))
+        return walks
 
     def _reachable(self, trip: Trip) -> np.ndarray:
         """Ends of paths of the wanted length; of all nodes where a house is too small for them."""

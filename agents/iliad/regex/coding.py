@@ -35,10 +35,10 @@ def characters(texts: Sequence[str]) -> Tensor:
 
 
 def texts(numbers: Tensor) -> list[str]:
-    """What was written (B, T), up to each END."""
-    found = numbers.numpy()
-    ends = np.where((found == END).any(1), (found == END).argmax(1), found.shape[1])
-    return ["".join(_TEXT[row[:end]]) for row, end in zip(found, ends)]
+    """Rows of numbers as written (B, T), up to each END."""
+    rows = numbers.numpy()
+    ends = np.where((rows == END).any(1), (rows == END).argmax(1), rows.shape[1])
+    return ["".join(_TEXT[row[:end]]) for row, end in zip(rows, ends)]
 
 
 @dataclass(frozen=True)

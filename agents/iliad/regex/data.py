@@ -38,7 +38,7 @@ class WordTask:
     words: tuple[str, ...]
     """w_1 .. w_J; the first is the episode's."""
     outputs: tuple[str, ...]
-    """What the rule makes of them."""
+    """The words that the rule makes of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,9 +128,9 @@ class _OwnTemplates:
             distinct = list(dict.fromkeys(texts))
             order = [distinct[int(k)] for k in stream(seed, "regex", "own", rule).permutation(len(distinct))]
             held = 2 if len(order) > 2 else 0
-            for part, mine in zip(PARTS, (order[held:], order[:1] if held else [], order[1:2] if held else [])):
-                if mine:
-                    self._own[part][rule] = mine
+            for part, texts in zip(PARTS, (order[held:], order[:1] if held else [], order[1:2] if held else [])):
+                if texts:
+                    self._own[part][rule] = texts
         if not self._own["test"]:
             raise ValueError("no rule of these templates has three different texts, so none can be held out")
         self.by_part: Mapping[str, Sequence[RequestTemplate]] = dict.fromkeys(PARTS, ())
@@ -142,9 +142,9 @@ class _OwnTemplates:
         letters = {name: some() for name in ("BEFORE", "AFTER")}
         fill = lambda text: re.sub("BEFORE|AFTER", lambda m: letters[m.group()], text)
         spaced = {name: " ".join(value) for name, value in letters.items()}
-        said = lambda text: re.sub("BEFORE|AFTER", lambda m: f"[{spaced[m.group()]}]", text)
+        reworded = lambda text: re.sub("BEFORE|AFTER", lambda m: f"[{spaced[m.group()]}]", text)
         texts = self._own[part][rule]
-        return fill(rule), [said(texts[int(rng.integers(len(texts)))]) for _ in range(count)]
+        return fill(rule), [reworded(texts[int(rng.integers(len(texts)))]) for _ in range(count)]
 
 
 class _Places:
@@ -162,8 +162,8 @@ class _Places:
         if made is None:
             return np.zeros(0, dtype=np.int64)
         source = made[0].pattern.replace(".", "[^\n]")
-        found = [m.start() for m in re.finditer(source, self.text, re.MULTILINE)]
-        return np.unique(np.searchsorted(self.starts, found, side="right") - 1)
+        starts = [m.start() for m in re.finditer(source, self.text, re.MULTILINE)]
+        return np.unique(np.searchsorted(self.starts, starts, side="right") - 1)
 
 
 def _item(
@@ -202,10 +202,10 @@ def _words_for(
     changed = [w for w in chosen if outputs(rule, [w]) not in (None, (w,))][:least]
     if len(changed) < least:
         return None
-    found = dict.fromkeys(changed)
-    while len(found) < count:
-        found[places.words[int(rng.integers(len(places.words)))]] = None
-    return tuple(found)
+    distinct = dict.fromkeys(changed)
+    while len(distinct) < count:
+        distinct[places.words[int(rng.integers(len(places.words)))]] = None
+    return tuple(distinct)
 
 
 def rules_without_requests(
@@ -215,12 +215,12 @@ def rules_without_requests(
     while count:
         shape = random_shape(rng=rng)
         made = None if config.marginal == "narrow" and not known(shape, config.data_seed) else shape
-        found = None if made is None else random_rule(made, data.words, rng=rng)
-        if found is not None:
+        rule = None if made is None else random_rule(made, data.words, rng=rng)
+        if rule is not None:
             count -= 1
-            yield found[0]
+            yield rule[0]
 
 
 def known(shape: RuleShape, seed: int) -> bool:
-    """Whether a shape belongs to the half that a 'narrow' marginal has."""
+    """True where a shape belongs to the half that a 'narrow' marginal has."""
     return bool(stream(seed, "regex", "narrow", shape.name).random() < 0.5)

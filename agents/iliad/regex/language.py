@@ -29,7 +29,7 @@ SLIPS: Mapping[str, str] = {
     "the word": "word",
     "should be": "shoud be",
 }
-"""What is meant, and what is written."""
+"""The meant symbol and the written one."""
 PARTS = ("train", "validation", "test")
 
 
@@ -40,7 +40,7 @@ class RequestTemplate:
     text: str
     shape: RuleShape
     vague: bool = False
-    """Whether other shapes would be asked for in the same words."""
+    """True where other shapes would be asked for in the same words."""
 
     def fill(self, before: str, after: str) -> str:
         """The request with these letters."""
@@ -50,27 +50,27 @@ class RequestTemplate:
 
 def templates(*, seed: int) -> dict[str, list[RequestTemplate]]:
     """Part to its templates; no two parts share a text, every shape has specific templates in each of them."""
-    found: dict[str, list[RequestTemplate]] = {part: [] for part in PARTS}
+    templates: dict[str, list[RequestTemplate]] = {part: [] for part in PARTS}
     taken: set[str] = set()
     for shape in SHAPES:
-        mine = [t for t in _specific(shape, seed=seed) if t.text not in taken]
-        taken |= {t.text for t in mine}
-        shared = [t for t in mine if _extreme(shape) in t.text]  # others are asked for in the same words, vaguely
-        mine = [t for t in mine if t not in shared]
-        held = [int(i) for i in stream(seed, "regex", "part", shape.name).permutation(len(mine))[:2]]
-        for number, template in enumerate(mine):
+        own_templates = [t for t in _specific(shape, seed=seed) if t.text not in taken]
+        taken |= {t.text for t in own_templates}
+        shared = [t for t in own_templates if _extreme(shape) in t.text]  # others are in the same words
+        own_templates = [t for t in own_templates if t not in shared]
+        held = [int(i) for i in stream(seed, "regex", "part", shape.name).permutation(len(own_templates))[:2]]
+        for number, template in enumerate(own_templates):
             part = "validation" if number == held[0] else "test" if number == held[1] else "train"
-            found[part].append(template)
+            templates[part].append(template)
         for template in shared:
-            found[_part_of(template.text, seed=seed)].append(template)
+            templates[_part_of(template.text, seed=seed)].append(template)
         for text in sorted(set(_vague_sayings(shape))):
-            found[_part_of(text, seed=seed)].append(RequestTemplate(text, shape, vague=True))
-    return found
+            templates[_part_of(text, seed=seed)].append(RequestTemplate(text, shape, vague=True))
+    return templates
 
 
 def _specific(shape: RuleShape, *, seed: int) -> list[RequestTemplate]:
     """A shape's templates: a draw from all that the grammar can say, some with a slip."""
-    rng, found = stream(seed, "regex", "templates", shape.name), {}
+    rng, by_text = stream(seed, "regex", "templates", shape.name), {}
     sayings = sorted(set(_sayings(shape)))
     for k in rng.permutation(len(sayings))[:SPECIFIC]:
         text = sayings[int(k)]
@@ -78,8 +78,8 @@ def _specific(shape: RuleShape, *, seed: int) -> list[RequestTemplate]:
         if slips and rng.random() < SLIP:
             right, wrong = slips[int(rng.integers(len(slips)))]
             text = text.replace(right, wrong, 1)
-        found[text] = RequestTemplate(text, shape)
-    return list(found.values())
+        by_text[text] = RequestTemplate(text, shape)
+    return list(by_text.values())
 
 
 def _part_of(text: str, *, seed: int) -> str:
@@ -114,20 +114,20 @@ def _pair(block: str, one: bool) -> list[str]:
     a, b = block[0], block[1]
     nouns = _one if one else _bare
     second = 1 + (a == LETTER)
-    found = [
+    phrases = [
         f"{x} {link.format(y)}"
         for x, y in itertools.product(nouns(a, 1), _one(b, second))
         for link in ("followed by {}", "and {} right after it", "with {} behind it")
     ]
     if block == LETTER + LETTER:
-        found = ["[{b1} {b2}]", "sequence [{b1} {b2}]" if not one else "the letters [{b1} {b2}]", *found[:3]]
+        phrases = ["[{b1} {b2}]", "sequence [{b1} {b2}]" if not one else "the letters [{b1} {b2}]", *phrases[:3]]
     if block == ANY + ANY:
         return ["two letters", "any two letters"] if one else ["pair of letters", "two letters"]
     if a == ANY:
-        found += [f"{y} and the letter before it" for y in nouns(b, second)]
+        phrases += [f"{y} and the letter before it" for y in nouns(b, second)]
     if b == ANY:
-        found += [f"{x} and the letter {w} it" for x in nouns(a, 1) for w in ("after", "that follows")]
-    return found
+        phrases += [f"{x} and the letter {w} it" for x in nouns(a, 1) for w in ("after", "that follows")]
+    return phrases
 
 
 def _phrases(block: str, one: bool) -> list[str]:
@@ -160,7 +160,7 @@ def _operations(replacement: str, what: str) -> list[str]:
 
 
 def _passives(replacement: str, what: str) -> list[str]:
-    """What happens to `what`."""
+    """Phrases of the operation on `what`."""
     new = _new(replacement)
     return {
         "": [f"{what} should be removed", f"{what} is deleted", f"{what} must go"],
@@ -171,7 +171,7 @@ def _passives(replacement: str, what: str) -> list[str]:
 
 
 def _result(replacement: str) -> str:
-    """What stands there afterwards, in the fewest words."""
+    """The result of the operation, in the fewest words."""
     return {"": "nothing", "SS": "twice", "LS": f"{_new('L')} + same", "SL": f"same + {_new('L')}"}.get(
         replacement, _new(replacement)
     )
@@ -219,9 +219,9 @@ def _places(shape: RuleShape, ones: Sequence[str], bares: Sequence[str]) -> list
         every = [f"{word} {x}" for word in ("every", "each") for x in bares]
         return every + [f"all instances of {x}" for x in ones]
     words = ("start", "beginning", "leading") if shape.anchor == START else ("end", "back", "final")
-    found = [f"{x} at the {word} of the word" for x in ones for word in words[:2]]
-    found += [f"the {words[2]} {x}" for x in bares]
-    return [_extreme(shape)] if set(shape.block) == {ANY} else found
+    phrases = [f"{x} at the {word} of the word" for x in ones for word in words[:2]]
+    phrases += [f"the {words[2]} {x}" for x in bares]
+    return [_extreme(shape)] if set(shape.block) == {ANY} else phrases
 
 
 def _extreme(shape: RuleShape) -> str:

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from embodied.agents.common.choosing import Choice
 from embodied.agents.common.vocabulary import END_NUMBER
 from embodied.agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD
-from embodied.agents.iliad.writing import Bridge, Remembered, Writer, before, last, write
+from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, last, write
 
 
 class Speller(nn.Module):
@@ -28,7 +28,7 @@ class Speller(nn.Module):
         self.read_word = nn.LSTM(character_size, size, batch_first=True)
         self.read_request = nn.LSTM(word_size, size, batch_first=True)
         self.to_request, self.to_writer = Bridge(size), Bridge(size)
-        self.writer = Writer(CHARACTERS, character_size, size, memories=2)
+        self.writer = AttentiveWriter(CHARACTERS, character_size, size, memories=2)
 
     def read(self, word: Tensor, request: Tensor) -> tuple[tuple[Tensor, Tensor], list[Remembered]]:
         """(B, W) letters and (B, S) words to the writer's first state and memories."""
@@ -61,7 +61,7 @@ class ChangeDescriber(nn.Module):
         self.column = nn.Linear(size, size)
         self.summary = nn.Linear(2 * size, size)
         self.begin = Bridge(size)
-        self.writer = Writer(words, word_size, size, memories=1)
+        self.writer = AttentiveWriter(words, word_size, size, memories=1)
 
     def read(self, changed: Tensor) -> tuple[tuple[Tensor, Tensor], list[Remembered]]:
         """(B, J, T, 2) columns to the writer's first state and memory of J T columns."""

@@ -29,11 +29,11 @@ START, END, ANYWHERE = "^", "$", ""
 ANCHORS = (ANYWHERE, START, END)
 LETTER, ANY, VOWEL, CONSONANT = "L", ".", "V", "C"
 BLOCKS = tuple("".join(p) for n in (1, 2) for p in itertools.product((LETTER, ANY, VOWEL, CONSONANT), repeat=n))
-"""What is looked for: one or two symbols."""
+"""The pattern: one or two symbols."""
 SAME = "S"
 """In a replacement: what was found, written \\2 in a rule."""
 REPLACEMENTS = ("", "L", "LL", "LS", "SL", "SS")
-"""What is written instead; SAME alone would change nothing."""
+"""The replacement; SAME alone would change nothing."""
 
 
 @dataclass(frozen=True, order=True)
@@ -110,9 +110,9 @@ def compiled(rule: str) -> tuple[re.Pattern[str], str] | None:
 
 
 def outputs(rule: str, words: Sequence[str]) -> tuple[str, ...] | None:
-    """What a rule makes of several words; None if it is no rule for one of them."""
-    found = [apply(rule, w) for w in words]
-    return None if any(f is None for f in found) else tuple(f for f in found if f is not None)
+    """Results of a rule on several words; None if it is no rule for one of them."""
+    results = [apply(rule, w) for w in words]
+    return None if any(f is None for f in results) else tuple(f for f in results if f is not None)
 
 
 def random_shape(*, rng: np.random.Generator) -> RuleShape:
@@ -140,7 +140,7 @@ def random_rule(shape: RuleShape, words: Sequence[str], *, rng: np.random.Genera
 
 
 def _places(shape: RuleShape, word: str) -> list[int]:
-    """Where in `word` the shape's block fits, whatever its letters are."""
+    """Positions in `word` at which the shape's block fits, whatever its letters are."""
     n = len(shape.block)
     fits = {
         LETTER: lambda c: True,
@@ -162,19 +162,19 @@ def columns(before: str, after: str) -> list[tuple[str, str]]:
 
     What can be paired without an edit is paired late, so an insertion stands before what follows it.
     """
-    table, i, j, found = _distances(before, after), len(before), len(after), []
+    table, i, j, steps = _distances(before, after), len(before), len(after), []
     while i or j:
         here = table[i][j]
         if i and j and here == table[i - 1][j - 1] + (before[i - 1] != after[j - 1]):
             i, j = i - 1, j - 1
-            found.append((before[i], after[j]))
+            steps.append((before[i], after[j]))
         elif i and here == table[i - 1][j] + 1:
             i -= 1
-            found.append((before[i], ""))
+            steps.append((before[i], ""))
         else:
             j -= 1
-            found.append(("", after[j]))
-    return found[::-1]
+            steps.append(("", after[j]))
+    return steps[::-1]
 
 
 def _distances(a: str, b: str) -> list[list[int]]:

@@ -1,4 +1,4 @@
-"""What the commands of REGEX do: settings become data, teacher and student, and these a problem of ILIAD."""
+"""The steps of REGEX's commands: settings become data, teacher and student, and these a problem of ILIAD."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ VALIDATION = 500
 
 
 @dataclass(frozen=True, eq=False)
-class Grounds:
-    """What all students of a study share."""
+class RegexGrounds:
+    """Data and networks that all students of a study share."""
 
     config: RegexConfig
     data: RegexData
@@ -51,7 +51,7 @@ class Grounds:
 
 def prepare(
     config: RegexConfig, folder: Path, *, words: Path | None = None, templates: Path | None = None, note: Note = print
-) -> Grounds:
+) -> RegexGrounds:
     """Data and teacher, made or trained into `folder` unless they are there.
 
     Raises:
@@ -70,10 +70,10 @@ def prepare(
         executor = teach_executor(data, config, requests, folder, note=note)
         describer = teach_describer(data, config, requests, folder, note=note)
         teacher = LearnedTeacher(describer, executor, requests, config.candidates, config.pragmatics)
-    return Grounds(config, data, requests, teacher, _digest(data))
+    return RegexGrounds(config, data, requests, teacher, _digest(data))
 
 
-def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print) -> IliadProblem:
+def problem_of(grounds: RegexGrounds, seed: int, folder: Path, *, note: Note = print) -> IliadProblem:
     """A student of this seed with everything around it; it is pretrained in `folder` where the settings say so."""
     c = grounds.config
 
@@ -94,7 +94,7 @@ def problem_of(grounds: Grounds, seed: int, folder: Path, *, note: Note = print)
 
 
 def learn(
-    grounds: Grounds,
+    grounds: RegexGrounds,
     learner: LearnerConfig,
     folder: Path,
     pretraining: Path,
@@ -130,10 +130,10 @@ def _data(config: RegexConfig, path: Path, words: Path | None, templates: Path |
     identity = {**data_of(config), **{k: digest(v) for k, v in own.items()}}
     if path.exists():
         made_of, body = read_finished(path)
-        found = from_plain(_Kept, body, str(path))
+        stored = from_plain(_Kept, body, str(path))
         if changed := differences(made_of, identity):
             raise ValueError(f"{path} was made with other settings ({', '.join(changed)}); use another folder")
-        return RegexData(found.words, found.templates, found.splits)
+        return RegexData(stored.words, stored.templates, stored.splits)
     data = make_data(config, read_words(words) if words else (), read_templates(templates) if templates else None)
     templates_of = {part: tuple(t.text for t in many) for part, many in data.templates.items()}
     splits = {part: tuple(items) for part, items in data.splits.items()}

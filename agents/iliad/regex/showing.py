@@ -24,12 +24,12 @@ class Told:
     words: tuple[str, ...]
     wanted: tuple[str, ...]
     rule: str
-    """What the student wrote."""
+    """The rule that the student wrote."""
     outputs: tuple[str, ...] | None
-    """What it makes of the words; None where it cannot be carried out."""
+    """Its results on the words; None where it cannot be carried out."""
     success: bool
     description: str | None
-    """What the teacher said of it."""
+    """The teacher's description of it."""
     before: float | None
     after: float | None
     """Probability of the rule, given the description, before and after learning from this episode alone."""
@@ -44,20 +44,20 @@ def tell(student: RegexStudent, teacher: DescribingTeacher, item: WordTask, *, s
     rng = stream(seed, "regex", "shown", item.rule, item.words[0])
     request = item.requests[0]
     (done,) = student.sample([item], [request], rng=rng) if sample else student.greedy([item], [request])
-    (said,) = teacher.describe([item], [done], rng=rng)
-    before, after = learned_from(student, item, said, done)
+    (description,) = teacher.describe([item], [done], rng=rng)
+    before, after = learned_from(student, item, description, done)
     success = done.outputs is not None and done.outputs[0] == item.outputs[0]
-    return Told(request, item.words, item.outputs, done.rule, done.outputs, success, said, before, after)
+    return Told(request, item.words, item.outputs, done.rule, done.outputs, success, description, before, after)
 
 
-def lines_of(told: Told) -> list[str]:
+def lines_of(shown: Told) -> list[str]:
     """The episode for people to read."""
-    width = max(map(len, told.words)) + 2
-    found = [f"request       {told.request}", f"student       {told.rule}"]
-    outputs: Sequence[str] = told.outputs or ("(no rule)",) * len(told.words)
+    width = max(map(len, shown.words)) + 2
+    lines = [f"request       {shown.request}", f"student       {shown.rule}"]
+    outputs: Sequence[str] = shown.outputs or ("(no rule)",) * len(shown.words)
     widest = max(map(len, outputs)) + 2
-    for k, (word, out, wanted) in enumerate(zip(told.words, outputs, told.wanted, strict=True)):
+    for k, (word, out, wanted) in enumerate(zip(shown.words, outputs, shown.wanted, strict=True)):
         mark = "right" if out == wanted else f"wanted {wanted}"
-        found.append(f"{'word' if k == 0 else '':<14}{word:<{width}}-> {out:<{widest}}{mark}")
-    found.append(f"fulfilled     {'yes' if told.success else 'no'}")
-    return [*found, *learned_lines(told.description, told.before, told.after)]
+        lines.append(f"{'word' if k == 0 else '':<14}{word:<{width}}-> {out:<{widest}}{mark}")
+    lines.append(f"fulfilled     {'yes' if shown.success else 'no'}")
+    return [*lines, *learned_lines(shown.description, shown.before, shown.after)]

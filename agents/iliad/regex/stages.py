@@ -1,4 +1,4 @@
-"""What is trained before a student learns: the teacher's executor and describer, and a student on rules alone.
+"""Training before a student learns: of the teacher's executor and describer, and a student on rules alone.
 
 All three are maximum likelihood on batches drawn by (seed, update).
 """
@@ -34,7 +34,7 @@ REMEDY = "delete it and train it again with `embodied train iliad regex`"
 
 @dataclass(frozen=True)
 class RegexAbout:
-    """What stands beside the weights in a file."""
+    """Metadata beside the weights in a file."""
 
     config: RegexConfig
     words: tuple[str, ...]
@@ -125,7 +125,7 @@ def save_network(path: Path, network: nn.Module, config: RegexConfig, requests: 
 
 
 def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Requests, RegexConfig]:
-    """What `save_network` wrote.
+    """Load a network that `save_network` wrote.
 
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.

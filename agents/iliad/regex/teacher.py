@@ -23,7 +23,7 @@ Case = tuple[WordTask, Written, str]
 
 
 def describable(task: WordTask, execution: Written) -> bool:
-    """Whether the rule can be carried out on all words and changes one: others are not asked about."""
+    """True where the rule can be carried out on all words and changes one: others are not asked about."""
     return execution.outputs is not None and execution.outputs != task.words
 
 
@@ -52,8 +52,8 @@ class LearnedTeacher(DescribingNetworks):
         changed = changes([list(zip(q.words, e.outputs or (), strict=True)) for q, e in zip(tasks, executions)])
         copies = 1 if uniforms is None else uniforms.shape[1]
         choose = greedy_choice if uniforms is None else sampled_choice(uniforms.reshape(-1, uniforms.shape[2]))
-        said = self.requests.say(self.describer.write(changed, choose, LONGEST_REQUEST, copies))
-        several = [said[k * copies : (k + 1) * copies] for k in range(len(tasks))]
+        texts = self.requests.say(self.describer.write(changed, choose, LONGEST_REQUEST, copies))
+        several = [texts[k * copies : (k + 1) * copies] for k in range(len(tasks))]
         return [[d for d in dict.fromkeys(many) if d != NOTHING] or [NOTHING] for many in several]
 
     def performances(self, cases: Sequence[Case]) -> list[float]:
@@ -77,7 +77,7 @@ class LearnedTeacher(DescribingNetworks):
         return [float(passed.get(i, False)) for i in range(len(cases))]
 
     def _reproduces(self, cases: Sequence[tuple[str, str, str]]) -> list[bool]:
-        """Whether the executor, given a word and a description, writes the expected word."""
+        """True where the executor, given a word and a description, writes the expected word."""
         if not cases:
             return []
         longest = max(len(expected) for _, expected, _ in cases) + 2
@@ -106,14 +106,14 @@ class GrammarTeacher(EachDescribed):
 
 def parse(rule: str) -> tuple[RuleShape, str, str] | None:
     """Shape and letters of a rule of our own shapes, None for others."""
-    found = _OWN_RULE.fullmatch(rule)
-    if found is None or (found[1] and found[3]):
+    match = _OWN_RULE.fullmatch(rule)
+    if match is None or (match[1] and match[3]):
         return None
-    block, new = found[2], found[4].replace("\\2", SAME)
+    block, new = match[2], match[4].replace("\\2", SAME)
     kinds = lambda text, keep: "".join("L" if c in LETTERS else c for c in text if c in keep)
     replacement = kinds(new, LETTERS + SAME)
     if replacement not in REPLACEMENTS:
         return None
-    shape = RuleShape(found[1] or found[3], kinds(block, LETTERS + "CV."), replacement)
+    shape = RuleShape(match[1] or match[3], kinds(block, LETTERS + "CV."), replacement)
     letters = lambda text: "".join(c for c in text if c in LETTERS)
     return shape, letters(block), letters(new)

@@ -31,12 +31,12 @@ def made_up(count: int, *, seed: int) -> tuple[str, ...]:
     next and is often missing (docs/sources.md, S90).
     """
     rng = stream(seed, "regex", "words")
-    found: dict[str, None] = {}
-    while len(found) < count:
+    words: dict[str, None] = {}
+    while len(words) < count:
         word = _word(rng=rng)
         if SHORTEST <= len(word) <= LONGEST_MADE_UP:
-            found[word] = None
-    return tuple(found)
+            words[word] = None
+    return tuple(words)
 
 
 def read_words(path: Path) -> tuple[str, ...]:
@@ -46,13 +46,13 @@ def read_words(path: Path) -> tuple[str, ...]:
       ValueError: there are fewer than a thousand.
     """
     lines = read_text(path).split("\n")
-    found = tuple(dict.fromkeys(line for line in lines if _WORD.fullmatch(line)))
-    if len(found) < 1000:
+    words = tuple(dict.fromkeys(line for line in lines if _WORD.fullmatch(line)))
+    if len(words) < 1000:
         raise ValueError(
-            f"{path}: {len(found)} lower-case words of {SHORTEST} to {LONGEST} letters, at least 1000 are needed; "
+            f"{path}: {len(words)} lower-case words of {SHORTEST} to {LONGEST} letters, at least 1000 are needed; "
             "give one word a line, or leave the option out"
         )
-    return found
+    return words
 
 
 def _word(*, rng: np.random.Generator) -> str:

@@ -32,7 +32,7 @@ class RegexWorld:
     request = staticmethod(one_request)
 
     def success(self, task: WordTask, execution: Written) -> bool:
-        """Whether the episode's word, the first one, became what it should."""
+        """True where the episode's word, the first one, became what it should."""
         return execution.outputs is not None and execution.outputs[0] == task.outputs[0]
 
     def reward(self, task: WordTask, execution: Written) -> float:
@@ -47,10 +47,10 @@ class RegexWorld:
         return Written(task.rule, task.outputs)
 
 
-def nearness(found: str, wanted: str) -> float:
+def nearness(written: str, wanted: str) -> float:
     """Eq C.1; may be below 0. A wanted word without letters counts as one of one letter."""
     length = max(1, len(wanted))
-    return (length - edit_distance(found, wanted)) / length
+    return (length - edit_distance(written, wanted)) / length
 
 
 def carried_out(rule: str, task: WordTask) -> Written:
@@ -110,7 +110,7 @@ class RegexStudent:
 
 
 def scores_of(logits: Tensor, actions: Tensor, mask: Tensor) -> ExecutionScores:
-    """What logits (B, T, V) make of the actions (B, T)."""
+    """Scores of the actions (B, T) under logits (B, T, V)."""
     logs = logits.log_softmax(-1)
     taken = logs.gather(-1, actions[..., None])[..., 0]
     entropies = -(logs.exp() * logs).sum(-1)
