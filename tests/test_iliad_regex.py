@@ -328,9 +328,9 @@ def descriptions_of(teacher, rule: str, count: int = 1) -> list:
 
 @pytest.mark.parametrize("pragmatics", ["text", "program"])
 def test_a_teacher_says_what_people_said_of_what_they_wanted(pragmatics):
-    found = said(Scripted("x", [], pragmatics), "()(n)()@", 60)
+    found = descriptions_of(Scripted("x", [], pragmatics), "()(n)()@", 60)
     assert set(found) == {"cut n", "no n"}, "Eq 3.15, above: any of the requests, for all J words right"
-    assert set(said(Scripted("x", [], pragmatics), "()(na)()@a", 60)) != {"cut n", "no n"}
+    assert set(descriptions_of(Scripted("x", [], pragmatics), "()(na)()@a", 60)) != {"cut n", "no n"}
 
 
 def test_what_the_marginal_writes_is_carried_out_so_that_it_can_be_described():
@@ -346,13 +346,13 @@ def test_a_teacher_is_silent_where_nothing_happened_or_could():
 
 def test_the_programs_teacher_prefers_the_likeliest_description_that_passes():
     right, equal, wrong = "()(e)()@x", "()(e)()@x ".strip(), "()(e)()@y"
-    assert said(Scripted(right, [wrong], "program"), "()(e)()@x") == [right]
-    assert said(Scripted(wrong, [wrong, equal], "program"), "()(e)()@x") == [equal]
-    assert said(Scripted(wrong, [wrong], "program"), "()(e)()@x") == [None]
+    assert descriptions_of(Scripted(right, [wrong], "program"), "()(e)()@x") == [right]
+    assert descriptions_of(Scripted(wrong, [wrong, equal], "program"), "()(e)()@x") == [equal]
+    assert descriptions_of(Scripted(wrong, [wrong], "program"), "()(e)()@x") == [None]
 
 
 def test_the_texts_teacher_is_silent_once_in_two_when_one_description_passes():
-    found = said(Scripted("()(e)()@x", ["()(e)()@y"], "text"), "()(e)()@x", 400)
+    found = descriptions_of(Scripted("()(e)()@x", ["()(e)()@y"], "text"), "()(e)()@x", 400)
     assert set(found) == {None, "()(e)()@x"} and abs(found.count(None) - 200) < 50
 
 
