@@ -56,7 +56,7 @@ from embodied.gym.env import HelpGymEnv
 from embodied.gym.eyes import CameraSensor, FeatureSensor, PanoramaStore, ViewSettings
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import TURNS, FeatureSource, FollowRoute, Pose, Sight, Task, Viewpoint, viewpoint
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.render.pictures import parse_pictures
 from embodied.seeds import stream
 from embodied.tasks.find import FindConfig, find_pool, find_task

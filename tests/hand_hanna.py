@@ -8,7 +8,7 @@ from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
 from embodied.envs.hanna import HannaEnv
 from embodied.interface import FindObject, Pose, Route, Task
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.tasks.hanna import hanna_pool, hanna_task
 
 LINE_TASK = Task(

@@ -11,7 +11,7 @@ from embodied.agents.vision.lessons import Split
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from embodied.kinds.vnla import VNLA
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.task_kind import EnvInputs
 from embodied.tasks.vnla import vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher

@@ -58,8 +58,8 @@ def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
 @pytest.mark.parametrize(
     ("table", "maker"),
     [
-        ("embodied/language/templates.toml", "embodied.language.voice"),
-        ("embodied/language/speakers.toml", "embodied.language.voice"),
+        ("embodied/language/templates.toml", "embodied.language.people_language"),
+        ("embodied/language/speakers.toml", "embodied.language.people_language"),
         ("embodied/generate/style_finishes.toml", "embodied.generate"),
         ("embodied/generate/furnish/smalls.toml", "embodied.generate"),
     ],

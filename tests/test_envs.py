@@ -13,7 +13,7 @@ from embodied.action_spaces import MonocularMoves, PanoramicMoves, nearest_views
 from embodied.envs.base import ActionError, HelpEnv, TaskError
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Pose, Stop
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 from embodied.tasks.find import find_pool, find_task

@@ -20,8 +20,8 @@ from embodied.envs.base import ActionError
 from embodied.evaluation.rollout import play
 from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
 from embodied.kinds.hanna import subtask_success
-from embodied.language.plain import PlainLanguage
-from embodied.language.prose import prose
+from embodied.language.detokenize import detokenized
+from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import (
     PerfectInterpreter,
@@ -291,7 +291,7 @@ def test_a_film_of_an_episode_shows_the_request_and_then_what_the_assistant_said
     episode = env.episode()
     reply = next(s.reply.text for s in episode.steps if s.reply)
     words, first = _captions(episode), f"Task: {LINE_TASK.request}"
-    assert words[0] == first and f"Agent asks. Assistant: {prose(reply)}" in words and first in words[-1]
+    assert words[0] == first and f"Agent asks. Assistant: {detokenized(reply)}" in words and first in words[-1]
     black = np.zeros((48, 64, 3), np.uint8)
     frames = film_episode(env.world.graph, episode, lambda i, c: black, tmp_path / "film.mp4", (48, 64))
     with av.open(str(tmp_path / "film.mp4")) as film:

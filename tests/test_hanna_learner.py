@@ -56,7 +56,7 @@ from embodied.envs.hanna import HannaEnv
 from embodied.evaluation.rollout import play
 from embodied.identity import identity_of
 from embodied.interface import Ask, Move, Observation, Sight, Stop, Task
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.locks import LockedError, locked
 from embodied.tasks.hanna import hanna_pool, hanna_task
 from embodied.teachers.hanna import HannaTeacher

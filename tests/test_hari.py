@@ -15,7 +15,7 @@ from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariEnv, HariExtras, shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import HalfwaySkyline, Shortest
 from embodied.tasks.hari import hari_pool, hari_task

@@ -63,7 +63,7 @@ from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
 from embodied.identity import identity_of
 from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Stop, Task
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.records import read_json
 from embodied.tasks.hari import PRETRAINING, hari_pool, hari_task
 

@@ -17,7 +17,7 @@ from embodied.envs.hari import HariRules
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
 from embodied.kinds.hari import HARI
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.task_kind import EnvInputs
 from embodied.tasks.hari import hari_pool, hari_task
 

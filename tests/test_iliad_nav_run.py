@@ -26,8 +26,8 @@ from embodied.agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.datasets.store import Dataset
 from embodied.interface import Sight, Stop
-from embodied.language.plain import PlainLanguage
-from embodied.language.voice import People, RouteDescriber
+from embodied.language.people_language import People, RouteDescriber
+from embodied.language.plain_language import PlainLanguage
 
 pytestmark = pytest.mark.slow
 

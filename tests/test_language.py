@@ -17,16 +17,16 @@ from embodied.generate import HouseConfig
 from embodied.gym.playground import AREA
 from embodied.interface import Route
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
+from embodied.language.detokenize import detokenized
 from embodied.language.grammar import NOVEL_WORDS, Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import cost, count_cost, follow
-from embodied.language.plain import with_article
-from embodied.language.prose import prose
+from embodied.language.people_language import People, RouteDescriber
+from embodied.language.plain_language import with_article
 from embodied.language.route_clauses import legs_of, shortened
-from embodied.language.seen import Lookout, doorway
 from embodied.language.speakers import SPEAKERS, draw_speaker
+from embodied.language.surroundings import Lookout, doorway
 from embodied.language.templates import TEMPLATES, WORDS
-from embodied.language.voice import People, RouteDescriber
 from embodied.tasks.vln import vln_task
 from embodied.world import open_world
 
@@ -287,9 +287,9 @@ def test_nobody_says_next_twice(spoken):
 
 def test_people_read_no_blanks_before_full_stops():
     assert (
-        prose("turn right and go into the hall . turn slightly left .")
+        detokenized("turn right and go into the hall . turn slightly left .")
         == "turn right and go into the hall. turn slightly left."
     )
-    assert prose("turn 60 degrees left , go forward") == "turn 60 degrees left, go forward"
+    assert detokenized("turn 60 degrees left , go forward") == "turn 60 degrees left, go forward"
     for written in ("Is it here? Yes, 2.5 m ahead.", "go on :) then stop", "a .5 litre bottle", ""):
-        assert prose(written) == written
+        assert detokenized(written) == written

@@ -34,7 +34,7 @@ from embodied.render.pictures import Baked
 from embodied.tasks.find import find_pool, find_task
 from embodied.viz import recording
 from embodied.viz.blueprint import blueprint_of, sees_title
-from embodied.viz.recording import Pictures, camera_axes, record
+from embodied.viz.recording import PictureSizes, camera_axes, record
 from embodied.viz.sinks import Sinks, listens, open_recording, open_viewers, viewer_program
 from embodied.viz.video import camera_track, write_video
 from embodied.world import open_world
@@ -66,7 +66,7 @@ def test_a_seed_becomes_a_house_a_walk_and_a_recording(world, tmp_path):
     with open_recording(
         Sinks(rrd), blueprint_of(world.house, frames[-1].episode), name="test", properties={"renderer": "any"}
     ) as recording:
-        passed_on = list(record(recording, world, task, (f.step for f in frames), pictures=Pictures((48, 64), 32)))
+        passed_on = list(record(recording, world, task, (f.step for f in frames), pictures=PictureSizes((48, 64), 32)))
     assert [s.pose for s in passed_on] == [f.step.pose for f in frames]
     assert success(frames[-1].episode, world.graph) == 1.0
     assert 10_000 < rrd.stat().st_size < 60 * 2**20
@@ -134,7 +134,7 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
     assert told["walk"]["success"] and told["walk"]["spl"] == 1.0
     assert {p.name for p in tmp_path.iterdir()} >= {"house.json", "plan.png", "episode.rrd", "help.rrd"}
     assert all(10_000 < (tmp_path / f"{k}.rrd").stat().st_size < 60 * 2**20 for k in ("episode", "help"))
-    agent = [jpeg(recording.ahead(fed[p.node], p, Pictures())) for p in poses]
+    agent = [jpeg(recording.ahead(fed[p.node], p, PictureSizes())) for p in poses]
     assert len(fed) == len(found) and len(poses) == told["help"]["steps"] + 1
     assert all(np.array_equal(p.rgb, rgb) for p, rgb in zip(fed, found, strict=True))
     assert logged == {"agent/camera/image": agent, "view/lit": []}
@@ -175,7 +175,7 @@ def test_what_is_sent_to_a_viewer_arrives(world, tmp_path):
             steps = [f.step for f in rollout(lambda: HelpEnv({world.name: world}), Shortest(), [task], seed=0)]
             for _ in range(2):  # a second recording follows the first into the same viewer
                 with open_recording(Sinks(None, viewers), rrb.Blueprint(), name="sent", properties={}) as recording:
-                    list(record(recording, world, task, steps, pictures=Pictures((48, 64), 32)))
+                    list(record(recording, world, task, steps, pictures=PictureSizes((48, 64), 32)))
 
         def held() -> int:
             return saved.read_bytes().count(b"RecordingInfo:name") if saved.exists() else 0

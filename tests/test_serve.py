@@ -27,9 +27,9 @@ from embodied.envs.base import ActionError
 from embodied.errors import UnableError
 from embodied.geometry import wrap
 from embodied.interface import Ask, Episode, Thought
-from embodied.language.plain import PlainLanguage
-from embodied.language.prose import prose
-from embodied.language.said import PeoplesWords
+from embodied.language.detokenize import detokenized
+from embodied.language.plain_language import PlainLanguage
+from embodied.language.utterances import PeoplesWords
 from embodied.policies.baselines import RandomWalk
 from embodied.records import load_lines, parse, to_json
 from embodied.serve.address import page_address
@@ -37,12 +37,12 @@ from embodied.serve.app import app_of
 from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game, set_table
 from embodied.serve.people_data import rated_by_people, worded_by_people, write_people_dataset
-from embodied.serve.results import JUDGEMENTS, Judgement, Writer, agreement, part_summary, summary
+from embodied.serve.results import JUDGEMENTS, Judgement, ResultsWriter, agreement, part_summary, summary
 from embodied.serve.run import open_study
 from embodied.serve.screens import screen_of
 from embodied.serve.sessions import Sessions
 from embodied.serve.store import Event
-from embodied.serve.study import Part, Question, StudyError, load_study
+from embodied.serve.study import Question, StudyError, StudyPart, load_study
 from embodied.serve.talk import spoken_reply
 from embodied.teachers.vnla import VnlaTeacher
 
@@ -140,7 +140,7 @@ def test_two_people_play_and_the_episode_holds_questions_answers_and_seconds(dat
     play.answer("bob", "the left one", picture=9)
     play.play("ann", "moved", candidate=0)
     play.play("ann", "stopped")
-    Writer(tmp_path, play.sessions)
+    ResultsWriter(tmp_path, play.sessions)
     (episode,) = load_lines(tmp_path / "episodes_val_seen_together.jsonl", Episode)
     ask, move, stop = episode.steps
     assert isinstance(ask.action, Ask) and ask.action.question == "Which door?"
@@ -198,7 +198,7 @@ def test_judges_see_what_others_played_and_never_their_own(data, tmp_path):
         with pytest.raises(ActionError, match="stars"):
             play.do("judged", "eve", stars=nonsense, text="")
     play.do("judged", "eve", stars=4, text="well <b>done</b>", seconds=3.21)
-    Writer(tmp_path, play.sessions)
+    ResultsWriter(tmp_path, play.sessions)
     (told,) = load_lines(tmp_path / JUDGEMENTS, Judgement)
     assert (told.stars, told.text, told.judge, told.seconds) == (4, "well <b>done</b>", "eve", 3.21)
     assert told.episode.steps[0].reply.text == "over there"
@@ -289,7 +289,7 @@ def test_a_person_is_helped_by_the_data_sets_own_assistant_under_its_own_rule(da
     route = game.env.last_step.reply.subtask
     screen, told = play.screen("ann"), game.observation.instruction
     assert game.situation.pose == route.start and screen["subtask"]
-    assert screen["instruction"] == screen["said"][-1]["text"] == prose(told), "people read what the learner reads,"
+    assert screen["instruction"] == screen["said"][-1]["text"] == detokenized(told), "people read what learners read,"
     assert " ." in told and " ." not in screen["instruction"], "without its blanks"
 
 
@@ -315,7 +315,7 @@ def test_an_assistant_of_ones_own_hears_the_question_in_words(data):
     play.do(kind, None, game=game.id, **body)
     assert play.screen("ann")["said"][-1]["text"] == "you asked 'Where is it?'"
     with pytest.raises(ValueError, match="module:NAME"):
-        set_table(Part("p", assistant="nowhere:Nobody"), data)
+        set_table(StudyPart("p", assistant="nowhere:Nobody"), data)
 
 
 def test_an_assistant_by_name_is_given_the_simulated_one_to_reword(data):
@@ -329,7 +329,7 @@ def test_an_assistant_by_name_is_given_the_simulated_one_to_reword(data):
             reply = self.base.answer(situation, question, rng=rng)
             return dataclasses.replace(reply, text=f"{reply.text} ({situation.question})".upper())
 
-    table = set_table(Part("p", assistant="loud", tasks=9), data, assistants={"loud": Loud})
+    table = set_table(StudyPart("p", assistant="loud", tasks=9), data, assistants={"loud": Loud})
     games = [Game("g", table, {"agent": "ann"}, False, 0.0, task, 0) for task in table.tasks.values()]
     game = next(g for g in games if g.observation.can_ask)
     game.apply(Event("asked", 1.0, body={"question": "where?"}))
@@ -362,7 +362,7 @@ def test_a_machine_goes_on_after_a_restart_where_it_was_and_its_thoughts_are_in_
             assert plays[1].sessions.games[game.id].think() == (kind, body)
         thought.append(body["thought"])
         plays[0].do(kind, None, game=game.id, **body)
-    Writer(tmp_path, plays[0].sessions)
+    ResultsWriter(tmp_path, plays[0].sessions)
     (episode,) = load_lines(tmp_path / "episodes_val_seen_help.jsonl", Episode)
     assert len(thought) > 3 and [parse(to_json(s.action.thought)) for s in episode.steps] == thought
 
@@ -393,7 +393,7 @@ def test_whoever_drives_moves_to_a_viewpoint_when_it_is_the_nearest(data):
         graph.positions[first], goal
     )
     with pytest.raises(ValueError, match="viewpoints"):
-        set_table(Part("p", assistant="simulated", moves="drive"), data)
+        set_table(StudyPart("p", assistant="simulated", moves="drive"), data)
 
 
 async def fetched(app, path):
@@ -463,7 +463,7 @@ def test_panoramas_too_small_for_a_page_are_drawn_larger(data, monkeypatch, caps
 
 
 def test_typed_questions_have_prices_that_are_written_down(data):
-    part = Part("p", questions=(Question("Which room?", 2.0),), free_question=False, tasks=1)
+    part = StudyPart("p", questions=(Question("Which room?", 2.0),), free_question=False, tasks=1)
     env, relay = set_table(part, data).make_env()
     task = next(iter(set_table(part, data).tasks.values()))
     env.reset(task)
@@ -579,7 +579,7 @@ def played(data, folder, text, *, far):
     play.play("bob", "answered", reply=parse(to_json(reply)))
     play.play("ann", "stopped")
     folder.mkdir()
-    Writer(folder, play.sessions)
+    ResultsWriter(folder, play.sessions)
     return game.task, reply.subtask.path
 
 
@@ -611,7 +611,7 @@ def test_vnlas_advisor_says_what_people_said_of_the_same_actions(tmp_path):
     task, path = played(data, tmp_path / "people", "over there", far=False)
     words = worded_by_people(tmp_path / "people")
     made = write_people_dataset(data, words, tmp_path / "made")
-    (said,) = made.said([task.world])
+    (said,) = made.utterances([task.world])
     actions, end = VnlaTeacher().words(data.place(task.world), task.start, (path[-1],), 99)
     assert (*said.words, "stop") == actions and end.node == path[-1]
     voice = PeoplesWords([said], PlainLanguage())
@@ -654,7 +654,7 @@ def test_descriptions_become_routes_and_stars_a_rater(data, tmp_path):
     play.do("judged", "eve", stars=2, text="")
     play.ready("eve")
     play.do("judged", "eve", text="one step on")
-    Writer(tmp_path, play.sessions)
+    ResultsWriter(tmp_path, play.sessions)
     (word,) = worded_by_people(tmp_path)
     assert word.text == "one step on" and word.path[-1] == walked and len(word.path) == 2
     assert [stars for _, stars in rated_by_people(tmp_path, data)] == [2]

@@ -114,7 +114,7 @@ def test_nobody_acts_for_another_or_out_of_turn(server):
     assert "error" in helper.say("answered", text="nobody asked", **theirs)
     assert "error" in agent.say("house"), "the plan is the assistant's"
     assert "error" not in helper.say("house") and helper.plan["rooms"]
-    for nonsense in ("happen", "_joined", "broken", "began", None, 7):
+    for nonsense in ("apply_event", "_joined", "broken", "began", None, 7):
         assert "error" in agent.say(nonsense, **theirs)
     assert "error" not in agent.play("asked", text="Where?")
     helper.until("assistant", lambda s: s["yours"])

@@ -13,7 +13,7 @@ from embodied.assistants.route_system import build_routes
 from embodied.evaluation.evaluate import agent
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Observation, Task
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.task_kind import EnvInputs, TaskInputs, kind_named
 
 KINDS = ("find", "vln", "vnla", "hanna", "hari")

@@ -28,7 +28,7 @@ from embodied.datasets.store import SplitData, dataset_of
 from embodied.evaluation.rollout import play
 from embodied.interface import Move
 from embodied.kinds.vln import VLN
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.policies.baselines import Forward10
 from embodied.task_kind import EnvInputs
 from embodied.tasks.vln import vln_task

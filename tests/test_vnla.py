@@ -17,7 +17,7 @@ from embodied.evaluation.rollout import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.kinds.find import FIND
 from embodied.kinds.vnla import VNLA
-from embodied.language.plain import PlainLanguage, heard_subgoal
+from embodied.language.plain_language import PlainLanguage, heard_subgoal
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
 from embodied.task_kind import EnvInputs
 from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task

@@ -21,7 +21,7 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Step, Stop, Task
-from embodied.language.prose import prose
+from embodied.language.detokenize import detokenized
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
@@ -30,9 +30,9 @@ from embodied.render.photograph import PhotoCamera
 from embodied.task_kind import kind_named
 from embodied.viz.blueprint import blueprint_of
 from embodied.viz.described import boxes, log_described, log_recognised
+from embodied.viz.episode_log import EpisodeLog
 from embodied.viz.house3d import light_meshes, lit_meshes, log_house
 from embodied.viz.sinks import Sinks, open_recording
-from embodied.viz.story import Story
 from embodied.world import World
 
 PALETTE = {
@@ -55,7 +55,7 @@ SHORT = 60
 
 
 @dataclass(frozen=True)
-class Pictures:
+class PictureSizes:
     """How large the pictures in a recording are; it decides the size of the file."""
 
     view: tuple[int, int] = (360, 480)
@@ -76,14 +76,14 @@ class Views:
     """The house as the agent sees it: its features come from these very panoramas, where it looks at any."""
     shown: World | None
     """The same house as people are to see it; None where that is no other."""
-    sizes: Pictures
+    sizes: PictureSizes
     vfov: float = VFOV
     """Of the picture along the gaze, radians."""
     recognise: Recognise | None = None
     """What the agent's encoder recognises in what it sees."""
 
 
-def views_of(world: World, eyes: World | None, sizes: Pictures = Pictures()) -> Views:
+def views_of(world: World, eyes: World | None, sizes: PictureSizes = PictureSizes()) -> Views:
     """Pictures as an agent with `eyes` sees them, or of `world` without; also of `world` if it is drawn otherwise."""
     if eyes is None or eyes.pictures == world.pictures:
         return Views(eyes or world, None, sizes)
@@ -97,7 +97,7 @@ def record(
     steps: Iterable[Step],
     *,
     eyes: World | None = None,
-    pictures: Pictures = Pictures(),
+    pictures: PictureSizes = PictureSizes(),
     budget: int | None = None,
     recognise: Recognise | None = None,
 ) -> Iterator[Step]:
@@ -118,7 +118,7 @@ def record(
     """
     log_world(recording, world)
     log_task(recording, world, task)
-    state, views = Story(task, budget), dataclasses.replace(views_of(world, eyes, pictures), recognise=recognise)
+    state, views = EpisodeLog(task, budget), dataclasses.replace(views_of(world, eyes, pictures), recognise=recognise)
     if kind_named(task.kind).monocular:
         views = dataclasses.replace(views, vfov=ONE_VIEW)
     for index, step in enumerate(steps):
@@ -138,7 +138,7 @@ def record_episode(
     sinks: Sinks,
     *,
     eyes: World | None = None,
-    pictures: Pictures = Pictures(),
+    pictures: PictureSizes = PictureSizes(),
     watch: Callable[[Sequence[Step]], Iterable[Step]] = iter,
     recognise: Recognise | None = None,
 ) -> None:
@@ -157,7 +157,7 @@ def record_episode(
     about = {name: str(value) for name, value in world.fingerprint.items()}
     seen = None if eyes is None else eyes.pictures
     layout = blueprint_of(world.house, episode, seen, shown=views_of(world, eyes).shown is not None)
-    with open_recording(sinks, layout, name=prose(episode.task.request), properties=about) as recording:
+    with open_recording(sinks, layout, name=detokenized(episode.task.request), properties=about) as recording:
         steps = watch(episode.steps)
         for _ in record(
             recording,
@@ -199,7 +199,7 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
         static=True,
     )
     heading = "## " if len(task.request) <= SHORT else ""
-    recording.log("text/request", markdown(f"{heading}“{prose(task.request)}”"), static=True)
+    recording.log("text/request", markdown(f"{heading}“{detokenized(task.request)}”"), static=True)
     for name in ("goal", "target"):
         recording.log(
             f"plot/distance/{name}",
@@ -221,7 +221,9 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
         )
 
 
-def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step, state: Story, views: Views) -> None:
+def log_step(
+    recording: rr.RecordingStream, world: World, task: Task, step: Step, state: EpisodeLog, views: Views
+) -> None:
     """One step: what is seen before the action, then the action and the reply to it."""
     log_sight(recording, views, step.pose)
     goal_distance = min(float(world.graph.distance[step.pose.node, g]) for g in task.goal_nodes)
@@ -250,7 +252,7 @@ def log_step(recording: rr.RecordingStream, world: World, task: Task, step: Step
     log_aim(recording, world, state, views)
 
 
-def log_end(recording: rr.RecordingStream, world: World, task: Task, state: Story, views: Views) -> None:
+def log_end(recording: rr.RecordingStream, world: World, task: Task, state: EpisodeLog, views: Views) -> None:
     """Where it ended, and whether that was right; `state` has seen a step."""
     assert state.last is not None
     end = state.last.next_pose
@@ -299,7 +301,7 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     )
 
 
-def ahead(panorama: Panorama, pose: Pose, sizes: Pictures, vfov: float = VFOV) -> rr.EncodedImage:
+def ahead(panorama: Panorama, pose: Pose, sizes: PictureSizes, vfov: float = VFOV) -> rr.EncodedImage:
     """The first-person view from a panorama along the gaze, `vfov` radians high."""
     rgb = panorama.view_rgb(pose.yaw, pose.pitch, vfov, sizes.view)
     return encoded(sizes.camera.photographed(rgb, vfov, pose.node, round(np.degrees(pose.yaw))), sizes.jpeg)
@@ -316,7 +318,7 @@ def log_path(recording: rr.RecordingStream, world: World, nodes: list[int]) -> N
     recording.log("agent/path", rr.LineStrips3D([points], radii=0.04, colors=PALETTE["path"]))
 
 
-def log_aim(recording: rr.RecordingStream, world: World, state: Story, views: Views) -> None:
+def log_aim(recording: rr.RecordingStream, world: World, state: EpisodeLog, views: Views) -> None:
     """The route that the agent was told and the picture of what it looks for, while they hold."""
     if state.image is not None:
         picture = views.seen.panorama(state.image.node).equirect(views.sizes.panorama)
@@ -356,11 +358,11 @@ def instruction_text(step: Step, left: int | None = None) -> str:
     """What the agent is trying to carry out right now, as Markdown; `left` requests remain where they are counted."""
     mode = "Sub-task, from an assistant" if step.mode is Mode.SUB else "Main task"
     if isinstance(step.action, Ask):
-        return f"**{mode}**\n\n> {prose(step.instruction)}\n\n**The agent asks for help.**"
+        return f"**{mode}**\n\n> {detokenized(step.instruction)}\n\n**The agent asks for help.**"
     helpers = "\n\n*Somebody is near who can be asked.*" if step.can_ask else ""
     if left is not None:
         helpers = f"\n\n*{left} request{'s' * (left != 1)} left.*"
-    return f"**{mode}**\n\n> {prose(step.instruction)}{helpers}"
+    return f"**{mode}**\n\n> {detokenized(step.instruction)}{helpers}"
 
 
 WANTED = {

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from embodied.assets.cache import write_bytes
 from embodied.interface import Ask, Episode
-from embodied.language.prose import prose
+from embodied.language.detokenize import detokenized
 from embodied.records import RecordError, episodes_file, load_lines, parse_file
 
 mpl.use("Agg")
@@ -66,7 +66,7 @@ def summary_line(number: int, listed: Listed) -> str:
     e = listed.episode
     end = "at a goal" if listed.arrived else e.ended
     counts = f"{len(e.steps):3} steps {e.requests:2} requests"
-    return f"{number:4}  {end:<10} {counts}  {listed.agent:<28} {e.task.id:<28} {prose(e.task.request)}"
+    return f"{number:4}  {end:<10} {counts}  {listed.agent:<28} {e.task.id:<28} {detokenized(e.task.request)}"
 
 
 def write_page(folder: Path, found: Sequence[Listed]) -> Path:
@@ -91,7 +91,8 @@ def write_page(folder: Path, found: Sequence[Listed]) -> Path:
         end = html.escape("at a goal" if x.arrived else x.episode.ended)
         rows.append(
             f"<tr><td class=n>{number}</td><td>{html.escape(x.agent)}</td>"
-            f"<td>{html.escape(prose(x.episode.task.request))}<div class=q>{html.escape(prose(asked))}</div></td>"
+            f"<td>{html.escape(detokenized(x.episode.task.request))}"
+            f"<div class=q>{html.escape(detokenized(asked))}</div></td>"
             f"<td>{end}</td><td class=n>{len(x.episode.steps)}</td><td class=n>{x.episode.requests}</td>"
             f"<td>{link}</td></tr>"
         )

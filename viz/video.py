@@ -14,7 +14,7 @@ from embodied.assets.cache import atomic_path
 from embodied.geometry import wrap
 from embodied.house.floor_plan import font
 from embodied.interface import Episode, Pose
-from embodied.language.prose import prose
+from embodied.language.detokenize import detokenized
 from embodied.navigation.graph import NavGraph
 
 FPS = 24
@@ -113,7 +113,7 @@ def _captions(episode: Episode) -> list[str]:
             told.append(f"Task: {episode.task.request}" if after == episode.task.request else f"Assistant: {after}")
     if episode.ended == "stop":
         told[-1] = f"Agent stops. {told[-1]}"
-    return [prose(words) for words in told]
+    return [detokenized(words) for words in told]
 
 
 def captioned(rgb: np.ndarray, caption: str) -> np.ndarray:

@@ -104,4 +104,4 @@ def _kept(cache: Path, about: Sequence[object], kind: type[T], make: Callable[[]
 
 
 def _code() -> str:
-    return code_digest("embodied.language.voice", "embodied.assistants.route_system")
+    return code_digest("embodied.language.people_language", "embodied.assistants.route_system")

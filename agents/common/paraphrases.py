@@ -24,7 +24,7 @@ from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedP
 from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
 from embodied.language.grammar import kind_of, normalised, parse
 from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
-from embodied.language.plain import PlainLanguage, heard_subgoal
+from embodied.language.plain_language import PlainLanguage, heard_subgoal
 from embodied.language.templates import WORDS
 from embodied.seeds import stream
 

@@ -40,7 +40,7 @@ from embodied.evaluation.rollout import play
 from embodied.identity import Identity, identity_of
 from embodied.interface import STEP, TURNS, VIEWS, FindObject, Place, Pose, Sight, Task
 from embodied.kinds.find import FIND
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.seeds import stream
 from embodied.task_kind import EnvInputs
 from embodied.tasks.find import find_pool, find_task

@@ -20,8 +20,8 @@ from embodied.agents.language_models.prompts import read_prompt
 from embodied.agents.language_models.words import SMALLEST_SIGHTING
 from embodied.interface import STEP, Episode, Route, SeenPlace, Usage
 from embodied.language import PlainLanguage, follow
-from embodied.language.plain import heard_subgoal
-from embodied.language.voice import ARRIVED
+from embodied.language.people_language import ARRIVED
+from embodied.language.plain_language import heard_subgoal
 
 STARS = 5
 RATING = object_schema(stars={"type": "integer", "minimum": 1, "maximum": STARS})

@@ -32,7 +32,7 @@ from embodied.assistants.advisor import HELP_STEPS
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.teachers.vnla import VnlaTeacher
 
 
@@ -78,7 +78,7 @@ def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[st
     names = data.names("train")[:houses]
     requests = [t.request for t in data.tasks("train") if t.world in names]
     said = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
-    heard = [*requests, *said, *(s.text for s in data.said(names))]
+    heard = [*requests, *said, *(s.text for s in data.utterances(names))]
     if reword:  # advice is said before a request
         heard += [f"{s} . {r}" for s, r in zip(itertools.cycle(said), requests)]
     return build_vocabulary(heard, reword=reword)

@@ -10,7 +10,7 @@ import numpy as np
 from embodied.geometry import wrap
 from embodied.house.house import Placement
 from embodied.interface import STEP, FindDescribed, Intention, Place, Reply, Situation, Subtask
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.language.questions import intention_of
 from embodied.navigation.graph import nearest
 from embodied.tasks.ask import Look

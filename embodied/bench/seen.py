@@ -19,7 +19,7 @@ from embodied.gym.in_step import make_vec
 from embodied.gym.playground import Asked, flat_playground
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.render.panorama_file import PanoramaFile
 from embodied.render.pictures import parse_pictures
 from embodied.seeds import stream

@@ -57,7 +57,7 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> None:
     from embodied.policies.baselines import WITHOUT_LEARNING
     from embodied.render.photograph import PhotoCamera
     from embodied.tasks.find import find_pool, find_task
-    from embodied.viz.recording import Pictures, record_episode
+    from embodied.viz.recording import PictureSizes, record_episode
     from embodied.viz.sinks import Sinks
 
     camera = PhotoCamera(args.camera, args.seed)
@@ -81,7 +81,7 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> None:
             if args.rrd or viewers:
                 rrd = numbered(args.rrd, number, args.episodes) if args.rrd else None
                 watch = lambda steps: bar(steps, "recording", "step")
-                record_episode(world, episode, Sinks(rrd, viewers), pictures=Pictures(camera=camera), watch=watch)
+                record_episode(world, episode, Sinks(rrd, viewers), pictures=PictureSizes(camera=camera), watch=watch)
                 row["recording"] = str(rrd or ", ".join(viewers))
             rows.append(row)
         facts = {"agent": args.agent, "seed": args.seed, "world": world.name, "renderer": world.fingerprint}

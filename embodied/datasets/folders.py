@@ -39,7 +39,7 @@ from embodied.datasets.matterport import (
 )
 from embodied.errors import UnableError
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import nearest, to_matterport
 from embodied.seeds import stream

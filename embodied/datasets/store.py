@@ -22,8 +22,8 @@ from embodied.datasets.checks import (
 from embodied.datasets.scale import OOD, Scale, quota, scale
 from embodied.house.house import House
 from embodied.interface import Assistant, Episode, Place, Route, Task
-from embodied.language.plain import PlainLanguage
-from embodied.language.said import PeoplesWords, Said
+from embodied.language.plain_language import PlainLanguage
+from embodied.language.utterances import PeoplesWords, Utterance
 from embodied.navigation.graph import NavGraph, from_matterport
 from embodied.records import read_lines
 from embodied.render.pictures import PictureSettings, Unlit, from_recorded, parse_pictures
@@ -269,7 +269,7 @@ class Dataset:
           DatasetError: an unknown split, or files that were lost or changed.
         """
         names = self.names(name)[:houses]
-        said = self.said(names)
+        said = self.utterances(names)
         places = {n: self.place(n) if worlds is None else worlds[n] for n in names}
         inputs = EnvInputs(
             places,
@@ -283,10 +283,10 @@ class Dataset:
         tasks = self.task_kind.tasks_under((t for t in self.tasks(name) if t.world in places), places, rules)
         return SplitData(name, places, tasks, self.task_kind.environments(inputs))
 
-    def said(self, names: Iterable[str]) -> tuple[Said, ...]:
+    def utterances(self, names: Iterable[str]) -> tuple[Utterance, ...]:
         """Sub-goals in the words of people who spoke of these houses."""
         spoken = [n for n in names if f"{n}/{SUBGOALS}" in self.index.files]
-        return tuple(s for n in spoken for s in self._lines(n, SUBGOALS, Said))
+        return tuple(s for n in spoken for s in self._lines(n, SUBGOALS, Utterance))
 
     def table(self) -> str:
         """The table of the splits, as Markdown."""

@@ -45,7 +45,7 @@ from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, obser
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
 from embodied.interface import Assistant, FeatureSource, Observation, Place, Pose, SeenPlace, Task
-from embodied.language.prose import prose
+from embodied.language.detokenize import detokenized
 from embodied.metrics import PER_EPISODE
 from embodied.plugins import assistant_of
 from embodied.render.pictures import PictureSettings
@@ -315,7 +315,7 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
     sheet.paste(plan, (view.width, 0))
     pen = ImageDraw.Draw(sheet)
     who = "assistant" if o.mode.value == "sub" else "task"
-    lines = textwrap.wrap(f"{who}: {prose(o.instruction)}", sheet.width // 9)[:2]
+    lines = textwrap.wrap(f"{who}: {detokenized(o.instruction)}", sheet.width // 9)[:2]
     pen.text((10, VIEW[0] + 8), "\n".join(lines), font=font(16), fill="black")
     return np.asarray(sheet)
 

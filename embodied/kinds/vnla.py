@@ -9,7 +9,7 @@ from embodied.assistants.advisor import Advisor
 from embodied.envs.vnla import RULES, check_rules, fitted
 from embodied.interface import Episode, FindObject, Place, Task
 from embodied.kinds.hanna import TABLE_4_2
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import NavGraph
 from embodied.policies.baselines import RandomWalk, Shortest, SubgoalListener, VnlaAsking
 from embodied.task_kind import (

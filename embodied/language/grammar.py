@@ -282,7 +282,7 @@ class _Pattern:
 
 
 @dataclass(frozen=True)
-class _Heard:
+class _ParsedTemplate:
     """A template found at the beginning of a text."""
 
     template: Template
@@ -292,7 +292,7 @@ class _Heard:
     thing: Referent | None
 
 
-def _longest(text: str, lexicon: Lexicon) -> _Heard | None:
+def _longest(text: str, lexicon: Lexicon) -> _ParsedTemplate | None:
     """The template that accounts for most of the beginning of `text`."""
     first, best = text.split(" ", 1)[0], None
     for pattern in _patterns():
@@ -303,16 +303,16 @@ def _longest(text: str, lexicon: Lexicon) -> _Heard | None:
     return best
 
 
-def _read(pattern: _Pattern, text: str, lexicon: Lexicon) -> _Heard | None:
+def _read(pattern: _Pattern, text: str, lexicon: Lexicon) -> _ParsedTemplate | None:
     start = pattern.before.match(text)
     if start is None:
         return None
     if pattern.after is None:
-        return _Heard(pattern.template, start.end(), start.groupdict(), None)
+        return _ParsedTemplate(pattern.template, start.end(), start.groupdict(), None)
     for words, thing in lexicon.things_at(text[start.end() :]):
         end = pattern.after.match(text, start.end() + len(words))
         if end is not None:
-            return _Heard(pattern.template, end.end(), start.groupdict() | end.groupdict(), thing)
+            return _ParsedTemplate(pattern.template, end.end(), start.groupdict() | end.groupdict(), thing)
     return None
 
 

@@ -35,7 +35,7 @@ from embodied.language.clauses import (
 )
 from embodied.language.grammar import parse
 from embodied.language.lexicon import lexicon_of
-from embodied.language.seen import Lookout, Seen, Way, doorway
+from embodied.language.surroundings import Lookout, Surroundings, Way, doorway
 
 LONGEST = 4
 """Most steps that one clause may stand for."""
@@ -48,7 +48,7 @@ MISSING = 4.0
 
 
 @dataclass(frozen=True)
-class Heard:
+class Execution:
     """What the listener did."""
 
     path: tuple[int, ...]
@@ -56,7 +56,7 @@ class Heard:
     """How badly the walk fits the words; 0 is perfect."""
 
 
-def follow(world: SeenPlace, text: str, start: int, yaw: float) -> Heard:
+def follow(world: SeenPlace, text: str, start: int, yaw: float) -> Execution:
     """Walk as `text` says, from `start`, looking along `yaw` (radians).
 
     Raises:
@@ -65,7 +65,7 @@ def follow(world: SeenPlace, text: str, start: int, yaw: float) -> Heard:
     return carry_out(Lookout(world), parse(text, lexicon_of(world.catalogue)), start, yaw)
 
 
-def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: float) -> Heard:
+def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: float) -> Execution:
     """The cheapest walk that fits the clauses, found by uniform-cost search."""
     clauses = runnable(instruction.clauses)
     tie = itertools.count()
@@ -78,7 +78,7 @@ def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: flo
             break
         cost, _, walk = heapq.heappop(queue)
         if walk.clause == len(clauses):
-            return Heard(walk.path, cost)
+            return Execution(walk.path, cost)
         if walk.state in seen_states:
             continue
         seen_states.add(walk.state)
@@ -86,7 +86,7 @@ def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: flo
             fallback, farthest = walk.path, walk.clause
         for added, further in _onward(eyes, clauses[walk.clause], walk):
             heapq.heappush(queue, (cost + added, next(tie), further))
-    return Heard(fallback, math.inf)
+    return Execution(fallback, math.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +197,7 @@ def count_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
     return 2.0 if found is None or found[0] != clause.side else min(1.2 * abs(found[1] - clause.nth), 2.0)
 
 
-def near_cost(seen: Seen, thing: Referent) -> float:
+def near_cost(seen: Surroundings, thing: Referent) -> float:
     """How far one is from being at a thing."""
     found = seen.nearest(thing)
     return MISSING if found is None else min(1.3 * max(found.distance - NEAR, 0.0) + 0.15 * found.distance, MISSING)
@@ -218,7 +218,7 @@ def past_cost(clause: Past, eyes: Lookout, path: Sequence[int]) -> float:
     return best
 
 
-def stop_cost(clause: Clause, seen: Seen) -> float:
+def stop_cost(clause: Clause, seen: Surroundings) -> float:
     """How badly a node fits where one is told to stop."""
     if isinstance(clause, StopBy):
         return near_cost(seen, clause.thing)
@@ -227,7 +227,7 @@ def stop_cost(clause: Clause, seen: Seen) -> float:
     return 0.0
 
 
-def _way(seen: Seen, node: int) -> Way:
+def _way(seen: Surroundings, node: int) -> Way:
     return next(w for w in seen.ways if w.node == node)
 
 
@@ -247,7 +247,7 @@ class _Led(Lookout):
         super().__init__(world)
         self._next = dict(itertools.pairwise(path))
 
-    def at(self, node: int) -> Seen:
+    def at(self, node: int) -> Surroundings:
         seen = super().at(node)
         onward = self._next.get(node)
         return dataclasses.replace(seen, ways=tuple(w for w in seen.ways if w.node == onward))

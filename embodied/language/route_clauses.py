@@ -33,8 +33,8 @@ from embodied.language.clauses import (
 from embodied.language.grammar import Phrase
 from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
 from embodied.language.listener import BESIDE, NEAR
-from embodied.language.seen import Lookout, Seen, SeenThing, doorway
 from embodied.language.speakers import Speaker
+from embodied.language.surroundings import Lookout, Surroundings, VisibleThing, doorway
 from embodied.language.templates import WORDS
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
@@ -225,7 +225,7 @@ def _mark(telling: _Telling, leg: Leg, *, needed: bool) -> Phrase | None:
 def _passing(telling: _Telling, nodes: Sequence[int]) -> list[Phrase]:
     """Something beside the way, with its side where that is clear."""
     eyes, used = telling.eyes, telling.used
-    found: dict[str, tuple[SeenThing, str, Seen]] = {}
+    found: dict[str, tuple[VisibleThing, str, Surroundings]] = {}
     for a, b in itertools.pairwise(nodes):
         seen = eyes.at(b)
         ahead = next(w.yaw for w in eyes.at(a).ways if w.node == b)
@@ -264,7 +264,7 @@ def _stop(telling: _Telling, path: Sequence[int], crossed: bool, phrases: Sequen
     return Phrase(StopIn(end.kind)) if crossed and not isinstance(last, Enter) else Phrase(StopHere())
 
 
-def _name(telling: _Telling, thing: SeenThing, view: Seen) -> Word | None:
+def _name(telling: _Telling, thing: VisibleThing, view: Surroundings) -> Word | None:
     """A word for a thing that means it and nothing nearer in `view`; None if there is none.
 
     Colours and materials are added where they tell two things apart, or because the speaker likes to.
@@ -286,7 +286,7 @@ def _name(telling: _Telling, thing: SeenThing, view: Seen) -> Word | None:
     return None
 
 
-def _ranked(things: Sequence[SeenThing], rng: np.random.Generator) -> list[SeenThing]:
+def _ranked(things: Sequence[VisibleThing], rng: np.random.Generator) -> list[VisibleThing]:
     """Things in the order somebody would think of them: large ones mostly first."""
     weights = {
         t.placement: math.log(t.pixels + 1) * (1 + 1.2 * float(rng.random()))

@@ -33,7 +33,7 @@ from embodied.interface import (
     Thought,
     act,
 )
-from embodied.language.plain import heard_subgoal
+from embodied.language.plain_language import heard_subgoal
 from embodied.teachers.shortest import ShortestTeacher, shortest_of
 from embodied.teachers.vnla import ask_reason
 

@@ -27,7 +27,7 @@ from embodied.records import parse, to_json
 from embodied.serve.address import origin_of, path_of
 from embodied.serve.driving import Live
 from embodied.serve.game import Game
-from embodied.serve.pictures import Pictures
+from embodied.serve.pictures import EncodedPanoramas
 from embodied.serve.results import summary
 from embodied.serve.screens import houses_of, live_name, next_part, plan_of, screen_of
 from embodied.serve.sessions import Person, Sessions
@@ -85,7 +85,7 @@ class Server:
         self,
         sessions: Sessions,
         store: Store,
-        pictures: Pictures,
+        pictures: EncodedPanoramas,
         secret: str,
         addresses: Iterable[str] | None = None,
         live: Live | None = None,
@@ -110,7 +110,7 @@ class Server:
         self._sockets: dict[str, WebSocket] = {}
         self._open = 0
         self._joining = Bucket(JOIN_RATE, JOIN_BURST)
-        self._machines: dict[str, asyncio.Task[None]] = {}
+        self._bots: dict[str, asyncio.Task[None]] = {}
         houses = houses_of(sessions)
         self._plan = functools.cache(lambda house: plan_of(houses[house], pictures))
         self.failed = False
@@ -128,7 +128,7 @@ class Server:
 
     # What happens --------------------------------------------------------------------------------
 
-    async def happen(self, event: Event) -> None:
+    async def apply_event(self, event: Event) -> None:
         """Take in an event and write it down; returns when it is on disk.
 
         Raises:
@@ -144,19 +144,19 @@ class Server:
             log.exception("an event could not be written; the server accepts nothing more until it is started again")
             raise
 
-    async def settle(self, *people: Person) -> None:
+    async def advance(self, *people: Person) -> None:
         """Begin what can begin for these people, and show everybody concerned what they now see."""
         seen = {p.id: p for p in people}
         for person in people:
             while events := self.sessions.next(person, time.time()):
                 for event in events:
-                    await self.happen(event)
+                    await self.apply_event(event)
                 if person.game:
                     seen |= {p: self.sessions.people[p] for p in self.sessions.games[person.game].people.values()}
         for person in seen.values():
             await self.show(person)
             if person.game:
-                self.start_machine(self.sessions.games[person.game])
+                self.start_bot(self.sessions.games[person.game])
 
     async def show(self, person: Person) -> None:
         """Send somebody their screen."""
@@ -166,28 +166,28 @@ class Server:
             with suppress(RuntimeError, WebSocketDisconnect):
                 await socket.send_text(json.dumps(screen))
 
-    def start_machine(self, game: Game) -> None:
+    def start_bot(self, game: Game) -> None:
         """Let the machine move whose turn it is, in a task of its own."""
-        if game.machine_moves and game.id not in self._machines:
-            task = asyncio.create_task(self._machine(game))
-            self._machines[game.id] = task
-            task.add_done_callback(lambda t: self._machines.pop(game.id, None))
+        if game.bot_moves and game.id not in self._bots:
+            task = asyncio.create_task(self._run_bot(game))
+            self._bots[game.id] = task
+            task.add_done_callback(lambda t: self._bots.pop(game.id, None))
 
-    async def _machine(self, game: Game) -> None:
+    async def _run_bot(self, game: Game) -> None:
         people = [self.sessions.people[p] for p in game.people.values()]
-        while game.machine_moves:
+        while game.bot_moves:
             if game.mover == "agent":
                 await asyncio.sleep(self.sessions.study.pace)
             try:
                 kind, body = await asyncio.to_thread(game.think)
                 if game.over:
                     return
-                await self.happen(Event(kind, time.time(), body={"game": game.id, **body}))
+                await self.apply_event(Event(kind, time.time(), body={"game": game.id, **body}))
             except Exception as e:  # of anybody's policy or assistant: the episode ends, the study goes on
-                log.exception("the machine of game %s failed", game.id)
+                log.exception("the bot of game %s failed", game.id)
                 if not game.over and not self.failed:
-                    await self.happen(
-                        Event("broken", time.time(), body={"game": game.id, "why": f"machine: {e!r:.200}"})
+                    await self.apply_event(
+                        Event("broken", time.time(), body={"game": game.id, "why": f"bot: {e!r:.200}"})
                     )
             for person in people:
                 await self.show(person)
@@ -265,7 +265,7 @@ class Server:
                 await older.send_text(json.dumps({"screen": "refused", "text": text, "elsewhere": True}))
                 await older.close(4409)
         await socket.send_text(json.dumps({"token": token}))
-        await self.settle(person)
+        await self.advance(person)
         await self._tell_partners(person)
         return person
 
@@ -280,7 +280,7 @@ class Server:
             raise Refused("Too many people want to take part just now. Please try again later.")
         token, name = secrets.token_urlsafe(24), secrets.token_hex(4)
         body = {"person": name, "key": key_of(token), "invitation": invitation if single else None}
-        await self.happen(Event("joined", time.time(), body=body))
+        await self.apply_event(Event("joined", time.time(), body=body))
         return self.sessions.people[name], token
 
     invitations: frozenset[str] = frozenset()
@@ -301,7 +301,7 @@ class Server:
                 answer["error"] = str(e)[:200]
                 await self.show(person)  # the browser may show what is no longer so
             await socket.send_text(json.dumps(answer))
-            await self.settle(*concerned)
+            await self.advance(*concerned)
 
     async def receive(self, person: Person, message: dict[str, Any]) -> Iterable[Person]:
         """Do what a browser says, until it is on disk; returns who is concerned.
@@ -319,17 +319,17 @@ class Server:
         if do == "ready":
             person.ready = True
         elif do == "consent":
-            await self.happen(Event("consented", now, person.id, name))
+            await self.apply_event(Event("consented", now, person.id, name))
             person.ready = next_part(self.sessions, person) is None  # else they read first what to do
         elif do == "leave":
-            await self.happen(Event("ended", now, person.id, name, {"person": person.id, "why": "left"}))
+            await self.apply_event(Event("ended", now, person.id, name, {"person": person.id, "why": "left"}))
             await self.late()
         elif do == "judge":
             text = words(message["text"]) if message.get("text") else ""
             body = {"stars": message.get("stars"), "text": text, "seconds": message.get("seconds")}
             if message["unit"] != "/".join(person.viewing or ()):
                 raise ActionError("this was judged already")
-            await self.happen(Event("judged", now, person.id, name, body))
+            await self.apply_event(Event("judged", now, person.id, name, body))
         else:
             return await self._play(person, do, message, Event(str(do), now, person.id, name))
         return (person,)
@@ -358,7 +358,7 @@ class Server:
                     raise ActionError("there is no such viewpoint")
             reply = spoken_reply(game.situation, words(message["text"]), picture, len(game.said), part.way)
             event.body["reply"] = parse(to_json(reply))
-        await self.happen(event)
+        await self.apply_event(event)
         return [self.sessions.people[p] for p in game.people.values()]
 
     async def _send_house(self, person: Person) -> None:
@@ -390,9 +390,9 @@ class Server:
         """End what nobody goes on with."""
         for event in self.sessions.late(time.time()):
             game = self.sessions.games.get(event.body.get("game", ""))
-            await self.happen(event)
+            await self.apply_event(event)
             if game is not None:
-                await self.settle(*(self.sessions.people[p] for p in game.people.values()))
+                await self.advance(*(self.sessions.people[p] for p in game.people.values()))
 
     async def tick(self) -> None:
         """Once a second: time-outs, and those who wait."""
@@ -401,7 +401,7 @@ class Server:
             with suppress(Refused):
                 await self.late()
                 for person in [p for p in self.sessions.people.values() if p.waiting]:
-                    await self.settle(person)
+                    await self.advance(person)
 
 
 def app_of(server: Server) -> ASGIApp:
@@ -437,7 +437,7 @@ def app_of(server: Server) -> ASGIApp:
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
         ticking = asyncio.create_task(server.tick())
         for game in server.sessions.games.values():
-            server.start_machine(game)
+            server.start_bot(game)
         yield
         ticking.cancel()
 

@@ -39,7 +39,7 @@ Eye = tuple[str, float, float, float, float]
 """World, x, y, z of the camera in metres, yaw in radians."""
 
 
-class Drive:
+class BrowserBody:
     """Where a body is in one episode. What it does follows from the order of its actions."""
 
     def __init__(self, place: Place, pose: Pose, grounds: Grounds) -> None:

@@ -35,10 +35,10 @@ from embodied.plugins import made_by_name
 from embodied.policies.baselines import WITHOUT_LEARNING
 from embodied.records import from_plain, parse, to_json
 from embodied.seeds import stream
-from embodied.serve.driving import ACTIONS, Drive
+from embodied.serve.driving import ACTIONS, BrowserBody
 from embodied.serve.store import Event
-from embodied.serve.study import LONGEST_TEXT, PERSON, Part
-from embodied.serve.talk import Follower, Overheard, PathSpeaker, Relay, TalkEnv
+from embodied.serve.study import LONGEST_TEXT, PERSON, StudyPart
+from embodied.serve.talk import Overheard, PathSpeaker, PracticeAgent, Relay, TalkEnv
 
 AgentMaker = Callable[[Mapping[str, Place]], Agent]
 AssistantMaker = Callable[[Assistant], Assistant]
@@ -52,7 +52,7 @@ POLICIES: Mapping[str, AgentMaker] = {
 class Table:
     """What all games of a part share: the places, the tasks, and who plays where no person does."""
 
-    part: Part
+    part: StudyPart
     places: Mapping[str, Place]
     tasks: Mapping[str, Task]
     practice: Task
@@ -65,7 +65,7 @@ class Table:
 
 
 def set_table(
-    part: Part,
+    part: StudyPart,
     data: Dataset,
     agents: Mapping[str, AgentMaker] = POLICIES,
     assistants: Mapping[str, AssistantMaker] = MappingProxyType({}),
@@ -143,14 +143,14 @@ class Game:
             self.relay = Relay()
             helped = self.table.part.assistant != "none"
             self.env: HelpEnv = TalkEnv(self.table.places, self.relay if helped else None, PanoramicMoves())
-            self.agent: Agent | None = None if "agent" in self.people else Follower()
+            self.agent: Agent | None = None if "agent" in self.people else PracticeAgent()
             self.assistant: Any = None if "assistant" in self.people else PathSpeaker()
         else:
             self.env, self.relay = self.table.make_env()
             self.agent, self.assistant = self.table.agent, self.table.assistant
         self.observation: Observation | None = self.env.reset(self.task, seed=self.seed)
         drives = self.table.part.moves == "drive" and "agent" in self.people
-        self.drive = Drive(self.env.world, self.task.start, self.table.grounds) if drives else None
+        self.drive = BrowserBody(self.env.world, self.task.start, self.table.grounds) if drives else None
         self.last_change = self.begun
         self._steps: list[Step] = []
         self._asked_at = 0.0
@@ -170,7 +170,7 @@ class Game:
         return None if self.over else "assistant" if self.question is not None else "agent"
 
     @property
-    def machine_moves(self) -> bool:
+    def bot_moves(self) -> bool:
         return self.mover is not None and self.mover not in self.people
 
     @property
@@ -254,7 +254,7 @@ class Game:
         self.question, self._asked_at = question, time
         self.said.append({"who": "agent", "text": question, "picture": None})
 
-    def _drive(self, drive: Drive, action: int, time: float) -> None:
+    def _drive(self, drive: BrowserBody, action: int, time: float) -> None:
         """One action of whoever drives; moves along the graph when another viewpoint is the nearest."""
         if action not in range(len(ACTIONS)):
             raise ActionError(f"there are {len(ACTIONS)} actions, counted from 0")

@@ -20,14 +20,14 @@ from embodied.datasets.build import UnitFacts, save_facts, share, write_index
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import SUBGOALS, Dataset
 from embodied.interface import STEP, Episode, Pose, Route, Task
-from embodied.language.plain import PlainLanguage
-from embodied.language.said import Said
+from embodied.language.plain_language import PlainLanguage
+from embodied.language.utterances import Utterance
 from embodied.metrics import sdtw, without_repeats
 from embodied.navigation.graph import nearest
 from embodied.records import load_json, load_lines, save_lines
 from embodied.seeds import stream
 from embodied.serve.results import JUDGEMENTS, Judgement
-from embodied.serve.talk import SAID
+from embodied.serve.talk import PERSON_SUBTASK
 from embodied.tasks.vln import vln_task
 from embodied.teachers.vnla import VnlaTeacher
 
@@ -60,7 +60,7 @@ def answers(episode: Episode) -> Iterator[Worded]:
     """The answers of people in an episode, with the way that was meant; machines' have no such sub-task."""
     for step in episode.steps:
         reply, meant = step.reply, step.reply and step.reply.subtask
-        if reply and reply.text and meant and meant.id.startswith(SAID) and len(meant.path) > 1:
+        if reply and reply.text and meant and meant.id.startswith(PERSON_SUBTASK) and len(meant.path) > 1:
             yield Worded(episode.task.world, meant.path, step.pose.turn, reply.text)
 
 
@@ -154,10 +154,10 @@ def _routes(source: Dataset, name: str, words: Sequence[Worded], split: str, hel
             yield Route(f"{name}_people_{k}_plain", w.path, w.turn, 0, text, held_out)
 
 
-def _subgoals(source: Dataset, words: Sequence[Worded]) -> Iterator[Said]:
+def _subgoals(source: Dataset, words: Sequence[Worded]) -> Iterator[Utterance]:
     """Ways of at most HELP_STEPS actions, as the advisor words them, with what people said."""
     teacher = VnlaTeacher()
     for w in words:
         actions, end = teacher.words(source.place(w.world), Pose(w.path[0], w.turn), (w.path[-1],), HELP_STEPS)
         if end.node == w.path[-1]:
-            yield Said(tuple(a for a in actions if a != "stop"), w.text)
+            yield Utterance(tuple(a for a in actions if a != "stop"), w.text)

@@ -20,7 +20,7 @@ KEPT = 600
 """Encoded panoramas held in memory: some 100 MB."""
 
 
-class Pictures:
+class EncodedPanoramas:
     """The panoramas of the study's houses; nothing else can be asked for."""
 
     def __init__(self, files: Mapping[str, PanoramaFile], secret: str) -> None:

@@ -37,7 +37,7 @@ class Judgement:
     """From the first picture to the answer, as their browser says."""
 
 
-class Writer:
+class ResultsWriter:
     """Keeps the JSON Lines of a study in its folder: written anew from the log at the start, then added to."""
 
     def __init__(self, folder: Path, sessions: Sessions) -> None:

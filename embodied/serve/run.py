@@ -15,10 +15,10 @@ from embodied.interface import Episode
 from embodied.records import load_lines, to_json
 from embodied.render.panorama_file import PanoramaFile
 from embodied.serve.app import Server, key_of
-from embodied.serve.driving import Drive, Live
+from embodied.serve.driving import BrowserBody, Live
 from embodied.serve.game import POLICIES, AgentMaker, AssistantMaker, set_table
-from embodied.serve.pictures import Pictures
-from embodied.serve.results import Writer
+from embodied.serve.pictures import EncodedPanoramas
+from embodied.serve.results import ResultsWriter
 from embodied.serve.sessions import Sessions
 from embodied.serve.store import Store
 from embodied.serve.study import Study, StudyError, load_study
@@ -98,13 +98,13 @@ def open_study(
         live = Live(functools.partial(open_world, data))
         for table in driven:
             for task in {t.world: t for t in (table.practice, *table.tasks.values())}.values():
-                live.prepare(Drive(table.places[task.world], task.start, table.grounds).eye)
+                live.prepare(BrowserBody(table.places[task.world], task.start, table.grounds).eye)
     sessions = Sessions(study, tables, viewed)
     for event in store.events():
         sessions.apply(event)
-    writer = Writer(folder, sessions)
+    writer = ResultsWriter(folder, sessions)
     sessions.finished, sessions.judged = writer.game, writer.judged
-    return Opened(study, folder, Server(sessions, store, Pictures(files, secret), secret, addresses, live))
+    return Opened(study, folder, Server(sessions, store, EncodedPanoramas(files, secret), secret, addresses, live))
 
 
 def serve(opened: Opened, host: str, port: int) -> None:

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 
 from embodied.interface import Ask, Mode, Move, Observation, Place, Pose, Situation, Step, viewpoint
-from embodied.language.prose import prose
+from embodied.language.detokenize import detokenized
 from embodied.serve.driving import ACTIONS
 from embodied.serve.game import Game
-from embodied.serve.pictures import Pictures
+from embodied.serve.pictures import EncodedPanoramas
 from embodied.serve.sessions import STARS, Person, Sessions
-from embodied.serve.study import Part
+from embodied.serve.study import StudyPart
 from embodied.serve.talk import way_to_goal
 
 Screen = dict[str, Any]
 
 
-def screen_of(sessions: Sessions, person: Person, pictures: Pictures, code: str) -> Screen:
+def screen_of(sessions: Sessions, person: Person, pictures: EncodedPanoramas, code: str) -> Screen:
     """Everything that `person` sees now."""
     study = sessions.study
     base: Screen = {"title": study.title, "contact": study.contact, "progress": progress(sessions, person)}
@@ -62,24 +62,24 @@ def coming(sessions: Sessions, person: Person) -> Screen:
     return {"advice": part.advice, "role": shown, "practise": practise}
 
 
-def next_part(sessions: Sessions, person: Person) -> Part | None:
+def next_part(sessions: Sessions, person: Person) -> StudyPart | None:
     """The part that `person` does next; None where they have done all."""
     todo = (p for p in sessions.study.parts if person.done[p.name] < p.per_person and p.name not in person.without)
     return next(todo, None)
 
 
-def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
+def game_of(game: Game, role: str, pictures: EncodedPanoramas) -> Screen:
     """What both roles see."""
     world = game.task.world
     shown = lambda node: None if node is None else pictures.name(world, node)
-    said = [{"who": s["who"], "text": prose(s["text"]), "pano": shown(s["picture"])} for s in game.said]
+    said = [{"who": s["who"], "text": detokenized(s["text"]), "pano": shown(s["picture"])} for s in game.said]
     return {
         "screen": role,
         "game": game.id,
         "turn": game.turn,
         "practice": game.practice,
         "advice": game.table.part.advice,
-        "request": prose(game.task.request),
+        "request": detokenized(game.task.request),
         "said": said,
         "question": game.question,
         "yours": game.mover == role,
@@ -89,7 +89,7 @@ def game_of(game: Game, role: str, pictures: Pictures) -> Screen:
     }
 
 
-def agent_of(game: Game, pictures: Pictures) -> Screen:
+def agent_of(game: Game, pictures: EncodedPanoramas) -> Screen:
     """What the agent sees, and nothing that an agent may not know."""
     part, seen = game.table.part, game.observation
     assert seen is not None
@@ -100,7 +100,7 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
     return {
         **(moves if game.drive is None else drives),
         "words": list(seen.candidates.words if game.drive is None else ACTIONS),
-        "instruction": prose(seen.instruction),
+        "instruction": detokenized(seen.instruction),
         "subtask": seen.mode is Mode.SUB,
         "target": target,
         "canAsk": bool(seen.can_ask) and game.question is None,
@@ -112,12 +112,12 @@ def agent_of(game: Game, pictures: Pictures) -> Screen:
     }
 
 
-def live_name(game: Game, pictures: Pictures) -> str:
+def live_name(game: Game, pictures: EncodedPanoramas) -> str:
     """Under which the browser of whoever drives gets what is seen now; others cannot guess it."""
     return f"{game.id}/{pictures.name(game.id, game.turn)}"
 
 
-def moves_of(seen: Observation, situation: Situation, pictures: Pictures) -> list[Screen]:
+def moves_of(seen: Observation, situation: Situation, pictures: EncodedPanoramas) -> list[Screen]:
     """The moves that are allowed: where they are seen, and the panorama to fetch in advance."""
     c, at = seen.candidates, situation.world.graph.positions
     return [
@@ -147,7 +147,7 @@ def assistant_of(game: Game) -> Screen:
     }
 
 
-def judge_of(sessions: Sessions, person: Person, pictures: Pictures) -> Screen:
+def judge_of(sessions: Sessions, person: Person, pictures: EncodedPanoramas) -> Screen:
     """An episode to be watched, with what is asked about it."""
     assert person.viewing is not None
     part, episode = sessions.part(person.viewing[0]), sessions.episode_of(*person.viewing)
@@ -158,7 +158,7 @@ def judge_of(sessions: Sessions, person: Person, pictures: Pictures) -> Screen:
         "ask": part.ask or DEFAULT_QUESTIONS[part.kind],
         "stars": STARS if part.kind == "rate" else 0,
         "unit": f"{part.name}/{person.viewing[1]}",
-        "request": prose(episode.task.request) if part.kind == "rate" else None,
+        "request": detokenized(episode.task.request) if part.kind == "rate" else None,
         "frames": frames(episode.task.world, episode.task.start, episode.steps, part, pictures),
     }
 
@@ -169,24 +169,26 @@ DEFAULT_QUESTIONS = {
 }
 
 
-def frames(world: str, start: Pose, steps: tuple[Step, ...], part: Part, pictures: Pictures) -> list[Screen]:
+def frames(
+    world: str, start: Pose, steps: tuple[Step, ...], part: StudyPart, pictures: EncodedPanoramas
+) -> list[Screen]:
     """The pictures of an episode, one per step and one of where it ended."""
-    found: list[Screen] = []
+    shown: list[Screen] = []
     for step in steps:
         text = ""
         if part.kind == "rate" and isinstance(step.action, Ask):
             asked = step.action.question or "Can you help me?"
             text = f"Question: {asked}"
             if step.reply and step.reply.text:
-                text += f"\nAnswer: {prose(step.reply.text)}"
+                text += f"\nAnswer: {detokenized(step.reply.text)}"
         if isinstance(step.action, Move) or text:
             pose = step.next_pose if isinstance(step.action, Move) else step.pose
-            found.append({"pano": pictures.name(world, step.pose.node), "yaw": pose.yaw, "pitch": 0, "text": text})
+            shown.append({"pano": pictures.name(world, step.pose.node), "yaw": pose.yaw, "pitch": 0, "text": text})
     last = steps[-1].next_pose if steps else start
-    return [*found, {"pano": pictures.name(world, last.node), "yaw": last.yaw, "pitch": 0, "text": "The end."}]
+    return [*shown, {"pano": pictures.name(world, last.node), "yaw": last.yaw, "pitch": 0, "text": "The end."}]
 
 
-def plan_of(place: Place, pictures: Pictures) -> Screen:
+def plan_of(place: Place, pictures: EncodedPanoramas) -> Screen:
     """A house as a plan: rooms and viewpoints, metres."""
     house, graph = place.house, place.graph
     floor = {r.id: r.storey for r in house.rooms}

@@ -17,7 +17,7 @@ from embodied.interface import Episode
 from embodied.metrics import strict_success
 from embodied.serve.game import Game, Table
 from embodied.serve.store import Event
-from embodied.serve.study import LONGEST_TEXT, Part, Study
+from embodied.serve.study import LONGEST_TEXT, Study, StudyPart
 
 GONE_SECONDS = 1800.0
 """After which a task is given to others when somebody who plays alone does not come back."""
@@ -35,7 +35,7 @@ class Person:
     ended: str | None = None
     """'done', 'left': asked to stop, 'nothing': no task was left."""
     roles: dict[str, str] = field(default_factory=dict)
-    """Part to role."""
+    """StudyPart to role."""
     practised: set[str] = field(default_factory=set)
     """Roles."""
     done: Counter[str] = field(default_factory=Counter)
@@ -64,7 +64,7 @@ class Sessions:
     tables: Mapping[str, Table]
     """Of the parts that are played."""
     viewed: Mapping[str, Sequence[Episode]]
-    """Part that judges to the episodes of its file."""
+    """StudyPart that judges to the episodes of its file."""
     people: dict[str, Person] = field(default_factory=dict)
     by_key: dict[str, Person] = field(default_factory=dict)
     games: dict[str, Game] = field(default_factory=dict)
@@ -76,7 +76,7 @@ class Sessions:
     judged: Callable[[Event], None] = lambda event: None
     """Called with every judgement."""
     _counts: defaultdict[str, Counter[str]] = field(default_factory=lambda: defaultdict(Counter))
-    """Part to how many have begun or done each unit."""
+    """StudyPart to how many have begun or done each unit."""
     _episodes: defaultdict[str, list[tuple[str, Game]]] = field(default_factory=lambda: defaultdict(list))
 
     # Changing ------------------------------------------------------------------------------------
@@ -178,10 +178,10 @@ class Sessions:
 
     # Asking --------------------------------------------------------------------------------------
 
-    def part(self, name: str) -> Part:
+    def part(self, name: str) -> StudyPart:
         return next(p for p in self.study.parts if p.name == name)
 
-    def episodes(self, part: Part) -> list[tuple[str, Episode]]:
+    def episodes(self, part: StudyPart) -> list[tuple[str, Episode]]:
         """What a part judges: (unit, episode)."""
         if part.episodes:
             return [(str(i), e) for i, e in enumerate(self.viewed[part.name])]
@@ -191,7 +191,7 @@ class Sessions:
         """What a part judges under the name `unit`."""
         return self.viewed[part][int(unit)] if self.part(part).episodes else self.games[unit].episode
 
-    def wanted(self, part: Part, *people: Person) -> str | None:
+    def wanted(self, part: StudyPart, *people: Person) -> str | None:
         """The unit of a part that lacks most and that none of `people` has had; None where there is none."""
         units: Iterable[str] = self.tables[part.name].tasks if part.kind == "play" else self._viewable(part, *people)
         counts = self._counts[part.name]
@@ -199,7 +199,7 @@ class Sessions:
         open_units = [u for u in open_units if all((part.name, u) not in p.units for p in people)]
         return min(open_units, key=lambda u: counts[u], default=None)
 
-    def _viewable(self, part: Part, *people: Person) -> Iterator[str]:
+    def _viewable(self, part: StudyPart, *people: Person) -> Iterator[str]:
         """Nobody judges what they took part in."""
         if part.episodes:
             yield from (str(i) for i in range(len(self.viewed[part.name])))
@@ -266,19 +266,19 @@ class Sessions:
                 events.append(_event("broken", now, game=game.id, why=why))
         return events
 
-    def _scarce_role(self, part: Part) -> str:
+    def _scarce_role(self, part: StudyPart) -> str:
         """The role that fewer of those who are here have."""
         here = [p for p in self.people.values() if p.connected and not p.ended]
         taken = Counter(p.roles[part.name] for p in here if part.name in p.roles)
         return min(part.roles, key=lambda r: taken[r])
 
-    def _waiting(self, part: Part, role: str) -> list[Person]:
+    def _waiting(self, part: StudyPart, role: str) -> list[Person]:
         """Those who wait for somebody in `role`, the longest first."""
         here = [(p.waiting, p) for p in self.people.values() if p.waiting and p.connected]
         here = [(w, p) for w, p in here if w[0] == part.name and p.roles[part.name] != role]
         return [p for _, p in sorted(here, key=lambda x: x[0])]
 
-    def _begin(self, part: Part, people: Mapping[str, Person], unit: str | None, now: float) -> Event:
+    def _begin(self, part: StudyPart, people: Mapping[str, Person], unit: str | None, now: float) -> Event:
         for person in people.values():
             person.waiting = None
         ids = {r: p.id for r, p in people.items()}

@@ -29,7 +29,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Part:
+class StudyPart:
     """One kind of thing that people are asked to do."""
 
     name: str
@@ -101,7 +101,7 @@ class Study:
     """The data set that tasks and houses come from; relative to the file."""
     consent: str
     """What people agree to, in paragraphs."""
-    parts: tuple[Part, ...]
+    parts: tuple[StudyPart, ...]
     contact: str = ""
     thanks: str = "Thank you for taking part."
     seed: int = 0

@@ -24,11 +24,11 @@ from embodied.interface import (
     Subtask,
     Viewpoint,
 )
-from embodied.language.plain import PlainLanguage
+from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import nearest
 from embodied.policies.baselines import Shortest
 
-SAID = "said "
+PERSON_SUBTASK = "said "
 """How the ids of sub-tasks begin that people put into words."""
 
 
@@ -100,7 +100,7 @@ def spoken_reply(situation: Situation, text: str, picture: int | None, number: i
     graph, pose = situation.world.graph, situation.pose
     path = way_to_goal(situation, way) if picture is None else graph.path(pose.node, picture)
     goal = nearest(graph, path[-1], situation.task.goal_nodes)
-    subtask = Subtask(f"{SAID}{number}", path[-1], start=pose, goal=goal, path=path)
+    subtask = Subtask(f"{PERSON_SUBTASK}{number}", path[-1], start=pose, goal=goal, path=path)
     return Reply(text, None if picture is None else Viewpoint(situation.task.world, picture), subtask=subtask)
 
 
@@ -127,7 +127,7 @@ class PathSpeaker:
         return dataclasses.replace(reply, subtask=dataclasses.replace(required(reply.subtask, "way"), id="way"))
 
 
-class Follower:
+class PracticeAgent:
     """Takes the shortest way and asks every few steps: somebody to practise answering with."""
 
     def __init__(self, every: int = 3) -> None:

@@ -25,7 +25,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.identity import identity_of
 from embodied.interface import SeenPlace
-from embodied.language.voice import People, RouteDescriber
+from embodied.language.people_language import People, RouteDescriber
 
 VALIDATION = 300
 """Trips of each validation, from all houses alike; judging takes all."""

@@ -14,7 +14,7 @@ from embodied.seeds import stream
 
 
 @dataclass(frozen=True)
-class Said:
+class Utterance:
     """What somebody said and the primitive actions that were meant, without 'stop'."""
 
     words: tuple[str, ...]
@@ -24,7 +24,7 @@ class Said:
 class PeoplesWords:
     """A `Language` with people's sub-goals where people meant the same actions, and another language's elsewhere."""
 
-    def __init__(self, said: Iterable[Said], other: Language) -> None:
+    def __init__(self, said: Iterable[Utterance], other: Language) -> None:
         self._other = other
         self._texts: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
         for s in said:

@@ -22,7 +22,7 @@ SMALLEST = 5
 
 
 @dataclass(frozen=True)
-class SeenThing:
+class VisibleThing:
     """One thing in view."""
 
     placement: str
@@ -63,15 +63,15 @@ class Door:
 
 
 @dataclass(frozen=True)
-class Seen:
+class Surroundings:
     """All of it from one node."""
 
     kind: str
-    things: tuple[SeenThing, ...]
+    things: tuple[VisibleThing, ...]
     ways: tuple[Way, ...]
     doors: tuple[Door, ...] = ()
 
-    def nearest(self, thing: Referent) -> SeenThing | None:
+    def nearest(self, thing: Referent) -> VisibleThing | None:
         """The nearest thing in view that `thing` may mean."""
         fitting = [s for s in self.things if says(s.asset, thing)]
         return min(fitting, key=lambda s: (s.distance, s.placement)) if fitting else None
@@ -82,20 +82,20 @@ class Lookout:
 
     def __init__(self, world: SeenPlace) -> None:
         self._world = world
-        self._looks: dict[int, Seen] = {}
+        self._looks: dict[int, Surroundings] = {}
 
-    def at(self, node: int) -> Seen:
+    def at(self, node: int) -> Surroundings:
         """What is seen from `node`."""
         if node not in self._looks:
             self._looks[node] = look(self._world, node)
         return self._looks[node]
 
 
-def look(world: SeenPlace, node: int) -> Seen:
+def look(world: SeenPlace, node: int) -> Surroundings:
     """What is seen from `node`, the largest things first."""
     graph, house, assets = world.graph, world.house, world.catalogue.assets
     things = tuple(
-        SeenThing(
+        VisibleThing(
             placement=s.placement,
             asset=assets[house.placement_by_id[s.placement].asset],
             yaw=s.yaw,
@@ -124,7 +124,7 @@ def look(world: SeenPlace, node: int) -> Seen:
             )
         )
     seen_doors = tuple(Door(name, (float(at[0] - here[0]), float(at[1] - here[1]))) for name, _, at in doors)
-    return Seen(house.room_by_id[room].kind, things, tuple(ways), seen_doors)
+    return Surroundings(house.room_by_id[room].kind, things, tuple(ways), seen_doors)
 
 
 def _doors(world: SeenPlace, room: str) -> list[tuple[str, str, np.ndarray]]:

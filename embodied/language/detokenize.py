@@ -5,6 +5,6 @@ from __future__ import annotations
 import re
 
 
-def prose(text: str) -> str:
+def detokenized(text: str) -> str:
     """'go into the hall . turn left' becomes 'go into the hall. turn left': no blanks before punctuation."""
     return re.sub(r" +([.,;:?!]+)(?=\s|$)", r"\1", text)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from embodied.assistants.words import described
 from embodied.interface import Ask, Intention, Mode, Place, Pose, Reply, Step, Task, Viewpoint
-from embodied.language.prose import prose
+from embodied.language.detokenize import detokenized
 from embodied.task_kind import kind_named
 
 QUESTIONS = {
@@ -21,7 +21,7 @@ QUESTIONS = {
 }
 
 
-class Story:
+class EpisodeLog:
     """What has happened so far: dialogue, path, goals, the route spoken about and the image looked for.
 
     Call `before` when a step is about to be taken and `after` when it was.
@@ -30,7 +30,7 @@ class Story:
     def __init__(self, task: Task, budget: int | None = None) -> None:
         """`budget`: requests that the episode allows; None where they are not counted."""
         self.task, self.budget = task, budget
-        self.dialogue = [f"**Requester:** {prose(task.request)}"]
+        self.dialogue = [f"**Requester:** {detokenized(task.request)}"]
         self.nodes = [task.start.node]
         self.goals = [task.goal_nodes[0]]
         """HARI's stack of goals, the top last."""
@@ -71,7 +71,7 @@ class Story:
             if step.reply is not None:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)
-            self.dialogue.append(f"**Teacher:** {prose(step.reply.text or '')}")
+            self.dialogue.append(f"**Teacher:** {detokenized(step.reply.text or '')}")
         remark = kind_named(self.task.kind).story.remark
         if remark and (line := remark(self.task, self.nodes, step)):
             self.dialogue.append(f"*{line}*")
@@ -83,7 +83,7 @@ class Story:
 
     def _heard(self, reply: Reply, pose: Pose) -> None:
         said = reply.text or described(reply.description or (), pose if reply.intention is Intention.CUR else None)
-        self.dialogue.append(f"**Assistant:** {prose(said)}")
+        self.dialogue.append(f"**Assistant:** {detokenized(said)}")
         self.image = reply.image or self.image
         if reply.subtask is not None:
             self.route = reply.subtask.path
@@ -113,7 +113,7 @@ class Story:
         here, lines = step.pose.node, []
         for depth, goal in reversed(list(enumerate(self.goals))):
             room = world.graph.room_of_node[goal].replace("_", " ")
-            name = f"the task: “{prose(self.task.request)}”" if depth == 0 else "sub-goal from the assistant"
+            name = f"the task: “{detokenized(self.task.request)}”" if depth == 0 else "sub-goal from the assistant"
             text = f"{depth + 1}. {name}, in the {room}, {world.graph.distance[here, goal]:.1f} m from here"
             lines.append(f"**{text}**  ← now" if depth == len(self.goals) - 1 else text)
         return "\n\n".join(lines)

@@ -20,7 +20,7 @@ from embodied.interface import (
     Task,
     Viewpoint,
 )
-from embodied.viz.story import Story
+from embodied.viz.episode_log import EpisodeLog
 
 GOAL = FindObject("mug", "hall", ("mug_1",))
 
@@ -42,7 +42,7 @@ def told(story, *steps):
 
 def test_the_route_is_spoken_of_until_it_is_left_and_then_the_goal_image_is_looked_for():
     reply = Reply("Go on .", Viewpoint("line", 1), subtask=Subtask("r1", 1, Pose(0), 2, (0, 1, 2)))
-    asked = told(Story(task_of("hanna")), step_of(Ask(), reply=reply))
+    asked = told(EpisodeLog(task_of("hanna")), step_of(Ask(), reply=reply))
     assert asked.route == (0, 1, 2) and asked.image == Viewpoint("line", 1)
     assert asked.dialogue[1:] == ["**Agent** (step 0): Can you help me?", "**Assistant:** Go on."]
     sub = {"mode": Mode.SUB, "targets": (1,), "subtask": "r1"}
@@ -54,12 +54,12 @@ def test_the_route_is_spoken_of_until_it_is_left_and_then_the_goal_image_is_look
 
 
 def test_requests_that_are_counted_run_out():
-    story = Story(task_of("vnla"), 2)
+    story = EpisodeLog(task_of("vnla"), 2)
     left = [story.left]
     for _ in range(2):
         told(story, step_of(Ask(Intention.HELP), reply=Reply(text="turn left")))
         left.append(story.left)
-    assert left == [2, 1, 0] and Story(task_of("hanna")).left is None
+    assert left == [2, 1, 0] and EpisodeLog(task_of("hanna")).left is None
 
 
 def test_the_goal_stack_grows_with_a_sub_goal_and_shrinks_when_it_is_dropped():
@@ -69,7 +69,7 @@ def test_the_goal_stack_grows_with_a_sub_goal_and_shrinks_when_it_is_dropped():
             description=(Feature("room", "hall"),), intention=Intention.SUB, subtask=Subtask("subgoal", 1, path=(0, 1))
         ),
     )
-    story = told(Story(task_of("hari")), step_of(Ask(Intention.SUB), reply=reply))
+    story = told(EpisodeLog(task_of("hari")), step_of(Ask(Intention.SUB), reply=reply))
     assert story.goals == [3, 1]
     sub = step_of(Move(0), to=1, mode=Mode.SUB, targets=(1,), subtask="subgoal")
     story.before(sub)
@@ -90,7 +90,7 @@ def test_descriptions_name_the_side_as_seen_from_the_gaze():
 
 
 def test_a_long_dialogue_keeps_the_request_and_its_end():
-    story = told(Story(task_of("hanna")), *[step_of(Ask(), reply=Reply(f"answer {i}.")) for i in range(20)])
+    story = told(EpisodeLog(task_of("hanna")), *[step_of(Ask(), reply=Reply(f"answer {i}.")) for i in range(20)])
     lines = story.told(11).split("\n\n")
     assert lines[0].startswith("**Requester:**") and lines[1] == "…" and lines[-1] == "**Assistant:** answer 19."
     assert len(lines) == 6, "six short lines and the gaps between them are eleven rows"
@@ -99,6 +99,6 @@ def test_a_long_dialogue_keeps_the_request_and_its_end():
 
 def test_an_answer_too_long_for_the_pane_is_shown_all_the_same():
     story = told(
-        Story(task_of("hanna")), step_of(Ask(), reply=Reply("short.")), step_of(Ask(), reply=Reply("long " * 300))
+        EpisodeLog(task_of("hanna")), step_of(Ask(), reply=Reply("short.")), step_of(Ask(), reply=Reply("long " * 300))
     )
     assert story.told(11).split("\n\n")[-1].startswith("**Assistant:** long")
