@@ -132,7 +132,7 @@ PRODUCTS = {
     "bakes": ("embodied.light.baking.house", settings.APART),
     "unwrappings": ("embodied.light.pages.unwrap", unwrap.APART),
     "halved maps": ("embodied.light.pages.colours", colours.APART),
-    "boxes": ("embodied.scene.collision", collision.APART),
+    "boxes": ("embodied.scene.collision", collision.UNCOUNTED_MODULES),
     "models": (importer.READER, importer.APART),
 }
 DECIDED_BY = {

@@ -18,7 +18,7 @@ from embodied.assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.config import RETRIES
 from embodied.generate.footprint import draw_footprint
-from embodied.generate.kinds import BEDROOMS, KINDS, Extra
+from embodied.generate.kinds import BEDROOMS, ROOM_TABLE, Extra
 from embodied.generate.stages import Draft
 from embodied.generate.style_finishes import STYLE_FINISHES
 from embodied.generate.walkways import remove_blocking_objects
@@ -346,7 +346,7 @@ def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(tmp_path, monkeypa
     """As docs/houses.md promises: its name, how architects think of it, and its furniture."""
     monkeypatch.setattr("embodied.house.house.ROOM_KINDS", (*ROOM_KINDS, "music_room"))
     often = Extra(house=0.0, size=14.0, likely=1e6)
-    monkeypatch.setitem(KINDS, "music_room", replace(KINDS["library"], extra=often))
+    monkeypatch.setitem(ROOM_TABLE, "music_room", replace(ROOM_TABLE["library"], extra=often))
     (tmp_path / "groups.toml").write_text(
         '[rooms.music_room]\nrules = [{ group = "piece", role = "upright piano" }, { group = "greenery" }]'
     )
@@ -356,7 +356,7 @@ def test_a_new_kind_of_room_is_an_entry_in_each_of_two_tables(tmp_path, monkeypa
 
 
 def test_every_kind_of_room_that_is_drawn_stands_in_the_table_of_kinds():
-    assert set(KINDS) == set(ROOM_KINDS) - {"stairwell"}  # houses of several storeys are not drawn yet
+    assert set(ROOM_TABLE) == set(ROOM_KINDS) - {"stairwell"}  # houses of several storeys are not drawn yet
 
 
 @pytest.mark.slow

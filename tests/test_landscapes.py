@@ -92,7 +92,7 @@ def test_each_landscape_compiles_and_stands_outside_the_house(two_room_house, la
         assert p.owner.removeprefix("outdoor/") in PIECES
         c, s = np.cos(p.yaw), np.sin(p.yaw)
         xy = p.mesh.vertices[:, :2] @ np.array([[c, s], [-s, c]]) + p.position[:2]
-        assert np.abs(xy).max() < 0.8 * backdrop.RADIUS
+        assert np.abs(xy).max() < 0.8 * backdrop.DOME_RADIUS
         if p.owner in ("outdoor/trees", "outdoor/neighbours", "outdoor/windows", "outdoor/street", "outdoor/border"):
             assert not shapely.contains_xy(inner.buffer(1.0), xy).any(), p.mesh_key
     model = build_spec(house, catalogue, collisions=False).compile()
@@ -106,7 +106,7 @@ def test_the_dome_has_no_id_and_a_ray_out_of_the_window_ends_on_it(two_room_hous
     data, hit = mujoco.MjData(scene.model), np.zeros(1, np.int32)
     mujoco.mj_forward(scene.model, data)
     away = mujoco.mj_ray(scene.model, data, np.array([2.5, -30.0, 2.0]), np.array([0.0, -1.0, 0.0]), None, 1, -1, hit)
-    assert hit[0] == dome[0] and 0.9 * backdrop.RADIUS - 32 < away < backdrop.RADIUS
+    assert hit[0] == dome[0] and 0.9 * backdrop.DOME_RADIUS - 32 < away < backdrop.DOME_RADIUS
 
 
 def test_neighbours_do_not_overlap_the_plot_and_only_three_landscapes_have_them(two_room_house):
@@ -129,7 +129,7 @@ def test_farther_hills_are_nearer_to_the_colour_of_the_sky(two_room_house):
     light = far_canvas.FarLight(grey[0], np.full(3, 0.3), np.zeros(3), np.array([0, 0, 1.0]), 12e3, 0.0)
     apart = []
     for distance in (500.0, 2000.0, 8000.0, 30000.0):
-        canvas = far_canvas.Canvas(grey.copy(), 1.75)
+        canvas = far_canvas.FarCanvas(grey.copy(), 1.75)
         hill = Ridge(distance, 0.06 * distance, 0.0, "wood")
         for _, draw in far_land.ridge(canvas, hill, place, light, rng=np.random.default_rng(0)):
             draw()

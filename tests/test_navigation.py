@@ -19,7 +19,7 @@ from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.house.house import HouseError, Placement
 from embodied.mattersim.graphs import load_graphs
 from embodied.navigation.free_space import EYE, free_floor, leaves, sight_floor
-from embodied.navigation.graph import RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
+from embodied.navigation.graph import AGENT_RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
 
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
 
@@ -105,7 +105,7 @@ def test_each_edge_is_walkable_for_the_agents_radius_and_sees_its_other_end(some
         floor, sight = free_floor(house, 0), sight_floor(house, 0)
         for i, j in graph.edges:
             way = shapely.LineString(graph.positions[[i, j], :2])
-            assert floor.covers(way.buffer(RADIUS - 1e-3)), (house.seed, i, j)
+            assert floor.covers(way.buffer(AGENT_RADIUS - 1e-3)), (house.seed, i, j)
             assert sight.covers(way), (house.seed, i, j)
 
 

@@ -16,12 +16,12 @@ from hand_worlds import grid_world, thing
 from embodied.assets.records import Asset, SupportSurface
 from embodied.assistants.route_system import route_paths
 from embodied.generate.people import (
-    APART,
     BACK,
     CLASS,
-    FARTHEST,
+    FARTHEST_PERSON,
     LAP,
-    NEAREST,
+    NEAREST_PERSON,
+    PERSONAL_SPACE,
     POLITE,
     add_people,
     place_people,
@@ -33,7 +33,7 @@ from embodied.geometry import facing_of, wrap
 from embodied.house.house import House, Opening, Placement, check
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import leaves
-from embodied.navigation.graph import RADIUS, NavGraph, graph_of, unreachable_rooms
+from embodied.navigation.graph import AGENT_RADIUS, NavGraph, graph_of, unreachable_rooms
 from embodied.tasks.goals import find_instances
 
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
@@ -82,7 +82,9 @@ def test_one_person_per_start_looking_at_it_or_at_a_start_nearby():
     for node in (0, 14, 30):
         here = [p for p in people if p.room == world.graph.room_of_node[node]]
         assert any(
-            NEAREST - 1e-3 <= math.dist(p.position[:2], world.graph.positions[node, :2]) <= FARTHEST + 1e-3
+            NEAREST_PERSON - 1e-3
+            <= math.dist(p.position[:2], world.graph.positions[node, :2])
+            <= FARTHEST_PERSON + 1e-3
             for p in here
         )
     for p in people:
@@ -90,7 +92,7 @@ def test_one_person_per_start_looking_at_it_or_at_a_start_nearby():
         assert any(
             abs(wrap(facing_of(p.yaw) - math.atan2(y, x))) < 1e-3
             for x, y in offsets
-            if math.hypot(x, y) <= FARTHEST + 1e-3
+            if math.hypot(x, y) <= FARTHEST_PERSON + 1e-3
         )
 
 
@@ -99,9 +101,11 @@ def test_nobody_blocks_an_edge_or_stands_in_furniture():
     ways = shapely.MultiLineString([world.graph.positions[list(e), :2].tolist() for e in world.graph.edges])
     people = [shapely.Point(p.position[:2]) for p in people_of(house)]
     assert len(people) > 12
-    assert all(ways.distance(p) >= RADIUS + max(FIGURE.size[:2]) / 2 - 0.02 for p in people)
+    assert all(ways.distance(p) >= AGENT_RADIUS + max(FIGURE.size[:2]) / 2 - 0.02 for p in people)
     assert all(
-        a.distance(b) >= APART / 2 + max(FIGURE.size[:2]) / 2 - 0.02 for i, a in enumerate(people) for b in people[:i]
+        a.distance(b) >= PERSONAL_SPACE / 2 + max(FIGURE.size[:2]) / 2 - 0.02
+        for i, a in enumerate(people)
+        for b in people[:i]
     )
     check(house)
 

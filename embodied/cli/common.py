@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from embodied.house.house import House, Opening, Room
 
 T = TypeVar("T")
-PATIENCE = 2.0
+BAR_DELAY = 2.0
 """Seconds after which a bar appears."""
 SELDOM = 30.0
 """Seconds between two states of a bar that no terminal shows, where each is a line."""
@@ -69,7 +69,7 @@ def pause() -> float:
 
 def bar(items: Iterable[T], name: str, unit: str, total: int | None = None) -> Iterable[T]:
     """`items`, with a progress bar that appears when they take longer than two seconds."""
-    return tqdm(items, name, total=total, unit=unit, delay=PATIENCE, leave=False, mininterval=pause())
+    return tqdm(items, name, total=total, unit=unit, delay=BAR_DELAY, leave=False, mininterval=pause())
 
 
 def fetch(catalogue: Catalogue, house: House) -> None:

@@ -19,8 +19,8 @@ from embodied.novelty import NOVELTIES
 from embodied.options import InputPath, OutputFolder, Settings
 
 KIND = "kind of house (what is not given is drawn from the seed)"
-WORDS = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}
-WORDS["novelty"] = NOVELTIES
+HOUSE_WORDS = {"shape": SHAPES, "style": STYLES, "weather": WEATHERS, "landscape": LANDSCAPES, "season": SEASONS}
+HOUSE_WORDS["novelty"] = NOVELTIES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class Options(Furnished, Printed):
     """Leave out house.xml and its files."""
     glb: bool = False
     """Also write house.glb, for Blender and the web."""
-    config: Annotated[HouseConfig, Settings(KIND, HouseConfig(), words=WORDS)]
+    config: Annotated[HouseConfig, Settings(KIND, HouseConfig(), words=HOUSE_WORDS)]
 
 
 def run(args: Options) -> None:

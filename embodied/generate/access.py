@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from embodied.generate.kinds import KINDS
+from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.modules import Cell
 
 
@@ -132,7 +132,7 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tupl
     for (i, j), wall in walls.items():
         for child, parent in ((i, j), (j, i)):
             cost, kinds = _cost(cells, child, parent), {cells[child].kind, cells[parent].kind}
-            needed = 9 if kinds <= {"hall", "corridor"} else KINDS[cells[child].kind].wall
+            needed = 9 if kinds <= {"hall", "corridor"} else ROOM_TABLE[cells[child].kind].wall
             if cost is not None and wall.length >= needed:
                 options[parent].append((cost, child, wall))
     links: list[Link] = []
@@ -184,6 +184,6 @@ def _cost(cells: list[Cell], child: int, parent: int) -> float | None:
     c, p = cells[child], cells[parent]
     if c.owner is not None:
         return 0.0 if c.owner == parent else None
-    if not KINDS[p.kind].leads_on and (p.kind, c.kind) not in ALSO_THROUGH:
+    if not ROOM_TABLE[p.kind].leads_on and (p.kind, c.kind) not in ALSO_THROUGH:
         return None
-    return KINDS[c.kind].entered_from.get(p.kind)
+    return ROOM_TABLE[c.kind].entered_from.get(p.kind)

@@ -66,8 +66,8 @@ class RoomKind:
     """None: the programme decides by itself whether a house has one."""
 
 
-KINDS: dict[str, RoomKind] = from_plain(
+ROOM_TABLE: dict[str, RoomKind] = from_plain(
     dict[str, RoomKind], read_toml(Path(__file__).with_name("kinds.toml")), "kinds.toml"
 )
 """Room kind to what is usual for it. The order of the kinds with an `extra` is that in which they are drawn."""
-BEDROOMS = tuple(name for name, kind in KINDS.items() if kind.is_bedroom)
+BEDROOMS = tuple(name for name, kind in ROOM_TABLE.items() if kind.is_bedroom)

@@ -11,14 +11,14 @@ import numpy as np
 
 from embodied.generate.access import Link, connect, has_outer_doors, walls_between
 from embodied.generate.footprint import Band, Cap, Footprint, Rect
-from embodied.generate.kinds import KINDS
+from embodied.generate.kinds import ROOM_TABLE
 from embodied.generate.modules import Cell, Module, Slot, arrange, draw_modules, width
 from embodied.generate.program import WantedRoom
 from embodied.generate.score import score
 
 LONG = 95
 """Corridors longer than this, decimetres, are divided."""
-KEPT = 6
+PARENTS = 6
 """Candidates kept as parents."""
 MAIN_SUITE = ("main_bedroom", "bathroom")
 CAP_STARTS = (
@@ -48,7 +48,7 @@ Rows = list[list[tuple[Module, int]]]
 
 
 @dataclass(frozen=True)
-class Plan:
+class FloorPlan:
     """A plan on the 0.1 m grid: cells, the walls they share, and the ways between them."""
 
     cells: tuple[Cell, ...]
@@ -82,13 +82,13 @@ class Ends:
 
 def draw_plan(
     footprints: Sequence[Footprint], spaces: tuple[WantedRoom, ...], tries: int, *, rng: np.random.Generator
-) -> Plan | None:
+) -> FloorPlan | None:
     """The best of `tries` candidates: random ones first, then changes of the best so far.
 
     Returns:
       None where no candidate can be walked without crossing a private room.
     """
-    best: list[tuple[float, Genome, Plan]] = []
+    best: list[tuple[float, Genome, FloorPlan]] = []
     for k in range(tries):
         if k < 0.45 * tries or not best:
             modules, rows, cuts = rng.integers(2**31, size=3).tolist()
@@ -96,9 +96,9 @@ def draw_plan(
             genome = Genome(which, modules, rows, cuts, privacy)
         else:
             genome = _changed(best[int(rng.integers(len(best)))][1], len(footprints), rng)
-        plan = _realised(footprints[genome.footprint], spaces, genome, best[-1][0] if len(best) == KEPT else -np.inf)
+        plan = _realised(footprints[genome.footprint], spaces, genome, best[-1][0] if len(best) == PARENTS else -np.inf)
         if plan is not None and all(plan.score != other for other, _, _ in best):
-            best = sorted([*best, (plan.score, genome, plan)], key=lambda b: -b[0])[:KEPT]
+            best = sorted([*best, (plan.score, genome, plan)], key=lambda b: -b[0])[:PARENTS]
     return best[0][2] if best else None
 
 
@@ -118,7 +118,7 @@ def _changed(genome: Genome, footprints: int, rng: np.random.Generator) -> Genom
     return replace(genome, privacy=tuple(privacy))
 
 
-def _realised(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Genome, floor: float) -> Plan | None:
+def _realised(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Genome, floor: float) -> FloorPlan | None:
     """The genome's plan, None where it cannot be built or scores below `floor`."""
     cells = _candidate(footprint, spaces, genome)
     if cells is None:
@@ -128,10 +128,10 @@ def _realised(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Geno
     if value <= floor or not has_outer_doors(cells, walls):
         return None
     linked = connect(cells, walls)
-    return None if linked is None else Plan(tuple(cells), tuple(linked[0]), value - linked[1])
+    return None if linked is None else FloorPlan(tuple(cells), tuple(linked[0]), value - linked[1])
 
 
-def with_short_corridors(plan: Plan) -> Plan:
+def with_short_corridors(plan: FloorPlan) -> FloorPlan:
     """The plan with corridors beyond LONG cut in two or three by a cased opening, where every door keeps its place."""
     cells = list(plan.cells)
     for i, c in enumerate(plan.cells):
@@ -158,10 +158,10 @@ def with_short_corridors(plan: Plan) -> Plan:
         cells[i] = replace(c, rect=parts[0], area=0.0)
         cells += [replace(c, rect=r, area=0.0) for r in parts[1:]]
     linked = connect(cells, walls_between(cells))
-    return plan if linked is None else Plan(tuple(cells), tuple(linked[0]), plan.score)
+    return plan if linked is None else FloorPlan(tuple(cells), tuple(linked[0]), plan.score)
 
 
-def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
+def turned(plan: FloorPlan, *, rng: np.random.Generator) -> FloorPlan:
     """The plan mirrored and turned at random, its lower left corner at the origin."""
     flip_x, flip_y, swap = (bool(b) for b in rng.integers(0, 2, 3))
 
@@ -180,7 +180,7 @@ def turned(plan: Plan, *, rng: np.random.Generator) -> Plan:
     walls = walls_between(list(cells))
     between = ((min(k.child, k.parent), max(k.child, k.parent)) for k in plan.links)
     links = tuple(replace(k, wall=walls[pair]) for k, pair in zip(plan.links, between))
-    return Plan(cells, links, plan.score)
+    return FloorPlan(cells, links, plan.score)
 
 
 def _candidate(footprint: Footprint, spaces: tuple[WantedRoom, ...], genome: Genome) -> list[Cell] | None:
@@ -261,7 +261,7 @@ def _assign(
     footprint: Footprint, modules: list[Module], privacy: dict[int, float], rng: np.random.Generator
 ) -> Rows | None:
     """Modules with their wanted widths to rows, from the public end to the private one."""
-    keys = [KINDS[m.main.kind].privacy + privacy[id(m.main)] for m in modules]
+    keys = [ROOM_TABLE[m.main.kind].privacy + privacy[id(m.main)] for m in modules]
     order = sorted(range(len(modules)), key=lambda k: keys[k])
     strips, corridor = footprint.strips, footprint.corridor
     depths = sorted({s.depth for s in strips})

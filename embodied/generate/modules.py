@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from embodied.generate.footprint import Rect, Strip
-from embodied.generate.kinds import BEDROOMS, KINDS
+from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
 from embodied.generate.program import WantedRoom
 
 FILLERS = {"kitchen": "pantry", **dict.fromkeys((*BEDROOMS, "hall", "study", "laundry_room"), "closet")}
@@ -127,7 +127,7 @@ def arrange(module: Module, slot: Slot, wanted: int, *, first: int = 0) -> list[
 
 def _least(kind: str) -> int:
     """Smallest usual side of a kind, decimetres."""
-    return round(KINDS[kind].side * 10)
+    return round(ROOM_TABLE[kind].side * 10)
 
 
 def _small_rooms(module: Module) -> tuple[WantedRoom, ...]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from embodied.generate.access import Link, SharedWall, outer_stretches, walls_between
-from embodied.generate.kinds import KINDS
-from embodied.generate.layout import Plan
+from embodied.generate.kinds import ROOM_TABLE
+from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
 from embodied.house.house import Opening, rounded
 
@@ -68,7 +68,7 @@ class Leaves:
 class _Openings:
     """The openings of a plan so far, and the floor that their leaves sweep."""
 
-    plan: Plan
+    plan: FloorPlan
     names: tuple[str, ...]
     """Room id of each cell."""
     leaves: Leaves
@@ -129,7 +129,7 @@ def outer_walls(cells: tuple[Cell, ...], walls: dict[tuple[int, int], SharedWall
 
 
 def draw_openings(
-    plan: Plan, names: tuple[str, ...], leaves: Leaves, height: float, open_plan: bool, *, rng: np.random.Generator
+    plan: FloorPlan, names: tuple[str, ...], leaves: Leaves, height: float, open_plan: bool, *, rng: np.random.Generator
 ) -> tuple[Opening, ...]:
     """All openings of a plan.
 
@@ -155,10 +155,10 @@ def draw_openings(
     return tuple(made.found)
 
 
-def _is_wide(plan: Plan, link: Link) -> bool:
+def _is_wide(plan: FloorPlan, link: Link) -> bool:
     """True if a way through is a passage without a leaf."""
     kinds = {plan.cells[link.child].kind, plan.cells[link.parent].kind}
-    return all(KINDS[k].is_open for k in kinds) or kinds <= CIRCULATION or kinds == {"hall", "living_room"}
+    return all(ROOM_TABLE[k].is_open for k in kinds) or kinds <= CIRCULATION or kinds == {"hall", "living_room"}
 
 
 def _jambs(cell: Cell, axis: str, across: float, low: float, high: float) -> tuple[Point, Point]:
@@ -250,7 +250,7 @@ def _door(made: _Openings, link: Link, rng: np.random.Generator) -> None:
     axis, (across, low, high) = link.wall.axis, _wall_metres(link)
     cell = made.plan.cells[link.child]
     own, side = _span_and_side(cell, axis, across)
-    width = min(KINDS[cell.kind].door, high - low - 2 * NIB)
+    width = min(ROOM_TABLE[cell.kind].door, high - low - 2 * NIB)
     places = []
     for start in (low + NIB, high - NIB - width, (low + high - width) / 2):
         corner = min(start - own[0], own[1] - start - width)
@@ -300,7 +300,7 @@ def _folded_door(made: _Openings, link: Link, rng: np.random.Generator) -> bool:
     axis, (across, low, high) = link.wall.axis, _wall_metres(link)
     outer = made.plan.cells[link.parent]
     own, side = _span_and_side(outer, axis, across)
-    width = min(KINDS[made.plan.cells[link.child].kind].door, high - low - 2 * NIB)
+    width = min(ROOM_TABLE[made.plan.cells[link.child].kind].door, high - low - 2 * NIB)
     k = 0 if axis == "x" else 1
     taken = [
         sorted((o.a[k], o.b[k]))
@@ -395,7 +395,7 @@ def _back_door(made: _Openings, i: int, rng: np.random.Generator) -> bool:
 def _windows(made: _Openings, i: int, height: float, rng: np.random.Generator) -> None:
     """Windows for one room: as much glass as its floor asks for, centred on the free stretches of outer wall."""
     c = made.plan.cells[i]
-    kind = KINDS[c.kind]
+    kind = ROOM_TABLE[c.kind]
     if kind.glass is None:
         return
     x0, y0, x1, y1 = _metres(c)

@@ -15,7 +15,7 @@ from embodied.geometry import rectangle, rotation, yaw_facing
 from embodied.house.house import House, Placement, Room, rounded
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import leaves
-from embodied.navigation.graph import RADIUS, unreachable_rooms
+from embodied.navigation.graph import AGENT_RADIUS, unreachable_rooms
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
 
 CLASS = "person"
-NEAREST, FARTHEST = 0.5, 2.0
+NEAREST_PERSON, FARTHEST_PERSON = 0.5, 2.0
 """How far from their node people may be, metres: within its zone of attention."""
 POLITE = 1.0
 """How far they are where there is room, metres."""
-APART = 0.9
+PERSONAL_SPACE = 0.9
 """Width of the circle around a person that nobody else's body enters, metres."""
 STANDING = 1.35
 """Least height of a standing figure, metres."""
@@ -123,12 +123,14 @@ class _Site:
     def __init__(
         self, house: House, room: Room, eye: np.ndarray, ways: shapely.MultiLineString, people: Sequence[Placement]
     ) -> None:
-        around = _disc(eye, 2 * FARTHEST)
+        around = _disc(eye, 2 * FARTHEST_PERSON)
         self.eye, self.room, self.floor = eye, room, house.storey_of(room).elevation
-        self.edges, far = ways.intersection(around), _disc(eye, FARTHEST)
-        self.ring, self.polite = far.difference(_disc(eye, NEAREST)), far.difference(_disc(eye, POLITE))
+        self.edges, far = ways.intersection(around), _disc(eye, FARTHEST_PERSON)
+        self.ring, self.polite = far.difference(_disc(eye, NEAREST_PERSON)), far.difference(_disc(eye, POLITE))
         self.others = [
-            _disc(p.position[:2], APART / 2) for p in people if math.dist(p.position[:2], eye) < 2 * FARTHEST
+            _disc(p.position[:2], PERSONAL_SPACE / 2)
+            for p in people
+            if math.dist(p.position[:2], eye) < 2 * FARTHEST_PERSON
         ]
         self.open = house.floor(room).intersection(around)
         self.things = [p for p in house.placements if p.room == room.id and p.position[2] < 1.8 and p.size[2] > 0.05]
@@ -144,7 +146,7 @@ class _Site:
             asset, body = figures[int(i)], max(figures[int(i)].size[:2]) / 2
             if body >= too_wide:
                 continue
-            stopped = self.edges.buffer(body + RADIUS, quad_segs=4)  # where a walker would be
+            stopped = self.edges.buffer(body + AGENT_RADIUS, quad_segs=4)  # where a walker would be
             where = free.buffer(-body, quad_segs=4).intersection(self.ring).difference(stopped)
             if where.area >= ROOM:
                 away = where.intersection(self.polite)
@@ -179,7 +181,7 @@ class _Site:
             if (
                 self.ring.contains(shapely.Point(spot))
                 and self.open.buffer(0.02).contains(body)
-                and self.edges.distance(body) >= RADIUS
+                and self.edges.distance(body) >= AGENT_RADIUS
                 and not any(body.intersects(x) for x in taken)
             ):
                 return self._placed(asset, spot, self.floor + seat.lift, yaw)
@@ -217,8 +219,10 @@ def _seats(house: House, catalogue: Catalogue) -> list[_Seat]:
 
 
 def _nearest(people: Sequence[Placement], room: Room, eye: np.ndarray) -> Placement | None:
-    """Who of a room is nearest to a spot of it, within FARTHEST."""
-    near = [p for p in people if p.room == room.id and NEAREST <= math.dist(p.position[:2], eye) <= FARTHEST]
+    """Who of a room is nearest to a spot of it, within FARTHEST_PERSON."""
+    near = [
+        p for p in people if p.room == room.id and NEAREST_PERSON <= math.dist(p.position[:2], eye) <= FARTHEST_PERSON
+    ]
     return min(near, key=lambda p: math.dist(p.position[:2], eye), default=None)
 
 

@@ -21,8 +21,8 @@ from embodied.assets.json_file import RecordError, load_json
 from embodied.generate.access import connect, has_outer_doors, walls_between
 from embodied.generate.config import HouseConfig
 from embodied.generate.footprint import Rect
-from embodied.generate.kinds import KINDS
-from embodied.generate.layout import Plan
+from embodied.generate.kinds import ROOM_TABLE
+from embodied.generate.layout import FloorPlan
 from embodied.generate.modules import Cell
 from embodied.generate.stages import DEFAULT, STAGES, generate_house, with_plan
 from embodied.house.house import House, HouseError
@@ -55,7 +55,7 @@ class PlanFile:
     rooms: tuple[PlannedRoom, ...]
 
 
-def load_plan(path: Path) -> Plan:
+def load_plan(path: Path) -> FloorPlan:
     """Read a plan; doors are placed as in generated houses.
 
     Raises:
@@ -71,9 +71,9 @@ def load_plan(path: Path) -> Plan:
         raise HouseError(f'{e}; a plan is {{"rooms": [{{"kind": ..., "polygon": [[x, y], ...]}}, ...]}}') from e
     if len(rooms) > MOST_ROOMS:
         raise HouseError(f"{path} has {len(rooms)} rooms, a plan may have {MOST_ROOMS}")
-    if unknown := [(n, r.kind) for n, r in enumerate(rooms) if r.kind not in KINDS]:
+    if unknown := [(n, r.kind) for n, r in enumerate(rooms) if r.kind not in ROOM_TABLE]:
         number, kind = unknown[0]
-        raise HouseError(f"room {number} has the kind {kind!r}; use one of {', '.join(KINDS)}")
+        raise HouseError(f"room {number} has the kind {kind!r}; use one of {', '.join(ROOM_TABLE)}")
     _check_size(rooms)
     return plan_of([_cell(number, room) for number, room in enumerate(rooms)])
 
@@ -84,7 +84,7 @@ def _check_size(rooms: Sequence[PlannedRoom]) -> None:
     if not boxes:
         return
     sides = [(x1 - x0, y1 - y0) for _, (x0, y0, x1, y1) in boxes]
-    ratio = statistics.median(w * h / KINDS[r.kind].area[1] for (r, _), (w, h) in zip(boxes, sides, strict=True))
+    ratio = statistics.median(w * h / ROOM_TABLE[r.kind].area[1] for (r, _), (w, h) in zip(boxes, sides, strict=True))
     if ratio > OVERSIZE:
         (room, _), (w, h) = boxes[0], sides[0]
         unit = min(UNITS, key=lambda u: abs(math.log(ratio * UNITS[u] ** 2 / USUAL)))
@@ -112,7 +112,7 @@ def _box(corners: Sequence[tuple[float, float]]) -> tuple[float, float, float, f
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def plan_of(cells: list[Cell]) -> Plan:
+def plan_of(cells: list[Cell]) -> FloorPlan:
     """The cells with the ways between them.
 
     Raises:
@@ -134,11 +134,11 @@ def plan_of(cells: list[Cell]) -> Plan:
             "some room cannot be entered: it needs a shared wall of about 1 m with a hall, a corridor or a room that "
             "may be crossed on the way to it"
         )
-    return Plan(tuple(cells), tuple(linked[0]), 0.0)
+    return FloorPlan(tuple(cells), tuple(linked[0]), 0.0)
 
 
 def house_of_plan(
-    plan: Plan, seed: int = 0, config: HouseConfig = DEFAULT, catalogue: Catalogue | None = None
+    plan: FloorPlan, seed: int = 0, config: HouseConfig = DEFAULT, catalogue: Catalogue | None = None
 ) -> House:
     """A furnished house on a plan of your own; the seed draws doors, windows, materials and furniture.
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.generate.config import HouseConfig
-from embodied.generate.kinds import BEDROOMS, KINDS, Extra
+from embodied.generate.kinds import BEDROOMS, ROOM_TABLE, Extra
 
-SECONDS = ("study", "family_room", "workshop", "playroom", "sun_room", "library")
+DOUBLE_KINDS = ("study", "family_room", "workshop", "playroom", "sun_room", "library")
 """Kinds with an `extra` of which large houses may have two."""
 
 
@@ -101,7 +101,7 @@ def _extras(spaces: list[WantedRoom], area: float, config: HouseConfig, rng: np.
     asked, grow = config.rooms is not None, float(np.clip((area - 150) / 450, 0, 1))
     left = list(extras)
     while True:
-        if config.rooms is not None and sum(KINDS[s.kind].is_main for s in spaces) >= config.rooms:
+        if config.rooms is not None and sum(ROOM_TABLE[s.kind].is_main for s in spaces) >= config.rooms:
             return spaces
         free = 0.925 * area - sum(s.area for s in spaces)
         if not asked and free < 7.0:
@@ -129,7 +129,7 @@ def _extras(spaces: list[WantedRoom], area: float, config: HouseConfig, rng: np.
 
 
 def _extra_kinds() -> dict[str, Extra]:
-    return {name: kind.extra for name, kind in KINDS.items() if kind.extra is not None}
+    return {name: kind.extra for name, kind in ROOM_TABLE.items() if kind.extra is not None}
 
 
 def _another(
@@ -139,7 +139,9 @@ def _another(
     extras, asked = _extra_kinds(), config.rooms is not None
     beds = sum(s.kind in BEDROOMS for s in spaces)
     most = 0.5 * config.rooms if config.rooms is not None else area / 62
-    seconds = [k for k in SECONDS if sum(s.kind == k for s in spaces) < 2 and (asked or area > 2 * extras[k].house)]
+    seconds = [
+        k for k in DOUBLE_KINDS if sum(s.kind == k for s in spaces) < 2 and (asked or area > 2 * extras[k].house)
+    ]
     if (beds < most and config.bedrooms is None) or (not seconds and asked):
         return WantedRoom("guest_room" if rng.random() < 0.5 else "bedroom", 11.0 + 3.0 * grow)
     if not seconds:
@@ -150,7 +152,7 @@ def _another(
 
 def _scaled(spaces: list[WantedRoom], total: float) -> tuple[WantedRoom, ...]:
     """The same rooms stretched to sum to `total`, none more than a tenth beyond what is usual while that can be met."""
-    factor, usual = 1.0, [(s.area, *KINDS[s.kind].area) for s in spaces]
+    factor, usual = 1.0, [(s.area, *ROOM_TABLE[s.kind].area) for s in spaces]
     for _ in range(12):
         areas = [float(np.clip(area * factor, 0.9 * least, 1.1 * most)) for area, least, most in usual]
         factor *= (total / sum(areas)) ** 1.2

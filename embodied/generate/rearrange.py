@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 GONE, MOVED = 0.3, 0.7
 """Share of the small things that are put away, and share of the others that lie elsewhere on the same surface."""
-SMALL = 0.6
+SMALL_THING = 0.6
 """Longest side of small things, metres."""
-EDGE, TRIES = 0.01, 12
+EDGE, SPOT_TRIES = 0.01, 12
 
 
 def rearranged(house: House, graph: NavGraph, catalogue: Catalogue, starts: Iterable[int], *, day: int) -> House:
@@ -52,7 +52,7 @@ def _small(house: House) -> list[Placement]:
     return [
         p
         for p in house.placements
-        if p.id not in carry and max(p.size) <= SMALL and p.surface and p.object_class != CLASS
+        if p.id not in carry and max(p.size) <= SMALL_THING and p.surface and p.object_class != CLASS
     ]
 
 
@@ -70,7 +70,7 @@ def _moved(house: House, catalogue: Catalogue, rng: np.random.Generator) -> Hous
         ]
         taken = shapely.union_all(others).buffer(EDGE)
         low, high = np.array(top.bounds[:2]), np.array(top.bounds[2:])
-        for _ in range(TRIES):
+        for _ in range(SPOT_TRIES):
             x, y = rng.uniform(low, high)
             elsewhere = dataclasses.replace(
                 thing, position=rounded((x, y, thing.position[2])), yaw=rounded(thing.yaw + rng.uniform(-0.6, 0.6))

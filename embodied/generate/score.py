@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from embodied.generate.access import SharedWall
-from embodied.generate.kinds import BEDROOMS, KINDS
+from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
 from embodied.generate.modules import Cell
 
 WET = ("bathroom", "toilet", "laundry_room", "kitchen")
-NEAR = {
+NEIGHBOUR_VALUES = {
     ("dining_room", "kitchen"): 2.6,
     ("dining_room", "living_room"): 1.8,
     ("kitchen", "living_room"): 0.8,
@@ -43,7 +43,7 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:
         inner[i] += n
         inner[j] += n
         a, b = cells[i].kind, cells[j].kind
-        worth = NEAR.get((a, b) if a < b else (b, a))
+        worth = NEIGHBOUR_VALUES.get((a, b) if a < b else (b, a))
         if worth and n >= 12:
             value += worth
         if a in WET and b in WET:
@@ -61,7 +61,7 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:
             moving += area
             value -= 0.07 * max(0, long - 80) + 0.15 * (long / 10 > 3)
             continue
-        kind = KINDS[c.kind]
+        kind = ROOM_TABLE[c.kind]
         least, most = kind.area
         if c.kind == "hall":
             moving += 0.5 * area

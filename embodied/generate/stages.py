@@ -16,7 +16,7 @@ from embodied.generate.config import RETRIES, DeadEndError, HouseConfig
 from embodied.generate.finishes import Palette, assign_materials, draw_palette
 from embodied.generate.footprint import Footprint, draw_footprint, draw_shape
 from embodied.generate.furnish import furnish
-from embodied.generate.layout import Plan, draw_plan, turned, with_short_corridors
+from embodied.generate.layout import FloorPlan, draw_plan, turned, with_short_corridors
 from embodied.generate.modules import Cell
 from embodied.generate.novelty import furnishable
 from embodied.generate.openings import Leaves, draw_openings
@@ -29,7 +29,7 @@ from embodied.house.shapes import inward
 from embodied.navigation.graph import unreachable_rooms
 from embodied.seeds import checked_seed, stream
 
-TRIES = 14000
+PLAN_TRIES = 14000
 """Candidate plans per attempt, times rooms wanted: large houses get fewer."""
 DEFAULT = HouseConfig()
 
@@ -46,7 +46,7 @@ class Draft:
     footprints: tuple[Footprint, ...] = ()
     """Alternatives of one shape and area, among which the rooms stage chooses."""
     spaces: tuple[WantedRoom, ...] = ()
-    plan: Plan | None = None
+    plan: FloorPlan | None = None
     palette: Palette | None = None
     house: House | None = None
     attempt: int = 0
@@ -96,7 +96,7 @@ def rooms(draft: Draft) -> Draft:
     if draft.attempt:
         footprints = tuple(draw_footprint(draft.area, draft.shape, rng=rng) for _ in range(24))
         spaces = draw_program(draft.area, draft.config, rng=rng)
-    plan = draw_plan(footprints, spaces, min(1500, max(550, TRIES // len(spaces))), rng=rng)
+    plan = draw_plan(footprints, spaces, min(1500, max(550, PLAN_TRIES // len(spaces))), rng=rng)
     if plan is None:
         raise DeadEndError(
             f"no walkable plan of {draft.area:.0f} m2 with {len(draft.spaces)} rooms on a {draft.shape} footprint; "
@@ -105,7 +105,7 @@ def rooms(draft: Draft) -> Draft:
     return dataclasses.replace(draft, plan=turned(with_short_corridors(plan), rng=rng), spaces=spaces)
 
 
-def with_plan(plan: Plan) -> Stage:
+def with_plan(plan: FloorPlan) -> Stage:
     """A stage that takes the place of `rooms`: this plan in every attempt."""
     spaces = tuple(WantedRoom(c.kind, c.area) for c in plan.cells)
     area = sum(s.area for s in spaces)
@@ -150,7 +150,7 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
     )
 
 
-def _names(plan: Plan) -> tuple[str, ...]:
+def _names(plan: FloorPlan) -> tuple[str, ...]:
     """'<kind>_<number>' for each cell."""
     counts: Counter[str] = Counter()
     names = []

@@ -13,7 +13,7 @@ from embodied.generate.config import RETRIES, DeadEndError
 from embodied.house.house import House
 from embodied.house.shapes import footprint
 from embodied.navigation.free_space import HEAD, LOW
-from embodied.navigation.graph import CELL, RADIUS, closed_rooms, reachable
+from embodied.navigation.graph import AGENT_RADIUS, CELL, closed_rooms, reachable
 
 NEEDED = ("bed", "toilet", "bath", "shower", "sink", "basin", "cooker", "fridge", "sofa", "wardrobe", "table", "desk")
 """Words of object classes that are moved out of the way last."""
@@ -75,7 +75,7 @@ def _blocking(house: House, storey: int, closed: list[int], open_cells: np.ndarr
     toll = np.zeros(len(grid.xy))
     covered = []
     for p in things:
-        shape = footprint(p).buffer(RADIUS + 0.06)
+        shape = footprint(p).buffer(AGENT_RADIUS + 0.06)
         x0, y0, x1, y1 = shape.bounds
         box = np.flatnonzero((grid.xy >= (x0, y0)).all(1) & (grid.xy <= (x1, y1)).all(1))
         near = box[shapely.contains_xy(shape, grid.xy[box, 0], grid.xy[box, 1])]

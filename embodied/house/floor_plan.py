@@ -28,7 +28,7 @@ Point = Sequence[float] | np.ndarray
 """x and y, and perhaps more that a plan does not show, metres."""
 Line = Iterable[Point] | np.ndarray
 
-PAPER, INK, SOFT, GLASS = (250, 248, 243), (52, 50, 56), (128, 124, 122), (150, 175, 190)
+PAPER, INK, SOFT, GLASS_COLOUR = (250, 248, 243), (52, 50, 56), (128, 124, 122), (150, 175, 190)
 ROOM_COLOURS = {
     "living_room": (250, 236, 208),
     "family_room": (248, 232, 205),
@@ -54,7 +54,7 @@ ROOM_COLOURS = {
     "closet": (228, 226, 232),
     "stairwell": (240, 237, 230),
 }
-SMALL = 3
+SUPERSAMPLING = 3
 """Draw at this many times the final resolution, then shrink: smooth lines."""
 
 
@@ -93,7 +93,7 @@ def paint_plan(
     rooms = [r for r in house.rooms if r.storey == storey]
     if not rooms:
         raise ValueError(f"house {house.name!r} has no rooms on storey {storey}; it has {len(house.storeys)} storeys")
-    sheet = _Sheet(rooms, pixels_per_metre * SMALL, house.outer_wall)
+    sheet = _Sheet(rooms, pixels_per_metre * SUPERSAMPLING, house.outer_wall)
     ids = {r.id for r in rooms}
     for room in rooms:
         sheet.polygon(room.polygon, fill=ROOM_COLOURS.get(room.kind, PAPER))
@@ -111,7 +111,9 @@ def paint_plan(
         _draw_graph(sheet, graph, path)
         if path and facing is not None:
             _draw_walker(sheet, graph.positions[path[-1]][:2], facing)
-    image = sheet.image.resize((sheet.image.width // SMALL, sheet.image.height // SMALL), Image.Resampling.LANCZOS)
+    image = sheet.image.resize(
+        (sheet.image.width // SUPERSAMPLING, sheet.image.height // SUPERSAMPLING), Image.Resampling.LANCZOS
+    )
     out = _Sheet(rooms, pixels_per_metre, house.outer_wall, image)
     for room in rooms:
         _label(out, house, room)
@@ -157,7 +159,7 @@ class _Sheet:
         self.high = corners.max(0) + margin + 0.9
         self.low[1] -= 1.0
         self.scale = scale
-        size = (np.ceil((self.high - self.low) * scale / SMALL) * SMALL).astype(int)
+        size = (np.ceil((self.high - self.low) * scale / SUPERSAMPLING) * SUPERSAMPLING).astype(int)
         self.image = image if image is not None else Image.new("RGB", (int(size[0]), int(size[1])), PAPER)
         self.draw = ImageDraw.Draw(self.image)
 
@@ -225,7 +227,7 @@ def _draw_opening(sheet: _Sheet, house: House, o: Opening) -> None:
             mid, width = (a + b) / 2, float(np.linalg.norm(b - a))
             sheet.line((mid + low * n, mid + high * n), 0.03)
             for end, sign in ((a, 1), (b, -1)):
-                _arc(sheet, end + high * n, (b - a) / width * sign, n, width / 2, 1.4, GLASS)
+                _arc(sheet, end + high * n, (b - a) / width * sign, n, width / 2, 1.4, GLASS_COLOUR)
     elif o.kind == "garage_door":
         for v in np.linspace(low, high, 4):
             sheet.line((a + v * n, b + v * n), 0.02, SOFT)
@@ -373,7 +375,9 @@ def _draw_graph(sheet: _Sheet, graph: Graph, path: tuple[int, ...]) -> None:
     for k, p in enumerate(graph.positions):
         x, y = sheet.xy(p)
         r = (0.11 if k in path else 0.075) * sheet.scale
-        sheet.draw.ellipse((x - r, y - r, x + r, y + r), fill=(186, 84, 56), outline=(255, 255, 255), width=SMALL)
+        sheet.draw.ellipse(
+            (x - r, y - r, x + r, y + r), fill=(186, 84, 56), outline=(255, 255, 255), width=SUPERSAMPLING
+        )
 
 
 def _label(sheet: _Sheet, house: House, room: Room) -> None:

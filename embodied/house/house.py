@@ -37,7 +37,7 @@ DOORS = ("door", "passage", "front_door", "back_door", "french_window", "garage_
 """Opening kinds that a person can walk through."""
 
 
-SMALLEST, LARGEST = 1e-4, 30.0
+SHORTEST_SIDE, LONGEST_SIDE = 1e-4, 30.0
 """Shortest and longest side an object may have, metres."""
 ID = re.compile(r"[\w'.-]+")
 """Form of an id; walls and leaves are named '<id>/<part>', so that it holds no slash."""
@@ -361,10 +361,10 @@ def _check_numbers(house: House) -> Iterator[str]:
         if not all(map(math.isfinite, values)):
             yield f"{name!r} has a number that is not finite: {values}"
     for p in house.placements:
-        if not all(SMALLEST <= s <= LARGEST for s in p.size):
+        if not all(SHORTEST_SIDE <= s <= LONGEST_SIDE for s in p.size):
             yield (
-                f"object {p.id!r} has the size {p.size}; all three must be positive, at least {SMALLEST} and "
-                f"at most {LARGEST:.0f} m"
+                f"object {p.id!r} has the size {p.size}; all three must be positive, at least {SHORTEST_SIDE} and "
+                f"at most {LONGEST_SIDE:.0f} m"
             )
     for x in house.lights:
         if x.power < 0 or not all(0 <= c <= 1 for c in x.color):

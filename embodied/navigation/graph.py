@@ -24,19 +24,19 @@ from embodied.house.house import DOORS, House, HouseError, Room
 from embodied.navigation.free_space import EYE, free_floor, sight_floor
 
 log = logging.getLogger(__name__)
-RADIUS = 0.2
+AGENT_RADIUS = 0.2
 """Radius of the agent's body, metres."""
 CELL = 0.1
 """Grid on which viewpoints are chosen, metres."""
 ENTERED = 0.4
 """Share of a room's free floor that must be reachable for the room to count as entered."""
-APART = 0.65
+NODE_DISTANCE = 0.65
 """Least distance between viewpoints of one room, in units of the wanted spacing."""
-LOOKS = 48
+VIEWS_COMPARED = 48
 """Candidates per viewpoint whose views of the others are compared."""
 CROWDED = 0.6
 """Viewpoints closer than this, in units of the wanted spacing, are thinned where they can be."""
-LONGEST = 2.0
+LONGEST_EDGE = 2.0
 """Longest edge in units of the wanted spacing: 4.5 m; 95 % of Matterport3D's edges are shorter than 5 m."""
 
 
@@ -156,7 +156,7 @@ def build_graph(house: House, *, spacing: float = 2.25) -> NavGraph:
 
 def walkable(house: House, storey: int = 0) -> shapely.Geometry:
     """Area in which the agent's centre may be: the free floor shrunk by its radius."""
-    return free_floor(house, storey).buffer(-(RADIUS + 0.005), quad_segs=6)
+    return free_floor(house, storey).buffer(-(AGENT_RADIUS + 0.005), quad_segs=6)
 
 
 def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list[str], list[tuple[int, int]]]:
@@ -165,7 +165,7 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
     space = grid.space
     if shut := closed_rooms(room_of_cell, reach, len(rooms)):
         raise HouseError(
-            f"room {rooms[shut[0]].id!r} cannot be entered on foot by a body of radius {RADIUS} m; "
+            f"room {rooms[shut[0]].id!r} cannot be entered on foot by a body of radius {AGENT_RADIUS} m; "
             "widen its door or move the furniture that blocks it"
         )
     room_of_cell[~reach] = -1
@@ -173,7 +173,7 @@ def _storey_graph(house: House, storey: int, spacing: float) -> tuple[list, list
     nodes = _join(house, storey, space, grid, reach, nodes, spacing)
     nodes = _thinned(space, grid, room_of_cell, nodes, spacing)
     xy = grid.xy[nodes]
-    pairs = [tuple(p) for p in _visible_pairs(space, xy, LONGEST * spacing).tolist()]
+    pairs = [tuple(p) for p in _visible_pairs(space, xy, LONGEST_EDGE * spacing).tolist()]
     return xy.tolist(), [rooms[room_of_cell[n]].id for n in nodes], pairs
 
 
@@ -268,7 +268,7 @@ def _spread(
 ) -> list[int]:
     """Cells of the viewpoints: halls and corridors first, in each room a loose packing of calm spots that see more."""
     chosen: list[int] = []
-    apart = APART * spacing
+    apart = NODE_DISTANCE * spacing
     order = sorted(range(len(rooms)), key=lambda k: (rooms[k].kind not in ("hall", "corridor", "stairwell"), k))
     for k in order:
         cells = np.flatnonzero(room_of_cell == k)
@@ -281,7 +281,7 @@ def _spread(
             value = 1.2 * calm - 0.5 * np.abs(np.minimum(gap, 1.5 * apart) - apart) - 0.4 * np.maximum(0, 1 - elsewhere)
             ranked = np.flatnonzero(open_)[np.argsort(-value[open_], kind="stable")]
             top = ranked[: max(1, len(ranked) // 2)]
-            top = top[np.linspace(0, len(top) - 1, min(LOOKS, len(top))).astype(int)]
+            top = top[np.linspace(0, len(top) - 1, min(VIEWS_COMPARED, len(top))).astype(int)]
             best = int(
                 top[np.argmax(value[top] + 0.5 * np.minimum(_seen(space, grid, cells[top], chosen, spacing), 3))]
             )
@@ -307,7 +307,7 @@ def _thinned(
 ) -> list[int]:
     """The nodes without those that crowd another one and that neither their room nor the graph needs."""
     xy = grid.xy[nodes]
-    pairs = _visible_pairs(space, xy, LONGEST * spacing)
+    pairs = _visible_pairs(space, xy, LONGEST_EDGE * spacing)
     lengths = np.hypot(*(xy[pairs[:, 0]] - xy[pairs[:, 1]]).T)
     alive = np.ones(len(nodes), bool)
     rooms = room_of_cell[nodes]
@@ -347,7 +347,7 @@ def _join(
     ids = {r.id for r in house.rooms if r.storey == storey}
     cells = np.flatnonzero(reach)
     tree = cKDTree(grid.xy[cells])
-    longest = LONGEST * spacing
+    longest = LONGEST_EDGE * spacing
     for o in house.openings:
         if o.kind not in DOORS or o.rooms[1] is None or o.rooms[0] not in ids:
             continue
@@ -396,7 +396,7 @@ def _bridge(space: shapely.Geometry, grid: FreeCells, nodes: list[int], label: n
     while True:
         ends = np.arange(len(way) - 1, at, -1)
         lines = shapely.linestrings([(grid.xy[way[at]], grid.xy[way[k]]) for k in ends])
-        ok = shapely.covers(space, lines) & (shapely.length(lines) < LONGEST * spacing)
+        ok = shapely.covers(space, lines) & (shapely.length(lines) < LONGEST_EDGE * spacing)
         far = int(ends[np.argmax(ok)]) if ok.any() else at + 1
         if far == len(way) - 1:
             return added or [way[len(way) // 2]]

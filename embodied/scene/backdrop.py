@@ -15,7 +15,7 @@ from embodied.assets.archives import read_picture
 from embodied.assets.cache import digest, write_bytes
 from embodied.assets.closure import code_digest
 from embodied.house.house import House
-from embodied.scene.far_canvas import KNOTS, Canvas, FarLight, Things, elevations, share_down
+from embodied.scene.far_canvas import KNOTS, FarCanvas, FarLight, Things, elevations, share_down
 from embodied.scene.far_land import DRY, paint_ground, paint_water, ridge
 from embodied.scene.far_towns import street_lamps, town
 from embodied.scene.far_trees import tree
@@ -24,7 +24,7 @@ from embodied.seeds import stream
 
 DOME = "outdoor/sky"
 """Owner of the dome; no instance id belongs to it."""
-RADIUS = 90.0
+DOME_RADIUS = 90.0
 """Metres to the dome that wears the picture."""
 EYE = 1.6
 """Above the floor, metres."""
@@ -45,7 +45,7 @@ def dome(house: House, rows: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarr
     i = np.arange(rows)[:, None] * (2 * rows + 1) + np.arange(2 * rows)[None]
     a, b, c, e = i, i + 1, i + 2 * rows + 2, i + 2 * rows + 1
     faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, e], -1).reshape(-1, 3)])
-    vertices = (centre + RADIUS * d).reshape(-1, 3)
+    vertices = (centre + DOME_RADIUS * d).reshape(-1, 3)
     p = vertices[faces]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     outward = (normal * (p.mean(1) - centre)).sum(1) > 0
@@ -82,11 +82,11 @@ def plain_picture(place: Scenery, seed: int, rows: int = 512) -> np.ndarray:
     towards = np.array([0.45, -0.55, 0.70])
     air = np.tile(np.array([0.80, 0.86, 0.92], np.float32), (4 * rows, 1))
     light = FarLight(air, np.array([0.52, 0.55, 0.60]), np.array([0.62, 0.60, 0.55]), towards, 26e3, 0.0)
-    paint_land(Canvas(picture, place.height + EYE), place, light, rng=land_rng(seed))
+    paint_land(FarCanvas(picture, place.height + EYE), place, light, rng=land_rng(seed))
     return (255 * np.clip(picture, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
 
 
-def paint_land(canvas: Canvas, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> None:
+def paint_land(canvas: FarCanvas, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> None:
     """Everything between the plot and the sky, into `canvas`."""
     paint_ground(canvas, place, light, rng=rng)
     things: Things = []

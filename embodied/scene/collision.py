@@ -21,7 +21,7 @@ from embodied.assets.records import Asset, MeshPart
 from embodied.geometry import r2
 from embodied.house.house import House, Room
 
-APART = (
+UNCOUNTED_MODULES = (
     "embodied.assets",
     "embodied.assets.data",
     "embodied",
@@ -31,7 +31,7 @@ APART = (
 )
 """Modules that do not count as code of boxes: packages' names, the catalogue's rows, and houses, which boxes know
 nothing of."""
-CELLS = (20, 14, 10, 7, 5, 3, 2)
+GRID_CELLS = (20, 14, 10, 7, 5, 3, 2)
 """Cells along the longest side of the occupancy grid, tried from fine to coarse until few enough boxes remain."""
 MOST_BOXES = 30
 SLAB = 0.02
@@ -40,7 +40,7 @@ EVEN = 0.006
 """Unevenness of a support surface that is smoothed away, metres."""
 THINNEST = 0.002
 """Half thickness below which a box is thickened, metres."""
-SMALL = 0.35
+ONE_BOX = 0.35
 """Objects no larger than this in metres, without support surfaces, are one box."""
 
 DENSITIES = (
@@ -90,7 +90,7 @@ def kept_boxes(
 
 def boxes_code() -> str:
     """Digest of the code and the libraries that make boxes; boxes made by others are made anew."""
-    return code_digest(__name__, without=APART)
+    return code_digest(__name__, without=UNCOUNTED_MODULES)
 
 
 def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[CollisionBox, ...]:
@@ -114,10 +114,10 @@ def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, flo
         slabs.append((np.append(low[:2], bottom), np.append(high[:2], max(low[2], bottom + 2 * THINNEST))))
     if not len(points):
         return tuple(_box(low, high) for low, high in slabs)
-    if not slabs and (max(size) < SMALL or is_solid(points)):
+    if not slabs and (max(size) < ONE_BOX or is_solid(points)):
         return (_box(points.min(axis=0), points.max(axis=0)),)
     cut = sorted({round(float(high[2]), 4) + 1e-6 for _, high in slabs} | set(levels(parts)))
-    for n in CELLS:
+    for n in GRID_CELLS:
         bounds = grid_boxes(points, n, cut, MOST_BOXES)
         if len(bounds) <= MOST_BOXES:
             break

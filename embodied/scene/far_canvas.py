@@ -67,7 +67,7 @@ def share_down(elevation: np.ndarray | float) -> np.ndarray:
     return np.interp(-np.asarray(elevation), -KNOTS[0], KNOTS[1])
 
 
-class Canvas:
+class FarCanvas:
     """The picture while it is painted."""
 
     def __init__(self, picture: np.ndarray, eye: float) -> None:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from embodied.scene.far_canvas import Canvas, FarLight, Things, clearness
+from embodied.scene.far_canvas import FarCanvas, FarLight, Things, clearness
 from embodied.scene.far_trees import FIR, LEAVES, SNOW, tree
 from embodied.scene.landscapes import Ridge, Scenery
 
@@ -26,7 +26,7 @@ DRY = 0.2
 """Cosine of the angle from the outlook beyond which a lake has land."""
 
 
-def paint_ground(canvas: Canvas, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> None:
+def paint_ground(canvas: FarCanvas, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> None:
     """The ground up to the horizon, as fields, a town's streets and gardens, or meadow."""
     first = int(np.searchsorted(-canvas.elevation, 0.0))
     down = -canvas.elevation[first:]
@@ -56,7 +56,7 @@ def paint_ground(canvas: Canvas, place: Scenery, light: FarLight, *, rng: np.ran
     canvas.picture[first:] = own * e * clear + light.air[None].astype(np.float32) * (1 - clear)
 
 
-def ridge(canvas: Canvas, r: Ridge, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> Things:
+def ridge(canvas: FarCanvas, r: Ridge, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> Things:
     """A line of hills or trees around the house."""
     height = r.height + r.rough * (2 * _wave(canvas.w, r.grain, rng=rng) - 1)
     if r.cover == "trees" and r.distance <= 600:
@@ -86,7 +86,7 @@ def ridge(canvas: Canvas, r: Ridge, place: Scenery, light: FarLight, *, rng: np.
 
 
 def paint_water(
-    canvas: Canvas, place: Scenery, light: FarLight, shore: tuple[float, float], *, rng: np.random.Generator
+    canvas: FarCanvas, place: Scenery, light: FarLight, shore: tuple[float, float], *, rng: np.random.Generator
 ) -> None:
     """A lake on the side that the house looks at: the sky and the far shore, mirrored in small waves."""
     turn = np.abs(np.angle(np.exp(1j * (canvas.yaw - place.outlook))))
@@ -162,7 +162,7 @@ def _wave(n: int, grain: int, *, rng: np.random.Generator) -> np.ndarray:
 
 
 def _cover_of(
-    canvas: Canvas, r: Ridge, y0: int, y1: int, top: np.ndarray, place: Scenery, rng: np.random.Generator
+    canvas: FarCanvas, r: Ridge, y0: int, y1: int, top: np.ndarray, place: Scenery, rng: np.random.Generator
 ) -> np.ndarray:
     """(rows, w, 3) reflectances of a ridge's face."""
     h, w = y1 - y0, canvas.w
@@ -196,7 +196,7 @@ def _cover_of(
 
 
 def _trees_of(
-    canvas: Canvas, r: Ridge, height: np.ndarray, place: Scenery, light: FarLight, *, rng: np.random.Generator
+    canvas: FarCanvas, r: Ridge, height: np.ndarray, place: Scenery, light: FarLight, *, rng: np.random.Generator
 ) -> Things:
     """A wood's edge or a row of trees as single trees over undergrowth."""
     low = Ridge(r.distance, 0.42 * r.height, 0.25 * r.rough, "wood", 3 * r.grain)

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from embodied.scene.buildings import EVENING, LIT, PANE, ROOF, WALL, Building, Faces, faces_of
-from embodied.scene.far_canvas import Canvas, FarLight, Things, clearness
+from embodied.scene.far_canvas import FarCanvas, FarLight, Things, clearness
 from embodied.scene.far_trees import SNOW
 from embodied.scene.landscapes import Scenery, Town
 
@@ -21,7 +21,7 @@ PAINTS = np.array([(0.6,) * 3, (0.2,) * 3, (0.6,) * 3, (0.1,) * 3, (0.045,) * 3,
 """Of what buildings are made of; walls and roofs have several."""
 TILES = ((0.24, 0.095, 0.060), (0.19, 0.080, 0.055), (0.085, 0.085, 0.090), (0.27, 0.12, 0.075), (0.12, 0.10, 0.09))
 _C = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-PLAIN = np.array(
+BARE_BUILDING = np.array(
     [[(*_C[i], 0), (*_C[(i + 1) % 4], 0), (*_C[(i + 1) % 4], 1), (*_C[i], 1)] for i in range(4)]
     + [[(-1, -1, 1), (1, -1, 1), (1, 0, 1), (-1, 0, 1)], [(1, 1, 1), (-1, 1, 1), (-1, 0, 1), (1, 0, 1)]]
     + [[(1, -1, 1), (1, 1, 1), (1, 0.1, 1), (1, -0.1, 1)], [(-1, 1, 1), (-1, -1, 1), (-1, -0.1, 1), (-1, 0.1, 1)]],
@@ -33,7 +33,7 @@ RIDGE = np.zeros((8, 4, 3))
 RIDGE[4:, 2:, 2] = 1
 
 
-def town(canvas: Canvas, t: Town, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> Things:
+def town(canvas: FarCanvas, t: Town, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> Things:
     """A town's buildings, each painted later."""
     spots = _scattered(t, rng=rng) if t.count else _streets(t, rng=rng)
     things: Things = []
@@ -49,7 +49,7 @@ def town(canvas: Canvas, t: Town, place: Scenery, light: FarLight, *, rng: np.ra
     return things
 
 
-def street_lamps(canvas: Canvas, light: FarLight, *, rng: np.random.Generator) -> None:
+def street_lamps(canvas: FarCanvas, light: FarLight, *, rng: np.random.Generator) -> None:
     """Points of light among the houses."""
     for _ in range(700):
         away, yaw = 45 * (60 ** rng.random()), rng.uniform(-np.pi, np.pi)
@@ -96,7 +96,7 @@ def _streets(t: Town, *, rng: np.random.Generator) -> list[tuple[float, float, f
     return out
 
 
-def _paint_building(canvas: Canvas, b: Building, place: Scenery, light: FarLight, rng: np.random.Generator) -> None:
+def _paint_building(canvas: FarCanvas, b: Building, place: Scenery, light: FarLight, rng: np.random.Generator) -> None:
     """Walls, then the roof, then windows, of the sides that face the eye."""
     away = float(np.hypot(*b.at))
     faces = faces_of(b, -canvas.eye, detail=False, rng=rng) if away < 190 else _plain(b, -canvas.eye, rng=rng)
@@ -124,7 +124,7 @@ def _paint_building(canvas: Canvas, b: Building, place: Scenery, light: FarLight
 def _plain(b: Building, base: float, *, rng: np.random.Generator) -> Faces:
     """A far building: walls and roof, and one lit window in the evening."""
     x, y, z = b.wide / 2, b.deep / 2, b.eaves
-    low, high = PLAIN * [x, y, z], RIDGE * [x, y, b.ridge]
+    low, high = BARE_BUILDING * [x, y, z], RIDGE * [x, y, b.ridge]
     c, s = np.cos(b.yaw), np.sin(b.yaw)
     corners = (low + high) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]) + [*b.at, base]
     made = np.array([WALL, WALL, WALL, WALL, ROOF, ROOF, WALL, WALL])

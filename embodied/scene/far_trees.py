@@ -8,7 +8,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from embodied.scene.far_canvas import Canvas, FarLight, clearness
+from embodied.scene.far_canvas import FarCanvas, FarLight, clearness
 from embodied.scene.landscapes import Scenery
 
 LEAVES = {
@@ -24,7 +24,7 @@ SNOW = (0.76, 0.78, 0.82)
 
 
 def tree(
-    canvas: Canvas,
+    canvas: FarCanvas,
     away: float,
     yaw: float,
     place: Scenery,

@@ -25,8 +25,8 @@ from embodied.seeds import stream
 PIECES = ("reveal", "frame", "leaf", "leaf_2", "handle", "glass", "sill", "threshold")
 """Owners of an opening are '<opening>/<piece>'."""
 
-GLASS = Finish(color=(0.86, 0.93, 0.92, 0.08), roughness=0.02, specular=0.5)
-METAL = Finish(color=(0.72, 0.71, 0.69, 1.0), roughness=0.32, metallic=1.0)
+PANE_FINISH = Finish(color=(0.86, 0.93, 0.92, 0.08), roughness=0.02, specular=0.5)
+FITTING_METAL = Finish(color=(0.72, 0.71, 0.69, 1.0), roughness=0.32, metallic=1.0)
 STONE_SILL = Finish(color=(0.78, 0.77, 0.74, 1.0), roughness=0.35)
 
 LINING = 0.025
@@ -130,7 +130,7 @@ def _threshold(house: House, hole: _Hole, y0: float, y1: float, finish: Callable
     if first.floor_finish != second.floor_finish:
         lining = LINING if o.kind != "passage" else 0
         bar = box([lining, y1 - 0.028, -0.001], [hole.length - lining, y1 - 0.002, 0.0035], 0.0015)
-        parts.append(Part(owner, "floor", first.id, part(METAL, hole.world(bar)), owner + "#bar"))
+        parts.append(Part(owner, "floor", first.id, part(FITTING_METAL, hole.world(bar)), owner + "#bar"))
     return parts
 
 
@@ -150,9 +150,9 @@ def _window(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[
     outer = finish(facade_finish(house)) if outdoors else finish(room.wall_finish)
     parts.append(_part(hole, "reveal", "wall", outer, _tunnel(hole, hole.outside, y0, True), tag="#outer"))
     parts.append(_part(hole, "frame", "opening", frame_finish, sashes))
-    parts.append(_part(hole, "glass", "opening", GLASS, panes))
+    parts.append(_part(hole, "glass", "opening", PANE_FINISH, panes))
     if handles:
-        parts.append(_part(hole, "handle", "opening", METAL, *handles))
+        parts.append(_part(hole, "handle", "opening", FITTING_METAL, *handles))
     if french:
         parts += _threshold(house, hole, y1, hole.inside, finish)
     else:
@@ -291,9 +291,12 @@ def _leaves(house: House, hole: _Hole, wood: Finish) -> list[Part]:
         yaw = hole.yaw + side * o.angle
         piece = "leaf" if n == 0 else "leaf_2"
         stem = f"leaf/{style}/{o.kind}/{width:.4f}/{height:.4f}/{side:+.0f}"
-        pieces = [(piece, wood, wood_shape, f"{stem}/{o.leaf_finish}"), ("handle", METAL, handle, stem + "/handle")]
+        pieces = [
+            (piece, wood, wood_shape, f"{stem}/{o.leaf_finish}"),
+            ("handle", FITTING_METAL, handle, stem + "/handle"),
+        ]
         if panes is not None:
-            pieces.append(("glass", GLASS, panes, stem + "/glass"))
+            pieces.append(("glass", PANE_FINISH, panes, stem + "/glass"))
         for name, material, shape, key in pieces:
             mesh = part(material, shape.scaled(side, 1, 1))
             parts.append(Part(f"{o.id}/{name}", "opening", o.rooms[0], mesh, key, pivot, yaw))

@@ -147,7 +147,7 @@ class Scenery:
     @property
     def reach(self) -> float:
         """From the edge of the plot to the face of the nearest building, metres."""
-        return NEAREST[self.table.neighbours]
+        return BUILDING_SETBACK[self.table.neighbours]
 
 
 def scenery_of(house: House) -> Scenery:
@@ -202,7 +202,7 @@ def side_frame(
 
 STREET = (1.6, 5.6)
 """Beginning and end of the carriageway beyond the edge of the plot, metres."""
-NEAREST = {"villas": 7.5, "cottages": 8.2, "terrace": 8.6}
+BUILDING_SETBACK = {"villas": 7.5, "cottages": 8.2, "terrace": 8.6}
 """From the edge of the plot to the face of the nearest building, metres."""
 
 

@@ -50,7 +50,7 @@ FIRS = 1
 ASPHALT = Finish(color=(0.27, 0.27, 0.28, 1.0), roughness=0.95, specular=0.1)
 WOOD = Finish(color=(0.40, 0.35, 0.29, 1.0), roughness=0.9, specular=0.1)
 TRIMS = Finish(color=(0.86, 0.85, 0.82, 1.0), roughness=0.8, specular=0.2)
-GLASS = Finish(color=(0.24, 0.27, 0.31, 1.0), roughness=0.3, specular=0.3)
+NEIGHBOURS_GLASS = Finish(color=(0.24, 0.27, 0.31, 1.0), roughness=0.3, specular=0.3)
 DOORS = ((0.20, 0.27, 0.24), (0.36, 0.15, 0.12), (0.18, 0.22, 0.30), (0.30, 0.22, 0.15))
 NEIGHBOURS = (
     "render_white/0", "render_white/1", "brick_red/0", "render_white/2", "brick_yellow/0", "render_white/1",
@@ -138,8 +138,8 @@ def _neighbours(house: House, place: Scenery, finish: Callable[[str], Finish]) -
             ROOF: roof[b.tiles % 2],
             TRIM: TRIMS,
             DOOR: door,
-            PANE: GLASS,
-            LIT: GLASS,
+            PANE: NEIGHBOURS_GLASS,
+            LIT: NEIGHBOURS_GLASS,
         }
         tags = {WALL: f"#wall_{wall}", ROOF: f"#roof_{b.tiles % 2}", TRIM: "", DOOR: f"#door_{b.paint % len(DOORS)}"}
         for kind in np.unique(faces.made_of).tolist():

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from embodied.assets.records import MeshPart
 
-KINDS = ("object", "wall", "floor", "ceiling", "opening", "outdoor")
+PART_KINDS = ("object", "wall", "floor", "ceiling", "opening", "outdoor")
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,7 +14,7 @@ class Part:
     owner: str
     """Placement id, or a shell id: '<room>/floor', '<room>/wall_<i>', '<opening>/leaf', 'outdoor/ground'."""
     kind: str
-    """One of KINDS; 'opening' is all joinery: frames, leaves, panes, sills, reveals, and stairs."""
+    """One of PART_KINDS; 'opening' is all joinery: frames, leaves, panes, sills, reveals, and stairs."""
     room: str
     """The room it is seen from first; '' for the outdoors."""
     mesh: MeshPart

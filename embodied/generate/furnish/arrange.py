@@ -20,7 +20,7 @@ WALL_GAP = 0.02
 """Free strip between a wall and furniture, for the skirting, metres."""
 RUG_HEIGHT = 0.012
 """Metres."""
-PATIENCE = 6.0
+TRIES_PER_THING = 6.0
 """Poses tried in vain for one more thing of an arrangement."""
 
 
@@ -81,19 +81,19 @@ def pack(
 ) -> RoomSpace | None:
     """The room with the arrangement at the first pose that takes all of it, or at one that takes most of it.
 
-    A worse pose must make up for its rank by more things (PATIENCE poses for one thing). None where no pose takes
-    what is not optional, or where it would cut the room apart.
+    A worse pose must make up for its rank by more things (TRIES_PER_THING poses for one thing). None where no pose
+    takes what is not optional, or where it would cut the room apart.
     """
     best: tuple[float, RoomSpace] | None = None
     for rank, pose in enumerate(sorted(poses, key=lambda p: -p.score)[:tries]):
-        if best is not None and len(items) - rank / PATIENCE <= best[0]:
+        if best is not None and len(items) - rank / TRIES_PER_THING <= best[0]:
             break
         fit = _fit(space, items, pose, group)
         if fit is None:
             continue
         added = len(fit.things) - len(space.things)
-        if best is None or added - rank / PATIENCE > best[0]:
-            best = added - rank / PATIENCE, fit
+        if best is None or added - rank / TRIES_PER_THING > best[0]:
+            best = added - rank / TRIES_PER_THING, fit
         if added == len(items):
             break
     return best[1] if best else None

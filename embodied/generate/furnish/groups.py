@@ -14,21 +14,21 @@ import shapely
 from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.arrange import RUG_HEIGHT, Item, ScoredPose, floor_poses, is_flat, wall_poses
 from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.likes import LIKES, Spot, depth_before
+from embodied.generate.furnish.likes import LIKES, CandidateSpot, depth_before
 from embodied.generate.furnish.space import Thing, Wall
-from embodied.generate.furnish.stock import LARGEST, SMALLEST
-from embodied.generate.furnish.tables import Group, Part
+from embodied.generate.furnish.stock import NO_LEAST_SIZE, NO_MOST_SIZE
+from embodied.generate.furnish.tables import FurnitureGroup, GroupPart
 
-LARGE = 2.0
+LARGE_BASE = 2.0
 """A thing with a larger base stands in the middle of the room if its group is placed in the open, square metres."""
 ASIDE = (0.0, 0.35, -0.35)
 """How far aside a part that faces another is tried, metres."""
 AT_WALL = 0.5
 """Distance from the wall up to which things count in the width of a group, metres."""
-FAR = 99.0
+NO_LIMIT = 99.0
 
 
-def put_group(ctx: Context, group: Group, name: str, asset: Asset | None = None) -> tuple[Thing, ...]:
+def put_group(ctx: Context, group: FurnitureGroup, name: str, asset: Asset | None = None) -> tuple[Thing, ...]:
     """The things of a group, placed; nothing if it found none.
 
     Args:
@@ -57,9 +57,9 @@ def at_round(values: Sequence[float], k: int, default: float) -> float:
 # Which models --------------------------------------------------------------------------------------
 
 
-def _choose(ctx: Context, group: Group, k: int, first: Asset | None) -> list[tuple[Part, Asset]]:
+def _choose(ctx: Context, group: FurnitureGroup, k: int, first: Asset | None) -> list[tuple[GroupPart, Asset]]:
     """The parts of a group that it has in round `k`, each with a model; none where one lacks that it must have."""
-    chosen: list[tuple[Part, Asset]] = []
+    chosen: list[tuple[GroupPart, Asset]] = []
     models: dict[str, Asset] = {}
     for n, part in enumerate(group.parts):
         of = models.get(part.of) if part.of else chosen[0][1] if chosen else None
@@ -84,14 +84,16 @@ def _choose(ctx: Context, group: Group, k: int, first: Asset | None) -> list[tup
     return chosen
 
 
-def _model(ctx: Context, part: Part, k: int, of: Asset | None) -> Asset | None:
+def _model(ctx: Context, part: GroupPart, k: int, of: Asset | None) -> Asset | None:
     low, high = list(part.least), list(part.most)
     low[0] = max(low[0], at_round(part.narrowest, k, 0.0))
-    high[0] = min(high[0], at_round(part.widest, k, FAR), of.size[0] if part.fits and of is not None else FAR)
-    high[1] = min(high[1], at_round(part.deepest, k, FAR))
+    high[0] = min(high[0], at_round(part.widest, k, NO_LIMIT), of.size[0] if part.fits and of is not None else NO_LIMIT)
+    high[1] = min(high[1], at_round(part.deepest, k, NO_LIMIT))
     high[2] = min(high[2], ctx.space.height - 0.03)
     stretched = part.wider is not None or part.width is not None or part.of_room is not None
-    least, most = (SMALLEST, LARGEST) if stretched else ((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+    least, most = (
+        (NO_LEAST_SIZE, NO_MOST_SIZE) if stretched else ((low[0], low[1], low[2]), (high[0], high[1], high[2]))
+    )
     before = ctx.roles(part.name) if part.same else []
     if before and ctx.chance(part.same):
         return before[-1].asset
@@ -142,7 +144,7 @@ class _Plan:
     def __post_init__(self) -> None:
         self.hand = 1 if self.ctx.chance(0.5) else -1
 
-    def add(self, part: Part, asset: Asset) -> None:
+    def add(self, part: GroupPart, asset: Asset) -> None:
         """The things of one part, by those of the part that it goes by."""
         if not self.items:
             self._first(part, asset)
@@ -158,7 +160,7 @@ class _Plan:
             for n, (u, v, turn) in enumerate(AROUND[part.at](self, part, anchor, asset, size)):
                 self._put(part, asset, anchor, size, (u, v, turn), n)
 
-    def _first(self, part: Part, asset: Asset) -> None:
+    def _first(self, part: GroupPart, asset: Asset) -> None:
         w, d, h = size = _size(self.ctx, part, asset, None)
         yaw = self._turn(part, asset) + self.hand * math.radians(part.turn)
         turned = part.long and d > w
@@ -170,7 +172,7 @@ class _Plan:
             self.spots[part.called] = [_Spot(0, asset, (d, w, h), 0.0, y, yaw)]
 
     def _put(
-        self, part: Part, asset: Asset, anchor: _Spot, size: Size, place: tuple[float, float, float], n: int
+        self, part: GroupPart, asset: Asset, anchor: _Spot, size: Size, place: tuple[float, float, float], n: int
     ) -> None:
         u, v, turn = place
         rng = self.ctx.rng
@@ -205,13 +207,13 @@ class _Plan:
         yaw = turn if part.straight else anchor.yaw + turn
         self._keep(part, dataclasses.replace(item, x=x, y=y, yaw=yaw))
 
-    def _turn(self, part: Part, asset: Asset) -> float:
+    def _turn(self, part: GroupPart, asset: Asset) -> float:
         rng, (w, d, _) = self.ctx.rng, asset.size
         if part.turn_any and (part.at == "about" or abs(w - d) < 0.03):
             return float(rng.uniform(-math.pi, math.pi))
         return jitter(rng, part.angle_jitter)
 
-    def _keep(self, part: Part, item: Item) -> None:
+    def _keep(self, part: GroupPart, item: Item) -> None:
         spot = _Spot(len(self.items), item.asset, item.extent, item.x, item.y, item.yaw)
         self.items.append(dataclasses.replace(item, role=part.name or item.asset.object_class))
         self.spots.setdefault(part.called, []).append(spot)
@@ -237,21 +239,21 @@ Places = Iterable[tuple[float, float, float]]
 """(x, y, yaw) in the frame of what a part goes by: x to the right of who faces it, its front toward -y."""
 
 
-def _on(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _on(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     yield plan.hand * part.off_middle * anchor.size[0], -part.forward, 0.0
 
 
-def _about(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _about(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     rng, (w, d, _) = plan.ctx.rng, anchor.size
     for _ in range(int(at_round(part.count, plan.round, 1)) + int(rng.integers(part.more + 1))):
         yield rng.uniform(-0.4, 0.4) * w, rng.uniform(-0.4, 0.4) * d, 0.0
 
 
-def _before(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _before(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     yield 0.0, -anchor.size[1] / 2 - part.gap - size[1] / 2 - part.forward, 0.0
 
 
-def _beside(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _beside(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     deep = size[1] if part.look else size[0]
     x = anchor.size[0] / 2 + part.gap + deep / 2
     y = ((anchor.size[1] - size[1]) / 2 if part.flush else 0.0) - part.forward
@@ -260,15 +262,15 @@ def _beside(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) ->
         yield plan.hand * sign * x, y, -plan.hand * sign * math.radians(part.turn)
 
 
-def _over(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _over(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     yield 0.0, (anchor.size[1] - size[1]) / 2, 0.0
 
 
-def _facing(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _facing(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     yield plan.aside, -(plan.distance - size[1] / 2) - anchor.y, math.pi
 
 
-def _row(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _row(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     count = max(1, int(anchor.size[0] / part.every))
     for k in range(count):
         x = ((k + 0.5) / count - 0.5) * anchor.size[0]
@@ -280,7 +282,7 @@ def _facing_point(x: float, y: float, tx: float, ty: float) -> float:
     return math.atan2(ty - y, tx - x) + math.pi / 2
 
 
-def _seats(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> Places:
+def _seats(plan: _Plan, part: GroupPart, anchor: _Spot, asset: Asset, size: Size) -> Places:
     """Chairs around a table, tucked in and a little askew: in a circle, or along its sides and now and then its ends.
 
     Those that must find a place come first: one on each long side.
@@ -306,7 +308,7 @@ def _seats(plan: _Plan, part: Part, anchor: _Spot, asset: Asset, size: Size) -> 
             yield sign * (w / 2 + cd / 2 - tuck + _pulled(ctx.rng)), 0.0, -sign * math.pi / 2
 
 
-AROUND: dict[str, Callable[[_Plan, Part, _Spot, Asset, Size], Places]] = {
+AROUND: dict[str, Callable[[_Plan, GroupPart, _Spot, Asset, Size], Places]] = {
     "on": _on,
     "under": _on,
     "about": _about,
@@ -329,7 +331,7 @@ def jitter(rng: np.random.Generator, degrees: float) -> float:
     return float(np.radians(rng.uniform(-degrees, degrees))) if degrees else 0.0
 
 
-def _size(ctx: Context, part: Part, asset: Asset, of: _Spot | None) -> Size:
+def _size(ctx: Context, part: GroupPart, asset: Asset, of: _Spot | None) -> Size:
     """Size of a thing: its model's size, or what the part or the room asks for."""
     w, d, h = asset.size
     if part.of_room is not None:
@@ -358,7 +360,9 @@ def sides(floor: shapely.Polygon) -> tuple[float, float]:
 # Which poses are tried -----------------------------------------------------------------------------
 
 
-def _distances(ctx: Context, group: Group, chosen: list[tuple[Part, Asset]]) -> Iterator[tuple[float, float]]:
+def _distances(
+    ctx: Context, group: FurnitureGroup, chosen: list[tuple[GroupPart, Asset]]
+) -> Iterator[tuple[float, float]]:
     """From the wall of the first part to the back of one that faces it, and how far that one stands aside, metres."""
     facing = next((asset for part, asset in chosen if part.at == "facing"), None)
     if facing is None:
@@ -374,13 +378,13 @@ def _distances(ctx: Context, group: Group, chosen: list[tuple[Part, Asset]]) -> 
     yield from ((d, aside) for aside in ASIDE for d in distances)
 
 
-def _poses(ctx: Context, group: Group, plan: _Plan, k: int) -> list[ScoredPose]:
+def _poses(ctx: Context, group: FurnitureGroup, plan: _Plan, k: int) -> list[ScoredPose]:
     low, high = plan.span()
     first, width = plan.items[0], high - low + 2 * at_round(group.margin, k, 0.0)
     place, terms = group.place, {"noise": 0.35, **group.likes}
     near, distance = ctx.called(*group.near), plan.distance
     yaws = tuple(n * math.pi / 2 for n in range(group.turns))
-    if place == "open" and first.extent[0] * first.extent[1] > LARGE:
+    if place == "open" and first.extent[0] * first.extent[1] > LARGE_BASE:
         place, terms = "floor", {"middle": 1.0, "noise": 0.3}
     elif place == "ahead":
         if not near:
@@ -389,7 +393,7 @@ def _poses(ctx: Context, group: Group, plan: _Plan, k: int) -> list[ScoredPose]:
         yaws, terms, distance = (near[0].yaw,), {"ahead": 1.0}, (near[0].size[1] + deep) / 2 + group.gap
 
     def score(x: float, y: float, yaw: float, wall: Wall | None = None, s: float = 0.0) -> float:
-        spot = Spot(ctx, x, y, yaw, wall, s, width, first, near, distance)
+        spot = CandidateSpot(ctx, x, y, yaw, wall, s, width, first, near, distance)
         return sum(weight * LIKES[term](spot) for term, weight in terms.items() if weight)
 
     def at_wall(wall: Wall, s: float) -> float:

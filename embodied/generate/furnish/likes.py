@@ -16,7 +16,7 @@ TALL = 0.95
 
 
 @dataclass(frozen=True)
-class Spot:
+class CandidateSpot:
     """A pose at which a group might go."""
 
     ctx: Context
@@ -108,13 +108,13 @@ def nearest(x: float, y: float, things: Sequence[Thing]) -> float:
     return min((math.hypot(x - t.x, y - t.y) for t in things), default=0.0)
 
 
-def _across(p: Spot) -> float:
+def _across(p: CandidateSpot) -> float:
     """1 where what faces the first part has its back at the opposite wall, -2 where there is no room for it."""
     depth = depth_before(p.ctx.space, p.wall, p.s) if p.wall else p.distance
     return 1.0 if abs(depth - 0.04 - p.distance) < 0.03 else -2.0 if depth < p.distance - 0.02 else 0.0
 
 
-def _facing_door(p: Spot) -> float:
+def _facing_door(p: CandidateSpot) -> float:
     """How many doors are opposite."""
     wall = p.wall
     if wall is None:
@@ -128,31 +128,31 @@ def _facing_door(p: Spot) -> float:
     return float(sum(abs(wall.along_of(x, y) - p.s) < p.first.extent[0] / 2 + 0.4 for x, y in opposite))
 
 
-def _neighbour(p: Spot) -> float:
+def _neighbour(p: CandidateSpot) -> float:
     """1 right beside a thing of the same name."""
     same = p.ctx.called(p.first.role)
     gaps = (math.hypot(p.x - t.x, p.y - t.y) - (t.size[0] + p.width) / 2 for t in same)
     return float(any(gap < 0.15 for gap in gaps))
 
 
-def _long(p: Spot) -> float:
+def _long(p: CandidateSpot) -> float:
     x0, y0, x1, y1 = p.ctx.space.polygon.bounds
     return float((x1 - x0 >= y1 - y0) == (abs(math.cos(p.yaw)) > 0.5))
 
 
-def _middle(p: Spot) -> float:
+def _middle(p: CandidateSpot) -> float:
     x0, y0, x1, y1 = p.ctx.space.polygon.bounds
     return -math.hypot(p.x - (x0 + x1) / 2, p.y - (y0 + y1) / 2)
 
 
-def _ahead(p: Spot) -> float:
+def _ahead(p: CandidateSpot) -> float:
     """0 where the group is `distance` before the middle of what is near, less elsewhere."""
     n, (fx, fy) = len(p.near), p.near[0].front
     dx, dy = p.x - sum(t.x for t in p.near) / n, p.y - sum(t.y for t in p.near) / n
     return -abs(dx * fx + dy * fy - p.distance) - 0.5 * abs(dy * fx - dx * fy)
 
 
-LIKES: Mapping[str, Callable[[Spot], float]] = {
+LIKES: Mapping[str, Callable[[CandidateSpot], float]] = {
     "corner": lambda p: at_corner(p.wall, p.s, p.width) if p.wall else 0.0,
     "centre": lambda p: centred(p.wall, p.s) if p.wall else 0.0,
     "window": lambda p: at_window(p.wall, p.s, p.width) if p.wall else 0.0,

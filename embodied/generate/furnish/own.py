@@ -10,7 +10,7 @@ from embodied.generate.furnish.ceilings import hang_from_ceiling
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.groups import put_group
 from embodied.generate.furnish.mounting import Hanging, about_the_middle, along_stretches, hang_first
-from embodied.generate.furnish.tables import Group, Part
+from embodied.generate.furnish.tables import FurnitureGroup, GroupPart
 
 GROUP = "own"
 LIKES = {
@@ -50,7 +50,7 @@ def _place(ctx: Context, asset: Asset) -> None:
             hang_from_ceiling(ctx, asset, centre.x + ASIDE * math.cos(t), centre.y + ASIDE * math.sin(t)) for t in turns
         )
         return
-    part = Part(asset.object_class, clear=(asset.clearance,))
-    at_wall = Group((part,), GROUP, likes=LIKES[asset.support], gap=0.06 if asset.support == "floor" else 0.02)
+    part = GroupPart(asset.object_class, clear=(asset.clearance,))
+    at_wall = FurnitureGroup((part,), GROUP, likes=LIKES[asset.support], gap=0.06 if asset.support == "floor" else 0.02)
     if not put_group(ctx, at_wall, GROUP, asset) and asset.support == "floor":
-        put_group(ctx, Group((Part(asset.object_class),), GROUP, "floor", {"middle": 1.0}), GROUP, asset)
+        put_group(ctx, FurnitureGroup((GroupPart(asset.object_class),), GROUP, "floor", {"middle": 1.0}), GROUP, asset)

@@ -8,7 +8,7 @@ from embodied.generate.config import RETRIES
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.groups import put_group, sides
 from embodied.generate.furnish.kitchen import kitchen_line
-from embodied.generate.furnish.tables import Group, PlacementRule, RuleCondition
+from embodied.generate.furnish.tables import FurnitureGroup, PlacementRule, RuleCondition
 
 
 def furnish_room(ctx: Context) -> None:
@@ -68,7 +68,7 @@ def _once(rule: PlacementRule, ctx: Context) -> bool:
     return bool(put_group(ctx, _adjusted(ctx.tables.groups[rule.group], rule), rule.group))
 
 
-def _adjusted(group: Group, rule: PlacementRule) -> Group:
+def _adjusted(group: FurnitureGroup, rule: PlacementRule) -> FurnitureGroup:
     """The group with what the rule says of its first part."""
     own = group.parts[0]
     first = dataclasses.replace(

@@ -19,10 +19,10 @@ from embodied.generate.furnish.arrange import Item, ScoredPose, floor_poses, wal
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.likes import door_distance, nearest
 from embodied.generate.furnish.mounting import Hanging, Spot, along_stretches, hang_first
-from embodied.generate.furnish.space import CELL, Box, Thing, Wall, box, overlap, same_box
+from embodied.generate.furnish.space import WALK_CELL, Box, Thing, Wall, box, overlap, same_box
 from embodied.generate.furnish.tables import SmallObject
 
-EDGE, APART = 0.012, 0.008
+EDGE, THING_GAP = 0.012, 0.008
 """Free strip at the edge of a surface, and between two things on it, metres."""
 GRID, MOST_STEPS = 0.03, 16
 """Between places that are looked at for a gap, metres, and how many are along one side."""
@@ -55,7 +55,7 @@ SHELVES = (
 STORING = ("pantry", "closet", "garage", "workshop", "laundry_room", "bathroom", "kitchen", "gym")
 """Room kinds whose shelves hold what is kept there instead of books."""
 CHILDRENS = ("kids_room", "playroom")
-LARGEST = 0.25
+MOST_FLOOR_TAKEN = 0.25
 """Most of the floor that one can walk on which a thing left on it takes from it, square metres."""
 CUT_TO_FIT = ("storage box", "folded clothes", "towel", "row of folders", "cushion", "heap of clothes")
 """Object classes that come in many sizes."""
@@ -161,8 +161,12 @@ class SurfaceOccupancy:
             return np.zeros((0, 2))
         us, vs = _steps(low_x, high_x), _steps(low_y, high_y)
         taken = np.array(self.taken.setdefault(board.key, [])).reshape(-1, 4)
-        beside = (us[:, None] >= taken[:, 2] + a + APART) | (us[:, None] <= taken[:, 0] - a - APART)  # (columns, n)
-        before = (vs[:, None] >= taken[:, 3] + b + APART) | (vs[:, None] <= taken[:, 1] - b - APART)  # (rows, n)
+        beside = (us[:, None] >= taken[:, 2] + a + THING_GAP) | (
+            us[:, None] <= taken[:, 0] - a - THING_GAP
+        )  # (columns, n)
+        before = (vs[:, None] >= taken[:, 3] + b + THING_GAP) | (
+            vs[:, None] <= taken[:, 1] - b - THING_GAP
+        )  # (rows, n)
         columns, rows = np.nonzero(np.all(beside[:, None] | before[None], axis=2))
         return np.stack([us[columns], vs[rows]], axis=1)
 
@@ -503,10 +507,10 @@ def _put_down(ctx: Context, small: SmallObject, asset: Asset) -> bool:
 
         poses = floor_poses(ctx.space, score=aside, yaws=(turn,), step=0.35)
         item = Item(asset, role=asset.object_class, aside=True)
-    free = ctx.space.walk.sum() * CELL**2
+    free = ctx.space.walk.sum() * WALK_CELL**2
     boxes = ((p, _where(item, p, ctx.space.bottom)) for p in sorted(poses, key=lambda p: -p.score))
     likely = itertools.islice(((p, b) for p, b in boxes if ctx.space.fits(b, aside=True)), 12)
-    chosen = [p for p, b in likely if ctx.space.taken(b) < min(LARGEST, 0.1 * free)]
+    chosen = [p for p, b in likely if ctx.space.taken(b) < min(MOST_FLOOR_TAKEN, 0.1 * free)]
     return bool(ctx.put([item], chosen, "left"))
 
 

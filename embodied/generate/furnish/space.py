@@ -22,7 +22,7 @@ from embodied.navigation.free_space import LOW
 
 Params = tuple[tuple[str, str | float], ...]
 """Arguments for a built asset, (name, value)."""
-CELL = 0.05
+WALK_CELL = 0.05
 """Side of a cell of the walking plan, metres."""
 NARROW = 0.4
 """Narrowest gap that one still gets through sideways, metres."""
@@ -283,7 +283,7 @@ class RoomSpace:
         """How much of the floor that one can walk on `b` would take, square metres."""
         plan = self.walk.copy()
         cv2.fillConvexPoly(plan, self._cells(b.corners(self.radius)), 0)
-        return float(int(self.walk.sum()) - int(plan.sum())) * CELL**2
+        return float(int(self.walk.sum()) - int(plan.sum())) * WALK_CELL**2
 
     def holding(
         self,
@@ -311,11 +311,11 @@ class RoomSpace:
         return b.bottom - self.bottom < 1.9 and b.top - self.bottom > LOW
 
     def _cells(self, points: np.ndarray) -> np.ndarray:
-        return np.rint((points - self.origin) / CELL).astype(np.int32)
+        return np.rint((points - self.origin) / WALK_CELL).astype(np.int32)
 
     def _cell(self, point: tuple[float, float]) -> tuple[int, int]:
-        row = round((point[1] - self.origin[1]) / CELL)
-        column = round((point[0] - self.origin[0]) / CELL)
+        row = round((point[1] - self.origin[1]) / WALK_CELL)
+        column = round((point[0] - self.origin[0]) / WALK_CELL)
         rows, columns = self.walk.shape
         return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
 
@@ -351,8 +351,8 @@ def room_space(house: House, room: Room) -> RoomSpace:
         if room.id in stair.rooms
         for b in _stair_keepouts(stair, storey.elevation, storey.height)
     ]
-    origin = (x0 - CELL, y0 - CELL)
-    shape = (int((y1 - y0) / CELL) + 3, int((x1 - x0) / CELL) + 3)
+    origin = (x0 - WALK_CELL, y0 - WALK_CELL)
+    shape = (int((y1 - y0) / WALK_CELL) + 3, int((x1 - x0) / WALK_CELL) + 3)
     grown = floor.buffer(TOUCH, join_style="mitre")
     shapely.prepare(grown)
     space = RoomSpace(
@@ -396,7 +396,7 @@ def _free_cells(
     for part in getattr(eroded, "geoms", (eroded,)):
         if not part.is_empty:
             ring = np.asarray(part.exterior.coords)[:-1]
-            cv2.fillPoly(plan, [np.rint((ring - origin) / CELL).astype(np.int32)], 1)
+            cv2.fillPoly(plan, [np.rint((ring - origin) / WALK_CELL).astype(np.int32)], 1)
     return plan
 
 

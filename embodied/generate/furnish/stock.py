@@ -14,7 +14,7 @@ from embodied.assets.records import Asset, Size
 from embodied.generate.furnish.style import Style, style_score
 from embodied.generate.furnish.tables import Tables
 
-SMALLEST, LARGEST = (0.0, 0.0, 0.0), (99.0, 99.0, 99.0)
+NO_LEAST_SIZE, NO_MOST_SIZE = (0.0, 0.0, 0.0), (99.0, 99.0, 99.0)
 """Bounds where no others are asked for, metres."""
 CHILDREN = ("kids_room", "playroom", None)
 """Room kinds where anything made for children may stand."""
@@ -66,7 +66,7 @@ class Stock:
           used: how often the house has each asset: what it has often is taken rarely.
           kind: room kind; assets that are rare there are rarely taken.
         """
-        most, least = limits.get("most", LARGEST), limits.get("least", SMALLEST)
+        most, least = limits.get("most", NO_MOST_SIZE), limits.get("least", NO_LEAST_SIZE)
         where, avoid = limits.get("where"), limits.get("avoid", ())
         fit = [
             a

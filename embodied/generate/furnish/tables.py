@@ -168,7 +168,7 @@ class PartClearance:
 
 
 @dataclass(frozen=True)
-class Part(PartClearance, PartPresence, PartPose, PartSize, PartModel):
+class GroupPart(PartClearance, PartPresence, PartPose, PartSize, PartModel):
     """One kind of thing in a group; groups.toml gives the fields of all five records side by side."""
 
     def __post_init__(self) -> None:
@@ -177,10 +177,10 @@ class Part(PartClearance, PartPresence, PartPose, PartSize, PartModel):
 
 
 @dataclass(frozen=True)
-class Group:
+class FurnitureGroup:
     """A small arrangement of things that finds its place as a whole."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[GroupPart, ...]
     """The first one is at its heart."""
     name: str = ""
     """Its name in placements; its key in the table if empty."""
@@ -355,7 +355,7 @@ class Tables:
 
     roles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Role to the object classes that can play it; a class is its own role."""
-    groups: Mapping[str, Group] = field(default_factory=dict)
+    groups: Mapping[str, FurnitureGroup] = field(default_factory=dict)
     choices: Mapping[str, PlacementRule] = field(default_factory=dict)
     """Rules that others refer to like groups."""
     rooms: Mapping[str, RoomSpec] = field(default_factory=dict)

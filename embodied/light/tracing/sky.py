@@ -13,7 +13,7 @@ import numpy as np
 
 from embodied.house.house import House, Sky
 from embodied.scene.backdrop import EYE, land_rng, paint_land
-from embodied.scene.far_canvas import Canvas, FarLight, elevations, share_down
+from embodied.scene.far_canvas import FarCanvas, FarLight, elevations, share_down
 from embodied.scene.landscapes import Scenery, scenery_of
 from embodied.seeds import stream
 
@@ -90,7 +90,7 @@ def paint(sky: Sky, seed: int, place: Scenery, height: int = HEIGHT) -> Outdoors
     ambient = above.mean(axis=(0, 1), dtype=np.float64) * 0.9
     light = FarLight(air, ambient, sun, towards, VISIBILITY[sky.weather], lamps)
     fine = _spread(above, height)
-    paint_land(Canvas(fine, place.height + EYE), place, light, rng=land_rng(seed))
+    paint_land(FarCanvas(fine, place.height + EYE), place, light, rng=land_rng(seed))
     np.maximum(fine, 1e-5, out=fine)
     return Outdoors(_evenly(fine), towards, sun, fine, lamps)
 
