@@ -73,7 +73,7 @@ from embodied.light.pages.records import load_record
 from embodied.light.pages.unwrap import Unwrapped
 from embodied.mattersim import pictures
 from embodied.mattersim.graphs import load_graphs
-from embodied.navigation.graph import from_matterport
+from embodied.navigation.connectivity import from_matterport
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import load_lines, save_lines, to_json
 from embodied.render import panorama_file

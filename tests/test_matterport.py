@@ -14,7 +14,7 @@ from embodied.datasets.folders import export_folder
 from embodied.datasets.matterport import action_list, in_matterport_order, tokenised, view_index, write_features
 from embodied.geometry import heading_of_yaw
 from embodied.interface import Pose
-from embodied.navigation.graph import from_matterport
+from embodied.navigation.connectivity import from_matterport
 
 
 def test_views_agree_about_where_they_look():

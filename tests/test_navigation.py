@@ -18,8 +18,9 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.generate import STAGES, HouseConfig, generate_house
 from embodied.house.house import HouseError, Placement
 from embodied.mattersim.graphs import load_graphs
+from embodied.navigation.connectivity import from_matterport, to_matterport
 from embodied.navigation.free_space import EYE, free_floor, leaves, sight_floor
-from embodied.navigation.graph import AGENT_RADIUS, build_graph, from_matterport, graph_of, sight_lines, to_matterport
+from embodied.navigation.graph import AGENT_RADIUS, build_graph, graph_of, sight_lines
 
 BARE = {name: stage for name, stage in STAGES.items() if name not in ("furnish", "clear")}
 

@@ -40,7 +40,8 @@ class Options(Furnished, Printed):
 
 def run(args: Options) -> None:
     from embodied.house.floor_plan import save_plan
-    from embodied.navigation.graph import build_graph, to_matterport
+    from embodied.navigation.connectivity import to_matterport
+    from embodied.navigation.graph import build_graph
     from embodied.scene.export import export_mjcf
 
     if args.glb:

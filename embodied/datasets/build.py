@@ -27,7 +27,8 @@ from embodied.house.house import House, HouseError
 from embodied.interface import Language
 from embodied.language import People, PlainLanguage
 from embodied.locks import LOCK, locked
-from embodied.navigation.graph import NavGraph, build_graph, from_matterport, to_matterport
+from embodied.navigation.connectivity import from_matterport, to_matterport
+from embodied.navigation.graph import NavGraph, build_graph
 from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import load_json, read_json, save_lines
 from embodied.render.pictures import PictureSettings, parse_pictures

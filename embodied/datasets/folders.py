@@ -40,8 +40,9 @@ from embodied.datasets.matterport import (
 from embodied.errors import UnableError
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
 from embodied.language.plain_language import PlainLanguage
+from embodied.navigation.connectivity import to_matterport
 from embodied.navigation.free_space import EYE
-from embodied.navigation.graph import nearest, to_matterport
+from embodied.navigation.graph import nearest
 from embodied.seeds import stream
 from embodied.tasks.goals import find_instances, goal_classes
 from embodied.tasks.vnla import VnlaConfig

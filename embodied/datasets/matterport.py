@@ -4,7 +4,7 @@ Only here, in embodied.mattersim and in exported files they apply: heading clock
 12 band + heading bin. Scans are named like our houses without underscores, because the programs join
 and split ids at underscores. embodied.datasets.folders writes the files; their fields:
 
-  connectivity/<scan>_connectivity.json, scans.txt   see navigation.graph.to_matterport
+  connectivity/<scan>_connectivity.json, scans.txt   see navigation.connectivity.to_matterport
   R2R_<split>.json      path_id, scan, heading, path, distance, instructions (three)
   hanna_<split>.json    path_id, scan, heading, paths (one shortest path per goal), instructions
   routes.json           scan -> [path_id (text), path, instruction, view_id, split]

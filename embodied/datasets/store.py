@@ -24,7 +24,8 @@ from embodied.house.house import House
 from embodied.interface import Assistant, Episode, Place, Route, Task
 from embodied.language.plain_language import PlainLanguage
 from embodied.language.utterances import PeoplesWords, Utterance
-from embodied.navigation.graph import NavGraph, from_matterport
+from embodied.navigation.connectivity import from_matterport
+from embodied.navigation.graph import NavGraph
 from embodied.records import read_lines
 from embodied.render.pictures import PictureSettings, Unlit, from_recorded, parse_pictures
 from embodied.splits import SplitPlan

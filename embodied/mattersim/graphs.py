@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from embodied.navigation.graph import viewpoints_of
+from embodied.navigation.connectivity import viewpoints_of
 
 
 @dataclass(frozen=True, eq=False)
