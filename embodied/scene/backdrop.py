@@ -15,7 +15,7 @@ from embodied.assets.archives import read_picture
 from embodied.assets.cache import digest, write_bytes
 from embodied.assets.closure import code_digest
 from embodied.house.house import House
-from embodied.scene.far_canvas import KNOTS, FarCanvas, FarLight, Things, elevations, share_down
+from embodied.scene.far_canvas import KNOTS, DrawList, FarCanvas, FarLight, elevations, share_down
 from embodied.scene.far_land import DRY, paint_ground, paint_water, ridge
 from embodied.scene.far_towns import street_lamps, town
 from embodied.scene.far_trees import tree
@@ -25,7 +25,7 @@ from embodied.seeds import stream
 DOME = "outdoor/sky"
 """Owner of the dome; no instance id belongs to it."""
 DOME_RADIUS = 90.0
-"""Metres to the dome that wears the picture."""
+"""Metres to the dome that shows the picture."""
 EYE = 1.6
 """Above the floor, metres."""
 VARIANTS = 8
@@ -33,7 +33,7 @@ VARIANTS = 8
 
 
 def dome(house: House, rows: int = 24) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A sphere around the house that wears a picture on its inside: vertices (n, 3), faces (m, 3), uv (n, 2) from the
+    """A sphere around the house that shows a picture on its inside: vertices (n, 3), faces (m, 3), uv (n, 2) from the
     top left."""
     corners = np.array([c for r in house.rooms for c in r.polygon])
     centre = np.array([*(corners.min(0) + corners.max(0)) / 2, EYE])
@@ -89,7 +89,7 @@ def plain_picture(place: Scenery, seed: int, rows: int = 512) -> np.ndarray:
 def paint_land(canvas: FarCanvas, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> None:
     """Everything between the plot and the sky, into `canvas`."""
     paint_ground(canvas, place, light, rng=rng)
-    things: Things = []
+    things: DrawList = []
     for far in place.table.far:
         if isinstance(far, Ridge):
             things += ridge(canvas, far, place, light, rng=rng)

@@ -30,7 +30,7 @@ class Building:
     ridge: float
     """Height of the roof above the eaves; 0 is a flat roof."""
     paint: int
-    """Which of the landscapes' wall colours it wears, counted from 0."""
+    """Which of the landscapes' wall colours it has, counted from 0."""
     tiles: int
     """Which of their roof colours."""
     storey: float = 2.9

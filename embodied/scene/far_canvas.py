@@ -16,7 +16,7 @@ KNOTS = (np.radians([90.0, 25.0, -40.0, -90.0]), np.array([0.0, 0.2, 0.86, 1.0])
 """Elevations, and how far down the picture they are."""
 AIR = np.array([0.85, 1.0, 1.3])
 """How much faster than green light red and blue light fade: hills turn blue."""
-Things = list[tuple[float, Callable[[], None]]]
+DrawList = list[tuple[float, Callable[[], None]]]
 """How far something is, metres, and what paints it."""
 
 
@@ -49,7 +49,7 @@ class FarLight:
         return self.ambient * 0.6 + self.sun * (0.22 + 0.4 * np.asarray(behind))[..., None]
 
 
-def clearness(distance: float | np.ndarray, visibility: float) -> np.ndarray:
+def transmittance(distance: float | np.ndarray, visibility: float) -> np.ndarray:
     """(..., 3) share of a thing's own light that is left at a distance; the air's light takes the rest.
 
     Source: Koschmieder 1924; extinction 3.912 / visibility.

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from embodied.scene.far_canvas import FarCanvas, FarLight, Things, clearness
+from embodied.scene.far_canvas import DrawList, FarCanvas, FarLight, transmittance
 from embodied.scene.far_trees import FIR, LEAVES, SNOW, tree
 from embodied.scene.landscapes import Ridge, Scenery
 
@@ -52,11 +52,11 @@ def paint_ground(canvas: FarCanvas, place: Scenery, light: FarLight, *, rng: np.
             colour = np.array([0.075, 0.060, 0.030], np.float32)
         own = colour * vary[..., None]
     e = (light.ambient + light.sun * max(light.towards[2], 0.0)).astype(np.float32)
-    clear = clearness(away, light.visibility).astype(np.float32)[:, None]
+    clear = transmittance(away, light.visibility).astype(np.float32)[:, None]
     canvas.picture[first:] = own * e * clear + light.air[None].astype(np.float32) * (1 - clear)
 
 
-def ridge(canvas: FarCanvas, r: Ridge, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> Things:
+def ridge(canvas: FarCanvas, r: Ridge, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> DrawList:
     """A line of hills or trees around the house."""
     height = r.height + r.rough * (2 * _wave(canvas.w, r.grain, rng=rng) - 1)
     if r.cover == "trees" and r.distance <= 600:
@@ -79,7 +79,7 @@ def ridge(canvas: FarCanvas, r: Ridge, place: Scenery, light: FarLight, *, rng: 
         sunny = 1 + 0.5 * np.clip(slope * to_sun, -0.8, 0.8) * float(light.sun.any())
         own = _cover_of(canvas, r, y0, y1, top, place, np.random.default_rng(noise))
         own = own * (e * sunny[:, None]).astype(np.float32)[None]
-        clear = clearness(r.distance, light.visibility).astype(np.float32)
+        clear = transmittance(r.distance, light.visibility).astype(np.float32)
         canvas.blend(0, y0, own * clear + light.air[None].astype(np.float32) * (1 - clear), cover)
 
     return [(r.distance, paint)]
@@ -108,7 +108,7 @@ def paint_water(
     fresnel = (0.02 + 0.98 * (1 - np.sin(down + 0.09)) ** 5).astype(np.float32)[:, None, None]
     level = light.ambient + light.sun * max(light.towards[2], 0.0)
     deep = (np.array([0.012, 0.03, 0.032]) * level).astype(np.float32)
-    clear = clearness(away, light.visibility).astype(np.float32)[:, None]
+    clear = transmittance(away, light.visibility).astype(np.float32)[:, None]
     own = (seen * fresnel + deep * (1 - fresnel)) * clear + light.air[None].astype(np.float32) * (1 - clear)
     canvas.blend(0, first, own, cover)
 
@@ -197,7 +197,7 @@ def _cover_of(
 
 def _trees_of(
     canvas: FarCanvas, r: Ridge, height: np.ndarray, place: Scenery, light: FarLight, *, rng: np.random.Generator
-) -> Things:
+) -> DrawList:
     """A wood's edge or a row of trees as single trees over undergrowth."""
     low = Ridge(r.distance, 0.42 * r.height, 0.25 * r.rough, "wood", 3 * r.grain)
     things = ridge(canvas, low, place, light, rng=rng) if r.height - r.rough > 0 else []

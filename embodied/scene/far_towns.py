@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from embodied.scene.buildings import EVENING, LIT, PANE, ROOF, WALL, Building, Faces, faces_of
-from embodied.scene.far_canvas import FarCanvas, FarLight, Things, clearness
+from embodied.scene.far_canvas import DrawList, FarCanvas, FarLight, transmittance
 from embodied.scene.far_trees import SNOW
 from embodied.scene.landscapes import Scenery, Town
 
@@ -33,10 +33,10 @@ RIDGE = np.zeros((8, 4, 3))
 RIDGE[4:, 2:, 2] = 1
 
 
-def town(canvas: FarCanvas, t: Town, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> Things:
+def town(canvas: FarCanvas, t: Town, place: Scenery, light: FarLight, *, rng: np.random.Generator) -> DrawList:
     """A town's buildings, each painted later."""
     spots = _scattered(t, rng=rng) if t.count else _streets(t, rng=rng)
-    things: Things = []
+    things: DrawList = []
     for x, y, yaw, wide in spots:
         storeys, flat = int(rng.integers(t.storeys[0], t.storeys[1] + 1)), rng.random() < t.flat
         tower = t.storeys[1] > 3 and rng.random() < 0.006 and np.hypot(x, y) > 250
@@ -56,7 +56,7 @@ def street_lamps(canvas: FarCanvas, light: FarLight, *, rng: np.random.Generator
         x, y = int(canvas.columns(yaw)) % canvas.w, int(round(float(canvas.rows(np.arctan2(7.0 - canvas.eye, away)))))
         size = 2 if away < 250 else 1
         colour = np.array([1.0, 0.68, 0.36]) if rng.random() < 0.7 else np.array([0.9, 0.95, 1.0])
-        shine = colour * clearness(away, light.visibility) * light.lamps * min(2.5, 160 / away)
+        shine = colour * transmittance(away, light.visibility) * light.lamps * min(2.5, 160 / away)
         canvas.picture[y : y + size, x : x + size] += shine.astype(np.float32)
 
 
@@ -107,7 +107,7 @@ def _paint_building(canvas: FarCanvas, b: Building, place: Scenery, light: FarLi
     normal /= np.sqrt((normal * normal).sum(1, keepdims=True))
     xy = canvas.project(corners)
     column = int(canvas.columns(np.arctan2(b.at[1], b.at[0]))) % canvas.w
-    clear = clearness(away, light.visibility)
+    clear = transmittance(away, light.visibility)
     air = light.air[column]
     own = PAINTS[made]
     own[made == WALL] = WALLS[b.paint % len(WALLS)]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from embodied.scene.far_canvas import FarCanvas, FarLight, clearness
+from embodied.scene.far_canvas import FarCanvas, FarLight, transmittance
 from embodied.scene.landscapes import Scenery
 
 LEAVES = {
@@ -52,7 +52,7 @@ def tree(
         x0, y0 = int(canvas.columns(yaw) - wide / 2), int(round(tip))
         small = small[max(-y0, 0) : canvas.h - y0]
         cover = small[..., 3:]
-        clear = clearness(away, light.visibility)
+        clear = transmittance(away, light.visibility)
         air = light.air[int(canvas.columns(yaw)) % canvas.w] * (1 - clear)
         own = small[..., :3] / np.maximum(cover, 1e-3)
         own = own * (light.on_leaves(np.array(yaw)) * hue * clear).astype(np.float32) + air.astype(np.float32)

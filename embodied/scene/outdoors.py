@@ -44,7 +44,7 @@ PIECES = ("facade", "roof", "ground", "terrace", "hedge", "trees", "border", "st
 """Owners outside are 'outdoor/<piece>'; 'windows' are the neighbours' that are lit in the evening."""
 
 LEAFY = {"spring": (0, 4), "summer": (0, 1), "autumn": (2, 3), "winter": ()}
-"""Kinds of foliage that trees wear."""
+"""Kinds of foliage of trees."""
 FIRS = 1
 """The kind of foliage of firs and hedges, all year."""
 ASPHALT = Finish(color=(0.27, 0.27, 0.28, 1.0), roughness=0.95, specular=0.1)
@@ -127,7 +127,7 @@ def _neighbours(house: House, place: Scenery, finish: Callable[[str], Finish]) -
         return []
     rng = stream(house.seed, "outdoors", "neighbours", "faces")
     roof = [finish("snow/0")] * 2 if place.snow else [finish(f"roof_tiles/{k}") for k in range(2)]
-    wears: dict[str, tuple[str, Finish, list[np.ndarray]]] = {}
+    surfaces_of_kind: dict[str, tuple[str, Finish, list[np.ndarray]]] = {}
     for b in near:
         faces = faces_of(b, -place.height, detail=True, rng=rng)
         seen = _seen_from(house, faces)
@@ -147,10 +147,10 @@ def _neighbours(house: House, place: Scenery, finish: Callable[[str], Finish]) -
             piece = "windows" if kind == LIT else "neighbours"
             corners_of_kind = faces.corners[seen & (faces.made_of == kind)]
             if len(corners_of_kind):
-                wears.setdefault(piece + tag, (piece, own[kind], []))[2].append(corners_of_kind)
+                surfaces_of_kind.setdefault(piece + tag, (piece, own[kind], []))[2].append(corners_of_kind)
     return [
         _part(piece, own, [quads(np.concatenate(corners))], key[len(piece) :])
-        for key, (piece, own, corners) in sorted(wears.items())
+        for key, (piece, own, corners) in sorted(surfaces_of_kind.items())
     ]
 
 
