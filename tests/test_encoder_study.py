@@ -10,6 +10,8 @@ from hand_data import build, small_house
 from hand_pixels import coloured_strips, world_in
 
 from embodied.agents.common.weights import origin_of, weights_digest
+from embodied.agents.learners.vision import VisionStudyOptions
+from embodied.agents.options import by_name
 from embodied.agents.studies.engine import run_study
 from embodied.agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import Detector, DetectorNetwork
@@ -18,8 +20,6 @@ from embodied.agents.vision.encoder import load_encoder, random_encoder, save_en
 from embodied.agents.vision.resnet import ARCHITECTURES
 from embodied.agents.vision.run import detector_for
 from embodied.agents.vision.study import EncoderStudy
-from embodied.cli.learning import by_name
-from embodied.cli.study import VisionOptions
 from embodied.options import add_options, read_options
 from embodied.records import read_json
 
@@ -129,7 +129,7 @@ def test_an_encoder_that_the_study_trains_keeps_its_name(setting):
 
 def test_files_of_one_name_are_training_seeds(tmp_path):
     parser = argparse.ArgumentParser()
-    add_options(parser, VisionOptions)
+    add_options(parser, VisionStudyOptions)
     words = ["--data", str(tmp_path), "--out", str(tmp_path / "o"), "--encoders", "a=x", "b=y", "a=z"]
-    arms = by_name(read_options(parser.parse_args(words), VisionOptions).encoders)
+    arms = by_name(read_options(parser.parse_args(words), VisionStudyOptions).encoders)
     assert {name: [p.name for p in paths] for name, paths in arms.items()} == {"a": ["x", "z"], "b": ["y"]}

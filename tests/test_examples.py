@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import runpy
@@ -12,6 +13,9 @@ from pathlib import Path
 import cv2
 import pytest
 import torch
+from hand_data import built, noise_features, small_house
+
+from embodied.cli import main
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "examples"
@@ -87,3 +91,21 @@ def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(run, tmp_path, wha
     assert (tmp_path / "ppo" / "agent.zip").exists()
     rows = (tmp_path / "ppo" / "curve.csv").read_text().splitlines()
     assert rows[0] == "steps,episodes,success,reward,seconds" and 1 < len(rows) <= 3
+
+
+def test_a_learner_outside_the_tree_is_trained_evaluated_and_studied(tmp_path, monkeypatch, capsys):
+    """Each viewpoint has features of its own: the learner knows the houses of its training by heart."""
+    monkeypatch.chdir(EXAMPLES)
+    assert len((EXAMPLES / "my_learner.py").read_text().splitlines()) < 120
+    data = built(tmp_path / "data", "find", "1x40", make_house=small_house)
+    noise_features(data)
+    common = ["--data", str(data.folder), "--network", "random", "--cache", str(tmp_path / "cache")]
+    assert main(["train", "my_learner:LEARNER", *common, "--out", str(tmp_path / "run"), "--seed", "1"]) == 0
+    trained = f"my_learner:LEARNER={tmp_path / 'run' / 'best.safetensors'}"
+    assert main(["evaluate", "find", *common, "--split", "train", "--agent", trained, "random walk", "--json"]) == 0
+    body = json.loads(capsys.readouterr().out)
+    learned, chance = sorted(body["rows"], key=lambda r: -r["values"]["success"]["mean"])
+    assert learned["agent"].endswith("learned") and learned["values"]["success"]["mean"] > 0.5
+    assert main(["study", "my_learner:LEARNER", *common, "--out", str(tmp_path / "out"), "--seeds", "1"]) == 0
+    assert "| 10 walks |" in capsys.readouterr().out
+    assert main(["train", "my_learner:NOBODY"]) == 2 and "my_learner" in capsys.readouterr().err

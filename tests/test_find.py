@@ -17,7 +17,7 @@ from embodied.agents.find.policy import STOP, WORDS, Search, Watched, costs_of
 from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
 from embodied.agents.find.way_map import WayMap
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.lessons import Split
+from embodied.agents.vision.training_data import Split
 from embodied.evaluation.rollout import play
 from embodied.interface import Move, Sight
 from embodied.kinds.find import FIND

@@ -49,7 +49,7 @@ from embodied.agents.hanna.policy import for_training
 from embodied.agents.hanna.run import HannaLearner
 from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.lessons import Split
+from embodied.agents.vision.training_data import Split
 from embodied.assistants.anna import Anna
 from embodied.assistants.route_system import build_routes
 from embodied.envs.hanna import HannaEnv
@@ -417,7 +417,7 @@ def test_a_run_may_begin_with_a_trained_agent_of_the_same_sizes(tmp_path):
     for n, value in first.network.state_dict().items():
         assert torch.equal(value, second.network.state_dict()[n]), n
     other = agent_for(split, dataclasses.replace(TINY, hidden_size=16))
-    with pytest.raises(ValueError, match="cannot be begun with"):
+    with pytest.raises(ValueError, match="cannot initialise this agent"):
         take_weights(other, first, tmp_path / "first.safetensors")
 
 

@@ -105,14 +105,14 @@ def fork_task(goal: int) -> Task:
     return Task(f"fork/hari/{goal}", "hari", "fork", Pose(0), what, (goal,), "find a mug in a hall", 0.0, 6)
 
 
-def fork_lessons() -> PretrainingData:
+def fork_data() -> PretrainingData:
     """Both ways of the fork, with the goal described densely or as the next action."""
     return PretrainingData(
         {"fork": fork_world()}, all_said(), [fork_task(1), fork_task(2)] * 8, [fork_task(1), fork_task(2)]
     )
 
 
-def grid_lessons() -> tuple[HandWorld, PretrainingData]:
+def grid_data() -> tuple[HandWorld, PretrainingData]:
     world = grid_world()
     pool = hari_pool(world, seed=0, config=PRETRAINING)
     tasks = [hari_task(pool, i, seed=0, language=PlainLanguage()) for i in range(48)]
@@ -309,11 +309,11 @@ class Certain:
 
 
 def test_do_stops_where_the_execution_policy_most_wants_to_and_the_belief_advances_at_every_step():
-    world, lessons = grid_lessons()
+    world, source = grid_data()
     executor = new_executor(SMALL, words_of(world))
     executor.network.eval()
-    env = HariEnv({"grid": world}, HariAssistant(lessons.describer), lessons.describer)
-    first = env.reset(lessons.training[1])
+    env = HariEnv({"grid": world}, HariAssistant(source.describer), source.describer)
+    first = env.reset(source.training[1])
     stay = consider(Reader(executor), [first], None)[0]
     for column, kind in ((0, Move), (len(stay.log_moves[0]) - 1, Stop)):
         wanted = torch.full_like(stay.log_moves, -9.0).index_fill(1, torch.tensor([column]), 0.0)
@@ -356,47 +356,47 @@ def test_the_shortest_path_takes_ever_fewer_steps():
 
 
 def test_a_walk_that_is_wholly_guided_takes_only_right_moves():
-    lessons = fork_lessons()
+    source = fork_data()
     executor = new_executor(dataclasses.replace(SMALL, guided=1.0, iterations=10**9), words_of(fork_world()))
     optimizer = torch.optim.Adam(executor.network.parameters(), 1e-4)
-    assert [lesson(executor, optimizer, lessons, u)["steps"] for u in range(3)] == [2 * SMALL.batch] * 3, "go, stop"
+    assert [lesson(executor, optimizer, source, u)["steps"] for u in range(3)] == [2 * SMALL.batch] * 3, "go, stop"
 
 
 def test_a_walk_that_stands_still_is_told_what_agents_are_told_unasked(monkeypatch):
     """As one that asks at every step: it goes nowhere, and its belief and its losses go on."""
-    world, lessons = grid_lessons()
-    executor = new_executor(dataclasses.replace(SMALL, standing=0.999999), words_of(world))
-    walks = [_begin(lessons, t, np.random.default_rng(0)) for t in lessons.training[:3]]
+    world, source = grid_data()
+    executor = new_executor(dataclasses.replace(SMALL, stay_fraction=0.999999), words_of(world))
+    walks = [_begin(source, t, np.random.default_rng(0)) for t in source.training[:3]]
     heard, where = [], [w.pose for w in walks]
     monkeypatch.setattr(
         pretraining, "percept", lambda words, told, *more: heard.append(told) or percept(words, told, *more)
     )
-    losses, _ = _play(executor, lessons, walks, 4, 0.0)
+    losses, _ = _play(executor, source, walks, 4, 0.0)
     assert [len(x) for x in losses] == [3] * 4 and [w.pose for w in walks] == where
-    assert heard == [lessons.describer.sparse(world, p.node) for p in where] * 4
+    assert heard == [source.describer.sparse(world, p.node) for p in where] * 4
 
 
 def test_a_walk_with_a_subgoal_from_the_beginning_goes_no_farther():
-    world, lessons = grid_lessons()
+    world, source = grid_data()
     for longest in (1, 2, 3):
-        for task in lessons.training:
-            walk = _begin(lessons, task, np.random.default_rng(0))
+        for task in source.training:
+            walk = _begin(source, task, np.random.default_rng(0))
             far = int(world.graph.hops[task.start.node, task.goal_nodes[0]])
-            give_subgoal(walk, lessons.describer, longest)
+            give_subgoal(walk, source.describer, longest)
             (target,) = walk.task.goal_nodes
             steps = min(longest, (far + 1) // 2)
             assert world.graph.hops[task.start.node, target] == steps
             if steps == 1:
-                assert walk.goal == lessons.describer.step(world, task.start.node, target)
+                assert walk.goal == source.describer.step(world, task.start.node, target)
 
 
-@pytest.mark.parametrize("afresh", [False, True])
-def test_a_belief_begins_anew_with_another_goal_only_if_it_is_to(afresh):
-    world, lessons = grid_lessons()
-    executor = new_executor(dataclasses.replace(SMALL, afresh=afresh), words_of(world))
+@pytest.mark.parametrize("reset", [False, True])
+def test_a_belief_begins_anew_with_another_goal_only_if_it_is_to(reset):
+    world, source = grid_data()
+    executor = new_executor(dataclasses.replace(SMALL, reset_on_goal_change=reset), words_of(world))
     executor.network.eval()
-    env = HariEnv({"grid": world}, HariAssistant(lessons.describer), lessons.describer)
-    first = env.reset(lessons.training[1])
+    env = HariEnv({"grid": world}, HariAssistant(source.describer), source.describer)
+    first = env.reset(source.training[1])
     reader = Reader(executor)
     considered, belief = consider(reader, [first], None)
     belief = carry(considered, belief)
@@ -405,7 +405,7 @@ def test_a_belief_begins_anew_with_another_goal_only_if_it_is_to(afresh):
     torch.testing.assert_close(same.carried[0], considered.belief[0])
     asked = env.step(Ask(Intention.SUB))
     after = consider(reader, [asked], belief)[1]
-    expected = executor.network.begin(1)[0] if afresh else considered.belief[0]
+    expected = executor.network.begin(1)[0] if reset else considered.belief[0]
     torch.testing.assert_close(after.carried[0], expected)
 
 
@@ -415,22 +415,22 @@ def test_a_belief_begins_anew_with_another_goal_only_if_it_is_to(afresh):
 @pytest.fixture(scope="module")
 def fork_executor():
     """An execution policy that has learned both ways of the fork."""
-    config = dataclasses.replace(SMALL, afresh=True, iterations=60, batch=16, validate_every=60)
+    config = dataclasses.replace(SMALL, reset_on_goal_change=True, iterations=60, batch=16, validate_every=60)
     executor = new_executor(config, words_of(fork_world()))
-    lessons = fork_lessons()
+    source = fork_data()
     optimizer = torch.optim.Adam(executor.network.parameters(), config.learning_rate)
     for update in range(config.iterations):
-        lesson(executor, optimizer, lessons, update)
+        lesson(executor, optimizer, source, update)
     executor.network.eval()
     return executor
 
 
 @pytest.mark.slow
 def test_pretraining_learns_a_world_it_can_see(fork_executor):
-    lessons = fork_lessons()
-    assert pretraining_success(fork_executor, lessons, lessons.validation * 8) > 0.9
+    source = fork_data()
+    assert pretraining_success(fork_executor, source, source.validation * 8) > 0.9
     fresh = new_executor(SMALL, fork_executor.words)
-    assert pretraining_success(fresh, lessons, lessons.validation * 8) < 0.9
+    assert pretraining_success(fresh, source, source.validation * 8) < 0.9
 
 
 def fork_env() -> HariEnv:
@@ -517,22 +517,22 @@ def test_an_episode_does_not_depend_on_the_batch_around_it(fork_executor):
 
 @pytest.mark.slow
 def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
-    world, lessons = grid_lessons()
+    world, source = grid_data()
     config = dataclasses.replace(SMALL, iterations=4, dropout=0.1)
     whole = new_executor(config, words_of(world))
-    pretrain(whole, lessons, tmp_path / "whole", identity(config), note=silent)
+    pretrain(whole, source, tmp_path / "whole", identity(config), note=silent)
     half = new_executor(dataclasses.replace(config, iterations=2), words_of(world))
-    pretrain(half, lessons, tmp_path / "parts", identity(half.config), note=silent)
+    pretrain(half, source, tmp_path / "parts", identity(half.config), note=silent)
     again = new_executor(config, words_of(world))
-    pretrain(again, lessons, tmp_path / "parts", identity(config), note=silent)
+    pretrain(again, source, tmp_path / "parts", identity(config), note=silent)
     for a, b in zip(whole.network.parameters(), again.network.parameters(), strict=True):
         assert torch.equal(a, b)
     with pytest.raises(CheckpointError, match="batch 8 -> 4"):
         other = new_executor(dataclasses.replace(config, batch=4), words_of(world))
-        pretrain(other, lessons, tmp_path / "parts", identity(other.config), note=silent)
+        pretrain(other, source, tmp_path / "parts", identity(other.config), note=silent)
 
-    say = lessons.describer
-    ground = TaskSet(lessons.places, lessons.training, lambda: HariEnv(lessons.places, HariAssistant(say), say))
+    say = source.describer
+    ground = TaskSet(source.places, source.training, lambda: HariEnv(source.places, HariAssistant(say), say))
     runs = {}
     for name, stops in (("one", (3,)), ("two", (1, 3))):
         for updates in stops:
@@ -601,6 +601,6 @@ def test_another_data_set_judges_what_it_may(tmp_path):
     sizes = ("2x20x1", "2x20x1/5", "1x20x1")
     data, more, other = (built(tmp_path / str(k), "hari", size) for k, size in enumerate(sizes))
     study = HariStudy(data.folder, (0,), 2, (0,), execution=SMALL, config=QUICK)
-    splits = [dataclasses.replace(study, elsewhere=d.folder).tables()["4.7"].splits for d in (more, other)]
+    splits = [dataclasses.replace(study, eval_data=d.folder).tables()["4.7"].splits for d in (more, other)]
     assert splits == [TEST, ("test_unseen_env",)]
     assert len(more.tasks("test_unseen_start")) > len(data.tasks("test_unseen_start"))

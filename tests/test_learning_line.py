@@ -11,6 +11,7 @@ import pytest
 import torch
 from hand_data import build, metrics_of
 
+from embodied import options
 from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
@@ -18,14 +19,13 @@ from embodied.agents.hanna.evaluation import counted, hanna_policies
 from embodied.agents.hanna.policy import PerfectInterpretation
 from embodied.agents.hanna.run import train_agent, vocabulary_of
 from embodied.agents.hanna.study import HannaStudy
+from embodied.agents.learners.hanna import HannaTraining
 from embodied.agents.studies.engine import run_study
 from embodied.agents.vision.config import PLAIN
-from embodied.agents.vision.encoder import load_encoder, random_encoder, save_encoder
+from embodied.agents.vision.encoder import encoder_of, load_encoder, random_encoder, save_encoder
 from embodied.agents.vision.features import feature_path, save_features
-from embodied.agents.vision.lessons import Lessons
-from embodied.agents.vision.run import encoder_of
-from embodied.cli import features, main, options
-from embodied.cli.train import TrainHanna
+from embodied.agents.vision.training_data import TrainingData
+from embodied.cli import features, main
 from embodied.cli.view import looked_at
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
@@ -125,8 +125,8 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
 
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
-    config = parsed(TrainHanna, "--data", ".", "--out", ".", *SMALL).config
-    bank = Lessons(data, random_encoder(seed=0)).split("test_unseen").bank
+    config = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL).config
+    bank = TrainingData(data, random_encoder(seed=0)).split("test_unseen").bank
     words = vocabulary_of(data).words
     torch.manual_seed(0)
     agent = HannaAgent.new(HannaAbout(config=config, encoder=bank.digest, feature_size=bank.size, words=words))
@@ -158,7 +158,7 @@ def study(data, tmp_path_factory):
     save_encoder(random_encoder(seed=1), folder / "encoder.safetensors")
     encoder = load_encoder(folder / "encoder.safetensors")
     give_features(data, {n for s in data.splits for n in data.names(s)}, encoder)
-    words = parsed(TrainHanna, "--data", ".", "--out", ".", *SMALL)
+    words = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL)
     config = dataclasses.replace(words.config, iterations=2)
     learner = HannaStudy(
         data.folder, (0, 1), tasks=3, encoder=folder / "encoder.safetensors", config=config, evaluation=words.evaluation
@@ -220,7 +220,7 @@ def test_what_was_judged_under_other_settings_is_not_shown_under_new_ones(study,
         dataclasses.replace(learner, config=dataclasses.replace(learner.config, learning_rate=0.5)),
         dataclasses.replace(learner, tasks=2),
         dataclasses.replace(learner, evaluation=dataclasses.replace(learner.evaluation, ask_threshold=0.9)),
-        dataclasses.replace(learner, begin=next(iter(times(out, "best.safetensors")))),
+        dataclasses.replace(learner, init_from=next(iter(times(out, "best.safetensors")))),
     ):
         assert "Not run: Target image only, + language instruction." in shown(changed)
     assert "Not run" not in shown(learner)
@@ -243,7 +243,7 @@ def test_agents_that_are_compared_differ_in_one_setting(study):
 def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tmp_path):
     learner, out = study
     other = build(tmp_path / "other", tmp_path / "cache", routes="spanning")
-    there = dataclasses.replace(learner, elsewhere=other.folder)
+    there = dataclasses.replace(learner, eval_data=other.folder)
     splits = ("test_unseen", "test_unseen as shipped")
     assert there.tables()["4.5"].splits == splits, "nobody has seen its houses, none are out of distribution"
     before = times(out, "best.safetensors")
@@ -258,20 +258,20 @@ def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tm
 
 def test_an_agent_that_knows_no_varied_words_cannot_go_on_with_them(study, tmp_path):
     learner, out = study
-    lessons = Lessons(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
+    source = TrainingData(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
     varied, begin = dataclasses.replace(learner.config, varied_words=True), next(iter(times(out, "best.safetensors")))
-    with pytest.raises(ValueError, match="knows none of the varied words; add --word-vectors minilm"):
-        train_agent(lessons, varied, learner.evaluation, tmp_path / "begun", begin=begin, note=print)
-    train_agent(lessons, varied, learner.evaluation, tmp_path / "new", note=print)
+    with pytest.raises(ValueError, match="knows no varied words; add --word-vectors minilm"):
+        train_agent(source, varied, learner.evaluation, tmp_path / "begun", init_from=begin, note=print)
+    train_agent(source, varied, learner.evaluation, tmp_path / "new", note=print)
     words, plain = (HannaAgent.load(f).about.words for f in ((tmp_path / "new" / "best.safetensors"), begin))
     assert set(plain) < set(words), "it heard the words as they are and others"
 
 
 def test_processor_time_is_counted_over_sessions(study, tmp_path):
     learner, _ = study
-    lessons = Lessons(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
+    source = TrainingData(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
     short = dataclasses.replace(learner.config, iterations=1)
-    go = lambda config: train_agent(lessons, config, learner.evaluation, tmp_path, note=print).processor
+    go = lambda config: train_agent(source, config, learner.evaluation, tmp_path, note=print).processor
     used = [go(config) for config in (short, learner.config, learner.config)]
     assert 0 < used[0] < used[1] == used[2], "sessions add up, and what is done is not forgotten"
 
@@ -288,16 +288,16 @@ def test_missing_features_are_told_before_anything_is_trained(study, data, tmp_p
 
 def test_more_training_houses_than_there_are_are_refused(study, tmp_path):
     learner, _ = study
-    lessons = Lessons(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
+    source = TrainingData(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
     config = dataclasses.replace(learner.config, training_houses=99)
     with pytest.raises(ValueError, match="99 houses of 'train' are wanted, .* has 2; ask for fewer"):
-        train_agent(lessons, config, learner.evaluation, tmp_path / "run")
+        train_agent(source, config, learner.evaluation, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
 def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
     encoder = random_encoder(seed=0)
-    some, every = (Lessons(data, encoder).split("train", houses=n) for n in (1, None))
+    some, every = (TrainingData(data, encoder).split("train", houses=n) for n in (1, None))
     assert {t.world for t in some.tasks} == {data.names("train")[0]}
     assert 0 < len(some.tasks) < len(every.tasks)
     assert len(vocabulary_of(data, 1).words) <= len(vocabulary_of(data).words)
@@ -306,7 +306,7 @@ def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
 def test_weights_of_another_network_are_named(data, tmp_path):
     words = ("--data", data.folder, "--encoder", _empty(tmp_path), "--network")
     with pytest.raises(SystemExit):
-        parsed(features.Options, *words, "resnet1")
+        parsed(features.FeatureOptions, *words, "resnet1")
     with pytest.raises(ValueError, match="not the weights of resnet18"):
         encoder_of(_empty(tmp_path), "resnet18")
 

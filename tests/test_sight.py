@@ -19,8 +19,8 @@ from embodied.agents.hanna.places import Query, auc, measured, precision_recall,
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.capture import strip_around
 from embodied.agents.vision.features import VIEW_SIZE, strip_of
-from embodied.agents.vision.lessons import Split
 from embodied.agents.vision.strip import VFOV
+from embodied.agents.vision.training_data import Split
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import interval
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint

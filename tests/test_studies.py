@@ -6,11 +6,9 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
-import types
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +16,6 @@ from typing import Any
 
 import pytest
 import torch
-from hand_data import built, small_house
 
 from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.studies.engine import check, run_study
@@ -246,21 +243,3 @@ def test_a_table_without_columns_shows_all_that_is_counted(tmp_path):
     assert [c["key"] for c in body["columns"]] == [
         f"{m}_{s}" for s in ("easy", "hard") for m in ("success", "error", "tries")
     ]
-
-
-@pytest.mark.slow
-def test_the_worked_example_of_the_docs_is_a_learner_in_under_sixty_lines(tmp_path, capsys):
-    text = (Path(__file__).parent.parent / "docs/guides/add_a_learner.md").read_text()
-    learner, use = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    assert len((learner + use).splitlines()) < 60
-    data = built(tmp_path / "data", "find", make_house=small_house)
-    space = {"__name__": "worked_example", "DATA": str(data.folder), "OUT": str(tmp_path / "out")}
-    sys.modules["worked_example"] = types.ModuleType("worked_example")
-    exec(compile("from __future__ import annotations\n" + learner + use, "add_a_learner.md", "exec"), space)
-    said = capsys.readouterr().out
-    assert "| 4 moves |" in said and "| shortest | 100.0 ±" in said and "2 training houses" in said
-    body = json.loads((tmp_path / "out" / "wanderer-patience.json").read_text())
-    assert [row["values"]["success_test_unseen"]["n"] for row in body["rows"]] == [16, 16, 8], (
-        "eight tasks by two seeds"
-    )
-    assert (tmp_path / "out" / "wanderer-patience.png").exists()

@@ -16,7 +16,7 @@ from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VLN
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
-from embodied.agents.vision.lessons import Split
+from embodied.agents.vision.training_data import Split
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
 from embodied.agents.vln.network import Said

@@ -122,7 +122,9 @@ class AskStudy(StudyLearner):
 
     def train(self, train_: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         config = dataclasses.replace(self.config, seed=seed)
-        first, rounds, make_env = lessons(config.houses, config.tasks, config.rounds, config.round_tasks, self.cache)
+        first, rounds, make_env = training_decisions(
+            config.houses, config.tasks, config.rounds, config.round_tasks, self.cache
+        )
         net = train(make_env, first, rounds, config, note)
         identity = self.trained(train_, seed, folder)
         save_weights(home / "best.safetensors", "asker", net.state_dict(), config, identity)
@@ -176,7 +178,7 @@ def houses(name: str, seed: int, count: int, cache: Path) -> tuple[dict[str, Sto
 
 
 @functools.cache
-def lessons(
+def training_decisions(
     count: int, tasks: int, rounds: int, round_tasks: int, cache: Path
 ) -> tuple[Decisions, list[list[Task]], Callable[[], HelpEnv]]:
     """What all training seeds share: the oracle's own decisions, and the tasks of the further rounds."""

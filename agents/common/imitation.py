@@ -51,7 +51,7 @@ class BatchLoss:
     """What is reported besides the losses and the gradient."""
 
 
-class Learner:
+class ImitationLearner:
     """An agent in training; who derives from it says `player` and `loss_of`, or `learn` as a whole."""
 
     optimizer_kind: ClassVar[type[torch.optim.Adam]] = torch.optim.Adam
@@ -120,7 +120,7 @@ class Learner:
 
 
 def train(
-    learner: Learner, validation: TaskSet, folder: Path, identity: Identity, **options: Unpack[Options]
+    learner: ImitationLearner, validation: TaskSet, folder: Path, identity: Identity, **options: Unpack[Options]
 ) -> Progress:
     """Train in place, from `folder`'s checkpoint if there is one (agents.common.session.run); one process at a time.
 
@@ -176,7 +176,7 @@ def asked(episodes: Sequence[Episode], logits: Tensor, labels: Tensor) -> dict[s
     return numbers
 
 
-def validate(learner: Learner, split: TaskSet, session: Session) -> Sequence[Episode]:
+def validate(learner: ImitationLearner, split: TaskSet, session: Session) -> Sequence[Episode]:
     """Play validation tasks as in evaluation; keep the agent if it is as good as the best so far."""
     config = learner.config
     tasks = [learner.evaluation_task(t) for t in split.tasks[: config.validation_tasks]]

@@ -33,7 +33,7 @@ from embodied.agents.find.config import THINGS, FinderConfig
 from embodied.agents.find.network import READ, Explorer, SeekNetwork
 from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
@@ -69,9 +69,9 @@ def tasks_in(places: Mapping[str, Place], per_house: int, things: Collection[str
     return found
 
 
-def find_split(lessons: Lessons, name: str, per_house: int, houses: int | None = None) -> Split:
+def find_split(source: TrainingData, name: str, per_house: int, houses: int | None = None) -> Split:
     """Find tasks in the houses of a split."""
-    split = lessons.split(name, limit=1, houses=houses)
+    split = source.split(name, limit=1, houses=houses)
     tasks = tasks_in(split.worlds, per_house)
     return dataclasses.replace(split, tasks=tasks, make_env=FIND.environments(EnvInputs(split.worlds)))
 
@@ -116,7 +116,7 @@ def new_finder(about: FinderAbout, requests: torch.Tensor) -> Finder:
         return Finder(about, network, Vocabulary(about.words))
 
 
-class FindLearner(imitation.Learner):
+class FindLearner(imitation.ImitationLearner):
     """An agent in training."""
 
     optimizer_kind = torch.optim.AdamW
@@ -150,19 +150,19 @@ class FindLearner(imitation.Learner):
         return list(searches.values()), imitation.played(episodes, split.worlds)
 
 
-def train_finder(lessons: Lessons, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:
+def train_finder(source: TrainingData, config: FinderConfig, folder: Path, cache: Path, *, note: Note = print) -> None:
     """Train, or go on training, an agent; writes best.safetensors and what embodied.agents.common.session writes."""
-    training = find_split(lessons, "train", HOUSE_TASKS, config.training_houses or None)
-    validation = find_split(lessons, "val_unseen", -(-config.validation_tasks // len(lessons.data.names("val_unseen"))))
+    training = find_split(source, "train", HOUSE_TASKS, config.training_houses or None)
+    validation = find_split(source, "val_unseen", -(-config.validation_tasks // len(source.data.names("val_unseen"))))
     vocabulary = build_vocabulary(t.request for t in training.tasks)
-    about = lessons.about(FinderAbout, config, EvaluationSettings(), vocabulary)
+    about = source.about(FinderAbout, config, EvaluationSettings(), vocabulary)
     classes = sorted({t.goal.object_class for t in training.tasks if isinstance(t.goal, FindObject)})
     say = lambda c: PlainLanguage().request(FindObject(c), rng=stream(config.seed, "unused"))
     requests = torch.stack([torch.from_numpy(vocabulary.encode(say(c), WORDS)) for c in classes])
     finder = new_finder(about, requests)
-    identity = identity_of("embodied.agents.find.run", settings=config, **lessons.identity())
+    identity = identity_of("embodied.agents.find.run", settings=config, **source.identity())
     looks = dataclasses.replace(training, bank=finder.policy(training.bank).bank)
-    labels = labels_of(lessons.data, looks, classes, cache)
+    labels = labels_of(source.data, looks, classes, cache)
     if config.agent == "detector":
         explorer_of(finder, labels, validation, note=note).save(folder / "best.safetensors", identity)
         return

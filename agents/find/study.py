@@ -13,9 +13,9 @@ from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.run import Finder, tasks_in, train_finder
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.vision.lessons import Lessons
-from embodied.agents.vision.run import encoder_of
+from embodied.agents.vision.encoder import encoder_of
 from embodied.agents.vision.sighted_study import SightedStudy
+from embodied.agents.vision.training_data import TrainingData
 from embodied.datasets.store import Dataset, SplitData
 from embodied.kinds.find import FIND
 from embodied.task_kind import EnvInputs
@@ -48,7 +48,7 @@ class FindStudy(SightedStudy):
     """Success of agents that find things in unseen houses."""
 
     config: FinderConfig
-    judged_tasks: int = 50
+    house_tasks: int = 50
     """Tasks of each house that agents are judged on."""
 
     name, agent_kind = "find", Finder
@@ -63,21 +63,21 @@ class FindStudy(SightedStudy):
         return self.repeats if dataclasses.replace(row, minus=None) in (SEEING, BLIND) else self.repeats[:1]
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_finder(self.lessons(), self.settings(train, seed), home, self.cache, note=note)
+        train_finder(self.training_data(), self.settings(train, seed), home, self.cache, note=note)
         return home / "best.safetensors"
 
     def where(self, agent: Any, judge: Mapping[str, Any], split: str) -> SplitData:
         places = self.judged_in(judge).places(split)
         return SplitData(
-            split, places, tuple(tasks_in(places, self.judged_tasks)), FIND.environments(EnvInputs(places))
+            split, places, tuple(tasks_in(places, self.house_tasks)), FIND.environments(EnvInputs(places))
         )
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {**super().judged(row, split), "house tasks": self.judged_tasks}
+        return {**super().judged(row, split), "house tasks": self.house_tasks}
 
-    def lessons_in(self, folder: Path) -> Lessons:
+    def training_data_in(self, folder: Path) -> TrainingData:
         """Of any kind: its houses are all that counts."""
-        return Lessons(Dataset(folder), encoder_of(self.encoder, self.network), self.pictures, cache=self.cache)
+        return TrainingData(Dataset(folder), encoder_of(self.encoder, self.network), self.pictures, cache=self.cache)
 
     def about(self) -> str:
-        return f"{super().about()} {self.judged_tasks} tasks of each house; hidden size {self.config.hidden_size}."
+        return f"{super().about()} {self.house_tasks} tasks of each house; hidden size {self.config.hidden_size}."

@@ -78,7 +78,7 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
     differ = [f"{k} {its[k]} -> {v}" for k, v in mine.items() if v != its[k]]
     if differ or vectors[1] not in (LEARNED_WORDS, vectors[0]):
         changed = ", ".join(differ or [f"word_vectors {vectors[1]} -> {vectors[0]}"])
-        raise ValueError(f"{source} cannot be begun with: {changed}; give this run its settings")
+        raise ValueError(f"{source} cannot initialise this agent: {changed}; give this run its settings")
     take_into(agent.network, other.network.state_dict())
 
 

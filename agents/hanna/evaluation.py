@@ -27,16 +27,6 @@ from embodied.teachers.hanna import HannaTeacher
 REASONS = ("lost", "uncertain_wrong", "never_asked")
 WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
 """Agents of embodied.evaluation.evaluate that are judged beside the learned one; they need no pictures."""
-COLUMNS = (
-    "success",
-    "strict success",
-    "spl",
-    "navigation error",
-    "requests",
-    "oracle success",
-    "mistake repeat",
-    "request repeat",
-)
 EVAL_ABLATIONS: Mapping[str, Mapping[str, Any]] = {
     "learned, without search": {"frontier_discount": 0.0},
     "learned, not by image": {"use_goal_image": False},

@@ -25,7 +25,7 @@ from embodied.agents.hanna.collect import Experience, imitation_loss, labelled
 from embodied.agents.hanna.policy import HannaMemory, for_training
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task, Teacher
@@ -33,7 +33,7 @@ from embodied.novelty import FAMILIAR
 from embodied.teachers.hanna import HannaTeacher
 
 
-class HannaLearner(imitation.Learner):
+class HannaLearner(imitation.ImitationLearner):
     """A HANNA agent in training."""
 
     def __init__(self, agent: HannaAgent, training: Split, teacher: Teacher) -> None:
@@ -76,35 +76,35 @@ def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[st
 
 
 def train_agent(
-    lessons: Lessons,
+    source: TrainingData,
     config: TrainingConfig,
     evaluation: HannaEvaluation,
     folder: Path,
     *,
-    begin: Path | None = None,
+    init_from: Path | None = None,
     **options: Unpack[imitation.Options],
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train.
 
     Args:
-      begin: a trained agent whose weights and words a new run begins with.
+      init_from: a trained agent whose weights and words a new run begins with.
 
     Raises:
-      ValueError: `begin` has networks of other sizes, learned from another encoder, or knows no varied words.
+      ValueError: `init_from` has networks of other sizes, learned from another encoder, or knows no varied words.
     """
     houses = config.training_houses or None
-    lessons = lessons.said_by(FAMILIAR) if config.speakers == FAMILIAR else lessons
-    training = lessons.split("train", houses=houses)
-    validation = lessons.split("val_unseen", limit=config.validation_tasks)
-    other = None if begin is None else HannaAgent.load(begin)
+    source = source.said_by(FAMILIAR) if config.speakers == FAMILIAR else source
+    training = source.split("train", houses=houses)
+    validation = source.split("val_unseen", limit=config.validation_tasks)
+    other = None if init_from is None else HannaAgent.load(init_from)
     if other and config.varied_words and not other.config.varied_words and config.word_vectors == LEARNED_WORDS:
-        raise ValueError(f"{begin} knows none of the varied words; add --word-vectors minilm, or leave --begin out")
-    reword, begun = lessons.rewording(config), dict[str, str]()
-    words = other.vocabulary if other else vocabulary_of(lessons.data, houses, reword)
-    agent = HannaAgent.new(lessons.about(HannaAbout, config, evaluation, words), reword)
-    if other is not None and begin is not None:
-        take_weights(agent, other, begin)  # a checkpoint in `folder` replaces them
-        begun["begin"] = weights_digest(begin)
-    agent.network.to(lessons.device)
-    identity = identity_of("embodied.agents.hanna.run", settings=config, **lessons.identity(), **begun)
+        raise ValueError(f"{init_from} knows no varied words; add --word-vectors minilm, or leave --init-from out")
+    reword, initial = source.rewording(config), dict[str, str]()
+    words = other.vocabulary if other else vocabulary_of(source.data, houses, reword)
+    agent = HannaAgent.new(source.about(HannaAbout, config, evaluation, words), reword)
+    if other is not None and init_from is not None:
+        take_weights(agent, other, init_from)  # a checkpoint in `folder` replaces them
+        initial["begin"] = weights_digest(init_from)
+    agent.network.to(source.device)
+    identity = identity_of("embodied.agents.hanna.run", settings=config, **source.identity(), **initial)
     return imitation.train(HannaLearner(agent, training, HannaTeacher()), validation, folder, identity, **options)

@@ -20,9 +20,9 @@ from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import speakers_table, words_table
 from embodied.agents.vision.config import CAPTURE_CONDITIONS
-from embodied.agents.vision.lessons import Lessons
 from embodied.agents.vision.sighted_study import SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy, spoken
+from embodied.agents.vision.training_data import TrainingData
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 
@@ -158,9 +158,9 @@ class HannaStudy(SightedStudy):
     config: TrainingConfig
     evaluation: HannaEvaluation
     device: str = "cpu"
-    begin: Path | None = None
+    init_from: Path | None = None
     """A trained agent whose weights and words every row begins with; None: random weights."""
-    elsewhere: Path | None = None
+    eval_data: Path | None = None
     """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
     goal_image: str = "same"
     """How the pictures that helpers show were taken, of agents.vision.config.CAPTURE_CONDITIONS, in training too."""
@@ -171,10 +171,10 @@ class HannaStudy(SightedStudy):
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
-        ood = Dataset(self.elsewhere or self.data).ood
+        ood = Dataset(self.eval_data or self.data).ood
         found = {}
         for name, table in TABLES.items():
-            splits = [s for s in table.splits if self.elsewhere is None or not s.endswith("_seen")]
+            splits = [s for s in table.splits if self.eval_data is None or not s.endswith("_seen")]
             splits += ood if table.splits == TEST else ()
             found[name] = dataclasses.replace(table, splits=tuple(splits))
             if name in PRINTED:
@@ -182,22 +182,24 @@ class HannaStudy(SightedStudy):
         return found
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
-        begun = {} if self.begin is None else {"begin": weights_digest(self.begin)}
-        return {**super().depends(train), "encoder": weights_digest(self.encoder), **begun}
+        initial = {} if self.init_from is None else {"begin": weights_digest(self.init_from)}
+        return {**super().depends(train), "encoder": weights_digest(self.encoder), **initial}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
-            self.judged_lessons({}).split(split)
+            self.evaluation_data({}).split(split)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(self.lessons(), self.settings(train, seed), self.evaluation, home, begin=self.begin, note=note)
+        train_agent(
+            self.training_data(), self.settings(train, seed), self.evaluation, home, init_from=self.init_from, note=note
+        )
         return home / "best.safetensors"
 
     def policies(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        bank = self.judged_lessons(judge).split(split.removesuffix(SHIPPED)).bank
+        bank = self.evaluation_data(judge).split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
         policy = all_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
         return self.heard(agent, policy, judge)
@@ -208,8 +210,8 @@ class HannaStudy(SightedStudy):
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         if PICTURE not in row.judge:
             return super().judge(weights, row, split, seed, folder, keep)
-        lessons = self.judged_lessons({})
-        return recognised(lessons.data, split, row.judge[PICTURE], lessons.encoder.digest, self.pictures)
+        source = self.evaluation_data({})
+        return recognised(source.data, split, row.judge[PICTURE], source.encoder.digest, self.pictures)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split.removesuffix(SHIPPED)), "shown": self.goal_image}
@@ -218,18 +220,18 @@ class HannaStudy(SightedStudy):
         return counted(episodes, split.worlds)
 
     def about(self) -> str:
-        begun = f", begun with {self.begin.name}" if self.begin else ""
+        initial = f", initialised from {self.init_from.name}" if self.init_from else ""
         other = self.judged_in({}).digest[:16]
-        judged = f" Judged in the data set {other}, not that of training." if self.elsewhere else ""
+        judged = f" Judged in the data set {other}, not that of training." if self.eval_data else ""
         return (
-            f"{super().about().removesuffix('.')}{begun}; goal images: {self.goal_image}.{judged} Judged at "
+            f"{super().about().removesuffix('.')}{initial}; goal images: {self.goal_image}.{judged} Judged at "
             f"temperature {self.evaluation.evaluation_temperature:g} and by docs/sources.md, S36, S161, S162; in "
             f"{', '.join(PRINTED)} so in the columns 'as shipped' alone, in the others, beside the printed numbers, "
             "the likeliest action is taken."
         )
 
-    def judged_lessons(self, judge: Mapping[str, Any]) -> Lessons:
-        return spoken(self.lessons_in(self.elsewhere or self.data), judge)
+    def evaluation_data(self, judge: Mapping[str, Any]) -> TrainingData:
+        return spoken(self.training_data_in(self.eval_data or self.data), judge)
 
-    def lessons_in(self, folder: Path) -> Lessons:
-        return dataclasses.replace(super().lessons_in(folder), device=self.device, goal_image=self.goal_image)
+    def training_data_in(self, folder: Path) -> TrainingData:
+        return dataclasses.replace(super().training_data_in(folder), device=self.device, goal_image=self.goal_image)

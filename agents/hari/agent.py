@@ -62,7 +62,7 @@ def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, Recu
         return actor, RecurrentHead(belief, config.hidden_size, 1, knows_stack=config.knows_stack)
 
 
-def begun_with(config: ExecutionConfig, other: Executor) -> Executor:
+def initialised_from(config: ExecutionConfig, other: Executor) -> Executor:
     """An execution policy with the words and weights of another.
 
     Raises:
@@ -72,7 +72,7 @@ def begun_with(config: ExecutionConfig, other: Executor) -> Executor:
     try:
         new.network.load_state_dict(other.network.state_dict())
     except RuntimeError as e:
-        raise ValueError(f"an execution policy of other sizes cannot be begun with ({e})") from e
+        raise ValueError(f"the weights of an execution policy of other sizes do not fit ({e})") from e
     return new
 
 

@@ -37,12 +37,12 @@ class ExecutionConfig(ValidatedRunSettings):
     subgoals: float = 0.0
     """Share of training episodes with a sub-goal of one to three nodes from the start, worded as SUB's answer
     (docs/sources.md, S144)."""
-    standing: float = 0.0
+    stay_fraction: float = 0.0
     """Share of training steps at which the agent stands still and gets the description of its place, as an agent that
     asks does (docs/sources.md, S172)."""
-    kept: float = 0.1
+    keep_fraction: float = 0.1
     """Share of object classes that these descriptions keep (docs/sources.md, S170)."""
-    afresh: bool = False
+    reset_on_goal_change: bool = False
     """Reset the belief when the goal on top of the stack changes (docs/sources.md, S145)."""
     clip: float = 1.0
     """Largest gradient norm (docs/sources.md, S76)."""
@@ -53,8 +53,8 @@ class ExecutionConfig(ValidatedRunSettings):
         super().__post_init__()
         require(self, AT_LEAST_ONE, "hidden_size", "layers", "heads", "horizon")
         require(self, POSITIVE, "clip")
-        require(self, NOT_ALL, "dropout", "standing")
-        require(self, SHARE, "cooldown", "guided", "subgoals", "kept")
+        require(self, NOT_ALL, "dropout", "stay_fraction")
+        require(self, SHARE, "cooldown", "guided", "subgoals", "keep_fraction")
         if self.hidden_size % self.heads:
             raise ValueError(f"hidden_size {self.hidden_size} should be a multiple of heads {self.heads}")
 
@@ -87,7 +87,7 @@ class IntentionConfig(ValidatedRunSettings):
     """Longest episode, steps (H)."""
     cooperative: bool = True
     """The assistant answers the question that was asked; False: a different one (Table 4.7)."""
-    kept: float = 0.1
+    keep_fraction: float = 0.1
     """Share of object classes that sparse descriptions keep (docs/sources.md, S170)."""
     perfect: bool = False
     """Reach sub-goals perfectly, whatever the execution policy does (the skyline of Table 4.7)."""
@@ -101,7 +101,7 @@ class IntentionConfig(ValidatedRunSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "stack", "longest", "horizon")
         require(self, POSITIVE, "clip")
         require(self, NOT_NEGATIVE, "critic_iterations", "cost", "entropy")
-        require(self, SHARE, "kept")
+        require(self, SHARE, "keep_fraction")
 
     @property
     def updates(self) -> int:
@@ -118,8 +118,8 @@ EXECUTION_SCALES: dict[str, ExecutionConfig] = {
         guided=0.5,
         cooldown=0.4,
         subgoals=0.5,
-        standing=0.3,
-        afresh=True,
+        stay_fraction=0.3,
+        reset_on_goal_change=True,
         validate_every=250,
     ),
     "paper": ExecutionConfig(),

@@ -16,7 +16,6 @@ from embodied.evaluation.rollout import play
 from embodied.interface import Agent
 
 TEST = tuple(f"test_{c}" for c in CONDITIONS)
-COLUMNS = ("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error")
 RANDOM = "random + rules"
 GREEDY = "learned, greedy"
 

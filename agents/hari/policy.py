@@ -106,7 +106,7 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     network, words = reader.executor.network, reader.executor.words
     depths = tuple(len(o.extras.goal_descriptions) if o is not None else 0 for o in observations)
     memory = memory or Belief(network.begin(len(observations)).clone(), depths)
-    if reader.executor.config.afresh:
+    if reader.executor.config.reset_on_goal_change:
         memory = _afresh(memory, depths, network.begin(1)[0])
     rows = [i for i, o in enumerate(observations) if o is not None]
     seen = [o for o in observations if o is not None]

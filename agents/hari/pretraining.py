@@ -70,7 +70,7 @@ class Walk:
 
 
 def pretrain(
-    executor: Executor, lessons: PretrainingData, folder: Path, identity: Identity, **options: Unpack[Options]
+    executor: Executor, source: PretrainingData, folder: Path, identity: Identity, **options: Unpack[Options]
 ) -> Progress:
     """Train `executor` in place (see embodied.agents.common.session.run).
 
@@ -80,22 +80,22 @@ def pretrain(
     optimizer = torch.optim.Adam(network.parameters(), config.learning_rate)
 
     def validate(session: Session) -> Sequence[Episode]:
-        tasks = lessons.validation[: config.validation_tasks]
-        success = pretraining_success(executor, lessons, tasks)
+        tasks = source.validation[: config.validation_tasks]
+        success = pretraining_success(executor, source, tasks)
         session.record({"success": success, "episodes": len(tasks)})
         if session.improved(success):
             save_executor(executor, session.folder / "best.safetensors", identity)
         return ()
 
     parts: dict[str, Stateful] = {"network": network, "optimizer": optimizer}
-    step = lambda update: train_step(executor, optimizer, lessons, update)
+    step = lambda update: train_step(executor, optimizer, source, update)
     done = run(folder, identity, parts, config, step, validate, may_change=MAY_CHANGE, **options)
     network.eval()
     return done
 
 
 def train_step(
-    executor: Executor, optimizer: torch.optim.Optimizer, lessons: PretrainingData, update: int
+    executor: Executor, optimizer: torch.optim.Optimizer, source: PretrainingData, update: int
 ) -> dict[str, float]:
     """One update; returns its loss per step and the share of steps at which the likeliest move was right.
 
@@ -103,15 +103,15 @@ def train_step(
       DivergedError: not finite; no weight was changed.
     """
     config = executor.config
-    tasks = tasks_of_update(lessons.training, update, config.batch, config.seed)
-    walks = [_begin(lessons, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
+    tasks = tasks_of_update(source.training, update, config.batch, config.seed)
+    walks = [_begin(source, t, stream(config.seed, "pretraining", update, i)) for i, t in enumerate(tasks)]
     if config.subgoals:
         for walk in walks:
             if walk.rng.random() < config.subgoals:
-                give_subgoal(walk, lessons.describer, longest=int(walk.rng.integers(1, LONGEST + 1)))
+                give_subgoal(walk, source.describer, longest=int(walk.rng.integers(1, LONGEST + 1)))
     executor.network.train()
     with seeded_dropout(config.seed, update):
-        losses, right = _play(executor, lessons, walks, config.horizon, guided_share(config, update))
+        losses, right = _play(executor, source, walks, config.horizon, guided_share(config, update))
     loss = torch.cat(losses).mean()
     set_learning_rate(optimizer, config.learning_rate, update, config.iterations, config.cooldown)
     descend(loss, optimizer, f"update {update}", config.clip)
@@ -125,14 +125,14 @@ def guided_share(config: ExecutionConfig, update: int) -> float:
 
 
 def _play(
-    executor: Executor, lessons: PretrainingData, walks: Sequence[Walk], horizon: int, beta: float
+    executor: Executor, source: PretrainingData, walks: Sequence[Walk], horizon: int, beta: float
 ) -> tuple[list[Tensor], list[Tensor]]:
     """Walk by the policy's own draws; per step (b,) cross-entropies against the shortest path, (b,) whether right.
 
     Args:
       beta: share of the steps that go where the shortest path goes instead.
     """
-    config, describer = executor.config, lessons.describer
+    config, describer = executor.config, source.describer
     beliefs = executor.network.begin(len(walks))  # (B, h)
     goals = executor.network.encode(torch.from_numpy(padded([executor.words.rows(w.goal, "goal") for w in walks])))
     losses, right = [], []
@@ -140,8 +140,8 @@ def _play(
         alive = [i for i, w in enumerate(walks) if not w.ended]
         if not alive:
             break
-        standing = [config.standing > 0 and walks[i].rng.random() < config.standing for i in alive]
-        reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
+        standing = [config.stay_fraction > 0 and walks[i].rng.random() < config.stay_fraction for i in alive]
+        reach = [source.moves.at(walks[i].place, walks[i].pose) for i in alive]
         told = [
             describer.sparse(walks[i].place, walks[i].pose.node) if still else _thinned(describer, walks[i])
             for i, still in zip(alive, standing, strict=True)
@@ -161,12 +161,12 @@ def _play(
     return losses, right
 
 
-def _begin(lessons: PretrainingData, task: Task, rng: np.random.Generator) -> Walk:
+def _begin(source: PretrainingData, task: Task, rng: np.random.Generator) -> Walk:
     """An episode with its goal described as in pre-training."""
-    place, goal = lessons.places[task.world], task.goal_nodes[0]
+    place, goal = source.places[task.world], task.goal_nodes[0]
     if not isinstance(task.goal, FindObject):
         raise TypeError(f"HARI's tasks ask for objects; task {task.id!r} asks for {task.goal}")
-    described = lessons.describer.pretraining_goal(place, goal, task.start.node, task.goal.object_class, rng=rng)
+    described = source.describer.pretraining_goal(place, goal, task.start.node, task.goal.object_class, rng=rng)
     return Walk(task, place, task.start, described, rng)
 
 
@@ -201,26 +201,26 @@ def _go(walk: Walk, column: int, poses: Sequence[Pose], stop: int) -> None:
         walk.pose = poses[column]
 
 
-def pretraining_success(executor: Executor, lessons: PretrainingData, tasks: Sequence[Task]) -> float:
+def pretraining_success(executor: Executor, source: PretrainingData, tasks: Sequence[Task]) -> float:
     """Share of tasks that end at their goal, taking the likeliest moves, with whole descriptions of the state."""
     config = executor.config
     executor.network.eval()
-    walks = [_begin(lessons, t, stream(config.seed, "validation", t.id)) for t in tasks]
+    walks = [_begin(source, t, stream(config.seed, "validation", t.id)) for t in tasks]
     with torch.inference_mode():
         for k in range(0, len(walks), config.batch):
-            _play_greedily(executor, lessons, walks[k : k + config.batch], config.horizon)
+            _play_greedily(executor, source, walks[k : k + config.batch], config.horizon)
     return sum(w.ended and w.pose.node in w.task.goal_nodes for w in walks) / len(walks)
 
 
-def _play_greedily(executor: Executor, lessons: PretrainingData, walks: Sequence[Walk], horizon: int) -> None:
+def _play_greedily(executor: Executor, source: PretrainingData, walks: Sequence[Walk], horizon: int) -> None:
     beliefs = executor.network.begin(len(walks)).clone()
     for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
         if not alive:
             return
-        reach = [lessons.moves.at(walks[i].place, walks[i].pose) for i in alive]
+        reach = [source.moves.at(walks[i].place, walks[i].pose) for i in alive]
         some = [walks[i] for i in alive]
-        told = [lessons.describer.dense(w.place, w.pose.node) for w in some]
+        told = [source.describer.dense(w.place, w.pose.node) for w in some]
         batch = perceived(executor, some, told, [candidates for candidates, _ in reach])
         beliefs[alive], log_moves = executor.network(beliefs[alive], batch)
         for i, column, (_, poses) in zip(alive, log_moves.argmax(1).tolist(), reach, strict=True):

@@ -1,4 +1,4 @@
-"""What the commands of HARI do: a data set becomes lessons and grounds, lessons an executor, grounds an agent."""
+"""What the commands of HARI do: a data set becomes training data and task sets, and these agents."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from embodied.agents.common.playing import TaskSet
 from embodied.agents.common.session import Options, Progress
 from embodied.agents.common.tensor_file import checksum_of
 from embodied.agents.common.weights import weights_digest
-from embodied.agents.hari.agent import Executor, HariAgent, begun_with, load_executor, new_executor, new_heads
+from embodied.agents.hari.agent import Executor, HariAgent, initialised_from, load_executor, new_executor, new_heads
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.intention import train
 from embodied.agents.hari.pretraining import PretrainingData, pretrain
@@ -30,7 +30,9 @@ CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
 def rules_of(config: IntentionConfig) -> HariRules:
     """The environment that an intention policy is trained for."""
     costs = Costs.alike(config.cost)
-    return HariRules(costs, config.stack, config.longest, config.cooperative, horizon=config.horizon, kept=config.kept)
+    return HariRules(
+        costs, config.stack, config.longest, config.cooperative, horizon=config.horizon, kept=config.keep_fraction
+    )
 
 
 def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig, limit: int | None = None) -> TaskSet:
@@ -54,28 +56,28 @@ def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[
 
 
 def train_execution(
-    data: Dataset, config: ExecutionConfig, folder: Path, *, begin: Path | None = None, **options: Unpack[Options]
+    data: Dataset, config: ExecutionConfig, folder: Path, *, init_from: Path | None = None, **options: Unpack[Options]
 ) -> Progress:
     """Train, or go on training, the execution policy of a run folder.
 
     Args:
-      begin: with the words and weights of this execution policy, not with random ones.
+      init_from: with the words and weights of this execution policy, not with random ones.
     """
     where: dict[str, Place] = {**data.places("pretrain"), **data.places("pretrain_val")}
     validation = spread(data.tasks("pretrain_val"), None)
-    describer = Describer(frequent_classes(data.places("train").values(), config.kept))
-    lessons = PretrainingData(where, describer, data.tasks("pretrain"), validation)
-    describe = lessons.describer.dense
-    houses = {t.world for t in lessons.training}
-    places = [lessons.places[name] for name in sorted(houses)]
+    describer = Describer(frequent_classes(data.places("train").values(), config.keep_fraction))
+    source = PretrainingData(where, describer, data.tasks("pretrain"), validation)
+    describe = source.describer.dense
+    houses = {t.world for t in source.training}
+    places = [source.places[name] for name in sorted(houses)]
     words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
-    executor = new_executor(config, words) if begin is None else begun_with(config, load_executor(begin))
+    executor = new_executor(config, words) if init_from is None else initialised_from(config, load_executor(init_from))
     size = sum(p.numel() for p in executor.network.parameters())
     note = options.get("note", print)
-    note(f"{len(lessons.training)} tasks in {len(houses)} houses, {len(executor.words)} names, {size:,} parameters")
-    more = {} if begin is None else {"begin": weights_digest(begin)}
+    note(f"{len(source.training)} tasks in {len(houses)} houses, {len(executor.words)} names, {size:,} parameters")
+    more = {} if init_from is None else {"begin": weights_digest(init_from)}
     identity = identity_of("embodied.agents.hari.run", settings=config, data=data.digest, **more)
-    return pretrain(executor, lessons, folder, identity, **options)
+    return pretrain(executor, source, folder, identity, **options)
 
 
 def train_intention(

@@ -95,7 +95,7 @@ class HariStudy(EpisodeStudy):
     """Where the rows start from."""
     executor: Path | None = None
     """A trained execution policy; None trains one in the study's folder."""
-    elsewhere: Path | None = None
+    eval_data: Path | None = None
     """Another data set to judge in: in its unseen houses, and in all its splits if `data` has the same houses and tasks
     to learn from; None: in `data`."""
 
@@ -137,7 +137,7 @@ class HariStudy(EpisodeStudy):
 
     def policies(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> Agent:
         means = validation_means(
-            dataset_of(self.data, "hari"), agent, seed=self.judging[0], tasks=agent.config.validation_tasks
+            dataset_of(self.data, "hari"), agent, seed=self.eval_seeds[0], tasks=agent.config.validation_tasks
         ) if judge["played"] == RANDOM else {"cur": 0.0, "goal": 0.0, "sub": 0.0, "do": 0.0}  # fmt: skip
         return policies(agent, means)[judge["played"]]
 
@@ -145,11 +145,11 @@ class HariStudy(EpisodeStudy):
         return self.judged_in(judge).split(split, rules=rules_of(agent.config))
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
-        return dataset_of(self.elsewhere or self.data, "hari")
+        return dataset_of(self.eval_data or self.data, "hari")
 
     def about(self) -> str:
         other = self.judged_in({}).digest[:16]
-        return super().about() + (f" Judged in the data set {other}." if self.elsewhere else "")
+        return super().about() + (f" Judged in the data set {other}." if self.eval_data else "")
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         if judge.get(TIMES):

@@ -1,4 +1,4 @@
-"""Assistants whose answers a language model or a person puts into words, in place of a template.
+"""Who words an assistant's answer: its own template, a language model, or a person; all through `Assistant`.
 
 Whoever words it is told what the assistant would say and, where it told a route, the walk in plain words; nothing else.
 """
@@ -102,7 +102,7 @@ class PersonAssistant(WordedAssistant):
 
 
 def assistant_maker(name: str, client: Callable[[], Client], prompts: Path | None) -> Callable[[Assistant], Assistant]:
-    """A function that replaces an assistant by its name: 'template' (not at all), 'llm', 'person', or 'module:Class'.
+    """How the assistant of an environment is replaced: 'template' (not at all), 'llm', 'person', or 'module:Class'.
 
     Raises:
       ValueError: no such class.

@@ -27,7 +27,7 @@ from embodied.interface import Usage
 from embodied.records import from_json, to_json
 
 FORMS = ("schema", "object", "tools", "text")
-"""Ways to ask for JSON: structured output as OpenAI has it, as llama-cpp-python has it, a tool, or in words alone."""
+"""How JSON is asked for: structured output as OpenAI has it, as llama-cpp-python has it, a tool, or in words alone."""
 LONGEST_WAIT = 30.0
 """Seconds between two tries."""
 UNSUPPORTED = re.compile(r"support|deprecated|only the default|not allowed|not permitted", re.IGNORECASE)
@@ -39,12 +39,12 @@ WRITE_WAIT = 60.0
 log = logging.getLogger(__name__)
 
 Message = Mapping[str, Any]
-"""A message of the chat-completions protocol: 'role' and 'content', a text or parts ('text', 'image_url')."""
+"""Of the chat-completions protocol: 'role' and 'content', a text or parts ('text', 'image_url')."""
 
 
 @dataclass(frozen=True)
 class ServerSettings:
-    """The model that answers, and the way it is asked."""
+    """Which model answers, and how it is asked."""
 
     model: str
     """Name of the model, as its server knows it."""

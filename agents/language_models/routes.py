@@ -47,7 +47,7 @@ class ModelJudge:
         self._describe = read_prompt("describe", ("walk",), prompts)
 
     def rate(self, world: SeenPlace, instruction: str, path: Sequence[int], yaw: float) -> float | None:
-        """A rating of a walk by its instruction, 0 to 1 in steps of a star; None where the answer is none.
+        """How well a walk carries out an instruction, 0 to 1 in steps of a star; None where the answer is none.
 
         Args:
           path: nodes; `yaw` is the first direction, radians.
@@ -136,7 +136,7 @@ def listener_arrives(world: SeenPlace, text: str, path: Sequence[int], yaw: floa
 
 
 def followed_replies(episodes: Iterable[Episode], worlds: Mapping[str, SeenPlace]) -> tuple[int, int]:
-    """Numbers of replies that told a way: those that a listener carries out, and all."""
+    """Of the replies that told a way: those that a listener carries out, and all."""
     right = total = 0
     for episode in episodes:
         for step in episode.steps:

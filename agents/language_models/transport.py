@@ -27,7 +27,7 @@ from urllib.parse import urljoin, urlsplit, urlunsplit
 from embodied.assets.json_file import RecordError, parse
 
 MOST_BYTES = 1_000_000
-"""Size of the longest response; more is not read."""
+"""Of a response; more is not read."""
 PASSING = (408, 409, 425, 429)
 """Status codes beside those from 500 on after which the same request is sent again."""
 ENDING = "/chat/completions"
@@ -149,7 +149,7 @@ class Endpoint:
         return ServerError(problem + _through(proxy, self._host), passing=True)
 
     def _advice(self, status: int, headers: Mapping[str, str], words: str) -> str:
-        """Advice on a status."""
+        """How a status may be mended."""
         if status in (401, 403):
             known = "" if os.environ.get(self.key_variable) else ", which is not set"
             return f"; check the key in the environment variable {self.key_variable}{known}"
@@ -247,7 +247,7 @@ def _certificates() -> ssl.SSLContext:
 
 
 def _trusted() -> str:
-    """Advice on the choice of certificates, with the variables that choose them now."""
+    """How the certificates that are trusted are chosen, and which variables choose them now."""
     chosen = {n: os.environ[n] for n in ("SSL_CERT_FILE", "SSL_CERT_DIR", "SSLKEYLOGFILE") if os.environ.get(n)}
     for name, path in chosen.items():
         if not os.path.exists(path):

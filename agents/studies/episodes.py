@@ -34,7 +34,7 @@ class EpisodeStudy(StudyLearner):
     repeats: tuple[int, ...]
     tasks: int | None = None
     """Judge on at most so many tasks of a split, from all houses alike."""
-    judging: tuple[int, ...] = (0,)
+    eval_seeds: tuple[int, ...] = (0,)
     """Seeds of what is drawn in judging; the same tasks are judged with each."""
     threads: int = 1
 
@@ -82,7 +82,7 @@ class EpisodeStudy(StudyLearner):
         return identity_of(*self.makers, settings=self.settings(train, seed), **self.depends(train))
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {"data": self.judged_in(row.judge).digest, "tasks": self.tasks, "judging": self.judging}
+        return {"data": self.judged_in(row.judge).digest, "tasks": self.tasks, "judging": self.eval_seeds}
 
     @torch.inference_mode()
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
@@ -90,7 +90,7 @@ class EpisodeStudy(StudyLearner):
         whole = self.where(agent, row.judge, split)
         tasks, player = spread(whole.tasks, self.tasks), self.policies(agent, row.judge, split)
         found: list[Episode] = []
-        for k in self.judging:
+        for k in self.eval_seeds:
             episodes = play(whole.make_env, player, tasks, seed=k, batch=self.batch, agent=keep.name)
             save_lines(keep.with_name(f"{keep.name}_{k}.jsonl"), episodes)
             found += episodes
@@ -101,5 +101,5 @@ class EpisodeStudy(StudyLearner):
         tasks = "all" if self.tasks is None else f"at most {self.tasks}"
         return (
             f"Data set {data.digest[:16]}, {len(data.names('train'))} training houses; training seeds {seeds}; {tasks} "
-            f"tasks of a split, judged with seeds {', '.join(map(str, self.judging))}."
+            f"tasks of a split, judged with seeds {', '.join(map(str, self.eval_seeds))}."
         )

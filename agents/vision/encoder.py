@@ -210,3 +210,10 @@ def _tensors(encoder: Encoder) -> dict[str, Tensor]:
     body = {k: v for k, v in encoder.network.state_dict().items() if not k.endswith("num_batches_tracked")}
     extra = {k: v for k, v in (("mean", encoder.mean), ("mix", encoder.mix)) if v is not None}
     return {**body, **extra}
+
+
+def encoder_of(path: Path, network: str | None = None) -> Encoder:
+    """The encoder of a file; of torchvision's weights, where `network` names one; an untrained one for 'random'."""
+    if network == "random":
+        return random_encoder(seed=0)
+    return imagenet_encoder(network, path) if network else load_encoder(path)

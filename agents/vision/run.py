@@ -17,7 +17,7 @@ from embodied.agents.common.session import Note
 from embodied.agents.vision.config import StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import train_detector
 from embodied.agents.vision.drawn import StripSource, houses_of, pictures_of
-from embodied.agents.vision.encoder import Encoder, imagenet_encoder, load_encoder, random_encoder
+from embodied.agents.vision.encoder import Encoder, load_encoder, random_encoder
 from embodied.agents.vision.extract import Extractor
 from embodied.agents.vision.labels import HouseStrips
 from embodied.agents.vision.probe import as_numbers, labelled, read
@@ -151,13 +151,6 @@ def training_houses(data: Dataset, config: StripTraining) -> list[str]:
 
 
 # Features ----------------------------------------------------------------------------------------
-
-
-def encoder_of(path: Path, network: str | None = None) -> Encoder:
-    """The encoder of a file; of torchvision's weights, where `network` names one; an untrained one for 'random'."""
-    if network == "random":
-        return random_encoder(seed=0)
-    return imagenet_encoder(network, path) if network else load_encoder(path)
 
 
 def make_features(

@@ -13,8 +13,9 @@ from embodied.agents.common.sighted import SightedAgent
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import SPEAKERS, code_of, hearing
-from embodied.agents.vision.lessons import Lessons
-from embodied.agents.vision.run import encoder_of
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.encoder import encoder_of
+from embodied.agents.vision.training_data import TrainingData
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
@@ -25,80 +26,100 @@ NOTHING: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
-class SightedStudy(EpisodeStudy):
-    """A study of agents that see features. A learner says its tables, `agent_kind` and `train`."""
+class FeatureStudy(EpisodeStudy):
+    """A study of agents that see features. A learner says its tables, `train`, `load` and `policy`."""
 
     encoder: Path
     network: str | None = None
     """Torchvision network of `encoder`, or 'random'; None for one of our own encoders."""
-    config: ImitationSettings
-    """Where the rows start from."""
-    evaluation: EvaluationSettings = EvaluationSettings()
+    config: Any
+    """Settings where the rows start from."""
     pictures: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
     cache: Path = field(default_factory=default_cache)
-    others: int | None = None
-    """Training seeds of every row but those of the unchanged settings; None: as many."""
 
-    agent_kind: ClassVar[type[SightedAgent]]
+    task_kind: ClassVar[str] = ""
+    """Kind of the tasks; the learner's name where not given."""
     all_tables: ClassVar[Mapping[str, StudyTable]]
 
     def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution that there are come beside the others."""
-        ood = self.lessons().data.ood
+        ood = self.training_data().data.ood
         return {name: dataclasses.replace(t, splits=(*t.splits, *ood)) for name, t in self.all_tables.items()}
-
-    def seeds(self, row: StudyRow) -> Sequence[int]:
-        return self.repeats[: self.others] if row.train else super().seeds(row)
 
     def settings(self, train: Mapping[str, Any], seed: int) -> Any:
         return dataclasses.replace(self.config, seed=seed, **train)
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
-        return self.lessons(train).identity()
+        return self.training_data(train).identity()
+
+    def policy(self, agent: Any, bank: FeatureBank) -> Agent:
+        """A trained agent as it plays, with features that it sees."""
+        return agent.policy(bank)
+
+    def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
+        if agent is None:
+            return agent_without_learning(self.task_kind or self.name, judge["played"])
+        return self.policy(agent, self.evaluation_data(judge).split(split).bank)
+
+    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
+        return self.evaluation_data(judge).data
+
+    def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
+        return {**super().judged(row, split), "pictures": self.evaluation_data(row.judge).pictures(split)}
+
+    def training_data(self, how: Mapping[str, Any] = NOTHING) -> TrainingData:
+        """What the agents of a row learn from, by what differs in it.
+
+        Raises:
+          DatasetError: a data set of another kind.
+        """
+        return self.training_data_in(self.data)
+
+    def evaluation_data(self, judge: Mapping[str, Any]) -> TrainingData:
+        """What they are judged in."""
+        return spoken(self.training_data(judge), judge)
+
+    def training_data_in(self, folder: Path) -> TrainingData:
+        """A data set with features."""
+        data = dataset_of(folder, self.task_kind or self.name)
+        return TrainingData(data, encoder_of(self.encoder, self.network), self.pictures, cache=self.cache)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SightedStudy(FeatureStudy):
+    """A study of agents that learn by imitation. A learner says its tables, `agent_kind` and `train`."""
+
+    config: ImitationSettings
+    evaluation: EvaluationSettings = EvaluationSettings()
+    others: int | None = None
+    """Training seeds of every row but those of the unchanged settings; None: as many."""
+
+    agent_kind: ClassVar[type[SightedAgent]]
+
+    def seeds(self, row: StudyRow) -> Sequence[int]:
+        return self.repeats[: self.others] if row.train else super().seeds(row)
 
     def load(self, weights: Path) -> Any:
         agent = self.agent_kind.load(weights)
         return dataclasses.replace(agent, about=dataclasses.replace(agent.about, evaluation=self.evaluation))
 
     def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
-        if agent is None:
-            return agent_without_learning(self.name, judge["played"])
-        return self.heard(agent, agent.policy(self.judged_lessons(judge).split(split).bank), judge)
+        policy = super().policies(agent, judge, split)
+        return policy if agent is None else self.heard(agent, policy, judge)
 
     def heard(self, agent: Any, policy: Any, judge: Mapping[str, Any]) -> Agent:
         """The policy of an agent, to which everything is said as the row has it."""
         return hearing(policy, judge, agent.about.words, self.cache)
 
-    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
-        return self.judged_lessons(judge).data
-
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        drawn = self.judged_lessons(row.judge).pictures(split)
-        return {**super().judged(row, split), "evaluation": self.evaluation, "pictures": drawn, **code_of(row.judge)}
-
-    def lessons(self, how: Mapping[str, Any] = NOTHING) -> Lessons:
-        """What the agents of a row learn from, by what differs in it.
-
-        Raises:
-          DatasetError: a data set of another kind.
-        """
-        return self.lessons_in(self.data)
-
-    def judged_lessons(self, judge: Mapping[str, Any]) -> Lessons:
-        """What they are judged in."""
-        return spoken(self.lessons(judge), judge)
-
-    def lessons_in(self, folder: Path) -> Lessons:
-        """A data set with features."""
-        data = dataset_of(folder, self.name)
-        return Lessons(data, encoder_of(self.encoder, self.network), self.pictures, cache=self.cache)
+        return {**super().judged(row, split), "evaluation": self.evaluation, **code_of(row.judge)}
 
     def about(self) -> str:
-        c, drawn = self.config, self.lessons().pictures("train")
+        c, drawn = self.config, self.training_data().pictures("train")
         return f"{super().about()} Trained {c.iterations} updates of {c.batch} episodes on pictures {drawn}."
 
 
-def spoken(lessons: Lessons, judge: Mapping[str, Any]) -> Lessons:
-    """Lessons in which those people describe routes whom a row says."""
-    return lessons.said_by(judge[SPEAKERS]) if SPEAKERS in judge else lessons
+def spoken(source: TrainingData, judge: Mapping[str, Any]) -> TrainingData:
+    """TrainingData in which those people describe routes whom a row says."""
+    return source.said_by(judge[SPEAKERS]) if SPEAKERS in judge else source

@@ -17,6 +17,8 @@ from embodied.agents.common.settings import (
     require_word,
 )
 
+MEASURES = ("success", "spl", "nDTW", "SDTW", "navigation error")
+"""Columns of tables."""
 FORCING = ("teacher", "student", "dagger")
 """Whose actions an episode of training takes: the teacher's; the follower's own, sampled; or at first the teacher's,
 then more and more its own (Ross et al. 2011). The label is always the teacher's."""

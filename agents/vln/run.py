@@ -1,5 +1,5 @@
 """The training of a follower: imitation of the shortest path, in the loop of agents.common.imitation; and what its
-commands do: a data set with features becomes lessons, lessons a follower.
+commands do: a data set with features becomes a follower.
 
 episodes = play tasks, actions of teacher or follower (FORCING)                                  (policy)
 loss = - log pi(a*) + progress_weight (left - left*)^2 - room_weight log p(room*)                (`losses_of`)
@@ -25,7 +25,7 @@ from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.weights import weights_digest
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.policy import SupervisedVln, VlnMoment
@@ -39,7 +39,7 @@ LONGEST = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
 
 
-class VlnLearner(imitation.Learner):
+class VlnLearner(imitation.ImitationLearner):
     """A follower in training."""
 
     optimizer_kind = torch.optim.AdamW
@@ -89,7 +89,7 @@ def _rooms(m: VlnMoment) -> Tensor:
 
 
 def train_follower(
-    lessons: Lessons,
+    source: TrainingData,
     config: FollowerSettings,
     evaluation: EvaluationSettings,
     folder: Path,
@@ -105,25 +105,25 @@ def train_follower(
     Raises:
       ValueError: spoken_share without a speaker.
     """
-    heard = lessons.said_by(FAMILIAR) if config.speakers == FAMILIAR else lessons
+    heard = source.said_by(FAMILIAR) if config.speakers == FAMILIAR else source
     training = heard.split("train", houses=config.training_houses or None)
     validation = heard.split("val_unseen", limit=config.validation_tasks)
     if config.more_paths:
-        training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(lessons, training, config)])
+        training = dataclasses.replace(training, tasks=[*training.tasks, *more_tasks(source, training, config)])
     if config.spoken_share:
         training = dataclasses.replace(training, tasks=mixed(training, config, speaker))
-    words = build_vocabulary((t.request for t in training.tasks), reword=lessons.rewording(config))
-    agent = VlnAgent.new(lessons.about(VlnAbout, config, evaluation, words), words.reword)
-    agent.network.to(lessons.device)
+    words = build_vocabulary((t.request for t in training.tasks), reword=source.rewording(config))
+    agent = VlnAgent.new(source.about(VlnAbout, config, evaluation, words), words.reword)
+    agent.network.to(source.device)
     spoken = {"speaker": weights_digest(speaker)} if speaker and config.spoken_share else {}
-    identity = identity_of("embodied.agents.vln.run", settings=config, **lessons.identity(), **spoken)
+    identity = identity_of("embodied.agents.vln.run", settings=config, **source.identity(), **spoken)
     return imitation.train(VlnLearner(agent, training), validation, folder, identity, **options)
 
 
-def more_tasks(lessons: Lessons, training: Split, config: FollowerSettings) -> list[Task]:
+def more_tasks(source: TrainingData, training: Split, config: FollowerSettings) -> list[Task]:
     """Tasks of further paths through the training houses; the same for all training seeds."""
     novelty = FAMILIAR if config.speakers == FAMILIAR else None
-    more = lambda name: more_routes(lessons.data, name, config.more_paths, seed=0, cache=lessons.cache, novelty=novelty)
+    more = lambda name: more_routes(source.data, name, config.more_paths, seed=0, cache=source.cache, novelty=novelty)
     routes = {name: more(name) for name in training.worlds}
     return [vln_task(name, route) for name, many in routes.items() for route in many]
 

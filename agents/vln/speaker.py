@@ -27,7 +27,7 @@ from embodied.agents.iliad.nav.world import HORIZON, Trip, walk_along
 from embodied.agents.iliad.stages import TeachingStage
 from embodied.agents.iliad.writing import log_likelihood
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import SpeakerSettings
 from embodied.agents.vln.network import COPIES
@@ -96,11 +96,11 @@ def load_speaker(path: Path) -> Speaker:
     return speaker
 
 
-def train_speaker(lessons: Lessons, config: SpeakerSettings, folder: Path, *, note: Note = print) -> Path:
+def train_speaker(source: TrainingData, config: SpeakerSettings, folder: Path, *, note: Note = print) -> Path:
     """Train, or go on training, the speaker of a folder by maximum likelihood; returns its file."""
-    training, judged = lessons.split("train"), lessons.split("val_unseen", limit=JUDGED)
+    training, judged = source.split("train"), source.split("val_unseen", limit=JUDGED)
     words = build_vocabulary(t.request for t in training.tasks).words
-    speaker = new_speaker(SpeakerAbout(config, lessons.encoder.digest, lessons.encoder.size, words))
+    speaker = new_speaker(SpeakerAbout(config, source.encoder.digest, source.encoder.size, words))
     eyes = speaker.eyes(dict(training.worlds), training.bank)
 
     def loss_of(rng: np.random.Generator) -> Tensor:
@@ -114,7 +114,7 @@ def train_speaker(lessons: Lessons, config: SpeakerSettings, folder: Path, *, no
         log, written = _scored(speaker, looking, judged.tasks, [_path(t) for t in judged.tasks])
         return {"unseen loss": float(-log.sum() / (written != 0).sum())}
 
-    identity = speaker_identity(lessons, config)
+    identity = speaker_identity(source, config)
     stage = TeachingStage(
         "vln-speaker", "speaker", folder, config.iterations, config.learning_rate, config.seed, identity, speaker.about
     )
@@ -122,9 +122,9 @@ def train_speaker(lessons: Lessons, config: SpeakerSettings, folder: Path, *, no
     return Path(folder) / "speaker.safetensors"
 
 
-def speaker_identity(lessons: Lessons, config: SpeakerSettings) -> Identity:
+def speaker_identity(source: TrainingData, config: SpeakerSettings) -> Identity:
     """All that a trained speaker depends on."""
-    return identity_of("embodied.agents.vln.speaker", settings=config, **lessons.identity())
+    return identity_of("embodied.agents.vln.speaker", settings=config, **source.identity())
 
 
 def _path(task: Task) -> tuple[int, ...]:

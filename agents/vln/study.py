@@ -16,14 +16,13 @@ from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import speakers_table, words_table
 from embodied.agents.vision.sighted_study import SPLITS, SightedStudy
 from embodied.agents.vln.agent import VlnAgent
-from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
+from embodied.agents.vln.config import MEASURES, FollowerSettings, SpeakerSettings
 from embodied.agents.vln.run import train_follower
 from embodied.agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
 from embodied.evaluation.evaluate import spread
 from embodied.identity import Identity, key_of
 from embodied.records import save_lines
 
-COLUMNS = ("success", "spl", "nDTW", "SDTW", "navigation error")
 LEARNED, RERANKED = "learned", "reranked"
 CANDIDATES = 10
 """K of Eq 2.19."""
@@ -51,19 +50,19 @@ TABLES: Mapping[str, StudyTable] = {
             _without("random walk"),
             _without("shortest"),
         ),
-        COLUMNS,
+        MEASURES,
         SPLITS,
         ((FOLLOWER, BLIND),),
     ),
     "speaker": StudyTable(
         "A speaker that chooses between walks (Eq 2.19) and words further paths",
         (FOLLOWER, CHOSEN, SPOKEN, _row("DAgger, back-translation, reranked", RERANKED, spoken_share=0.5)),
-        COLUMNS,
+        MEASURES,
         SPLITS,
         ((CHOSEN, FOLLOWER), (SPOKEN, FOLLOWER)),
     ),
-    "words": words_table(_row, COLUMNS, SPLITS[1:]),
-    "speakers": speakers_table(_row, COLUMNS, SPLITS[1:]),
+    "words": words_table(_row, MEASURES, SPLITS[1:]),
+    "speakers": speakers_table(_row, MEASURES, SPLITS[1:]),
 }
 
 
@@ -85,21 +84,25 @@ class VlnStudy(SightedStudy):
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """The speaker, if a row wants it."""
         if any((r.train or {}).get("spoken_share") or r.judge["played"] == RERANKED for r in rows):
-            train_speaker(self.lessons(), self.speaker, folder / "speaker", note=lambda line: note(f"speaker: {line}"))
+            train_speaker(
+                self.training_data(), self.speaker, folder / "speaker", note=lambda line: note(f"speaker: {line}")
+            )
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         speaker = _file(folder) if train.get("spoken_share") else None
-        train_follower(self.lessons(), self.settings(train, seed), self.evaluation, home, speaker=speaker, note=note)
+        train_follower(
+            self.training_data(), self.settings(train, seed), self.evaluation, home, speaker=speaker, note=note
+        )
         return home / "best.safetensors"
 
     @torch.inference_mode()
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         if weights is None or row.judge["played"] != RERANKED:
             return super().judge(weights, row, split, seed, folder, keep)
-        lessons, speaker, agent = self.lessons(), load_speaker(_file(folder)), self.load(weights)
-        whole, bank = lessons.data.split(split), lessons.split(split).bank
+        source, speaker, agent = self.training_data(), load_speaker(_file(folder)), self.load(weights)
+        whole, bank = source.data.split(split), source.split(split).bank
         tasks, found = spread(whole.tasks, self.tasks), []
-        for k in self.judging:
+        for k in self.eval_seeds:
             episodes = reranked(whole, tasks, agent, speaker, bank, candidates=CANDIDATES, seed=k)
             save_lines(keep.with_name(f"{keep.name}_{k}.jsonl"), episodes)
             found += episodes
@@ -110,7 +113,7 @@ class VlnStudy(SightedStudy):
         return {**about, "speaker": self._speaker()} if row.judge["played"] == RERANKED else about
 
     def _speaker(self) -> Identity:
-        return speaker_identity(self.lessons(), self.speaker)
+        return speaker_identity(self.training_data(), self.speaker)
 
 
 def _file(folder: Path) -> Path:

@@ -7,8 +7,6 @@ from embodied.agents.vnla.agent import VnlaAgent
 from embodied.interface import Agent
 from embodied.kinds.vnla import VNLA
 
-COLUMNS = ("success", "strict success", "room success", "navigation error", "requests", "oracle success", "steps")
-"""Those of the first paper, and how far the agents came."""
 WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
 TEACHER = "learned, asks as its teacher"
 ASKED = {

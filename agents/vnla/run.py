@@ -1,5 +1,5 @@
 """The training of VNLA: imitation by two cross-entropies (Eq 4.2 and 4.3), in the loop of agents.common.imitation; and
-what its commands do: a data set with features becomes lessons, lessons an agent.
+what its commands do: a data set with features becomes an agent.
 
 episodes = play tasks: moves are sampled, questions are the asking teacher's, and where an advisor acts in the
            learner's place it learns from what is done all the same                              (policy)
@@ -24,7 +24,7 @@ from embodied.agents.common.session import Progress
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.lessons import Lessons, Split
+from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
 from embodied.agents.vnla.policy import VnlaMoment, for_training
@@ -36,7 +36,7 @@ from embodied.language.plain_language import PlainLanguage
 from embodied.teachers.vnla import VnlaTeacher
 
 
-class VnlaLearner(imitation.Learner):
+class VnlaLearner(imitation.ImitationLearner):
     """A VNLA agent in training."""
 
     def __init__(self, agent: VnlaAgent, training: Split) -> None:
@@ -85,7 +85,7 @@ def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[st
 
 
 def train_agent(
-    lessons: Lessons,
+    source: TrainingData,
     config: VnlaSettings,
     evaluation: EvaluationSettings,
     folder: Path,
@@ -93,10 +93,10 @@ def train_agent(
 ) -> Progress:
     """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
     houses = config.training_houses or None
-    training = lessons.split("train", houses=houses, rules=TRAINED_UNDER[config.rules])
-    validation = lessons.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
-    words = vocabulary_of(lessons.data, houses, lessons.rewording(config))
-    agent = VnlaAgent.new(lessons.about(VnlaAbout, config, evaluation, words), words.reword)
-    agent.network.to(lessons.device)
-    identity = identity_of("embodied.agents.vnla.run", settings=config, **lessons.identity())
+    training = source.split("train", houses=houses, rules=TRAINED_UNDER[config.rules])
+    validation = source.split("val_unseen", limit=config.validation_tasks, rules=config.rules)
+    words = vocabulary_of(source.data, houses, source.rewording(config))
+    agent = VnlaAgent.new(source.about(VnlaAbout, config, evaluation, words), words.reword)
+    agent.network.to(source.device)
+    identity = identity_of("embodied.agents.vnla.run", settings=config, **source.identity())
     return imitation.train(VnlaLearner(agent, training), validation, folder, identity, **options)

@@ -15,8 +15,8 @@ from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import words_table
-from embodied.agents.vision.lessons import Lessons
 from embodied.agents.vision.sighted_study import NOTHING, SPLITS, SightedStudy
+from embodied.agents.vision.training_data import TrainingData
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
@@ -103,7 +103,7 @@ class VnlaStudy(SightedStudy):
     config: VnlaSettings
     without_rooms: Path | None = None
     """A data set whose requests name no room, for the table 'rooms'."""
-    judging: tuple[int, ...] = EVALUATION_SEEDS
+    eval_seeds: tuple[int, ...] = EVALUATION_SEEDS
 
     name, agent_kind, all_tables = "vnla", VnlaAgent, TABLES
     makers = ("embodied.agents.vnla.run",)
@@ -116,23 +116,23 @@ class VnlaStudy(SightedStudy):
         """Data sets that are missing are told before anything is trained."""
         for row in rows:
             for how in (row.train or {}, row.judge):
-                self.lessons(how)
+                self.training_data(how)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(self.lessons(train), self.settings(train, seed), self.evaluation, home, note=note)
+        train_agent(self.training_data(train), self.settings(train, seed), self.evaluation, home, note=note)
         return home / "best.safetensors"
 
     def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        return self.heard(agent, player(agent, self.lessons(judge).split(split).bank, judge["played"]), judge)
+        return self.heard(agent, player(agent, self.training_data(judge).split(split).bank, judge["played"]), judge)
 
     def where(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         if agent is None:
             return super().where(agent, judge, split)
         return self.judged_in(judge).split(split, rules=rules_of_row(agent, judge["played"]))
 
-    def lessons(self, how: Mapping[str, Any] = NOTHING) -> Lessons:
+    def training_data(self, how: Mapping[str, Any] = NOTHING) -> TrainingData:
         """
         Raises:
           ValueError: requests without rooms are wanted and there are none, or the data set names (no) rooms.
@@ -144,9 +144,9 @@ class VnlaStudy(SightedStudy):
                 "the table 'rooms' needs requests that name no room: `embodied dataset vnla --no-rooms --out DIR2`, "
                 "features for it, and --without-rooms DIR2"
             )
-        lessons = self.lessons_in(folder)
-        if lessons.data.config.rooms != rooms:
+        source = self.training_data_in(folder)
+        if source.data.config.rooms != rooms:
             raise ValueError(
                 f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"
             )
-        return lessons
+        return source

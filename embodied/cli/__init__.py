@@ -13,6 +13,7 @@ import importlib
 import io
 import os
 import sys
+import typing
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor
@@ -43,7 +44,8 @@ COMMANDS = (
     "bench",
     "cache",
 )
-"""Subcommands in the order `--help` lists them; each is a module with `Options` and `run`, or with `COMMANDS`."""
+"""Subcommands in the order `--help` lists them; each is a module with `run(options)`, or with commands of its own:
+`COMMANDS`, or `commands(words)` of the command line."""
 
 REMEDIES = {
     errno.ENOSPC: "the disk is full; free some space, or put --cache and --out on another disk. What is whole is kept",
@@ -112,8 +114,12 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"error: {message}; `{self.prog} --help` explains\n")
 
 
-def parser(*chosen: str) -> argparse.ArgumentParser:
-    """The argument parser; of the subcommands, only those `chosen` get their options (and are imported)."""
+def parser(*chosen: str, words: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """The argument parser; of the subcommands, only those `chosen` get their options (and are imported).
+
+    Args:
+      words: of the command line, by which `train` and `study` see which learner they are for.
+    """
     top = Parser(
         prog="embodied",
         description="Generated houses in MuJoCo, panoramas, and agents that ask people for help.",
@@ -144,10 +150,12 @@ def parser(*chosen: str) -> argparse.ArgumentParser:
             module = importlib.import_module(f"embodied.cli.{name}")
             from embodied.options import add_command, add_commands
 
-            if hasattr(module, "COMMANDS"):
-                add_commands(sub, module.COMMANDS, "WHAT", "what")
+            if hasattr(module, "run"):
+                (options,) = (hint for name, hint in typing.get_type_hints(module.run).items() if name != "return")
+                add_command(sub, options, module.run)
             else:
-                add_command(sub, module.Options, module.run)
+                commands_of = module.commands(words) if hasattr(module, "commands") else module.COMMANDS
+                add_commands(sub, commands_of, "WHAT", "what")
     return top
 
 
@@ -158,7 +166,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(out, io.TextIOWrapper):  # "±" on a terminal without it is a "?", not an error at the end
             out.reconfigure(errors="replace")
     try:
-        args = parser(*[a for a in argv if a in COMMANDS][:1]).parse_args(argv)
+        args = parser(*[a for a in argv if a in COMMANDS][:1], words=argv).parse_args(argv)
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
             return args.run(args) or 0

@@ -21,9 +21,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from embodied.agents.language_models.options import client_of
 from embodied.cli.common import bar, catalogue_of, note, show
 from embodied.cli.evaluate_options import TEMPLATE, Options
-from embodied.cli.model import client_of
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, SplitData
@@ -63,16 +63,17 @@ def _agents(args: Options) -> tuple[list[str], list[Path]]:
     Raises:
       ValueError: an unknown agent, or several trained ones.
     """
-    from embodied.agents.common.shipped import SHIPPED
+    from embodied.agents.learner import playing_learner
     from embodied.task_kind import kind_named
 
     known = kind_named(args.kind).agent_names
-    names, files = [], []
-    for name in args.agent or (["shipped"] if args.kind in SHIPPED and args.data else known):
+    names, files, learner = [], [], playing_learner(args.kind)
+    shipped = learner and learner.shipped
+    for name in args.agent or (["shipped"] if shipped and args.data else known):
         path = Path(name)
-        if name == "shipped" and args.kind in SHIPPED:
-            files.append(SHIPPED[args.kind])
-        elif args.kind in SHIPPED and (path.suffix == ".safetensors" or path.is_dir()):
+        if name == "shipped" and shipped:
+            files.append(shipped)
+        elif learner and (path.suffix == ".safetensors" or path.is_dir()):
             files.append(path / "best.safetensors" if path.is_dir() else path)
         elif name in known or name == LLM or (args.kind == "ask" and (name.startswith("http") or path.is_dir())):
             names.append(name)
@@ -126,12 +127,11 @@ def _evaluate(
 
 def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
     from embodied import metrics
+    from embodied.agents.learner import playing_learner
     from embodied.task_kind import kind_named
 
-    if files:
-        from embodied.cli.evaluate_trained import columns_of
-
-        return columns_of(kind)
+    if files and (learner := playing_learner(kind)):
+        return learner.columns
     return [*kind_named(kind).columns, *metrics.USAGE]
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from embodied.agents.language_models.options import WithModel
+from embodied.agents.options import GOAL_IMAGES, Encoded, Threaded
 from embodied.cli.common import Furnished, Printed
-from embodied.cli.learning import GOAL_IMAGES, Encoded, Threaded
-from embodied.cli.model import WithModel
 from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
 SEES = ("names", "strip", "panorama", "nothing")

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from embodied.agents.options import GOAL_IMAGES, Encoded, WithData, WithDevice
 from embodied.cli.common import note
-from embodied.cli.learning import GOAL_IMAGES, Encoded, WithData, WithDevice
 from embodied.options import Count, Option
 
 
@@ -31,15 +31,13 @@ class FeatureOptions(WithData, Encoded, WithDevice):
     """Use a Ray cluster instead: its address, or 'local'."""
 
 
-Options = FeatureOptions
-
-
 def run(args: FeatureOptions) -> None:
     from embodied.agents.common.parallel import check_device
     from embodied.agents.vision.config import CAPTURE_CONDITIONS
     from embodied.agents.vision.drawn import houses_of
+    from embodied.agents.vision.encoder import encoder_of
     from embodied.agents.vision.extract import Extractor
-    from embodied.agents.vision.run import encoder_of, make_features
+    from embodied.agents.vision.run import make_features
     from embodied.datasets.store import Dataset
 
     check_device(args.device)

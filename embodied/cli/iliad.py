@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents.common.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
+from embodied.agents.options import Nav
 from embodied.cli.common import Printed, note, show
-from embodied.cli.learning import Nav
 from embodied.options import AnyFolder, Count, Option, OutputRrd, any_path
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from embodied.cli.learning import Threaded
-from embodied.cli.model import WithModel, client_of
+from embodied.agents.language_models.options import WithModel, client_of
+from embodied.agents.options import Threaded
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 from embodied.options import Cached, Count, InputFolder, Option, file_to_write, whole

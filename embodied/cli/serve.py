@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from embodied.agents.language_models.options import WithModel, client_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
-from embodied.cli.model import WithModel, client_of
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError
 from embodied.options import Count, Option, OutputFolder, any_path, whole

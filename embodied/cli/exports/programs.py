@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from embodied.cli.common import note, show
 from embodied.cli.exports import Export, OfData, register_export
-from embodied.cli.learning import Encoded
+from embodied.agents.options import Encoded
 from embodied.datasets.folders import PROGRAMS
 from embodied.options import Count
 

@@ -14,11 +14,12 @@ from embodied.agents.common.playing import TaskSet
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
 from embodied.agents.common.sighted import About
 from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.learner import PlaySettings
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.capture import with_goal_images
 from embodied.agents.vision.config import CAPTURE_CONDITIONS, drawing
 from embodied.agents.vision.drawn import pictures_of
-from embodied.agents.vision.encoder import Encoder
+from embodied.agents.vision.encoder import Encoder, encoder_of
 from embodied.agents.vision.features import feature_path, load_bank
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
@@ -36,7 +37,7 @@ class Split(TaskSet):
 
 
 @dataclass(frozen=True, eq=False)
-class Lessons:
+class TrainingData:
     """What an agent learns from, and where it does."""
 
     data: Dataset
@@ -68,7 +69,7 @@ class Lessons:
         bank = with_goal_images(bank, data, list(split.worlds), condition, encoder, self.cache, kind)
         return Split(split.worlds, tasks, split.make_env, bank)
 
-    def said_by(self, novelty: str) -> Lessons:
+    def said_by(self, novelty: str) -> TrainingData:
         """The same with routes as somebody of a novelty describes them."""
         return dataclasses.replace(self, data=SaidBy(novelty, self.data, cache=self.cache))
 
@@ -101,3 +102,9 @@ class Lessons:
 def drawings(data: Dataset, houses: Iterable[str], picture_kind: str | None) -> str:
     """How the pictures of some houses were drawn, in words: 'unlit_192', or several of them."""
     return ", ".join(sorted({drawing(pictures_of(data, n, picture_kind)) for n in houses}))
+
+
+def evaluation_data(data: Dataset, how: PlaySettings) -> TrainingData:
+    """A data set as a trained agent is evaluated in it."""
+    encoder = encoder_of(how.encoder, how.network)
+    return TrainingData(data, encoder, how.pictures, goal_image=how.goal_image, cache=how.cache)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.vision.config import CAPTURE_CONDITIONS, RENDER_PRESETS, TORCHVISIONS
 from embodied.options import (
     PICTURE_HELP,
+    REPEATS,
     Cached,
     Count,
     InputFolder,
@@ -20,7 +22,11 @@ from embodied.options import (
     OutputFolder,
     any_path,
     positive,
+    whole,
 )
+
+if TYPE_CHECKING:
+    from embodied.agents.vision.training_data import TrainingData
 
 PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
 PRESETS = Option(words=tuple(RENDER_PRESETS), metavar="KIND")
@@ -49,7 +55,7 @@ class Encoded(EncoderFile):
 
     def encoder_digest(self) -> str:
         """The digest of the encoder, which names its features."""
-        from embodied.agents.vision.run import encoder_of
+        from embodied.agents.vision.encoder import encoder_of
 
         return encoder_of(self.encoder, self.network).digest
 
@@ -84,6 +90,8 @@ class Timed:
     """Stop after X minutes; rerun the command to resume."""
 
 
+TRAINING, EVALUATION = "settings of training", "settings of evaluation"
+"""Titles of groups of options."""
 SCALE = Option(words=("mini", "paper"))
 SMALL_SCALE = Option(words=("mini", "paper", "tiny"))
 
@@ -100,6 +108,66 @@ class Run(WithData, Timed):
 class Nav(Cached, Encoded):
     data: InputFolder | None = None
     """NAV: the data set, a folder that `embodied dataset vln` or `hanna` built."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    rrd: bool = False
+    """Record two validation episodes at each validation, into the run folder."""
+
+
+def training_data(args: Any, kind: str, device: str = "cpu", goal_image: str = "same") -> TrainingData:
+    """What an agent learns from by options of WithData and Encoded; under torchrun, PyTorch has its device.
+
+    Raises:
+      DatasetError: a data set of another kind.
+    """
+    from embodied.agents.common.parallel import join_launcher
+    from embodied.agents.vision.encoder import encoder_of
+    from embodied.agents.vision.training_data import TrainingData
+    from embodied.datasets.store import dataset_of
+
+    data, encoder = dataset_of(args.data, kind), encoder_of(args.encoder, args.network)
+    return TrainingData(data, encoder, args.pictures, join_launcher(device), goal_image, args.cache)
+
+
+# Studies ------------------------------------------------------------------------------------------
+
+Tables = Annotated[tuple[str, ...], Option(metavar="TABLE", name="TABLE")]
+Seeds = Annotated[int, Option(whole(1, REPEATS), "N")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyOptions(Threaded):
+    """Options of every study."""
+
+    out: OutputFolder
+    """Folder of the study: runs, episodes and tables; rerun the command to resume."""
+    rows: tuple[Annotated[str, Option(metavar="LABEL")], ...] = ()
+    """Run only the rows with these labels."""
+    workers: Count = 1
+    """Train N runs in parallel."""
+    report: bool = False
+    """Train and evaluate nothing; write tables of the stored results."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repeated:
+    seeds: Seeds = 3
+    """Train every row with N random seeds, from --seed on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limited:
+    tasks: Count | None = None
+    """Evaluate on at most N tasks of a split, spread over its houses (default: all)."""
+
+
+def study_of(kind: Any, args: Any, **more: Any) -> Any:
+    """A study: its fields are the options of the same names, but for `more`."""
+    named = {f.name: getattr(args, f.name) for f in dataclasses.fields(kind) if hasattr(args, f.name)}
+    seed = named["config"].seed
+    return kind(**{"repeats": tuple(range(seed, seed + args.seeds)), **named, **more})
 
 
 class NamedFile(NamedTuple):

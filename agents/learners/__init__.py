@@ -1,0 +1,1 @@
+"""The learners that come with the program: a file each, with its commands. Free of torch."""

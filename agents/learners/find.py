@@ -1,0 +1,35 @@
+"""Agents that find things without help, with sight and without: `embodied study find`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from embodied.agents.find.config import FinderConfig
+from embodied.agents.learner import Learner
+from embodied.agents.options import TRAINING, EncoderFile, Repeated, StudyOptions, WithData, study_of
+from embodied.options import Count, Settings
+
+if TYPE_CHECKING:
+    from embodied.agents.studies.engine import StudyLearner
+
+WORDLESS = ("instruction_length", "word_vectors", "varied_words")
+"""Of the settings of agents, those that an agent that is told a class has no use for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FindStudyOptions(StudyOptions, Repeated, WithData, EncoderFile):
+    """Agents that find things without help, with sight and without."""
+
+    house_tasks: Count = 50
+    """Evaluate on at most N tasks of each unseen house."""
+    config: Annotated[FinderConfig, Settings(TRAINING, FinderConfig(), skip=WORDLESS)]
+
+
+def study(args: FindStudyOptions) -> StudyLearner:
+    from embodied.agents.find.study import FindStudy
+
+    return study_of(FindStudy, args)
+
+
+LEARNER = Learner(name="find", study=(FindStudyOptions, study))

@@ -1,0 +1,110 @@
+"""HANNA: agents that ask people for help and follow their routes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from embodied.agents.common.shipped import SHIPPED_AGENT
+from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
+from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings
+from embodied.agents.options import (
+    EVALUATION,
+    SCALE,
+    TRAINING,
+    Encoded,
+    EncoderFile,
+    Limited,
+    Recorded,
+    Repeated,
+    Run,
+    Seeds,
+    StudyOptions,
+    Tables,
+    WithData,
+    WithDevice,
+    WithGoalImage,
+    study_of,
+    training_data,
+)
+from embodied.options import Count, InputFolder, InputPath, Settings
+
+if TYPE_CHECKING:
+    from embodied.agents.studies.engine import StudyLearner
+    from embodied.datasets.store import Dataset
+
+
+@dataclass(frozen=True, kw_only=True)
+class HannaTraining(Recorded, Run, Encoded, WithDevice, WithGoalImage):
+    """The agent, on a HANNA data set with features.
+
+    Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
+    """
+
+    threads: Count = 2
+    init_from: InputPath | None = None
+    """Initialise with the weights of this agent."""
+    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES)]
+    evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HannaStudyOptions(StudyOptions, Repeated, Limited, WithData, EncoderFile, WithDevice, WithGoalImage):
+    """Agents that ask people for help and follow their routes."""
+
+    tables: Tables
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight, words, speakers or places."""
+    seeds: Seeds = 1
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    eval_seed: int = 0
+    """Random seed of the evaluation."""
+    eval_data: InputFolder | None = None
+    """Evaluate in the unseen houses of another data set that has features (default: of --data)."""
+    init_from: InputPath | None = None
+    """Initialise with the weights of this agent."""
+    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES, skip=("training_houses",))]
+    evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
+
+
+def train(args: HannaTraining, **session: Any) -> None:
+    from embodied.agents.hanna.run import train_agent
+
+    source = training_data(args, "hanna", args.device, args.goal_image)
+    session["minutes"] = args.minutes
+    train_agent(source, args.config, args.evaluation, args.out, init_from=args.init_from, **session)
+
+
+def study(args: HannaStudyOptions) -> StudyLearner:
+    from embodied.agents.hanna.study import HannaStudy
+
+    return study_of(HannaStudy, args, eval_seeds=(args.eval_seed,))
+
+
+def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
+    """Tables 4.3 to 4.5."""
+    from embodied.agents.hanna.agent import HannaAgent
+    from embodied.agents.hanna.evaluation import WITHOUT_LEARNING, players
+    from embodied.agents.vision.training_data import evaluation_data
+
+    source, agent = evaluation_data(data, how), HannaAgent.load(file)
+
+    def of_split(split: str) -> Players:
+        whole, (policies, usual) = data.split(split), players(agent, source.split(split).bank)
+        return Players({name: (whole, policy) for name, policy in policies.items()}, usual, WITHOUT_LEARNING)
+
+    return of_split
+
+
+LEARNER = Learner(
+    name="hanna",
+    train=(HannaTraining, train),
+    study=(HannaStudyOptions, study),
+    players=players,
+    columns=(
+        *("success", "strict success", "spl", "navigation error", "requests"),
+        *("oracle success", "mistake repeat", "request repeat"),
+    ),
+    shipped=SHIPPED_AGENT,
+)

@@ -1,0 +1,120 @@
+"""VLN: agents that follow route instructions, and a speaker that describes walks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.shipped import SHIPPED_VLN
+from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings
+from embodied.agents.options import (
+    EVALUATION,
+    SCALE,
+    TRAINING,
+    Encoded,
+    Limited,
+    Recorded,
+    Repeated,
+    Run,
+    StudyOptions,
+    Tables,
+    WithData,
+    WithDevice,
+    study_of,
+    training_data,
+)
+from embodied.agents.vln.config import FORCING, MEASURES, SCALES, SPEAKER_SCALES, FollowerSettings, SpeakerSettings
+from embodied.options import Count, InputPath, OutputFolder, Settings
+
+if TYPE_CHECKING:
+    from embodied.agents.common.session import Note
+    from embodied.agents.studies.engine import StudyLearner
+    from embodied.datasets.store import Dataset
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowerTraining(Recorded, Run, Encoded, WithDevice):
+    """An agent that follows route instructions, on a VLN or HANNA data set with features (imitation)."""
+
+    speaker: InputPath | None = None
+    """For --spoken-share: a file of `embodied train vln speaker`."""
+    config: Annotated[FollowerSettings, Settings(TRAINING, SCALES, words={"forcing": FORCING})]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeakerTraining(WithData, Encoded):
+    """A network that describes walks, on a VLN or HANNA data set with features (maximum likelihood)."""
+
+    out: OutputFolder
+    """Run folder; rerun the command to resume an interrupted run."""
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    config: Annotated[SpeakerSettings, Settings(TRAINING, SPEAKER_SCALES)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VlnStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
+    """Agents that follow route instructions, and a speaker."""
+
+    tables: Tables
+    """Make these tables: followers, speaker, words or speakers."""
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    others: Count = 1
+    """Training seeds of all rows but the first."""
+    config: Annotated[
+        FollowerSettings, Settings(TRAINING, SCALES, skip=("forcing", "blind", "wordless", "spoken_share"))
+    ]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
+
+
+def follower(args: FollowerTraining, **session: Any) -> None:
+    from embodied.agents.vln.run import train_follower
+
+    source = training_data(args, "vln", args.device)
+    session["minutes"] = args.minutes
+    train_follower(source, args.config, args.evaluation, args.out, speaker=args.speaker, **session)
+
+
+def speaker(args: SpeakerTraining, *, note: Note) -> None:
+    from embodied.agents.vln.speaker import train_speaker
+
+    train_speaker(training_data(args, "vln"), args.config, args.out, note=note)
+
+
+def study(args: VlnStudyOptions) -> StudyLearner:
+    from embodied.agents.vln.study import VlnStudy
+
+    return study_of(VlnStudy, args, speaker=SPEAKER_SCALES[args.scale])
+
+
+def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
+    """The follower beside agents without learning."""
+    from embodied.agents.vision.training_data import evaluation_data
+    from embodied.agents.vln.agent import VlnAgent
+    from embodied.task_kind import PLAIN_AGENTS
+
+    source, agent = evaluation_data(data, how), VlnAgent.load(file)
+
+    def of_split(split: str) -> Players:
+        whole, learned = data.split(split), agent.policy(source.split(split).bank)
+        rows = {"learned": (whole, learned), **{name: (whole, make()) for name, make in PLAIN_AGENTS.items()}}
+        return Players(rows, list(rows), PLAIN_AGENTS)
+
+    return of_split
+
+
+LEARNER = Learner(
+    name="vln",
+    train=(
+        "Agents that follow route instructions, and a speaker that describes walks.",
+        {"follower": (FollowerTraining, follower), "speaker": (SpeakerTraining, speaker)},
+    ),
+    study=(VlnStudyOptions, study),
+    players=players,
+    columns=MEASURES,
+    shipped=SHIPPED_VLN,
+)

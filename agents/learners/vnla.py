@@ -1,0 +1,107 @@
+"""VNLA: agents that ask an advisor within a budget."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from embodied.agents.common.settings import EvaluationSettings
+from embodied.agents.common.shipped import SHIPPED_VNLA
+from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings
+from embodied.agents.options import (
+    EVALUATION,
+    SCALE,
+    TRAINING,
+    Encoded,
+    Limited,
+    Recorded,
+    Repeated,
+    Run,
+    StudyOptions,
+    Tables,
+    WithData,
+    WithDevice,
+    study_of,
+    training_data,
+)
+from embodied.agents.vnla.config import ASK_RULES, ASKERS, SCALES, TRAINED_UNDER, VnlaSettings
+from embodied.options import Count, InputFolder, Settings
+
+if TYPE_CHECKING:
+    from embodied.agents.studies.engine import StudyLearner
+    from embodied.datasets.store import Dataset
+
+
+@dataclass(frozen=True, kw_only=True)
+class VnlaTraining(Recorded, Run, Encoded, WithDevice):
+    """The agent that asks an advisor, on a VNLA data set with features.
+
+    Trains an agent by imitation to navigate by one view, to ask an advisor within a budget and to follow the advice.
+    """
+
+    threads: Count = 2
+    config: Annotated[
+        VnlaSettings,
+        Settings(
+            TRAINING, SCALES, words={"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
+        ),
+    ]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VnlaStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
+    """Agents that ask an advisor within a budget."""
+
+    tables: Tables
+    """Make these tables: askers, interventions, algorithm-6, rooms, rules or words."""
+    scale: Annotated[str, SCALE] = "mini"
+    """The settings to start from."""
+    without_rooms: InputFolder | None = None
+    """A data set of --no-rooms, for the table `rooms`."""
+    others: Count | None = None
+    """Training seeds of all rows but the learned asker's (default: --seeds)."""
+    config: Annotated[VnlaSettings, Settings(TRAINING, SCALES, skip=("asker", "ask_rules", "rules"))]
+    evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
+
+
+def train(args: VnlaTraining, **session: Any) -> None:
+    from embodied.agents.vnla.run import train_agent
+
+    source = training_data(args, "vnla", args.device)
+    train_agent(source, args.config, args.evaluation, args.out, minutes=args.minutes, **session)
+
+
+def study(args: VnlaStudyOptions) -> StudyLearner:
+    from embodied.agents.vnla.study import VnlaStudy
+
+    return study_of(VnlaStudy, args)
+
+
+def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
+    """The learned asker beside other askers, direct intervention and agents without learning."""
+    from embodied.agents.vision.training_data import evaluation_data
+    from embodied.agents.vnla.agent import VnlaAgent
+    from embodied.agents.vnla.judging import WITHOUT_LEARNING, player, row_names, rules_of_row
+
+    source, agent = evaluation_data(data, how), VnlaAgent.load(file)
+
+    def of_split(split: str) -> Players:
+        bank, names = source.split(split).bank, row_names(agent)
+        under = functools.cache(lambda rules: data.split(split, rules=rules))
+        rows = {name: (under(rules_of_row(agent, name)), player(agent, bank, name)) for name in names}
+        return Players(rows, names, WITHOUT_LEARNING)
+
+    return of_split
+
+
+LEARNER = Learner(
+    name="vnla",
+    train=(VnlaTraining, train),
+    study=(VnlaStudyOptions, study),
+    players=players,
+    columns=("success", "strict success", "room success", "navigation error", "requests", "oracle success", "steps"),
+    shipped=SHIPPED_VNLA,
+)
