@@ -57,6 +57,8 @@ class Players:
     """Rows that are played unless others are named; none for all."""
     blind: Collection[str] = ()
     """Rows whose agents need no pictures."""
+    about: str = ""
+    """What is said of the trained agent."""
 
 
 PlayersOfSplit = Callable[[str], Players]

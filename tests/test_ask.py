@@ -369,7 +369,7 @@ def test_the_command_judges_in_houses_of_hidden_seeds_and_does_not_tell_the_seed
     words = [
         "evaluate",
         "ask",
-        "--seeds",
+        "--seed-file",
         str(tmp_path / "seeds.txt"),
         "--agent",
         "never ask",

@@ -96,7 +96,7 @@ def test_ppo_runs_on_pixels_and_leaves_an_agent_and_its_curve(run, tmp_path, wha
 def test_a_learner_outside_the_tree_is_trained_evaluated_and_studied(tmp_path, monkeypatch, capsys):
     """Each viewpoint has features of its own: the learner knows the houses of its training by heart."""
     monkeypatch.chdir(EXAMPLES)
-    assert len((EXAMPLES / "my_learner.py").read_text().splitlines()) < 120
+    assert len((EXAMPLES / "my_learner.py").read_text("utf-8").splitlines()) < 120
     data = built(tmp_path / "data", "find", "1x40", make_house=small_house)
     noise_features(data)
     common = ["--data", str(data.folder), "--network", "random", "--cache", str(tmp_path / "cache")]

@@ -68,9 +68,7 @@ class FindStudy(SightedStudy):
 
     def where(self, agent: Any, judge: Mapping[str, Any], split: str) -> SplitData:
         places = self.judged_in(judge).places(split)
-        return SplitData(
-            split, places, tuple(tasks_in(places, self.house_tasks)), FIND.environments(EnvInputs(places))
-        )
+        return SplitData(split, places, tuple(tasks_in(places, self.house_tasks)), FIND.environments(EnvInputs(places)))
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split), "house tasks": self.house_tasks}

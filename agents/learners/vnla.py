@@ -88,11 +88,13 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 
     source, agent = evaluation_data(data, how), VnlaAgent.load(file)
 
+    about = f"rules of play: {agent.config.rules}; trained on pictures {agent.about.pictures}"
+
     def of_split(split: str) -> Players:
         bank, names = source.split(split).bank, row_names(agent)
         under = functools.cache(lambda rules: data.split(split, rules=rules))
         rows = {name: (under(rules_of_row(agent, name)), player(agent, bank, name)) for name in names}
-        return Players(rows, names, WITHOUT_LEARNING)
+        return Players(rows, names, WITHOUT_LEARNING, about)
 
     return of_split
 

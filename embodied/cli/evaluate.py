@@ -4,7 +4,8 @@
     embodied evaluate hanna --data DATA --agent "random walk" shortest
     embodied evaluate hanna --data DATA --agent RUN/best.safetensors --out RESULTS
     embodied evaluate vnla --data DATA --agent llm --model NAME --base-url URL
-    embodied evaluate ask --seeds FILE --agent submissions/team_7
+    embodied evaluate hanna --data DATA --agent my_module:Policy my_learner:LEARNER=RUN
+    embodied evaluate ask --seed-file FILE --agent submissions/team_7
 
 The command prints a table with 95 % confidence intervals. With --out it also writes the table as Markdown, CSV and
 JSON, and all episodes, which `embodied view` shows. Every answer of a language model is kept in --answers, so that the
@@ -17,6 +18,7 @@ import contextlib
 import dataclasses
 import functools
 import json
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,12 +28,15 @@ from embodied.cli.common import bar, catalogue_of, note, show
 from embodied.cli.evaluate_options import TEMPLATE, Options
 
 if TYPE_CHECKING:
+    from embodied.agents.learner import Learner
     from embodied.datasets.store import Dataset, SplitData
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.tables import Row
     from embodied.interface import Agent, Assistant, Episode, Place, SeenPlace
 
 LLM = "llm"
+OWN_AGENT = re.compile(r"[\w.]+:\w+")
+"""module:Class of a policy of one's own."""
 FEW_TASKS = 20
 """How many tasks a language model plays, or anybody in a generated house, unless --tasks says otherwise."""
 AREA = (90.0, 140.0)
@@ -46,46 +51,65 @@ def run(args: Options) -> None:
     if args.rrd and not args.out:
         raise ValueError("--rrd wants --out DIR beside it: recordings go to DIR/recordings")
     data = dataset_of(args.data, args.kind) if args.data else None
-    names, files = _agents(args)
-    if files and data is None:
+    names, trained = _agents(args)
+    if trained and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
     splits = args.split or kind_named(args.kind).test_splits
     if data is not None:
         for split in splits:
             data.names(split)  # refuses unknown ones
     with locked(args.out) if args.out else contextlib.nullcontext():
-        _evaluate(args, data, names, files, splits)
+        _evaluate(args, data, names, trained, splits)
 
 
-def _agents(args: Options) -> tuple[list[str], list[Path]]:
-    """Names of agents, and the file of the trained one, that --agent lists.
+def _agents(args: Options) -> tuple[list[str], tuple[Learner, Path] | None]:
+    """Names of agents, and the trained one with its learner, that --agent lists.
 
     Raises:
       ValueError: an unknown agent, or several trained ones.
     """
-    from embodied.agents.learner import playing_learner
+    from embodied.agents.learner import learner_named, playing_learner
     from embodied.task_kind import kind_named
 
     known = kind_named(args.kind).agent_names
-    names, files, learner = [], [], playing_learner(args.kind)
+    names, learner = list[str](), playing_learner(args.kind)
+    trained: list[tuple[Learner, Path]] = []
     shipped = learner and learner.shipped
     for name in args.agent or (["shipped"] if shipped and args.data else known):
-        path = Path(name)
-        if name == "shipped" and shipped:
-            files.append(shipped)
+        path, (module, _, run) = Path(name), name.partition("=")
+        if name == "shipped" and learner and shipped:
+            trained.append((learner, shipped))
+        elif ":" in module and run and not name.startswith("http"):
+            trained.append((learner_named(module), weights_in(Path(run))))
         elif learner and (path.suffix == ".safetensors" or path.is_dir()):
-            files.append(path / "best.safetensors" if path.is_dir() else path)
-        elif name in known or name == LLM or (args.kind == "ask" and (name.startswith("http") or path.is_dir())):
+            trained.append((learner, weights_in(path)))
+        elif (
+            OWN_AGENT.fullmatch(name)
+            or name in known
+            or name == LLM
+            or (args.kind == "ask" and (name.startswith("http") or path.is_dir()))
+        ):
             names.append(name)
         else:
             raise ValueError(f"unknown agent {name!r}; those of {args.kind!r} are {[*known, LLM]}, or a trained one")
-    if len(files) > 1:
-        raise ValueError(f"one trained agent can be evaluated at a time, got {[str(f) for f in files]}")
-    return names, files
+    if len(trained) > 1:
+        raise ValueError(f"one trained agent can be evaluated at a time, got {[str(file) for _, file in trained]}")
+    if trained and trained[0][0].players is None:
+        raise ValueError(f"learner {trained[0][0].name!r} says nothing of `players`, who play its agents")
+    return names, trained[0] if trained else None
+
+
+def weights_in(path: Path) -> Path:
+    """The weights of a run folder, or the file itself."""
+    return path / "best.safetensors" if path.is_dir() else path
 
 
 def _evaluate(
-    args: Options, data: Dataset | None, names: Sequence[str], files: Sequence[Path], splits: Sequence[str]
+    args: Options,
+    data: Dataset | None,
+    names: Sequence[str],
+    trained: tuple[Learner, Path] | None,
+    splits: Sequence[str],
 ) -> None:
     """Play, print the table, and write what goes into --out."""
     from embodied.assets.cache import write_json
@@ -101,17 +125,18 @@ def _evaluate(
     rows, heard = _play(args, data, names, splits, changes, client, keep) if names else ([], {})
     about: dict[str, object] = {"data": data and data.digest, "seed": args.seed, "tasks": args.tasks, "agents": names}
     about |= {"splits": splits, "rules": args.rules, "assistant": args.assistant}
-    if files and data is not None:
+    if trained and data is not None:
         from embodied.cli.evaluate_trained import evaluate_trained
 
         rows_wanted = args.rows or (["learned"] if names else ())
-        more, facts = evaluate_trained(args, data, files[0], splits, rows_wanted, keep, changes.applied)
+        more, facts = evaluate_trained(args, data, *trained, splits, rows_wanted, keep, changes.applied)
         rows, about = [*rows, *more], about | facts
     if args.out:
         tables.save(rows, args.out, "table")
         write_json(args.out / "run.json", fingerprint(**about), indent=1)
         note(f"table and episodes in {args.out}")
-    text = tables.markdown(rows, [c for c in _columns(args.kind, files) if any(c in r.values for r in rows)])
+    columns = trained[0].columns if trained else ()
+    text = tables.markdown(rows, [c for c in columns or _columns(args.kind) if any(c in r.values for r in rows)])
     result: dict[str, object] = {"data": data and data.digest, "rows": json.loads(tables.as_json(rows))}
     result["listener"] = heard
     for name, (right, total) in heard.items():
@@ -119,19 +144,16 @@ def _evaluate(
     if client.cache_info().currsize:
         text += f"\n{client().sent} requests were sent; all other answers were in {args.answers}"
     show(args, result, text)
-    if args.rrd and args.out and files and data is not None:
+    if args.rrd and args.out and trained and data is not None:
         from embodied.cli.evaluate_trained import record_trained
 
         record_trained(args, data, args.out, args.rrd)
 
 
-def _columns(kind: str, files: Sequence[Path]) -> Sequence[str]:
+def _columns(kind: str) -> Sequence[str]:
     from embodied import metrics
-    from embodied.agents.learner import playing_learner
     from embodied.task_kind import kind_named
 
-    if files and (learner := playing_learner(kind)):
-        return learner.columns
     return [*kind_named(kind).columns, *metrics.USAGE]
 
 
@@ -212,8 +234,8 @@ def _stages(
     from embodied.datasets.store import SplitData
     from embodied.gym.playground import Asked, flat_playground
 
-    if data is None and args.seeds:
-        yield _hidden_houses(args, args.seeds, limit or FEW_TASKS)
+    if data is None and args.seed_file:
+        yield _hidden_houses(args, args.seed_file, limit or FEW_TASKS)
     elif data is None:
         seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
         how = Asked(args.cache, sees=seen, rules=args.rules, assistant=assistant)
@@ -253,10 +275,13 @@ def _agent(
     args: Options, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None, client: Callable[[], Any]
 ) -> Agent:
     from embodied.evaluation.ask import submitted
+    from embodied.plugins import made_by_name
     from embodied.task_kind import kind_named
 
     if name == LLM:
         return _model_agent(args, split, client())
+    if OWN_AGENT.fullmatch(name):
+        return made_by_name(name)
     kind = kind_named(args.kind)
     return kind.agent(name, worlds) if name in kind.agent_names else submitted(name)
 

@@ -36,7 +36,7 @@ class TaskOptions:
     rules: Annotated[str | None, Option(metavar="WORD")] = None
     """Rules of play of the kind of task. vnla: help in words (indirect, the default), the advisor acts and says it
     (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
-    seeds: InputPath | None = None
+    seed_file: InputPath | None = None
     """ask: seeds of the houses, one per line."""
     unseen_classes: bool = False
     """ask: use only classes held out from training."""
@@ -70,8 +70,9 @@ class Options(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Fur
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
     """The kind of task: find, vln, vnla, hanna, hari, ask, or MODULE:NAME of your own."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
-    """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', or for ask a
-    folder with an agent.py or the http:// address of an agent (default: shipped, else all baselines)."""
+    """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', MODULE:CLASS
+    of your own policy, MODULE:LEARNER=RUN of your own learner, or for ask a folder with an agent.py or the http://
+    address of an agent (default: shipped, else all baselines)."""
     threads: Count = 2
     sees: Annotated[str, Option(words=SEES)] = "names"
     """What a language model is given: the true names of what is visible (an oracle), the candidate views as one strip,

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from embodied.agents.learner import PlaySettings, playing_learner
-from embodied.cli.common import bar
+from embodied.agents.learner import Learner, PlaySettings
+from embodied.cli.common import bar, note
 from embodied.evaluation.tables import Row
 from embodied.render.pictures import in_words
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 def evaluate_trained(
     args: Options,
     data: Dataset,
+    learner: Learner,
     file: Path,
     splits: Sequence[str],
     wanted: Sequence[str],
@@ -32,6 +33,7 @@ def evaluate_trained(
     """Rows of a trained agent and of agents beside it, over the same tasks, and facts for run.json.
 
     Args:
+      learner: the agent's, which can play.
       wanted: names of rows; none for all of the paper's tables.
       keep: is given split, name and episodes (to save them).
       instead: the split with another assistant.
@@ -47,13 +49,14 @@ def evaluate_trained(
     from embodied.identity import identity_of
 
     use_threads(args.threads)
-    learner = playing_learner(args.kind)
-    assert learner is not None and learner.players is not None, "trained agents of other kinds were refused"
+    assert learner.players is not None, "others were refused"
     how = PlaySettings(**{f.name: getattr(args, f.name) for f in dataclasses.fields(PlaySettings)})
     players_of = learner.players(file, data, how)
     rows, blind = list[Row](), set[str]()
     for split in splits:
         players = players_of(split)
+        if players.about and split == splits[0]:
+            note(players.about)
         if unknown := sorted(set(wanted) - set(players.agents)):
             raise ValueError(f"unknown rows {unknown}; there are {list(players.agents)}")
         for name in bar(wanted or players.usual or [*players.agents], "agents", "agent"):
