@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from embodied.agents.options import Encoded
 from embodied.cli.common import note, show
 from embodied.cli.exports import Export, OfData, register_export
-from embodied.agents.options import Encoded
 from embodied.datasets.folders import PROGRAMS
 from embodied.options import Count
 
@@ -63,8 +63,8 @@ def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str
     import numpy as np
 
     from embodied.agents.vision.drawn import pictures_of
+    from embodied.agents.vision.encoder import encoder_of
     from embodied.agents.vision.features import feature_path, load_features
-    from embodied.agents.vision.run import encoder_of
     from embodied.datasets.folders import names_of
 
     encoder = encoder_of(args.encoder, args.network)
