@@ -404,7 +404,7 @@ def test_a_large_house_holds_at_least_250_objects_and_a_middle_one_at_least_130(
     assert len(furnished(2, (110, 130)).placements) >= 130
 
 
-def test_every_style_has_a_taste_in_furniture_and_no_other_is_taken_for_one():
+def test_every_style_prefers_some_furniture_and_no_other_is_taken_for_one():
     assert tuple(PREFERENCES) == STYLES
     with pytest.raises(HouseError, match="unknown style 'rococo'"):
         furnish(dataclasses.replace(two_rooms(), style="rococo"), catalogue(), seed=1)

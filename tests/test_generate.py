@@ -228,7 +228,7 @@ def test_living_rooms_mostly_look_south():
     assert south > 0.75 * SEEDS
 
 
-def test_every_style_has_a_taste():
+def test_every_style_has_its_finishes():
     assert tuple(STYLE_FINISHES) == STYLES
 
 

@@ -28,7 +28,7 @@ class Options(Furnished, Printed):
     out: OutputFolder
     """Folder to write, made if missing."""
     seed: int = 0
-    """Which house; the same seed gives the same house."""
+    """Random seed; the same seed gives the same house."""
     plan: InputPath | None = None
     """JSON file with the rooms of your own floor plan (docs/houses.md)."""
     no_mjcf: bool = False

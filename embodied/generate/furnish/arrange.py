@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -165,19 +166,8 @@ class _Trial:
     def _thing(self, item: Item) -> Thing:
         pose, c, s = self.pose, math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         x, y = pose.x + c * item.x - s * item.y, pose.y + s * item.x + c * item.y
-        z, yaw, group = self.space.bottom + item.z, pose.yaw + item.yaw, self.group
-        return Thing(
-            asset=item.asset,
-            x=x,
-            y=y,
-            z=z,
-            yaw=yaw,
-            size=item.extent,
-            params=item.params,
-            group=group,
-            role=item.role,
-            wall=pose.wall,
-        )
+        z, yaw = self.space.bottom + item.z, pose.yaw + item.yaw
+        return _thing_of(item, x=x, y=y, z=z, yaw=yaw, group=self.group, wall=pose.wall)
 
     def _stands(self, item: Item, b: Box, flat: bool) -> bool:
         """True if an item finds room among what stands in the room and in the arrangement."""
@@ -260,20 +250,12 @@ def _rest(space: RoomSpace, item: Item, parent: Thing | None, group: str) -> Thi
     u = min(max(item.x, x0 + w / 2), x1 - w / 2) if w < x1 - x0 else (x0 + x1) / 2
     v = min(max(item.y, y0 + d / 2), y1 - d / 2) if d < y1 - y0 else (y0 + y1) / 2
     (x, y), z, yaw = parent.local(u, v), parent.z + surface.z * scale[2] + item.z, parent.yaw + item.yaw
-    return Thing(
-        asset=item.asset,
-        x=x,
-        y=y,
-        z=z,
-        yaw=yaw,
-        size=item.extent,
-        params=item.params,
-        parent=parent,
-        surface=surface.name,
-        group=group,
-        role=item.role,
-        wall=parent.wall,
-    )
+    on = {"parent": parent, "surface": surface.name, "wall": parent.wall}
+    return _thing_of(item, x=x, y=y, z=z, yaw=yaw, group=group, **on)
+
+
+def _thing_of(item: Item, **place: Any) -> Thing:
+    return Thing(asset=item.asset, size=item.extent, params=item.params, role=item.role, **place)
 
 
 def wall_poses(
