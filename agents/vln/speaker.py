@@ -22,7 +22,7 @@ from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features, load_weights, seeded
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes
-from embodied.agents.iliad.nav.teacher import said, walked
+from embodied.agents.iliad.nav.teacher import encoded_walks, texts_of
 from embodied.agents.iliad.nav.world import HORIZON, Trip, walk_along
 from embodied.agents.iliad.stages import TeachingStage
 from embodied.agents.iliad.writing import log_likelihood
@@ -138,7 +138,7 @@ def _scored(
     """(B, W) log L0 of each word of the tasks' requests, given walks along `paths`, and the words."""
     trips = [Trip(t.world, t.start, tuple(p), (t.request,)) for t, p in zip(tasks, paths, strict=True)]
     words = eyes.words([t.request for t in tasks])[:, :LONGEST]
-    logits = speaker.network(*walked(eyes, trips, [walk_along(p) for p in paths]), words)
+    logits = speaker.network(*encoded_walks(eyes, trips, [walk_along(p) for p in paths]), words)
     return log_likelihood(logits, words), words
 
 
@@ -191,8 +191,8 @@ def spoken_tasks(speaker: Speaker, training: Split, dropout: float, *, seed: int
         trips = [Trip(name, t.start, _path(t), ("",)) for t in unworded]
         channels = torch.stack([channels_of(t.id, training.bank.size, dropout) for t in unworded])
         choose = sampled_choice(rng.random((len(paths), LONGEST)))
-        seen = walked(eyes, trips, [walk_along(p) for p in paths], channels)
+        seen = encoded_walks(eyes, trips, [walk_along(p) for p in paths], channels)
         numbers = speaker.network.write(*seen, choose, LONGEST)
-        texts = said(eyes.vocabulary, numbers)
+        texts = texts_of(eyes.vocabulary, numbers)
         tasks += [dataclasses.replace(t, request=text) for t, text in zip(unworded, texts, strict=True)]
     return tasks
