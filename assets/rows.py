@@ -59,11 +59,11 @@ def _is_object(value: object, holds: Callable[[Any, Any], bool]) -> bool:
     return isinstance(value, dict) and all(holds(k, v) for k, v in value.items())
 
 
-TEXT = Field("one line of text of at most 200 characters", is_text)
+LINE_OF_TEXT = Field("one line of text of at most 200 characters", is_text)
 WORD = Field("a word or more", lambda v: is_text(v) and bool(v.strip()))
-WORDS = Field("a list of words", lambda v: is_list(v, is_text))
+WORD_LIST = Field("a list of words", lambda v: is_list(v, is_text))
 LENGTH = Field("a length from 0 to 30 metres", lambda v: is_number(v, 0.0, 30.0))
-SIZE = Field(
+SIZE_FIELD = Field(
     f"a size of three lengths in metres, each from {SIZES[0]:g} to {SIZES[1]:g}",
     lambda v: is_list(v, lambda s: is_number(s, *SIZES), 3),
 )
@@ -76,30 +76,30 @@ SUPPORT = Field(f"one of {', '.join(SUPPORTS)}", lambda v: v in SUPPORTS)
 FIELDS = {
     "class": WORD,
     "name": WORD,
-    "size": SIZE,
+    "size": SIZE_FIELD,
     "support": SUPPORT,
     "rooms": WEIGHTS,
-    "synonyms": WORDS,
-    "on": WORDS,
+    "synonyms": WORD_LIST,
+    "on": WORD_LIST,
     "clearance": LENGTH,
-    "tags": WORDS,
+    "tags": WORD_LIST,
     "elevation": LENGTH,
-    "colours": WORDS,
-    "materials": WORDS,
+    "colours": WORD_LIST,
+    "materials": WORD_LIST,
     "surfaces": Field(
         "a list of [name, z, x0, y0, x1, y1, headroom], metres, x0 < x1 and y0 < y1", lambda v: is_list(v, _is_surface)
     ),
     "emits": Field(
         "three numbers from 0 up, or null", lambda v: v is None or is_list(v, lambda x: is_number(x, 0.0), 3)
     ),
-    "creator": TEXT,
-    "licence": TEXT,
+    "creator": LINE_OF_TEXT,
+    "licence": LINE_OF_TEXT,
     "lamp": Field("a point of three numbers, or null", lambda v: v is None or is_list(v, is_number, 3)),
     "yaw": Field("a number of degrees", is_number),
-    "glow": WORDS,
-    "two_sided": WORDS,
-    "flipped": WORDS,
-    "dropped": WORDS,
+    "glow": WORD_LIST,
+    "two_sided": WORD_LIST,
+    "flipped": WORD_LIST,
+    "dropped": WORD_LIST,
     "looks": Field(
         "an object of material names and words", lambda v: _is_object(v, lambda k, x: is_text(k) and is_text(x))
     ),
@@ -258,7 +258,7 @@ def variant(where: str, row: Row, rows: Mapping[str, Row]) -> Row:
         raise CatalogueError(f"{where} should be a variant `of` a model in the same file, got {row['of']!r}")
     check_row(where, base, FIELDS | REMADE_FIELDS)
     if "size" not in base:
-        raise CatalogueError(f"{where} is a variant of {row['of']!r}, which should have {SIZE.what}, got none")
+        raise CatalogueError(f"{where} is a variant of {row['of']!r}, which should have {SIZE_FIELD.what}, got none")
     out = merged(base, row, deep=("look", "looks"))
     x, y, z = (n / o for n, o in zip(out["size"], base["size"]))
     out["surfaces"] = row.get("surfaces") or [

@@ -41,14 +41,14 @@ GLAZES = {
     "terracotta": plain((0.66, 0.40, 0.29), 0.4),
     "black": plain((0.08, 0.08, 0.085), 0.4),
 }
-FRAMES = {"black": BLACK, "white": WHITE, "brass": BRASS}
+FRAME_COLOURS = {"black": BLACK, "white": WHITE, "brass": BRASS}
 
 
 def picture(spec: BuildRequest) -> list[MeshPart]:
     """Framed art: a moulded frame, a mat where params['mat'] > 0, the picture, glass over paper."""
     w, d, h = spec.size
     name = spec.word("frame", "oak/0")
-    wood = FRAMES[name] if name in FRAMES else spec.finish(name)
+    wood = FRAME_COLOURS[name] if name in FRAME_COLOURS else spec.finish(name)
     f = float(spec.params.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
     m = float(spec.params.get("mat", 0.0)) * min(w, h)
     y0, y1 = -d / 2, d / 2
@@ -96,7 +96,7 @@ def mirror(spec: BuildRequest) -> list[MeshPart]:
     w, d, h = spec.size
     y0, f = -d / 2, float(spec.params.get("width", 0.016))
     name = spec.word("frame", "black")
-    rim = FRAMES[name] if name in FRAMES else spec.finish(name)
+    rim = FRAME_COLOURS[name] if name in FRAME_COLOURS else spec.finish(name)
     if spec.params.get("round"):
         ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)], 48)
         ring = ring.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)

@@ -38,7 +38,7 @@ FOLDED = ("cloth", "bedding")
 """Covers whose folds textures get, too."""
 BRIGHTEST, DARKEST = 0.95, 0.02
 """sRGB that no texel passes."""
-ROUNDS = 6
+FOLD_ROUNDS = 6
 """Times that directions are averaged over neighbours."""
 STEEP = 0.45
 """Cosine to an axis below which cloth is not projected along it: stretched to more than twice its length."""
@@ -223,7 +223,7 @@ def laid_on(cover: str, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def _evened(vertices: np.ndarray, faces: np.ndarray, unit: np.ndarray) -> np.ndarray:
     """(m, 3) directions of faces averaged over those around, lest the folds of a blanket cut its cloth to pieces."""
-    for _ in range(ROUNDS):
+    for _ in range(FOLD_ROUNDS):
         sums = np.zeros((len(vertices), 3))
         for k in range(3):
             np.add.at(sums, faces[:, k], unit)

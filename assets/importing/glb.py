@@ -22,7 +22,7 @@ from PIL import Image
 
 from embodied.assets.importing.importer import MAX_PIXELS, MAX_TEXTURE, RawPart, Tell
 from embodied.assets.importing.meshing import face_normals
-from embodied.assets.importing.obj import FARTHEST, MAX_FACES, MeshError
+from embodied.assets.importing.obj import FARTHEST_VERTEX, MAX_FACES, MeshError
 from embodied.assets.importing.sh3f import MAX_ENTRY
 from embodied.assets.importing.textures import mirrored, palette, sampled, shrunk, tinted, to_linear, to_srgb
 from embodied.assets.json_file import shown
@@ -44,16 +44,16 @@ REFUSED = {
     "EXT_mesh_gpu_instancing": "it repeats its meshes by instancing; export it again with instances made real",
 }
 """Extensions whose data are not read, and what to do."""
-LOOKS = "KHR_materials_"
+LOOK_EXTENSIONS = "KHR_materials_"
 """Beginning of extensions that refine a look; without them the material is drawn as the core of the format says."""
-KINDS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+COMPONENT_TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MAX_NODES = 20_000
 CLAMPED, MIRRORED = 33071, 33648
 """CLAMP_TO_EDGE and MIRRORED_REPEAT."""
 FADED = 0.1
 """Opacity below which blended texels are cut away."""
-METAL = 0.5
+METAL_FROM = 0.5
 """Metalness from which a face is drawn as metal."""
 ANEW = "copy the file again, or open it in Blender and export it from there as binary glTF 2.0"
 """The remedy for a damaged file: whoever exports it again as before gets the same."""
@@ -156,7 +156,7 @@ class _Reader:
         for name in required:
             if name in REFUSED:
                 raise RefusedError(f"{REFUSED[name]} ({name})")
-            if name not in HONOURED and not name.startswith(LOOKS):
+            if name not in HONOURED and not name.startswith(LOOK_EXTENSIONS):
                 raise RefusedError(f"it requires the extension {name}, which is not read; export it again without it")
         for name in self.header.get("extensionsUsed", []):
             if name not in HONOURED and name not in required:
@@ -202,7 +202,7 @@ class _Reader:
     def _accessor(self, number: int, width: int) -> np.ndarray:
         """(n, width) float64, normalised where it says so, sparse values put in."""
         accessor = self.header["accessors"][number]
-        kind, held = np.dtype(KINDS[accessor["componentType"]]), WIDTHS[accessor["type"]]
+        kind, held = np.dtype(COMPONENT_TYPES[accessor["componentType"]]), WIDTHS[accessor["type"]]
         if number < 0 or held != width:
             raise ValueError(f"accessor {number} should hold {width} numbers each")
         count, sparse = self._count(accessor), accessor.get("sparse")
@@ -223,7 +223,7 @@ class _Reader:
         return count
 
     def _numbers(self, where: dict[str, Any], kind: np.dtype | None, count: int, width: int) -> np.ndarray:
-        kind = kind or np.dtype(KINDS[where["componentType"]])
+        kind = kind or np.dtype(COMPONENT_TYPES[where["componentType"]])
         view = self.header["bufferViews"][where["bufferView"]]
         step = view.get("byteStride") or kind.itemsize * width
         data = self._view(where["bufferView"])
@@ -288,7 +288,7 @@ class _Reader:
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
             if np.linalg.det(matrix[:3, :3]) < 0:
                 faces = faces[:, ::-1]
-        there = (np.abs(vertices) <= FARTHEST).all(axis=1)
+        there = (np.abs(vertices) <= FARTHEST_VERTEX).all(axis=1)
         if not there.all():
             faces, whole = faces[there[faces].all(axis=1)], len(faces)
             vertices = np.where(there[:, None], vertices, 0.0)
@@ -441,7 +441,7 @@ class _Reader:
             self.tell(f"a mesh has a texture and no {name}; it is drawn in the texture's mean colour")
             return None
         uv = self._accessor(attributes[name], 2) @ texture.turn.T + texture.shift
-        lost = ~(np.abs(uv) <= FARTHEST).all(axis=1)
+        lost = ~(np.abs(uv) <= FARTHEST_VERTEX).all(axis=1)
         if lost[faces].any():
             self.tell(f"some values of {name} are not finite; those corners show the texture's beginning")
         uv[lost] = 0.0
@@ -495,7 +495,7 @@ class _Reader:
             values = sampled(surface.both.picture.convert("RGB"), at.mean(axis=1))
             rough, metal = rough * values[:, 1], metal * values[:, 2]
         area = np.linalg.norm(face_normals(vertices, faces), axis=1) + 1e-30
-        for chosen in (metal >= METAL, metal < METAL):
+        for chosen in (metal >= METAL_FROM, metal < METAL_FROM):
             if chosen.any():
                 finish = Finish(
                     (red, green, blue, round(opacity, 4)),

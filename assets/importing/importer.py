@@ -28,7 +28,16 @@ from embodied.assets.closure import code_digest
 from embodied.assets.importing.covers import COVERS, FOLDED, cover_of, creased, kind_of, laid_on, picture
 from embodied.assets.importing.meshing import CREASE, crease_normals, decimate, face_normals, indexed, sound_faces, weld
 from embodied.assets.importing.mtl_finish import corrected, finish_of
-from embodied.assets.importing.obj import Group, MeshError, MtlMaterial, Obj, decoded, libraries, parse_mtl, parse_obj
+from embodied.assets.importing.obj import (
+    MaterialFaces,
+    MeshError,
+    MtlMaterial,
+    Obj,
+    decoded,
+    libraries,
+    parse_mtl,
+    parse_obj,
+)
 from embodied.assets.importing.rounding import FINE, folded, is_coarse, refined, rounded
 from embodied.assets.importing.sh3f import Pack, PackError
 from embodied.assets.importing.textures import cut, filled, palette, shrunk, tinted
@@ -170,7 +179,7 @@ def read_obj(
 
 
 def _obj_part(
-    obj: Obj, group: Group, chosen: np.ndarray, material: MtlMaterial, image: Image.Image | None, own: bool
+    obj: Obj, group: MaterialFaces, chosen: np.ndarray, material: MtlMaterial, image: Image.Image | None, own: bool
 ) -> RawPart:
     """Those faces of a group that all have texture coordinates, or none."""
     corners, uv = group.corners[chosen], None

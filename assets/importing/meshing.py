@@ -13,7 +13,7 @@ MANY = 256
 """Faces around one vertex above which they are taken together by direction; furniture has up to some 100."""
 PAIRS = 4_000_000
 """Pairs of corners compared at a time."""
-CELLS = 8
+DIRECTION_CELLS = 8
 """Cells of directions per unit: some 800 on the sphere, 7 degrees wide."""
 
 WORKING_SIZE, AGGRESSIVENESS = 50.0, 5.0
@@ -103,7 +103,7 @@ def _corner_sums(
 def _hub_sums(unit: np.ndarray, weight: np.ndarray, least: float) -> np.ndarray:
     """As `_corner_sums` for the k corners of one vertex: normals (k, 3) that fall into the same small
     cell count as one direction, so that no more than some hundreds are compared with one another."""
-    _, cell = np.unique(np.round(unit * CELLS).astype(np.int64), axis=0, return_inverse=True)
+    _, cell = np.unique(np.round(unit * DIRECTION_CELLS).astype(np.int64), axis=0, return_inverse=True)
     cell = cell.reshape(-1)
     sums = np.stack([np.bincount(cell, unit[:, k] * weight) for k in range(3)], axis=1)
     middle = np.stack([np.bincount(cell, unit[:, k]) for k in range(3)], axis=1)

@@ -12,7 +12,7 @@ from embodied.assets.importing.obj import MtlMaterial
 from embodied.assets.records import Finish
 
 MIRROR = re.compile(r"mirror|espejo|miroir|spiegel|reflejo", re.IGNORECASE)
-METAL = re.compile(
+METAL_NAMES = re.compile(
     r"metal|chrom|steel|inox|alumin|\balu\b|brass|bronze|copper|gold|silver|iron|nickel|acero|laton|hierro|"
     r"cromo|zinc|platin",
     re.IGNORECASE,
@@ -22,7 +22,7 @@ CLOTH = re.compile(
     r"wool|cotton|mattress|colch|coussin|drap|matelas|rug|felt|velvet|shirt|pants|jean|hair|skin|curtain",
     re.IGNORECASE,
 )
-GLASS = re.compile(r"glass|vidrio|cristal|verre|glas\b|crystal", re.IGNORECASE)
+GLASS_NAMES = re.compile(r"glass|vidrio|cristal|verre|glas\b|crystal", re.IGNORECASE)
 SHINY = re.compile(r"ceramic|porcelain|enamel|lacquer|varnish|gloss|plastic|acryl|leather|cuero|cuir", re.IGNORECASE)
 WHITEST = 0.92
 """Largest sRGB value kept: white paint reflects about 0.83 of the light, never all of it."""
@@ -45,7 +45,7 @@ def finish_of(material: MtlMaterial, has_texture: bool) -> Finish:
         return Finish((0.9, 0.9, 0.9, 1.0), roughness=0.03, metallic=1.0, mirror=True)
     if CLOTH.search(name):
         roughness, specular = max(roughness, 0.9), 0.1
-    elif METAL.search(name) and not has_texture:
+    elif METAL_NAMES.search(name) and not has_texture:
         if color.max() > 0.3:
             metallic, roughness = 1.0, min(max(roughness, 0.2), 0.4)
             color = np.maximum(color, 0.45 * color / color.max())
@@ -53,7 +53,7 @@ def finish_of(material: MtlMaterial, has_texture: bool) -> Finish:
             roughness = min(roughness, 0.45)
     elif alpha < 0.95 and not has_texture:
         roughness, alpha = min(roughness, 0.08), max(alpha, 0.12)
-        if GLASS.search(name):
+        if GLASS_NAMES.search(name):
             alpha = min(alpha, 0.35)
     elif SHINY.search(name):
         roughness = min(roughness, 0.4)
@@ -68,7 +68,7 @@ def finish_of(material: MtlMaterial, has_texture: bool) -> Finish:
     )
 
 
-LOOKS: dict[str, dict[str, Any]] = {
+LOOK_WORDS: dict[str, dict[str, Any]] = {
     "mirror": {"color": (0.9, 0.9, 0.9, 1.0), "roughness": 0.03, "metallic": 1.0, "mirror": True},
     "glass": {"roughness": 0.05, "metallic": 0.0, "specular": 0.5},
     "metal": {"roughness": 0.3, "metallic": 1.0},
@@ -92,15 +92,15 @@ def corrected(finish: Finish, look: str) -> tuple[Finish, bool]:
     """`finish` after a reviewer's words, and whether its texture stays.
 
     Args:
-      look: words of LOOKS, '#rrggbb' (sRGB; drops the texture), 'alpha=0.3', in any order.
+      look: words of LOOK_WORDS, '#rrggbb' (sRGB; drops the texture), 'alpha=0.3', in any order.
 
     Raises:
       ValueError: an unknown word.
     """
     keep = True
     for word in look.split():
-        if word in LOOKS:
-            change = dict(LOOKS[word])
+        if word in LOOK_WORDS:
+            change = dict(LOOK_WORDS[word])
             keep = keep and "color" not in change
         elif re.fullmatch(r"#[0-9a-fA-F]{6}", word):
             rgb = [int(word[i : i + 2], 16) / 255 for i in (1, 3, 5)]
@@ -109,6 +109,6 @@ def corrected(finish: Finish, look: str) -> tuple[Finish, bool]:
         elif re.fullmatch(r"alpha=(0?\.[0-9]+|[01](\.0*)?)", word):
             change = {"color": (*finish.color[:3], float(word[6:]))}
         else:
-            raise ValueError(f"unknown look {word!r}; use {sorted(LOOKS)}, '#rrggbb' or 'alpha=0.3'")
+            raise ValueError(f"unknown look {word!r}; use {sorted(LOOK_WORDS)}, '#rrggbb' or 'alpha=0.3'")
         finish = dataclasses.replace(finish, **change)
     return finish, keep

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 MAX_FACES = 2_000_000
-FARTHEST = 1e12
+FARTHEST_VERTEX = 1e12
 """Largest coordinate, of vertices in a file's own unit and of textures (the packs have some of 3e9)."""
 MAX_CORNERS = 20_000
 """Of one polygon."""
@@ -84,7 +84,7 @@ class MtlMaterial:
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class MaterialFaces:
     """The triangles of one material."""
 
     material: str
@@ -100,7 +100,7 @@ class Obj:
     """(n, 3) float64 in the file's own axes and unit."""
     uvs: np.ndarray
     """(k, 2) float64."""
-    groups: tuple[Group, ...]
+    groups: tuple[MaterialFaces, ...]
     libraries: tuple[str, ...]
     """Texts of its mtllib statements: the names of one or more MTL files each."""
     colours: np.ndarray | None = None
@@ -221,7 +221,7 @@ def _material_field(head: str, rest: str) -> dict[str, Any]:
 
 def _finite(word: str) -> float:
     value = float(word)
-    if not abs(value) <= FARTHEST:
+    if not abs(value) <= FARTHEST_VERTEX:
         raise ValueError(f"{word} is not finite")
     return value
 
@@ -281,7 +281,7 @@ def _pair(line: Line) -> Line:
 
 def _finite_rows(rows: np.ndarray) -> tuple[np.ndarray, frozenset[int]]:
     """Rows of finite numbers; those that are not, or lie too far away, are zeros, and are named."""
-    good = (np.abs(rows) <= FARTHEST).all(axis=1)
+    good = (np.abs(rows) <= FARTHEST_VERTEX).all(axis=1)
     return np.where(good[:, None], rows, 0.0), frozenset(np.flatnonzero(~good).tolist())
 
 
@@ -297,7 +297,7 @@ def _corners(polygon: Polygon, points: int, uvs: int, lost_uvs: frozenset[int], 
     return v + (t if min(t, default=0) >= 0 and not lost_uvs.intersection(t) else [-1] * len(t))
 
 
-def _group(name: str, rows: list[list[int]], points: np.ndarray, where: str) -> Group:
+def _group(name: str, rows: list[list[int]], points: np.ndarray, where: str) -> MaterialFaces:
     by_size: dict[int, list[list[int]]] = {}
     for row in rows:
         by_size.setdefault(len(row) // 2, []).append(row)
@@ -311,7 +311,7 @@ def _group(name: str, rows: list[list[int]], points: np.ndarray, where: str) -> 
         polygon, order = _split(table[:, :n], points)
         corners.append(np.take_along_axis(table[polygon, :n], order, axis=1))
         uv_corners.append(np.take_along_axis(table[polygon, n:], order, axis=1))
-    return Group(name, np.concatenate(corners), np.concatenate(uv_corners))
+    return MaterialFaces(name, np.concatenate(corners), np.concatenate(uv_corners))
 
 
 def _index(word: str, before: int, count: int) -> int:

@@ -16,16 +16,16 @@ from embodied.assets.importing.sh3f import MAX_ENTRY, open_pack
 from embodied.assets.records import Asset, Finish, ImportRecipe, MeshPart
 from embodied.assets.rows import CatalogueError, Field, Row
 
-KINDS = (".glb", ".obj", ".sh3f")
+MODEL_SUFFIXES = (".glb", ".obj", ".sh3f")
 OWN_FIELDS = {
     "pack": Field("a word without '/'", lambda v: rows.WORD.holds(v) and "/" not in v and "\\" not in v),
-    "licence": rows.TEXT,
-    "creator": rows.TEXT,
+    "licence": rows.LINE_OF_TEXT,
+    "creator": rows.LINE_OF_TEXT,
     "classes": Field("an object of classes", lambda v: isinstance(v, dict)),
     "models": Field("an object of models", lambda v: isinstance(v, dict)),
 }
 """Fields of a user's catalogue.json."""
-ROW_FIELDS = rows.FIELDS | {"file": rows.TEXT, "model": rows.TEXT}
+ROW_FIELDS = rows.FIELDS | {"file": rows.LINE_OF_TEXT, "model": rows.LINE_OF_TEXT}
 """Fields of a model in it."""
 
 
@@ -142,8 +142,8 @@ def _reader(path: Path) -> Reader:
 
 def _model(folder: Path, where: str, file: str | None, entry: str) -> OwnModel:
     path = _inside(folder, file) if file else None
-    if path is None or path.suffix.lower() not in KINDS:
-        raise CatalogueError(f"{where} should name a file {KINDS} inside {folder}, got {rows.shown(file)}")
+    if path is None or path.suffix.lower() not in MODEL_SUFFIXES:
+        raise CatalogueError(f"{where} should name a file {MODEL_SUFFIXES} inside {folder}, got {rows.shown(file)}")
     if not path.is_file():
         raise CatalogueError(f"{where} names {file!r}, which is not in {folder}")
     if path.suffix.lower() == ".sh3f":

@@ -13,15 +13,15 @@ from embodied.assets.importing.meshing import corner_angles, crease_normals, fac
 
 SAG = 0.0012
 """Metres between an edge and the curve over it, from which on the edge is split."""
-ROUNDS = 2
+SPLIT_ROUNDS = 2
 """Times that edges are split at most."""
 HIGHEST = 0.2
 """A curve rises over its edge by at most this share of the edge: normals of torn models point anywhere."""
-LONGEST = 0.15
+LONGEST_EDGE = 0.15
 """Metres of an edge above which it is straight: bars are, whatever the normals at their bent ends say."""
 COARSE, FINE = 0.08, 0.04
 """Metres: cloth with longer edges than the first has no folds of its own; it is split down to the second for them."""
-DEEP, APART = 0.018, 0.26
+DEEP, FOLD_SPACING = 0.018, 0.26
 """Metres that folds rise at most, and from one to the next."""
 HANG = 0.30
 """Metres below its top over which what hangs falls into its full folds."""
@@ -41,7 +41,7 @@ def rounded(
       most: faces that may come on top.
     """
     limit, low, high = len(faces) + most, vertices[faces].min((0, 1)), vertices[faces].max((0, 1))
-    for _ in range(ROUNDS):
+    for _ in range(SPLIT_ROUNDS):
         number, pairs = _edges(faces)
         rise = _rises(vertices, faces, number, len(pairs), crease)
         sag = np.linalg.norm(rise, axis=1)
@@ -89,7 +89,7 @@ def folded(vertices: np.ndarray, faces: np.ndarray, rng: np.random.Generator) ->
     """
     normal = _vertex_normals(vertices, faces)
     along = vertices[:, 0] + vertices[:, 1] + 0.06 * np.sin(2 * np.pi * vertices[:, 2] / 0.7 + rng.uniform(0, 6.3))
-    phase = along / APART + 0.35 * np.sin(2 * np.pi * along / (3.4 * APART) + rng.uniform(0, 6.3))
+    phase = along / FOLD_SPACING + 0.35 * np.sin(2 * np.pi * along / (3.4 * FOLD_SPACING) + rng.uniform(0, 6.3))
     top = float(vertices[faces, 2].max())  # of the cloth: `vertices` may hold the rest of the model, too
     depth = np.clip((top - vertices[:, 2]) / HANG, 0.0, 1.0)
     hangs = 1 - np.clip(normal[:, 2] / LIES, 0.0, 1.0) ** 2
@@ -136,7 +136,7 @@ def _rises(vertices: np.ndarray, faces: np.ndarray, number: np.ndarray, edges: i
     rise = total / np.where(count == 2, 1 + share, 1.0)[:, None]
     rise[count > 2] = 0.0
     length = np.bincount(flat, np.linalg.norm(along, axis=-1).reshape(-1), minlength=edges) / np.maximum(count, 1)
-    rise[length > LONGEST] = 0.0
+    rise[length > LONGEST_EDGE] = 0.0
     high = np.linalg.norm(rise, axis=1)
     return rise * np.minimum(1.0, HIGHEST * length / np.maximum(high, 1e-30))[:, None]
 

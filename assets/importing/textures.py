@@ -19,7 +19,7 @@ FINER = 4
 """Times that a mask is enlarged before its outline is drawn."""
 OUTLINE = 0.75
 """Texels by which an outline may depart from the mask."""
-REPEATS = 64
+MOST_TILES = 64
 """Tiles of a repeating mask that one triangle may cover."""
 
 
@@ -160,7 +160,7 @@ def _covered(outline: shapely.Geometry, triangle: np.ndarray) -> shapely.Geometr
     low, high = np.floor(triangle.min(0) + 1e-9), np.ceil(triangle.max(0) - 1e-9)
     across, down = (int(max(1, n)) for n in high - low)
     whole = shapely.Polygon(triangle)
-    if across * down > REPEATS or whole.area < 1e-9:
+    if across * down > MOST_TILES or whole.area < 1e-9:
         return None
     tiles = [
         shapely.transform(outline, functools.partial(np.add, low + (i, j))) for i in range(across) for j in range(down)

@@ -24,8 +24,8 @@ MATERIAL_FIELDS = {
     "roles": Field(
         f"a list of roles out of {', '.join(ROLES)}", lambda v: rows.is_list(v, lambda r: r in ROLES) and bool(v)
     ),
-    "colours": rows.WORDS,
-    "materials": rows.WORDS,
+    "colours": rows.WORD_LIST,
+    "materials": rows.WORD_LIST,
     "tile": Field("a length from 0.01 to 10 metres", lambda v: rows.is_number(v, 0.01, 10.0)),
     "pixels": Field("a whole number from 64 to 4096", lambda v: isinstance(v, int) and 64 <= v <= 4096),
     "specular": Field("a number from 0 to 1", lambda v: rows.is_number(v, 0.0, 1.0)),
