@@ -72,7 +72,7 @@ class Viewpoint:
 
 
 class Sight:
-    """What is seen at one step, or a picture that is shown, as a token that tells nothing by itself.
+    """View at one step, or a picture that is shown, as a token that tells nothing by itself.
 
     A policy hands it to a `FeatureSource` and gets numbers. Every observation has new ones, which can neither be
     compared nor hashed, so a place is known again only by what it looks like.
@@ -94,12 +94,12 @@ class Sight:
 
 
 def viewpoint(sight: Sight) -> Viewpoint:
-    """Where a sight is from: for renderers, recordings and sources of features, never for a policy."""
+    """Viewpoint of a sight: for renderers, recordings and sources of features, never for a policy."""
     return sight._Sight__viewpoint  # type: ignore[attr-defined]
 
 
 def is_picture(sight: Sight) -> bool:
-    """Whether it is a picture that was taken at another time, not what the agent sees now; as `viewpoint`."""
+    """True for a picture that was taken at another time, False for what the agent sees now; as `viewpoint`."""
     return sight._Sight__picture  # type: ignore[attr-defined]
 
 
@@ -230,7 +230,17 @@ class FindDescribed:
     """The kind of room in the request."""
 
 
-Goal = FindObject | FollowRoute | FindDescribed
+@dataclass(frozen=True)
+class GoTo:
+    """Go to rooms or things of the house: the goal of a kind of task of one's own, which says what that means."""
+
+    rooms: tuple[str, ...] = ()
+    """Ids of rooms."""
+    placements: tuple[str, ...] = ()
+    """Ids of things."""
+
+
+Goal = FindObject | FollowRoute | FindDescribed | GoTo
 
 
 @dataclass(frozen=True)
@@ -252,7 +262,7 @@ class Task:
     goal_nodes: tuple[int, ...]
     """Success is to end within `radius` of one of these, along the graph."""
     request: str
-    """What the requester says, d* in the dissertation."""
+    """Words of the requester, d* in the dissertation."""
     radius: float
     """Metres along the graph, inclusive."""
     horizon: int
@@ -280,7 +290,7 @@ class Route:
 
 
 class Intention(enum.Enum):
-    """What a request for help asks for.
+    """Purpose of a request for help.
 
     Examples:
       >>> embodied.Intention('help')
@@ -296,22 +306,22 @@ class Intention(enum.Enum):
     SUB = "sub"
     """HARI: give me a nearer goal."""
     CONFIRM = "confirm"
-    """Ask-v0, as all below: is what I am at what you mean?"""
+    """Ask-v0, as all below: say if this is the thing that is meant."""
     APPEARANCE = "appearance"
-    """What does it look like?"""
+    """Describe what it looks like."""
     REGION = "region"
-    """Which room is it in?"""
+    """Name its room."""
     ROUTE = "route"
-    """How do I get there?"""
+    """Describe the way."""
     DISAMBIGUATE = "disambiguate"
-    """Which of those that I see do you mean?"""
+    """Say which of those that I see is meant."""
     FREE = "free"
     """A question in the agent's own words (Ask.question)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What language models were asked for one step."""
+    """Calls of language models for one step."""
 
     calls: int = 0
     tokens_in: int = 0
@@ -329,7 +339,7 @@ class Usage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thought:
-    """What a policy thought when it acted. The environment never reads it; teachers and viz may."""
+    """Thought of a policy when it acted. The environment never reads it; teachers and viz may."""
 
     moves: np.ndarray | None = None
     """(n + 1,) float32 probabilities over the candidates and, last, stop."""
@@ -338,9 +348,9 @@ class Thought:
     reasons: tuple[float, ...] | None = None
     """HANNA: probabilities of (lost, uncertain_wrong, never_asked)."""
     usage: Usage | None = None
-    """What a language model was asked; None where there is none."""
+    """Calls of a language model; None where there is none."""
     words: str = ""
-    """What a language model gave as its reason."""
+    """The reason that a language model gave."""
     match: float | None = None
     """HANNA: how well the picture that it was shown matches what it sees, up to 1."""
 
@@ -419,7 +429,7 @@ class Mode(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Subtask:
-    """What stands behind a reply. Privileged: for the environment, teachers and metrics.
+    """Meaning of a reply. Privileged: for the environment, teachers and metrics.
 
     Examples:
       >>> embodied.Subtask('subgoal', target=3).target
@@ -442,7 +452,7 @@ class Subtask:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What the assistant says: a text, an image, a description, or several of them.
+    """Answer of the assistant: a text, an image, a description, or several of them.
 
     Examples:
       >>> embodied.Reply(text='Turn left.').text
@@ -451,14 +461,14 @@ class Reply:
 
     text: str | None = None
     image: Viewpoint | None = None
-    """Where the picture that it shows was taken; the agent gets a Sight of it."""
+    """Viewpoint of the picture that it shows; the agent gets a Sight of it."""
     description: Description | None = None
     intention: Intention = Intention.HELP
-    """What was answered; an uncooperative assistant may answer another question."""
+    """Question that was answered; an uncooperative assistant may answer another."""
     subtask: Subtask | None = None
     """Privileged; never shown to a policy."""
     usage: Usage | None = None
-    """What a language model was asked for it; None where there is none."""
+    """Calls of a language model for it; None where there is none."""
     ruled_out: tuple[str, ...] = ()
     """Ask-v0: placements that the answer tells are not meant. Privileged."""
 
@@ -476,7 +486,7 @@ class Detection:
 
 
 class Extras:
-    """What a kind of task adds to an observation; each kind derives a frozen record from it."""
+    """Part of an observation that a kind of task adds; each kind derives a frozen record from it."""
 
     def lines(self, turn: int) -> tuple[str, ...]:
         """It in words, for language models and people; directions as seen along `turn` (Observation.turn)."""
@@ -484,7 +494,7 @@ class Extras:
 
     def as_json(self) -> dict[str, Any]:
         """It for agents that are asked over HTTP."""
-        return dataclasses.asdict(self)  # type: ignore[call-overload, no-any-return]  # a record
+        return dataclasses.asdict(self)  # type: ignore[call-overload]  # a record
 
 
 @dataclass(frozen=True, slots=True)
@@ -538,7 +548,7 @@ class Situation:
     targets: tuple[int, ...]
     """Nodes the current task or sub-task wants: all goals, g* after departing, or the sub-goal."""
     subtask: Subtask | None
-    """What the last reply meant; None before any reply and, in HANNA, after departing."""
+    """Meaning of the last reply; None before any reply and, in HANNA, after departing."""
     candidate_nodes: tuple[int, ...]
     """Node of each candidate in the observation of this step."""
     candidates: Candidates
@@ -617,19 +627,19 @@ class Assistant(Protocol):
     """Part of the world, present at test time too. Sees the situation and answers requests."""
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:
-        """What may be asked here and now."""
+        """Questions that may be asked here and now."""
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """What a teacher says about one step."""
+    """Judgement of a teacher about one step."""
 
     move: Move | Stop | None
     """The reference navigation action; None: not to be learned from."""
     ask: bool | None = None
-    """Whether it should have asked; None: not to be learned from (no zone, or no such teacher)."""
+    """True where it should have asked; None: not to be learned from (no zone, or no such teacher)."""
     reasons: tuple[bool, bool, bool] | None = None
     """HANNA: (lost, uncertain_wrong, never_asked)."""
     negatives: tuple[Move | Stop, ...] = ()
@@ -682,7 +692,7 @@ Agent = Policy | PrivilegedPolicy
 def act(
     agent: Agent, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
 ) -> tuple[Actions, Any]:
-    """What an agent does; it is shown the situations only if it says that it needs them."""
+    """Actions of an agent; it is shown the situations only if it says that it needs them."""
     if isinstance(agent, PrivilegedPolicy):
         return agent.act_privileged(observations, situations, memory, rngs=rngs)
     return agent.act(observations, memory, rngs=rngs)

@@ -25,7 +25,7 @@ def navigation_error(episode: Episode, graph: NavGraph) -> float:
 
 
 def within(distance: float, radius: float, *, strict: bool = False) -> bool:
-    """Whether an end is near enough: at most `radius` metres away (docs/sources.md, S3), or less where `strict`."""
+    """True for an end at most `radius` metres away (docs/sources.md, S3), or less than that where `strict`."""
     return distance < radius if strict else distance <= radius + 1e-9
 
 
@@ -68,9 +68,11 @@ def path_length(episode: Episode, graph: NavGraph) -> float:
 def spl(episode: Episode, graph: NavGraph) -> float:
     """Success weighted by path length, one term of (4.17).
 
-    L is the distance from the start to the goal nearest the *final* node. An episode whose start
-    is that goal has L = 0; it scores 1 if the agent did not walk, else 0.
+    L is what the kind of task says, or the distance from the start to the goal nearest the *final* node. An episode
+    whose start is that goal has L = 0; it scores 1 if the agent did not walk, else 0.
     """
+    if measure := kind_named(episode.task.kind).shortest:
+        return weighted_by_path(success(episode, graph), measure(episode, graph), path_length(episode, graph))
     goals = episode.task.goal_nodes
     goal = min(goals, key=lambda g: (graph.distance[episode.nodes[-1], g], g))
     shortest = float(graph.distance[episode.nodes[0], goal])
@@ -180,11 +182,11 @@ USAGE: dict[str, Callable[[Usage], float]] = {
     "invalid answers": lambda u: u.invalid,
     "refusals": lambda u: u.refusals,
 }
-"""What episodes with a language model report besides, per episode."""
+"""Numbers that episodes with a language model report besides, per episode."""
 
 
 def usage(episode: Episode) -> Usage | None:
-    """What language models were asked in an episode, as agent and as assistant; None where there was none."""
+    """Calls of language models in an episode, as agent and as assistant; None where there was none."""
     asked = [s.action.thought.usage for s in episode.steps if s.action.thought and s.action.thought.usage]
     asked += [s.reply.usage for s in episode.steps if s.reply and s.reply.usage]
     return sum(asked, Usage()) if asked else None

@@ -69,7 +69,7 @@ def named_object(name: str) -> Any:
 
 
 def made_by_name(name: str) -> Any:
-    """What the class or function that 'module:NAME' names makes, without arguments.
+    """The product of the class or function that 'module:NAME' names, without arguments.
 
     Raises:
       ValueError: no such module or name, or it cannot be made.

@@ -71,7 +71,8 @@ def read_lines(data: bytes, kind: type[T], path: Path) -> Iterator[T]:
 
 def episodes_file(split: str, agent: str) -> str:
     """Name of the file with one agent's episodes on one split: 'episodes_val_seen_learned_no_ask.jsonl'."""
-    return f"episodes_{split}_{agent.replace(',', '').replace(' ', '_')}.jsonl"
+    safe = agent.replace(",", "").replace(" ", "_").replace("/", "%2F").replace(":", "%3A")
+    return f"episodes_{split}_{safe}.jsonl"
 
 
 def fingerprint(**facts: object) -> dict[str, object]:

@@ -26,7 +26,7 @@ class SplitPlan:
 
 @dataclass(frozen=True)
 class SplitSizes:
-    """What the splits of a data set that is not a paper's are made of."""
+    """Numbers that the splits of a data set are made of, unless a paper has its own."""
 
     houses: Mapping[str, int]
     """Number of houses to train in ('train'), to train in where a kind wants more of them ('extra'), to validate in
@@ -121,7 +121,7 @@ class DatasetSize:
 
     @property
     def sizes(self) -> SplitSizes:
-        """What its splits are made of."""
+        """Numbers that its splits are made of."""
         n, test = self.houses, self.test_houses or max(1, self.houses // 5)
         unseen = max(2, round(self.tasks / n * test) if self.test_houses else self.tasks // 5)
         houses = {"train": n, "extra": max(1, n // 3), "val": max(1, n // 10), "test": test}

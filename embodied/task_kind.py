@@ -36,7 +36,6 @@ from embodied.interface import (
     Place,
     Route,
     SeenPlace,
-    Step,
     Task,
 )
 from embodied.navigation.graph import NavGraph
@@ -59,7 +58,7 @@ UNBOUNDED = 1e6
 
 @dataclass(frozen=True, eq=False)
 class TaskInputs:
-    """What the tasks of one house are made from."""
+    """Inputs of the tasks of one house."""
 
     world: Place
     routes: Sequence[Route]
@@ -104,7 +103,7 @@ def _no_routes(world: str) -> Sequence[Route]:
 
 @dataclass(frozen=True, eq=False)
 class EnvInputs:
-    """What the environments of a kind are made from; they share all of it."""
+    """Inputs that all environments of one maker share."""
 
     worlds: Mapping[str, Place]
     """By House.name."""
@@ -113,7 +112,7 @@ class EnvInputs:
     wording: str = "test"
     """The split of the routes that is spoken."""
     language: Language | None = None
-    """Whose words an assistant uses; plain ones where not given."""
+    """Voice of an assistant; plain words where not given."""
     training: Callable[[], Iterable[Place]] | None = None
     """Houses to learn from, where an assistant counts what is common; `worlds` where not given."""
     rules: Any = None
@@ -144,7 +143,7 @@ class ArraySpec:
 
 @dataclass(frozen=True)
 class ExtraArrays:
-    """What Observation.extras of a kind become in a Gymnasium observation."""
+    """Arrays of Observation.extras in a Gymnasium observation."""
 
     specs: Callable[[int, Any], Mapping[str, ArraySpec]]
     """(number of candidates, rules of play) -> array by name."""
@@ -157,7 +156,7 @@ class ExtraArrays:
 
 @dataclass(frozen=True)
 class Metric:
-    """What a kind counts of an episode besides what all kinds do."""
+    """A number of an episode that only one kind of task reports."""
 
     of: Measure
     percent: bool = False
@@ -165,7 +164,7 @@ class Metric:
     share: bool = False
     """0 or 1 of an episode."""
     per: Measure | None = None
-    """What `of` is out of, summed over the episodes: the column is the ratio of both sums."""
+    """Number that `of` is out of; the column is the ratio of both sums over the episodes."""
 
 
 @dataclass(frozen=True)
@@ -177,9 +176,7 @@ class StoryStyle:
     goal_stack: bool = False
     """Goals lie on each other and steps have costs; both are shown."""
     leaving: str = ""
-    """What the agent does when it leaves a sub-task for the task, whose goal it is then shown."""
-    remark: Callable[[Task, Sequence[int], Step], str | None] | None = None
-    """(task, nodes walked before, step) -> a line for the dialogue, or None."""
+    """Line for the moment in which the agent leaves a sub-task for the task, whose goal it is then shown."""
 
 
 # The record -------------------------------------------------------------------------------------
@@ -190,7 +187,7 @@ PLAIN_AGENTS: Mapping[str, Callable[[], Agent]] = {
     "shortest": Shortest,
 }
 INTENTIONS = (Intention.HELP, Intention.CUR, Intention.GOAL, Intention.SUB)
-"""What may be asked where a kind does not say otherwise."""
+"""Questions of a kind that does not say otherwise."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -223,17 +220,19 @@ class TaskKind:
 
     success: Measure | None = None
     """1 for a success; by default an episode that ends within the radius of a goal."""
+    shortest: Measure | None = None
+    """Metres of the shortest way that succeeds, for SPL; by default to the goal nearest the end."""
     needs_stop: bool = False
     """No success without the agent saying that it is done."""
     metrics: Mapping[str, Metric] = field(default_factory=dict)
-    """What only this kind reports."""
+    """Numbers that only this kind reports, by column."""
     columns: tuple[str, ...] = ("success", "strict success", "spl", "navigation error", "requests", "steps")
     """Of a table of agents that do not learn."""
     test_splits: tuple[str, ...] = ("test_unseen",)
-    """What is evaluated in unless somebody says otherwise."""
+    """Splits to evaluate in unless somebody says otherwise."""
 
     intentions: tuple[Intention, ...] = INTENTIONS
-    """What may be asked, in the order of the actions' numbers."""
+    """Questions that may be asked, in the order of the actions' numbers."""
     extras: ExtraArrays | None = None
     """Of a kind whose environments fill in Observation.extras."""
     monocular: bool = False

@@ -5,13 +5,17 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from pathlib import Path
 
 import pytest
-from hand_data import built
+from hand_data import built, small_house
 
 from embodied.cli import main
+from embodied.cli.evaluate import rows_of
+from embodied.datasets.store import Dataset
 from embodied.evaluation import tables
 from embodied.evaluation.evaluate import agent, evaluate, spread
+from embodied.records import episodes_file
 from embodied.task_kind import kind_named
 
 
@@ -132,3 +136,22 @@ def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     assert json.loads((out / "run.json").read_text())["data"] == data.digest
     assert main(["evaluate", "vnla", "--data", str(data.folder)]) == 2
     assert "data set of 'hanna'" in capsys.readouterr().err
+
+
+def test_agents_whose_addresses_or_folders_end_alike_have_rows_of_their_own():
+    names = ["http://h1/act", "http://h2/act", "a/agent", "b/agent/", "team/one", "shortest", "shortest"]
+    rows = rows_of(names)
+    assert list(rows.values()) == names[:-1], "each is played once"
+    assert rows["one"] == "team/one" and rows["http://h2/act"] == "http://h2/act" and rows["a/agent"] == "a/agent"
+    files = {episodes_file("s", row) for row in rows}
+    assert len(files) == len(rows) and all(Path(f).name == f for f in files)
+
+
+def test_what_the_listener_makes_of_routes_is_told_for_every_split(tmp_path, capsys, monkeypatch):
+    data, counts = built(tmp_path / "d", make_house=small_house), iter([(1, 2), (3, 4)])
+    monkeypatch.setattr(Dataset, "open_world", lambda self, name, *_: self.place(name))
+    monkeypatch.setattr("embodied.agents.language_models.routes.followed_replies", lambda *_: next(counts))
+    order = ["evaluate", "hanna", "--data", str(data.folder), "--agent", "no ask", "--assistant", "hand_chat:Parrot"]
+    assert main([*order, "--split", "val_unseen", "test_unseen", "--tasks", "2", "--json"]) == 0
+    listener = json.loads(capsys.readouterr().out)["listener"]
+    assert listener == {"val_unseen": {"no ask": [1, 2]}, "test_unseen": {"no ask": [3, 4]}}

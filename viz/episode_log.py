@@ -72,9 +72,6 @@ class EpisodeLog:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)
             self.dialogue.append(f"**Teacher:** {detokenized(step.reply.text or '')}")
-        remark = kind_named(self.task.kind).story.remark
-        if remark and (line := remark(self.task, self.nodes, step)):
-            self.dialogue.append(f"*{line}*")
         if step.next_pose.node != self.nodes[-1]:
             self.nodes.append(step.next_pose.node)
         self.last = step

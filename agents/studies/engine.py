@@ -28,7 +28,7 @@ from embodied.agents.common.weights import weights_digest
 from embodied.agents.studies.pages import draw, page
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.assets.cache import digest, write_bytes, write_json
-from embodied.evaluation.tables import PERCENT, Samples, interval, less
+from embodied.evaluation.tables import Samples, in_percent, interval, less
 from embodied.identity import (
     CODE,
     MAKERS,
@@ -312,12 +312,12 @@ def result(
             continue
         values = {}
         for (split, metric), samples in found.items():
-            scale = 100.0 if metric in PERCENT else 1.0
+            scale = 100.0 if in_percent(metric) else 1.0
             column = f"{metric} {split}".strip().replace(" ", "_")
             e = interval(samples)
             values[column] = {"mean": _number(scale * e.mean), "half_width": _number(scale * e.half), "n": e.n}
             title = f"{metric}, {split.replace('_', ' ')}" if split else metric
-            columns[column] = {"key": column, "title": title, "unit": "%" if metric in PERCENT else ""}
+            columns[column] = {"key": column, "title": title, "unit": "%" if in_percent(metric) else ""}
         for seed in learner.seeds(row) if row.train is not None else ():
             home = _home(learner, out, row, seed)
             identity, facts = read_finished(home / "trained.json")
@@ -390,10 +390,10 @@ def _comparisons(learner: StudyLearner, table: StudyTable, out: Path, rows: Sequ
     for first, second in table.compared if rows is None else ():
         pair = StudyRow(first.label, first.train, first.judge, minus=second)
         for (split, metric), samples in _found(learner, dataclasses.replace(table, pooled=()), pair, out).items():
-            scale, e = 100.0 if metric in PERCENT else 1.0, interval(samples)
+            scale, e = 100.0 if in_percent(metric) else 1.0, interval(samples)
             told.append(
                 f"{first.label} minus {second.label}, {metric}, {split.replace('_', ' ')}: "
-                f"{scale * e.mean:+.2f} ± {scale * e.half:.2f}{' points' * (metric in PERCENT)}"
+                f"{scale * e.mean:+.2f} ± {scale * e.half:.2f}{' points' * in_percent(metric)}"
             )
     return told
 

@@ -34,17 +34,17 @@ UNKNOWN = "I do not know."
 
 
 def in_view(world: Place, node: int, goal: FindDescribed) -> list[tuple[str, float, float]]:
-    """What of the goal's class is in the room and within FARTHEST, nearest first: (placement, yaw, metres)."""
+    """Things of the goal's class in the room and within FARTHEST, nearest first: (placement, yaw, metres)."""
     eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
-    found = []
+    things = []
     for name in (*goal.fitting, *goal.similar):
         p = world.house.placement_by_id[name]
         if p.room != room:
             continue
         distance = float(np.round(footprint_distance(p, eye[None])[0], 6))
         if distance <= FARTHEST:
-            found.append((name, math.atan2(p.position[1] - eye[1], p.position[0] - eye[0]), distance))
-    return sorted(found, key=lambda x: (x[2], x[0]))
+            things.append((name, math.atan2(p.position[1] - eye[1], p.position[0] - eye[0]), distance))
+    return sorted(things, key=lambda x: (x[2], x[0]))
 
 
 class AskAssistant:
@@ -92,18 +92,18 @@ class AskAssistant:
         return Reply(text=text, intention=question, subtask=subtask, ruled_out=out)
 
     def facts(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> tuple[str, ...]:
-        """What a model or a person who words the answer is told: the answer itself, or for a free question, all."""
+        """Facts for a model or a person who words the answer: the answer itself, or for a free question, all."""
         if question is not Intention.FREE:
             return (self.answer(situation, question, rng=rng).text or "",)
-        told = (Intention.REGION, Intention.APPEARANCE, Intention.ROUTE)
-        return tuple(self.answer(situation, q, rng=rng).text or "" for q in told)
+        intentions = (Intention.REGION, Intention.APPEARANCE, Intention.ROUTE)
+        return tuple(self.answer(situation, q, rng=rng).text or "" for q in intentions)
 
     def _appearance(self, s: Situation) -> tuple[str, set[str]]:
         goal, of = _goal(s), s.world.house.placement_by_id
-        mine, own = of[goal.placement], self._look(of[goal.placement])
-        width = f"about {max(mine.size[0], 0.05):.1f} m wide"
-        text = f"It is {', '.join([*own, width])}{_beside(s.world, mine)}."
-        return text, {p for p in (*goal.fitting, *goal.similar) if self._look(of[p]) == own}
+        thing, appearance = of[goal.placement], self._look(of[goal.placement])
+        width = f"about {max(thing.size[0], 0.05):.1f} m wide"
+        text = f"It is {', '.join([*appearance, width])}{_beside(s.world, thing)}."
+        return text, {p for p in (*goal.fitting, *goal.similar) if self._look(of[p]) == appearance}
 
     def _route(self, s: Situation, rng: np.random.Generator) -> tuple[str, Subtask]:
         graph = s.world.graph
@@ -149,13 +149,13 @@ def _side(bearing: float) -> str:
     return "behind you" if abs(steps) >= 6 else f"{30 * abs(steps)} degrees to your {'left' if steps > 0 else 'right'}"
 
 
-def _beside(world: Place, mine: Placement) -> str:
+def _beside(world: Place, thing: Placement) -> str:
     """', next to the bed': the nearest larger thing of another class in the room, within 1.5 m."""
     others: Sequence[Placement] = [
         p
         for p in world.house.placements
-        if p.room == mine.room and p.object_class != mine.object_class and p.size[0] * p.size[1] > 0.15
+        if p.room == thing.room and p.object_class != thing.object_class and p.size[0] * p.size[1] > 0.15
     ]
-    at = np.asarray([mine.position])
-    near = sorted((float(footprint_distance(p, at)[0]), p.id, p.object_class) for p in others)
-    return f", next to the {near[0][2]}" if near and near[0][0] < 1.5 else ""
+    at = np.asarray([thing.position])
+    neighbours = sorted((float(footprint_distance(p, at)[0]), p.id, p.object_class) for p in others)
+    return f", next to the {neighbours[0][2]}" if neighbours and neighbours[0][0] < 1.5 else ""

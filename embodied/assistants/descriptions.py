@@ -103,21 +103,21 @@ def near_placements(world: Place, node: int, radius: float) -> list[tuple[Featur
     """Objects of the node's own room within `radius` metres (3-D, from eye to the middle of the object), nearest first,
     with what each feature set is said of. Nobody describes what is behind a wall."""
     eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
-    found = []
+    features = []
     for p in world.house.placements:
         if p.object_class in NOT_OBJECTS or p.room != room:
             continue
         offset = np.asarray(p.position) + [0.0, 0.0, p.size[2] / 2] - eye
         distance = float(np.linalg.norm(offset))
         if distance <= radius:
-            found.append((round(distance, 6), p.id, Feature("object", p.object_class, *_bins(offset)), p))
-    return [(feature, p) for _, _, feature, p in sorted(found, key=lambda x: x[:2])[:MOST_OBJECTS]]
+            features.append((round(distance, 6), p.id, Feature("object", p.object_class, *_bins(offset)), p))
+    return [(feature, p) for _, _, feature, p in sorted(features, key=lambda x: x[:2])[:MOST_OBJECTS]]
 
 
 def spoken_of(world: Place, node: int, description: Description) -> list[tuple[Feature, Placement]]:
-    """What the objects of a description of `node` are, nearest first."""
-    said = set(description)
-    return [(f, p) for f, p in near_placements(world, node, STATE_RADIUS) if f in said]
+    """The objects that a description of `node` names, nearest first."""
+    named = set(description)
+    return [(f, p) for f, p in near_placements(world, node, STATE_RADIUS) if f in named]
 
 
 def frequent_classes(worlds: Iterable[Place], share: float = KEPT) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ SIDES = (
     "right",
     "ahead on the right",
 )
-"""Where something is, by its direction in steps of 30 degrees counter-clockwise from the gaze."""
+"""Side on which something is, by its direction in steps of 30 degrees counter-clockwise from the gaze."""
 
 
 def described(description: Description, pose: Pose | None = None, most: int = 6) -> str:
@@ -63,13 +63,13 @@ def side(bearing: float) -> str:
 
 def features_in_words(description: Description, turn: int) -> str:
     """A bag of features in words, directions relative to the gaze."""
-    said = []
+    parts = []
     for f in description:
         if f.kind == "room":
-            said.append(f.name.replace("_", " "))
+            parts.append(f.name.replace("_", " "))
         elif f.name == "stop":
-            said.append("you are there")
+            parts.append("you are there")
         else:
             where = side((f.horizontal - turn) * STEP)
-            said.append(f"go {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
-    return ", ".join(said)
+            parts.append(f"go {where}" if f.kind == "action" else f"{f.name} ({where}, {f.distance} m)")
+    return ", ".join(parts)

@@ -37,9 +37,9 @@ class TaskOptions:
     """Rules of play of the kind of task. vnla: help in words (indirect, the default), the advisor acts and says it
     (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
     seed_file: InputPath | None = None
-    """ask: seeds of the houses, one per line."""
-    unseen_classes: bool = False
-    """ask: use only classes held out from training."""
+    """Without --data: seeds of the houses to play in, one per line."""
+    part: Annotated[str | None, Option(metavar="NAME")] = None
+    """With --seed-file: the part of each house's tasks (ask: unseen_classes, those held out from training)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +71,9 @@ class Options(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Fur
     """The kind of task: find, vln, vnla, hanna, hari, ask, or MODULE:NAME of your own."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
     """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', MODULE:CLASS
-    of your own policy, MODULE:LEARNER=RUN of your own learner, or for ask a folder with an agent.py or the http://
-    address of an agent (default: shipped, else all baselines)."""
+    of your own policy, MODULE:LEARNER=RUN of your own learner, a folder with an agent.py, or the http:// address
+    of an agent (default: shipped, else all baselines)."""
     threads: Count = 2
     sees: Annotated[str, Option(words=SEES)] = "names"
-    """What a language model is given: the true names of what is visible (an oracle), the candidate views as one strip,
+    """Input of a language model: the true names of what is visible (an oracle), the candidate views as one strip,
     the panorama with markers, or nothing."""

@@ -71,11 +71,11 @@ class DatasetConfig:
     routes: str = "sampled"
     """'sampled' as in Room-to-Room, or 'spanning' as in Lemma 2."""
     people: bool = True
-    """Whether assistants stand in the house as figures (HANNA)."""
+    """Assistants stand in the house as figures (HANNA)."""
     language: str = "people"
     """Who words the routes: 'people' with their habits and landmarks, or 'plain' turns and rooms."""
     rooms: bool = True
-    """Whether requests name the room (VNLA); without, any thing of the class in the house will do."""
+    """Requests name the room; without (VNLA), any thing of the class in the house will do."""
     ood: int = 0
     """Houses out of distribution, split 'test_ood': of models, looks, speakers and words that occur in no other split
     (embodied.novelty). With any, all other houses are of familiar ones only, so they differ from those without."""
@@ -106,7 +106,7 @@ class DatasetConfig:
         return scale(self.scale, self.kind, self.ood)
 
     def novelty_of(self, group: str) -> str | None:
-        """What houses of a group are made of, and who speaks in them: all there is, familiar or novel things."""
+        """Familiar or novel things and speakers for the houses of a group; None for all there is."""
         return (NOVEL if group == "ood" else FAMILIAR) if self.ood else None
 
     def facts(self) -> dict[str, object]:
@@ -374,13 +374,13 @@ def shares(unit: Unit, config: DatasetConfig) -> list[tuple[SplitPlan, int]]:
 
 def _claim(folder: Path, config: DatasetConfig) -> None:
     """Write down whose folder it is, or refuse another data set's, or one that another program began."""
-    mine = {"version": VERSION, "config": json.loads(json.dumps(config.facts()))}
+    wanted = {"version": VERSION, "config": json.loads(json.dumps(config.facts()))}
     path = folder / "config.json"
     if path.exists():
-        theirs = read_json(path)
-        begun_by = theirs.pop("program", None)
-        if theirs != mine:
-            raise ValueError(f"{folder} holds another data set ({theirs}); this one is {mine}; choose another folder")
+        stored = read_json(path)
+        begun_by = stored.pop("program", None)
+        if stored != wanted:
+            raise ValueError(f"{folder} holds another data set ({stored}); this one is {wanted}; choose another folder")
         if begun_by != program() and any(missing_units(config, folder)):
             raise ValueError(
                 f"{folder} was begun by another version of the program ({begun_by}, this is {program()}), whose houses "
@@ -389,7 +389,7 @@ def _claim(folder: Path, config: DatasetConfig) -> None:
     else:
         if any(f.name != LOCK for f in folder.iterdir()):
             raise ValueError(f"{folder} is not empty and holds no data set; choose an empty folder")
-        write_bytes(path, (json.dumps({**mine, "program": program()}, sort_keys=True, indent=1) + "\n").encode())
+        write_bytes(path, (json.dumps({**wanted, "program": program()}, sort_keys=True, indent=1) + "\n").encode())
 
 
 def _groups_digest(own: Sequence[Path], cache: Path) -> str:

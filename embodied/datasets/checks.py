@@ -1,4 +1,4 @@
-"""Whether what a data set says fits together: files and their digests, a house and its graph, tasks and their house."""
+"""Checks that a data set fits together: files and their digests, a house and its graph, tasks and their house."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import shapely
 from embodied.assets.cache import digest
 from embodied.datasets.build import VERSION, DatasetConfig
 from embodied.house.house import House
-from embodied.interface import Episode, FindObject, FollowRoute, Place, Route, Task
+from embodied.interface import Episode, FindObject, FollowRoute, GoTo, Place, Route, Task
 from embodied.navigation.graph import NavGraph
 from embodied.records import RecordError, from_plain, read_json
 
@@ -177,6 +177,10 @@ def _wrong_task(task: Task, kind: str, house: House, graph: NavGraph) -> str | N
 def _wrong_goal(task: Task, house: House, graph: NavGraph, edges: Edges) -> str | None:
     if isinstance(task.goal, FindObject):
         return _wrong_object(task.goal, house)
+    if isinstance(task.goal, GoTo):
+        known = house.room_by_id.keys() | house.placement_by_id.keys()
+        missing = [name for name in (*task.goal.rooms, *task.goal.placements) if name not in known]
+        return f"the house has no {missing[0]!r}" if missing else None
     if not isinstance(task.goal, FollowRoute):
         return f"a data set holds no goals of kind {type(task.goal).__name__}"
     ends = (task.goal.path[0], (task.goal.path[-1],))

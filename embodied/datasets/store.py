@@ -46,7 +46,7 @@ ANNA_SPLIT = {
     "test_unseen": "test",
     "test_ood": "test",
 }
-"""Whose wordings are spoken in each split: even in seen houses evaluation hears new ones (4.2.5)."""
+"""Split of the wordings that are spoken in each split: even in seen houses evaluation hears new ones (4.2.5)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,9 +242,9 @@ class Dataset:
         tasks: list[Task] = []
         for name in self.names(split):
             file, place = f"tasks_{split}.jsonl", self.place(name)
-            mine = self._lines(name, file, Task)
-            check_tasks(self._path(name, file), mine, self.kind, place.house, place.graph)
-            tasks += mine
+            house_tasks = self._lines(name, file, Task)
+            check_tasks(self._path(name, file), house_tasks, self.kind, place.house, place.graph)
+            tasks += house_tasks
         if (limits := self.task_kind.time_limits) and split != "train":
             tasks = [limits.apply(t, self.place(t.world), self._time_limits) for t in tasks]
         return tuple(tasks)
@@ -270,13 +270,13 @@ class Dataset:
           DatasetError: an unknown split, or files that were lost or changed.
         """
         names = self.names(name)[:houses]
-        said = self.utterances(names)
+        sentences = self.utterances(names)
         places = {n: self.place(n) if worlds is None else worlds[n] for n in names}
         inputs = EnvInputs(
             places,
             self.routes,
             ANNA_SPLIT.get(name, ""),
-            PeoplesWords(said, PlainLanguage()) if said else None,
+            PeoplesWords(sentences, PlainLanguage()) if sentences else None,
             lambda: self.places("train").values(),
             rules,
             assistant,

@@ -32,7 +32,7 @@ from embodied.seeds import stream
 
 @dataclass(frozen=True)
 class Prices:
-    """What each question costs, where a success is worth 1."""
+    """Price of each question, where a success is worth 1."""
 
     confirm: float = 0.05
     appearance: float = 0.05
@@ -51,7 +51,7 @@ class Prices:
 
 @dataclass(frozen=True)
 class AskSettings:
-    """What may be varied of Ask-v0."""
+    """Rules of play that may be varied."""
 
     prices: Prices = Prices()
     grounded: bool = True
@@ -68,14 +68,14 @@ class AskSettings:
 
 @dataclass(frozen=True)
 class AskExtras(Extras):
-    """What the agent is told besides."""
+    """Observation of the agent besides what all kinds see."""
 
     state_description: Description
     """The room and what is near."""
     detections: tuple[Detection, ...]
     """The best first."""
     advised: Move | Stop | None
-    """What the route that was told says to do next; None where none is being followed."""
+    """The next action of the route that was told; None where none is being followed."""
 
     def lines(self, turn: int) -> tuple[str, ...]:
         parts = [f"here: {features_in_words(self.state_description, turn)}"] if self.state_description else []
@@ -99,7 +99,7 @@ class AskExtras(Extras):
 
 @dataclass(frozen=True)
 class AskTruth:
-    """What the assistant knows besides."""
+    """Knowledge of the assistant besides the situation."""
 
     possible: tuple[str, ...]
     """Placements that fit all that was said so far."""
@@ -133,7 +133,7 @@ class AskEnv(HelpEnv):
         self._way: tuple[int, ...] = ()
         """Nodes of the route that is being followed, the present one first."""
         self._arrives = False
-        """Whether it leads to a goal node, not only towards one."""
+        """It leads to a goal node, not only towards one."""
 
     def _replied(self, reply: Reply) -> None:
         self._fitting = tuple(p for p in self._fitting if p not in reply.ruled_out)
@@ -169,10 +169,10 @@ class AskEnv(HelpEnv):
     def _detections(self) -> tuple[Detection, ...]:
         known = self._fitting if self.rules.grounded else self._goal.fitting
         denied = self._denied if self.rules.grounded else ()
-        found = []
+        detections = []
         for name, yaw, distance in in_view(self.world, self.pose.node, self._goal):
             rng = stream(0, "detector", self.task.world, name, self.pose.node)
             mean = self.rules.denied if name in denied else self.rules.fits if name in known else self.rules.other
             score = min(max(mean + self.rules.noise * float(rng.standard_normal()), 0.0), 1.0)
-            found.append(Detection(float(wrap(yaw - self.pose.yaw)), round(distance, 2), round(score, 2)))
-        return tuple(sorted(found, key=lambda d: (-d.score, d.distance)))
+            detections.append(Detection(float(wrap(yaw - self.pose.yaw)), round(distance, 2), round(score, 2)))
+        return tuple(sorted(detections, key=lambda d: (-d.score, d.distance)))

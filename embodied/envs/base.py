@@ -19,7 +19,7 @@ from embodied.interface import (
     Episode,
     Extras,
     FindDescribed,
-    FindObject,
+    GoTo,
     Intention,
     Mode,
     Move,
@@ -57,7 +57,7 @@ class HelpEnv:
     """
 
     asking_takes_time = True
-    """Whether a request uses up a step of the horizon (Algorithms 6 and 7)."""
+    """A request uses up a step of the horizon (Algorithms 6 and 7)."""
 
     def __init__(
         self, worlds: Mapping[str, Place], assistant: Assistant | None = None, moves: Moves | None = None
@@ -156,7 +156,7 @@ class HelpEnv:
 
     @property
     def last_step(self) -> Step:
-        """What was just written down."""
+        """The step that was just written down."""
         return self._steps[-1]
 
     def episode(self, agent: str = "") -> Episode:
@@ -285,7 +285,7 @@ class HelpEnv:
 
 
 def required(value: T | None, what: str) -> T:
-    """What a rule of play cannot do without.
+    """`value`, which a rule of play cannot do without.
 
     Raises:
       TypeError: it is not there; the assistant does not fit the rule.
@@ -310,11 +310,13 @@ def check_task(task: Task, worlds: Mapping[str, Place]) -> None:
         raise TaskError(
             f"task {task.id!r} names the nodes {nodes}, world {task.world!r} has 0..{n - 1}; sample it again"
         )
-    if isinstance(task.goal, FindObject | FindDescribed):
-        goal = task.goal
-        sought = goal.placements if isinstance(goal, FindObject) else (goal.placement, *goal.fitting, *goal.similar)
-        gone = [p for p in sought if p not in world.house.placement_by_id]
-        if gone:
-            raise TaskError(f"task {task.id!r} looks for {gone}, not in the house {task.world!r}; sample it again")
+    house, goal = world.house, task.goal
+    rooms = goal.rooms if isinstance(goal, GoTo) else ()
+    things: tuple[str, ...] = getattr(goal, "placements", ())
+    if isinstance(goal, FindDescribed):
+        things = (goal.placement, *goal.fitting, *goal.similar)
+    missing = [p for p in things if p not in house.placement_by_id] + [r for r in rooms if r not in house.room_by_id]
+    if missing:
+        raise TaskError(f"task {task.id!r} looks for {missing}, not in the house {task.world!r}; sample it again")
     if task.horizon < 1 or (task.budget is not None and task.budget < 0):
         raise TaskError(f"task {task.id!r} needs horizon >= 1 and budget >= 0, got {task.horizon} and {task.budget}")

@@ -62,7 +62,7 @@ class Costs:
 
 @dataclass(frozen=True)
 class HariRules:
-    """What may be varied of HARI's environment; the defaults are Table E.2."""
+    """Rules of play that may be varied; the defaults are Table E.2."""
 
     costs: Costs = Costs()
     stack: int = 2
@@ -90,7 +90,7 @@ AS_PRINTED = HariRules()
 
 @dataclass(frozen=True)
 class HariExtras(Extras):
-    """What the agent is told without asking, and what it was told."""
+    """Observation of the agent besides what all kinds see: descriptions that it perceives or was told."""
 
     state_description: Description
     """d^s."""
@@ -104,7 +104,7 @@ class HariExtras(Extras):
 
 @dataclass(frozen=True)
 class HariTruth:
-    """What the assistant knows besides."""
+    """Knowledge of the assistant besides the situation."""
 
     goals: tuple[int, ...]
     """The goal nodes on the stack, top last."""

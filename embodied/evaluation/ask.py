@@ -26,6 +26,7 @@ from embodied.interface import (
     Stop,
     Task,
 )
+from embodied.plugins import made_by_name
 from embodied.records import RecordError, parse
 from embodied.tasks.ask import Look, ask_pool, ask_tasks
 
@@ -72,15 +73,17 @@ def ask_split(
 
 
 def submitted(where: str) -> Agent:
-    """The agent of a submission: a folder whose agent.py has `make_agent()`, or the address of an HTTP agent.
+    """An agent of somebody's own: a folder whose agent.py has `make_agent()`, 'module:Policy', or an HTTP address.
 
-    Code of a folder is run as it is: judge strangers in a container.
+    Its code is run as it is: run agents that you do not trust in a container.
 
     Raises:
-      ValueError: neither.
+      ValueError: none of them, or an agent of a folder that wants to be shown the situations.
     """
     if where.startswith(("http://", "https://")):
         return HttpAgent(where)
+    if ":" in where:
+        return made_by_name(where)
     file = Path(where) / "agent.py"
     if not file.exists():
         raise ValueError(
@@ -151,14 +154,14 @@ def observed(o: Observation) -> dict[str, object]:
 def acted(o: Observation, answer: bytes) -> Action:
     """The action of an answer: 'go 0', 'ask region', 'stop'; with 'question' for a free one. Anything else stops."""
     try:
-        said = parse(answer[: MOST_BYTES + 1], "an action")
+        body = parse(answer[: MOST_BYTES + 1], "an action")
     except RecordError:
         return Stop()
-    word = said.get("action") if isinstance(said, dict) else None
+    word = body.get("action") if isinstance(body, dict) else None
     kind, _, what = word.partition(" ") if isinstance(word, str) else ("", "", "")
     if kind == "go" and what.isdigit() and len(what) < 4 and int(what) < len(o.candidates):
         return Move(int(what))
     if kind == "ask" and what in {i.value for i in o.can_ask}:
-        question = said.get("question") if isinstance(said, dict) else None
+        question = body.get("question") if isinstance(body, dict) else None
         return Ask(Intention(what), question=question[:300] if isinstance(question, str) else None)
     return Stop()

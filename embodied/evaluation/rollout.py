@@ -19,11 +19,11 @@ class Frame:
     index: int
     """Which of the tasks."""
     observation: Observation
-    """What the policy saw."""
+    """Given to the policy."""
     situation: Situation
-    """What was the case, before the action."""
+    """The truth, before the action."""
     step: Step
-    """What was done."""
+    """The action with its consequences."""
     episode: Episode | None
     """The whole episode with its last frame, else None."""
 

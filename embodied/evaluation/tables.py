@@ -65,15 +65,15 @@ class Row:
 
 @dataclass(frozen=True)
 class Samples:
-    """What was counted, once per episode, sentence or run, and is to be averaged."""
+    """Numbers to be averaged, one per episode, sentence or run."""
 
     values: tuple[float, ...]
     groups: tuple[str, ...] = ()
-    """What each value belongs to, such as its house; values of one group are not independent. (): each stands alone."""
+    """Groups of the values, such as houses; values of one group are not independent. (): each stands alone."""
     weights: tuple[float, ...] = ()
-    """What each value is out of; the mean is then the ratio of both sums. (): out of one."""
+    """Number that each value is out of; the mean is then the ratio of both sums. (): out of one."""
     share: bool = False
-    """Whether each value is 0 or 1."""
+    """Each value is 0 or 1."""
 
 
 def interval(runs: Sequence[Samples]) -> Estimate:
@@ -184,20 +184,20 @@ def measured(episodes: Sequence[Episode], graphs: Mapping[str, NavGraph]) -> dic
     """Every metric of the kind of task and the repeat rates, one value per episode."""
     houses, kind = tuple(e.task.world for e in episodes), kind_named(episodes[0].task.kind)
     of = lambda f: tuple(f(e, graphs[e.task.world]) for e in episodes)
-    found = {name: Samples(of(f), houses, share=name in SHARES) for name, f in metrics.PER_EPISODE.items()}
+    samples = {name: Samples(of(f), houses, share=name in SHARES) for name, f in metrics.PER_EPISODE.items()}
     for name, metric in kind.metrics.items():
-        found[name] = Samples(of(metric.of), houses, of(metric.per) if metric.per else (), metric.share)
+        samples[name] = Samples(of(metric.of), houses, of(metric.per) if metric.per else (), metric.share)
     used = [metrics.usage(e) for e in episodes]
     if any(used):
         for name, count in metrics.USAGE.items():
-            found[name] = Samples(tuple(float(count(u)) if u else 0.0 for u in used), houses)
+            samples[name] = Samples(tuple(float(count(u)) if u else 0.0 for u in used), houses)
     repeats = {"mistake repeat": metrics.mistake_repeats, "request repeat": metrics.request_repeats}
     if kind.monocular:  # turning on the spot is no mistake
         del repeats["mistake repeat"]
     for name, f in repeats.items():
         again, total = zip(*of(f), strict=True)
-        found[name] = Samples(tuple(map(float, again)), houses, tuple(map(float, total)))
-    return found
+        samples[name] = Samples(tuple(map(float, again)), houses, tuple(map(float, total)))
+    return samples
 
 
 def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str, NavGraph], *, seed: int) -> Row:
@@ -213,7 +213,7 @@ def row(agent: str, split: str, episodes: Sequence[Episode], graphs: Mapping[str
 
 
 def in_percent(name: str) -> bool:
-    """Whether a column is shown in per cent."""
+    """True for a column that is shown in per cent."""
     return name in PERCENT or any(name in k.metrics and k.metrics[name].percent for k in known_kinds())
 
 

@@ -146,15 +146,15 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         if named is None:
             return None
         if isinstance(named, str):
-            found = [k for k, t in enumerate(self._tasks) if t.id == named]
+            numbers = [k for k, t in enumerate(self._tasks) if t.id == named]
         else:
-            found = [int(named)] if isinstance(named, (int, np.integer)) and 0 <= named < len(self._tasks) else []
-        if not found:
+            numbers = [int(named)] if isinstance(named, (int, np.integer)) and 0 <= named < len(self._tasks) else []
+        if not numbers:
             raise ValueError(
                 f"there is no task {named!r:.80}; name one by its id, such as {self._tasks[0].id!r}, or by a number "
                 f"from 0 to {len(self._tasks) - 1}"
             )
-        return found[0]
+        return numbers[0]
 
     def refuse(self, action: Any) -> None:
         """Raises what `step` would raise for `action`, before anything is done.
@@ -209,7 +209,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
 
     @property
     def observed(self) -> Observation:
-        """What was handed out last, before it became numbers."""
+        """The last observation, before it became numbers."""
         return self._o
 
     @property
@@ -219,7 +219,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
 
     @property
     def pose(self) -> Pose:
-        """Where the agent is: node, turn and tilt."""
+        """Pose of the agent: node, turn and tilt."""
         return self._env.pose
 
     @property
@@ -261,7 +261,8 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         """Success and SPL, and once the episode has ended all metrics of every task."""
         env, graph = self._env, self._env.world.graph
         away = min(graph.distance[env.pose.node, g] for g in env.task.goal_nodes)
-        if env.ended is None and (self._needs_stop or away > env.task.radius + 1e-6):  # a success costs more to find
+        own = kind_named(env.task.kind).success is not None
+        if env.ended is None and (self._needs_stop or (away > env.task.radius + 1e-6 and not own)):  # cheaper to find
             return {"success": 0.0, "spl": 0.0, "is_success": False}
         episode, names = env.so_far(), ("success", "spl") if env.ended is None else PER_EPISODE
         measures: dict[str, Any] = {name.replace(" ", "_"): PER_EPISODE[name](episode, graph) for name in names}
@@ -362,7 +363,7 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentSettings:
-    """What environments of a kind of task play in and see."""
+    """Houses, tasks, senses and rules of the environments of a kind of task."""
 
     data: str | Path | None = None
     """Folder that `embodied dataset` built; without it a flat is generated from `seed` and lit."""

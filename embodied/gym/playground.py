@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings, Unlit, parse_pictures
-from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, kind_named
+from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 from embodied.world import makers, open_world
 
 if TYPE_CHECKING:
@@ -90,29 +90,78 @@ def flat_playground(kind: str, seed: int, asked: Asked) -> Playground:
 
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
     """
-    catalogue, worlds, known = load_catalogue(asked.cache), asked.worlds, kind_named(kind)
-    language: Language = PlainLanguage() if worlds is not None else People(tries=1)
-    paths = None
-    if worlds is None:
-        name = f"flat_{seed}"
-        house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
+    catalogue = load_catalogue(asked.cache)
+    if asked.worlds is None:
+        return houses_playground(kind, [(f"flat_{seed}", seed)], seed, asked, catalogue, AREA, TASKS)
+    name, place = next(iter(asked.worlds.items()))
+    tasks, routes = _tasks_in(kind_named(kind), place, None, seed, PlainLanguage(), asked.rooms, TASKS, None)
+    return _playground(kind, asked.worlds, tasks, {name: routes}, asked, catalogue)
+
+
+def houses_playground(
+    kind: str,
+    houses: Iterable[tuple[str, int]],
+    seed: int,
+    asked: Asked,
+    catalogue: Catalogue,
+    area: tuple[float, float],
+    each: int,
+    part: str | None = None,
+) -> Playground:
+    """Generated houses with `each` tasks in every one.
+
+    Args:
+      houses: names and seeds.
+      seed: of tasks and routes.
+      area: smallest and largest house, square metres.
+      part: of the pool of tasks; that of unseen houses if None.
+    """
+    known, language = kind_named(kind), People(tries=1)
+    drawn = parse_pictures(asked.pictures or ("fast" if set(asked.sees) - {"oracle"} else "unlit"))
+    worlds, tasks, routes = dict[str, SeenPlace](), list[Task](), dict[str, Sequence[Route]]()
+    for name, house_seed in houses:
+        house, graph = make_dataset_house(house_seed, name, HouseConfig(area=area), catalogue)
+        paths = None
         if known.people:
-            met = place_people(house, graph, catalogue, seed=seed)
-            paths = route_paths(graph, name, seed=seed, house_split="test", starts=met)
+            met = place_people(house, graph, catalogue, seed=house_seed)
+            paths = route_paths(graph, name, seed=house_seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
-        drawn = parse_pictures(asked.pictures or ("fast" if set(asked.sees) - {"oracle"} else "unlit"))
         world = open_world(house, catalogue, asked.cache, graph=graph, pictures=drawn)
         if drawn.quality is not None:
             world.baked(progress=True)
-        worlds = {name: world}
-    name, place = next(iter(worlds.items()))
-    routes: tuple[Route, ...] = ()
-    if known.routes:
+        more, routes[name] = _tasks_in(known, world, paths, seed, language, asked.rooms, each, part)
+        worlds[name], tasks = world, [*tasks, *more]
+    return _playground(kind, worlds, tasks, routes, asked, catalogue)
+
+
+def _tasks_in(
+    kind: TaskKind,
+    place: SeenPlace,
+    paths: list[tuple[int, ...]] | None,
+    seed: int,
+    language: Language,
+    rooms: bool,
+    count: int,
+    part: str | None,
+) -> tuple[list[Task], Sequence[Route]]:
+    """Tasks in a house that nobody learned in, and its routes, where the kind has such; along `paths` if given."""
+    routes: Sequence[Route] = ()
+    if kind.routes:
         paths = paths or route_paths(place.graph, place.house.name, seed=seed, house_split="test")
         routes = worded(place, paths, WORDINGS["test"], seed=seed, language=language)
-    inputs = TaskInputs(place, routes, seed, language, asked.rooms)
-    tasks = known.tasks(inputs, [(known.unseen_part, TASKS)])[known.unseen_part]
-    routes_of = lambda world: routes if world == name else ()
+    part = part or kind.unseen_part
+    return kind.tasks(TaskInputs(place, routes, seed, language, rooms), [(part, count)])[part], routes
+
+
+def _playground(
+    kind: str,
+    worlds: Mapping[str, SeenPlace],
+    tasks: Sequence[Task],
+    routes: Mapping[str, Sequence[Route]],
+    asked: Asked,
+    catalogue: Catalogue,
+) -> Playground:
+    known, routes_of = kind_named(kind), lambda name: routes.get(name, ())
     make_env = known.environments(EnvInputs(worlds, routes_of, rules=asked.rules, assistant=asked.assistant))
     return Playground(
         worlds, known.tasks_under(tasks, worlds, asked.rules), make_env, _oracle(worlds, catalogue, asked)
@@ -134,16 +183,16 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
     Raises:
       ValueError: none, not of all houses, or not in one way, though they are wanted.
     """
-    found = {n: drawn for n in names if (drawn := data.drawn_pictures(n)) is not None}
+    settings = {n: drawn for n in names if (drawn := data.drawn_pictures(n)) is not None}
     again = f"`embodied dataset {data.kind} --out {data.folder} ... --pictures fast`"
-    if wanted and len(found) < len(names):
+    if wanted and len(settings) < len(names):
         raise ValueError(
-            f"{data.folder} has pictures of {len(found)} of its {len(names)} houses here; draw them with "
+            f"{data.folder} has pictures of {len(settings)} of its {len(names)} houses here; draw them with "
             f"{again}, or choose sees='oracle'"
         )
-    if wanted and len(ways := {(p.word, p.size) for p in found.values()}) > 1:
+    if wanted and len(ways := {(p.word, p.size) for p in settings.values()}) > 1:
         raise ValueError(f"the pictures in {data.folder} are of several kinds ({sorted(ways)}); finish {again}")
-    return next(iter(found.values()), Unlit())
+    return next(iter(settings.values()), Unlit())
 
 
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:

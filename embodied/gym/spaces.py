@@ -29,11 +29,11 @@ class SpaceLayout:
     text: int = 1000
     """Most characters of an instruction; longer ones are cut."""
     intentions: tuple[Intention, ...] = INTENTIONS
-    """What may be asked, in the order of the actions."""
+    """Questions, in the order of the actions."""
     extras: Mapping[str, ArraySpec] = field(default_factory=dict)
     """Arrays of the kind's own part of the observation, by name."""
     encode_extras: Callable[[Observation, Mapping[str, ArraySpec]], Mapping[str, Any]] | None = None
-    """What fills them (TaskKind.extras)."""
+    """Fills them (TaskKind.extras)."""
 
     @classmethod
     def of(cls, kind: TaskKind, rules: Any = None, *, candidates: int = 16) -> SpaceLayout:

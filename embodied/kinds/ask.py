@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -73,7 +74,7 @@ def ask_environments(
 
 
 def price(episode: Episode, graph: NavGraph) -> float:
-    """What the questions cost."""
+    """Price of the questions."""
     return float(sum(s.cost for s in episode.steps))
 
 
@@ -132,7 +133,7 @@ ASK = register_kind(
         environment=environments,
         rules=AS_USUAL,
         help="words",
-        baselines={**{name: lambda rule=rule: Asker(rule) for name, rule in RULES.items()}, "oracle": Shortest},
+        baselines={**{name: functools.partial(Asker, rule) for name, rule in RULES.items()}, "oracle": Shortest},
         metrics={
             "weighted success": Metric(weighted_success, percent=True),
             "success progress": Metric(success_progress, percent=True),
@@ -144,6 +145,7 @@ ASK = register_kind(
             *("success", "spl", "weighted success", "success progress"),
             *("price", "price per success", "requests"),
         ),
+        expert="oracle",
         splits=None,
         intentions=QUESTIONS,
         extras=ExtraArrays(specs, encode),

@@ -24,7 +24,7 @@ LIKELY = 0.55
 
 @dataclass
 class Mind:
-    """What an agent remembers of one episode."""
+    """Memory of one episode."""
 
     visits: dict[int, int] = field(default_factory=dict)
     asked: dict[Intention, int] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class Mind:
 
 
 AskRule = Callable[[Observation, Detection | None, Mind], Action | None]
-"""What to do about what is known: an Ask, a Stop, or None to go on. It is given the thing that was reached, if any, the
+"""Decision about what is known: an Ask, a Stop, or None to go on. It is given the thing that was reached, if any, the
 one nearest."""
 
 

@@ -58,7 +58,7 @@ class OneByOne:
     something of an episode, `mind`."""
 
     def mind(self) -> Any:
-        """What it remembers when an episode begins; `one` may change it."""
+        """Memory at the beginning of an episode; `one` may change it."""
         return None
 
     def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
@@ -97,7 +97,7 @@ WITHOUT_LEARNING: Mapping[str, Callable[[], Agent]] = {
 
 
 class AskRule(Protocol):
-    """Whether to ask now; called only where help can be asked for."""
+    """True to ask now; called only where help can be asked for."""
 
     def __call__(self, observation: Observation, last_asked: int, *, rng: np.random.Generator) -> bool:
         """`last_asked` is the time of the last request, -1 before any."""
@@ -137,7 +137,7 @@ class PrivilegedAsking:
 
 @dataclass
 class _Trail:
-    """What an Explorer remembers of one episode."""
+    """Memory of one episode."""
 
     visited: Counter[int] = field(default_factory=Counter)
     """Steps that began at each node."""

@@ -97,7 +97,8 @@ def set_table(
     elif part.assistant not in (PERSON, "none"):
         assistant = made_by_name(part.assistant)
     simulated_help = part.assistant in ("simulated", *assistants)
-    by_own_rule = kind.help == "words" and (simulated_help or part.agent not in (PERSON, *POLICIES))
+    unhelped = kind.help == "none" and part.assistant == "none" and part.moves != "drive"
+    by_own_rule = unhelped or kind.help == "words" and (simulated_help or part.agent not in (PERSON, *POLICIES))
     if by_own_rule and part.moves == "drive":
         raise ValueError(
             f"part {part.name!r}: nobody drives by the rules of {data.kind!r}; let a person assist, or use viewpoints"
@@ -107,7 +108,7 @@ def set_table(
         relay = Relay() if assistant is None else Overheard(assistant)
         if by_own_rule:
             env = split.make_env()
-            env.assistant = relay
+            env.assistant = None if unhelped else relay
             return env, relay
         return TalkEnv(split.worlds, None if part.assistant == "none" else relay, moves, prices), relay
 

@@ -54,7 +54,7 @@ def look_of(catalogue: Catalogue | None) -> Look:
 
 
 def is_unseen(object_class: str) -> bool:
-    """Whether a class is kept from training; it depends on its name alone."""
+    """True for a class that is kept from training; it depends on its name alone."""
     return float(stream(0, "ask class", object_class).random()) < UNSEEN
 
 
@@ -68,9 +68,9 @@ def ask_pool(world: Place, look: Look, *, seed: int, unseen: bool | None = None)
     for x in find_instances(world, REACH):
         if unseen is None or is_unseen(x.object_class) == unseen:
             by_class.setdefault(x.object_class, []).append(x)
-    found = [(x, alike) for _, alike in sorted(by_class.items()) if len(alike) > 1 for x in alike]
+    instances = [(x, alike) for _, alike in sorted(by_class.items()) if len(alike) > 1 for x in alike]
     goals, kinds = [], []
-    for x, alike in found:
+    for x, alike in instances:
         if nodes := _own_nodes(world, x, alike):
             for goal in _descriptions(world, x, alike, look):
                 goals.append((goal, nodes))
@@ -135,19 +135,19 @@ def _own_nodes(world: Place, x: Instance, alike: list[Instance]) -> tuple[int, .
     """The nodes within reach of an object at which none of its like in the room is as near; ascending."""
     at = np.asarray(world.graph.positions)[list(x.nodes)]
     of = world.house.placement_by_id
-    mine = footprint_distance(of[x.placement], at)
+    distance = footprint_distance(of[x.placement], at)
     others = [footprint_distance(of[o.placement], at) for o in alike if o is not x and o.room == x.room]
     nearest = np.min(others, axis=0) if others else np.full(len(at), np.inf)
-    return tuple(sorted(v for v, d, e in zip(x.nodes, mine, nearest) if d < e - 1e-6))
+    return tuple(sorted(v for v, d, e in zip(x.nodes, distance, nearest) if d < e - 1e-6))
 
 
 def _descriptions(world: Place, x: Instance, alike: list[Instance], look: Look) -> list[FindDescribed]:
     """Every way to describe an object by its class, some of its words, and its kind of room."""
     of = world.house.placement_by_id
-    own, found = look(of[x.placement]), {}
+    words_of_it, descriptions = look(of[x.placement]), {}
     looks = {o.placement: look(of[o.placement]) for o in alike}
-    for n in range(len(own) + 1):
-        for words in itertools.combinations(own, n):
+    for n in range(len(words_of_it) + 1):
+        for words in itertools.combinations(words_of_it, n):
             for kind in (None, x.room_kind):
                 fits = [
                     o.placement
@@ -155,5 +155,5 @@ def _descriptions(world: Place, x: Instance, alike: list[Instance], look: Look) 
                     if all(w in looks[o.placement] for w in words) and kind in (None, o.room_kind)
                 ]
                 others = tuple(o.placement for o in alike if o.placement not in fits)
-                found[words, kind] = FindDescribed(x.object_class, x.placement, tuple(fits), others, words, kind)
-    return list(found.values())
+                descriptions[words, kind] = FindDescribed(x.object_class, x.placement, tuple(fits), others, words, kind)
+    return list(descriptions.values())

@@ -13,7 +13,7 @@ from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 
 @dataclass(frozen=True)
 class FindConfig:
-    """What a task of finding something may be."""
+    """Limits of tasks of finding something."""
 
     kind: str = "find"
     """Names the shuffle of the pool."""

@@ -1,4 +1,4 @@
-"""Where an object can be found: goal nodes per object class, room kind and house."""
+"""Goal nodes: where an object can be found, per object class, room kind and house."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def find_instances(world: Place, reach: float) -> tuple[Instance, ...]:
     nodes_of_room: dict[str, list[int]] = {}
     for node, room in enumerate(world.graph.room_of_node):
         nodes_of_room.setdefault(str(room), []).append(node)
-    found = []
+    instances = []
     for p in house.placements:
         nodes = nodes_of_room.get(p.room)
         if not nodes or p.object_class in NOT_OBJECTS:
@@ -66,8 +66,8 @@ def find_instances(world: Place, reach: float) -> tuple[Instance, ...]:
         order = [nodes[i] for i in np.argsort(distance, kind="stable") if distance[i] <= reach]
         if order:
             kind = house.room_by_id[p.room].kind
-            found.append(Instance(p.id, p.object_class, p.room, kind, tuple(order)))
-    return tuple(found)
+            instances.append(Instance(p.id, p.object_class, p.room, kind, tuple(order)))
+    return tuple(instances)
 
 
 def goal_classes(instances: tuple[Instance, ...], *, by_room: bool, nearest_only: bool) -> tuple[GoalClass, ...]:
