@@ -14,11 +14,10 @@ from conftest import two_rooms
 from gymnasium.utils.env_checker import check_env
 from handmade import HandCatalogue, furnished
 
-from embodied.assets.json_file import RecordError
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.habitat import (
     from_habitat,
-    object_excursions,
+    object_episodes,
     read_objectnav,
     read_vlnce,
     rotation_of,
@@ -27,10 +26,18 @@ from embodied.datasets.habitat import (
     write_vlnce,
     yaw_of,
 )
-from embodied.envs.continuous import Aim, Body, ContinuousEnv, Excursion, Follower, Grounds, Move
+from embodied.envs.continuous import (
+    Body,
+    ContinuousEnv,
+    ContinuousEpisode,
+    HabitatAction,
+    NavigationGoal,
+    NavMeshCache,
+    ShortestPathFollower,
+)
 from embodied.evaluation.continuous import judged
 from embodied.generate import HouseConfig
-from embodied.gym.continuous import ContinuousGymEnv, make, make_course
+from embodied.gym.continuous import ContinuousGymEnv, make, open_episodes
 from embodied.world import open_world
 
 SMALL = {"height": 32, "width": 32}
@@ -44,35 +51,37 @@ def world(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def course(world):
-    return make_course("vlnce", worlds={world.name: world}, **SMALL)
+def dataset(world):
+    return open_episodes("vlnce", worlds={world.name: world}, **SMALL)
 
 
-def excursion(world, a=(1.5, 3.0, 0.0), b=(8.0, 2.0, 0.0), yaw=0.0, **fields) -> Excursion:
-    return Excursion("1", world.name, a, yaw, "go", (Aim(b),), **fields)
+def episode(world, a=(1.5, 3.0, 0.0), b=(8.0, 2.0, 0.0), yaw=0.0, **fields) -> ContinuousEpisode:
+    return ContinuousEpisode("1", world.name, a, yaw, "go", (NavigationGoal(b),), **fields)
 
 
 def placed(world, *actions: int, body: Body = VLNCE, **where) -> ContinuousEnv:
     env = ContinuousEnv(body)
-    env.reset(excursion(world, **where), world)
+    env.reset(episode(world, **where), world)
     for action in actions:
         env.step(action)
     return env
 
 
 def test_steps_and_turns_are_those_of_habitat(world):
-    env = placed(world, Move.LEFT, Move.LEFT, Move.FORWARD, Move.RIGHT, Move.FORWARD)
+    env = placed(
+        world, HabitatAction.LEFT, HabitatAction.LEFT, HabitatAction.FORWARD, HabitatAction.RIGHT, HabitatAction.FORWARD
+    )
     c, s = (np.array([f(math.radians(30)), f(math.radians(15))]).sum() for f in (np.cos, np.sin))
     assert np.allclose(env.position, [1.5 + 0.25 * c, 3.0 + 0.25 * s]) and not env.collided
-    looking = placed(world, *[Move.UP] * 3, Move.DOWN, body=Body(looks=True))
+    looking = placed(world, *[HabitatAction.UP] * 3, HabitatAction.DOWN, body=Body(looks=True))
     assert looking.pitch == pytest.approx(math.radians(30))
     with pytest.raises(ValueError, match="0 to 3"):
-        placed(world, Move.UP)
+        placed(world, HabitatAction.UP)
 
 
 def test_a_wall_is_slid_along_or_stopped_at(world):
-    free = placed(world, *[Move.FORWARD] * 8, a=(3.0, 0.5, 0.0), yaw=-0.3)
-    stuck = placed(world, *[Move.FORWARD] * 8, a=(3.0, 0.5, 0.0), yaw=-0.3, body=Body(sliding=False))
+    free = placed(world, *[HabitatAction.FORWARD] * 8, a=(3.0, 0.5, 0.0), yaw=-0.3)
+    stuck = placed(world, *[HabitatAction.FORWARD] * 8, a=(3.0, 0.5, 0.0), yaw=-0.3, body=Body(sliding=False))
     assert free.collisions > 3 and stuck.collisions > 3
     assert free.position[0] - stuck.position[0] > 0.5 and free.position[1] == pytest.approx(stuck.position[1], abs=0.06)
     for env in (free, stuck):
@@ -110,41 +119,44 @@ def test_gymnasium_accepts_the_environments(world, kind):
 
 
 @pytest.mark.gl
-def test_what_is_seen_is_drawn_at_the_pose(world, course):
-    env = ContinuousGymEnv(replace(course, excursions=(excursion(world, a=(2.0, 3.0, 0.0)),)))
+def test_what_is_seen_is_drawn_at_the_pose(world, dataset):
+    env = ContinuousGymEnv(replace(dataset, episodes=(episode(world, a=(2.0, 3.0, 0.0)),)))
     before = env.reset()[0]
-    after = env.step(Move.FORWARD)[0]
+    after = env.step(HabitatAction.FORWARD)[0]
     assert np.median(before["depth"][15:17, 15:17]) - np.median(after["depth"][15:17, 15:17]) == pytest.approx(
         0.25, abs=1e-3
     )
     assert not np.array_equal(before["rgb"], after["rgb"])
-    assert course.lens.vfov == pytest.approx(math.pi / 2)
+    assert dataset.camera.vfov == pytest.approx(math.pi / 2)
 
 
 @pytest.mark.gl
-def test_vector_environments_play_as_one_alone_does(world, course):
-    envs = gymnasium.vector.SyncVectorEnv([lambda: ContinuousGymEnv(course)] * 2)
-    alone = ContinuousGymEnv(course)
+def test_vector_environments_play_as_one_alone_does(world, dataset):
+    envs = gymnasium.vector.SyncVectorEnv([lambda: ContinuousGymEnv(dataset)] * 2)
+    alone = ContinuousGymEnv(dataset)
     together, _ = envs.reset(seed=[3, 4])
     o, _ = alone.reset(seed=4)
     for action in (1, 2, 1, 3):
         assert all(np.array_equal(together[name][1], o[name]) for name in o)
         together, *_ = envs.step(np.array([1, action]))
         o, *_ = alone.step(action)
-    made = gymnasium.make_vec("embodied/VLNCE-v0", num_envs=2, worlds={world.name: world}, **SMALL)
+    made = gymnasium.make_vec("embodied/VLNCE-v0", num_envs=2, worlds={world.name: world}, max_episode_steps=2, **SMALL)
     assert made.reset(seed=0)[0]["rgb"].shape == (2, 32, 32, 3)
+    assert not made.step(np.array([2, 2]))[3].any()
+    *_, truncated, info = made.step(np.array([2, 2]))
+    assert truncated.all() and {"success", "is_success", "spl"} <= set(info)
 
 
-def test_running_out_of_actions_truncates_and_stop_terminates(course):
-    env = ContinuousGymEnv(replace(course, body=Body(steps=3), sees=()))
+def test_running_out_of_actions_truncates_and_stop_terminates(dataset):
+    env = ContinuousGymEnv(replace(dataset, body=Body(steps=3), sees=()))
     env.reset(seed=0)
-    ends = [env.step(Move.LEFT)[2:4] for _ in range(3)]
+    ends = [env.step(HabitatAction.LEFT)[2:4] for _ in range(3)]
     assert ends == [(False, False), (False, False), (False, True)]
     env.reset(seed=0, options={"episode": 1})
-    *_, terminated, truncated, info = env.step(Move.STOP)
+    *_, terminated, truncated, info = env.step(HabitatAction.STOP)
     assert terminated and not truncated and info["steps_taken"] == 1 and not info["is_success"]
     with pytest.raises(RuntimeError, match="reset"):
-        env.step(Move.STOP)
+        env.step(HabitatAction.STOP)
 
 
 @pytest.mark.slow
@@ -154,20 +166,20 @@ def test_an_expert_arrives_in_generated_houses_whatever_its_turns(seed, shared_c
 
     house, graph = make_dataset_house(seed, f"flat_{seed}", HouseConfig(area=(70.0, 110.0)), load_catalogue())
     place = type("Place", (), {"house": house, "graph": graph, "name": house.name})()
-    rng, grounds, walks = np.random.default_rng(seed), Grounds(), []
-    episodes = object_excursions(place, 4, seed=seed, grounds=grounds)
+    rng, navmeshes, walks = np.random.default_rng(seed), NavMeshCache(), []
+    episodes = object_episodes(place, 4, seed=seed, navmeshes=navmeshes)
     for _ in range(3):
         a, b = rng.choice(len(graph.positions), 2, replace=False)
         path = tuple((float(x), float(y), 0.0) for x, y, _ in graph.positions[list(graph.path(int(a), int(b)))])
-        episodes.append(excursion(place, path[0], path[-1], float(rng.uniform(-3, 3)), reference=path))
+        episodes.append(episode(place, path[0], path[-1], float(rng.uniform(-3, 3)), reference=path))
     for body in (Body(), Body(turn=30, sliding=False)):
         for e in episodes:
-            env = ContinuousEnv(body, grounds)
+            env = ContinuousEnv(body, navmeshes)
             env.reset(e, place)
-            expert = Follower(env, along=bool(e.reference))
+            expert = ShortestPathFollower(env, along=bool(e.reference))
             while not env.ended:
                 env.step(expert.action())
-            walks.append(env.walk())
+            walks.append(env.trajectory())
     numbers = [judged(w) for w in walks]
     assert all(n["success"] for n in numbers) and np.mean([n["collisions"] for n in numbers]) < 0.01
     assert np.mean([n["spl"] for n in numbers]) > 0.8
@@ -177,13 +189,13 @@ def test_an_expert_knows_the_way_from_wherever_an_agent_went(world):
     rng, body = np.random.default_rng(1), Body()
     for _ in range(5):
         env = placed(world, body=body)
-        expert = Follower(env)
+        expert = ShortestPathFollower(env)
         for _ in range(40):
             expert.action()
             env.step(int(rng.integers(1, 4)))
         while not env.ended:
             env.step(expert.action())
-        assert judged(env.walk())["success"] == 1.0
+        assert judged(env.trajectory())["success"] == 1.0
 
 
 def published(positions, actions, distance, goal, gt, radius=3.0):
@@ -224,28 +236,33 @@ def test_measures_are_those_of_the_published_evaluator_on_the_same_walks(world):
     seen: set[float] = set()
     for run in range(8):
         env = placed(world, b=gt[-1], expert=gt)
-        expert = Follower(env)
+        expert = ShortestPathFollower(env)
         while not env.ended:
             drawn = int(rng.integers(0 if env.steps > 30 else 1, 4))
             env.step(drawn if rng.random() < run / 16 else expert.action())
-        walk = env.walk()
+        trajectory = env.trajectory()
         wanted = published(
-            [tuple(p) for p in walk.positions.tolist()],
-            walk.actions,
+            [tuple(p) for p in trajectory.positions.tolist()],
+            trajectory.actions,
             lambda p, env=env: env.ways.length_from(np.array(p[:2])),
             gt[-1],
             gt,
         )
-        ours = judged(walk)
+        ours = judged(trajectory)
         assert {k: ours[k] for k in wanted} == pytest.approx(wanted, abs=1e-12)
         seen.add(ours["success"])
     assert seen == {0.0, 1.0}
 
 
 def test_stopping_exactly_at_the_radius_is_no_success(world):
-    env = placed(world, Move.STOP, a=(6.0, 2.0, 0.0), b=(8.0, 2.0, 0.0), radius=2.0)
-    assert env.distance == 2.0 and judged(env.walk())["success"] == 0.0
-    assert judged(placed(world, Move.STOP, a=(6.0, 2.0, 0.0), b=(8.0, 2.0, 0.0), radius=2.001).walk())["success"] == 1.0
+    env = placed(world, HabitatAction.STOP, a=(6.0, 2.0, 0.0), b=(8.0, 2.0, 0.0), radius=2.0)
+    assert env.distance == 2.0 and judged(env.trajectory())["success"] == 0.0
+    assert (
+        judged(placed(world, HabitatAction.STOP, a=(6.0, 2.0, 0.0), b=(8.0, 2.0, 0.0), radius=2.001).trajectory())[
+            "success"
+        ]
+        == 1.0
+    )
 
 
 def test_habitats_frame_has_y_up_and_agents_look_along_minus_z():
@@ -258,8 +275,8 @@ def test_habitats_frame_has_y_up_and_agents_look_along_minus_z():
     assert to_habitat((1, 2, 3)) == [1, 3, -2] and from_habitat(to_habitat((1, 2, 3))) == (1, 2, 3)
 
 
-def test_vlnce_episodes_come_back_from_their_files(world, course, tmp_path):
-    walked = with_experts(course.excursions[:3], course.worlds, ContinuousEnv())
+def test_vlnce_episodes_come_back_from_their_files(world, dataset, tmp_path):
+    walked = with_experts(dataset.episodes[:3], dataset.worlds, ContinuousEnv())
     whole, gt = write_vlnce(tmp_path, "val", walked)
     for ours, back in zip([e for e, _ in walked], read_vlnce(whole), strict=True):
         assert replace(back, yaw=ours.yaw) == replace(ours, trajectory=back.trajectory)
@@ -271,33 +288,52 @@ def test_vlnce_episodes_come_back_from_their_files(world, course, tmp_path):
     assert len(told["instruction_tokens"]) == 200 and said[0] in told["instruction_text"].lower()
     experts = json.loads(gzip.decompress(gt.read_bytes()))
     assert experts["1"]["actions"][-1] == 0
-    again = make_course("vlnce", worlds={world.name: world}, episodes=whole, **SMALL)
+    again = open_episodes("vlnce", worlds={world.name: world}, episodes=whole, **SMALL)
     env = ContinuousGymEnv(replace(again, sees=()))
     env.reset(options={"episode": 0})
     for action in experts["1"]["actions"]:
         info = env.step(action)[-1]
     assert info["is_success"] and info["ndtw"] > 0.95
-    (tmp_path / "bad.json.gz").write_bytes(gzip.compress(b'{"episodes": [{"goals": []}]}'))
-    with pytest.raises(RecordError, match="episode 0"):
-        read_vlnce(tmp_path / "bad.json.gz")
+    hundred = lambda point: [100 * v for v in point]
+    start, goal, turned = item["start_position"], item["goals"], item["start_rotation"]
+    for wrong, message in [
+        ({"goals": []}, "expected goals and an instruction_text"),
+        ({"instruction": {"instruction_text": None}}, "instruction_text, got .* and None"),
+        ({"start_rotation": [turned[3], *turned[:3]]}, "start_rotation is .*about y"),
+        ({"start_rotation": [2 * v for v in turned]}, "expected a unit quaternion"),
+        ({"start_rotation": [0, 0, 0, 0]}, "expected a unit quaternion"),
+        ({"start_position": hundred(start), "goals": [{"position": hundred(goal[0]["position"])}]}, "the start of"),
+        ({"start_position": [start[0], -start[2], start[1]]}, r"the start of .*in Habitat's files are \[x, z, -y\]"),
+        ({"start_position": [start[0], 30.0, start[2]]}, "the start of episode '1' is at"),
+        ({"start_position": [1e3, 0.0, 1e3]}, "nobody can stand in house"),
+        ({"goals": [{"position": [1e3, 0.0, 1e3]}]}, "the goal 0 of episode '1'"),
+    ]:
+        bad = tmp_path / "bad.json.gz"
+        bad.write_bytes(gzip.compress(json.dumps({"episodes": [item | wrong]}).encode()))
+        with pytest.raises(ValueError, match=message) as refused:
+            open_episodes("vlnce", worlds={world.name: world}, episodes=bad, **SMALL)
+        assert str(bad) in str(refused.value)
 
 
-def write_objectnav(folder, excursions):
+def write_objectnav(folder, episodes):
     """ObjectNav's files as Habitat has them: one without episodes, and one for each house beside it."""
     towards = lambda a, b: rotation_of(math.atan2(b[1] - a[1], b[0] - a[0]))
-    view = lambda v, aim: {"agent_state": {"position": to_habitat(v), "rotation": towards(v, aim.position)}, "iou": 0.0}
-    goal = lambda aim, e: {
-        "position": to_habitat(aim.position), "object_id": aim.placement, "object_category": e.object_class,
-        "view_points": [view(v, aim) for v in aim.views],
+    view = lambda v, goal: {
+        "agent_state": {"position": to_habitat(v), "rotation": towards(v, goal.position)},
+        "iou": 0.0,
+    }
+    goal = lambda goal, e: {
+        "position": to_habitat(goal.position), "object_id": goal.placement, "object_category": e.object_class,
+        "view_points": [view(v, goal) for v in goal.views],
     }  # fmt: skip
     episode = lambda e: {
         "episode_id": e.id, "scene_id": f"hm3d/{e.world}/{e.world}.glb", "start_position": to_habitat(e.start),
         "start_rotation": rotation_of(e.yaw), "goals": [], "object_category": e.object_class,
     }  # fmt: skip
     (folder / "content").mkdir()
-    for name in {e.world for e in excursions}:
-        here = [e for e in excursions if e.world == name]
-        goals = {f"{name}.glb_{e.object_class}": [goal(a, e) for a in e.aims] for e in here}
+    for name in {e.world for e in episodes}:
+        here = [e for e in episodes if e.world == name]
+        goals = {f"{name}.glb_{e.object_class}": [goal(a, e) for a in e.goals] for e in here}
         text = json.dumps({"goals_by_category": goals, "episodes": [episode(e) for e in here]})
         (folder / "content" / f"{name}.json.gz").write_bytes(gzip.compress(text.encode()))
     (folder / "val.json.gz").write_bytes(gzip.compress(b'{"episodes": []}'))
@@ -305,15 +341,15 @@ def write_objectnav(folder, excursions):
 
 
 def test_objectnav_episodes_come_back_from_their_files(world, tmp_path):
-    ours = object_excursions(world, 6, seed=3)
+    ours = object_episodes(world, 6, seed=3)
     whole = write_objectnav(tmp_path, ours)
     for a, b in zip(ours, read_objectnav(whole), strict=True):
         assert replace(b, yaw=a.yaw) == a and b.yaw == pytest.approx(a.yaw)
     env = ContinuousEnv(Body(turn=30, looks=True))
     env.reset(ours[0], world)
-    expert = Follower(env)
+    expert = ShortestPathFollower(env)
     while not env.ended:
         env.step(expert.action())
     found = {p.id: p.object_class for p in world.house.placements}
-    assert judged(env.walk())["success"] == 1.0
-    assert {found[a.placement] for a in ours[0].aims} == {ours[0].instruction}
+    assert judged(env.trajectory())["success"] == 1.0
+    assert {found[a.placement] for a in ours[0].goals} == {ours[0].instruction}

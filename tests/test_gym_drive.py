@@ -12,7 +12,7 @@ from handmade import HandCatalogue, furnished
 
 from embodied.gym import drive
 from embodied.gym.drive import DriveEnv, make
-from embodied.gym.driving import DriveSettings, Driving, guided
+from embodied.gym.driving import DriveSettings, Driving, expert_action
 from embodied.navigation.floor_ways import FloorWays
 from embodied.world import open_world
 
@@ -70,7 +70,7 @@ def test_whoever_knows_the_way_arrives_without_a_collision(world, task):
         env.reset(seed=seed)
         ended = False
         while not ended:
-            _, _, terminated, truncated, info = env.step(guided(env.driving))
+            _, _, terminated, truncated, info = env.step(expert_action(env.driving))
             ended = terminated or truncated
         assert info["success"] == 1.0 and info["collisions"] == 0 and info["spl"] > 0.75, (seed, info)
 

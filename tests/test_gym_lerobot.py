@@ -85,11 +85,15 @@ def test_the_blind_see_black_and_feel_the_same(world, name):
 def drives(world, tmp_path_factory):
     home = tmp_path_factory.mktemp("drives")
     env = make_one("Drive", worlds={world.name: world}, farthest=4.0, **SMALL)
-    steps = {wander: export_drives(env, home / str(wander), 3, seed=5, wander=wander) for wander in (0.0, 0.3)}
-    tables = {
-        wander: pq.read_table(next((home / str(wander) / "data").rglob("*.parquet"))).to_pydict() for wander in steps
+    steps = {
+        action_noise: export_drives(env, home / str(action_noise), 3, seed=5, action_noise=action_noise)
+        for action_noise in (0.0, 0.3)
     }
-    assert {wander: len(table["index"]) for wander, table in tables.items()} == steps
+    tables = {
+        action_noise: pq.read_table(next((home / str(action_noise) / "data").rglob("*.parquet"))).to_pydict()
+        for action_noise in steps
+    }
+    assert {action_noise: len(table["index"]) for action_noise, table in tables.items()} == steps
     return tables
 
 
@@ -107,7 +111,7 @@ def test_whoever_takes_the_written_commands_sees_the_written_states_and_arrives(
 
 
 def test_who_wanders_is_elsewhere_and_is_told_what_the_expert_does_there(drives):
-    straight, wandering = (np.array(drives[wander]["observation.state"]) for wander in (0.0, 0.3))
+    straight, wandering = (np.array(drives[action_noise]["observation.state"]) for action_noise in (0.0, 0.3))
     assert np.ptp(wandering[:, 0]) > np.ptp(straight[:, 0]) + 0.1, "the expert never drives backwards"
     assert all(0 <= ahead <= 1 for ahead, _ in drives[0.3]["action"])
     assert sum(drives[0.3]["next.success"]) == 3

@@ -13,12 +13,12 @@ from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 from PIL import Image
 
-from embodied.datasets.vlnce import FORMATS, export_walks, frames, pixel_goal, pose_of, teach, wandering
-from embodied.envs.continuous import Aim, ContinuousEnv, Excursion, Lens, Move
+from embodied.datasets.vlnce import FORMATS, export_walks, frames, noisy_actions, pixel_goal, pose_of, teach
+from embodied.envs.continuous import CameraConfig, ContinuousEnv, ContinuousEpisode, HabitatAction, NavigationGoal
 from embodied.world import open_world
 
 pytestmark = pytest.mark.gl
-SMALL = Lens(32, 48, 79.0)
+SMALL = CameraConfig(32, 48, 79.0)
 
 
 @pytest.fixture(scope="module")
@@ -27,32 +27,34 @@ def world(tmp_path_factory):
         yield w
 
 
-def excursion(world) -> Excursion:
+def episode(world) -> ContinuousEpisode:
     path = ((3.0, 3.0, 0.0), (4.0, 1.8, 0.0), (5.5, 1.1, 0.0))
-    return Excursion("7", world.name, path[0], 0.2, "go to the bedroom", (Aim(path[-1]),), reference=path)
+    return ContinuousEpisode(
+        "7", world.name, path[0], 0.2, "go to the bedroom", (NavigationGoal(path[-1]),), reference=path
+    )
 
 
 @pytest.fixture(scope="module")
 def folders(world, tmp_path_factory):
     home = tmp_path_factory.mktemp("forms")
     for form in FORMATS:
-        export_walks(form, home / form, [excursion(world)], {world.name: world}, seed=0, lens=SMALL, depth=True)
+        export_walks(form, home / form, [episode(world)], {world.name: world}, seed=0, camera=SMALL, depth=True)
     return home
 
 
 @pytest.fixture(scope="module")
 def taught(world):
-    return teach(ContinuousEnv(), excursion(world), world)
+    return teach(ContinuousEnv(), episode(world), world)
 
 
 def test_samples_lead_whoever_takes_their_actions_to_the_goal(folders, world, taught):
     lines = [json.loads(line) for line in (folders / "vlnce" / "samples.jsonl").read_text().splitlines()]
     env = ContinuousEnv()
-    env.reset(excursion(world), world)
+    env.reset(episode(world), world)
     for line in lines:
         assert Image.open(folders / "vlnce" / line["image"]).size == (48, 32)
         env.step(line["action"])
-    assert env.ended and env.distance < 0.3 and lines[-1]["action"] == Move.STOP
+    assert env.ended and env.distance < 0.3 and lines[-1]["action"] == HabitatAction.STOP
     assert (folders / "vlnce/train/train_gt.json.gz").exists()
 
 
@@ -114,23 +116,23 @@ def test_lerobots_form_has_the_experts_action_the_way_so_far_and_depth_of_12_bit
         assert np.abs(metres - np.clip(depth, 0.01, 10)).max() < 3e-3
 
 
-def test_labels_of_a_walk_that_wanders_lead_back(world):
+def test_labels_of_a_walk_with_action_noise_lead_back(world):
     rng = np.random.default_rng(0)
-    wandered = teach(ContinuousEnv(), excursion(world), world, wandering(0.5, rng))
-    assert sum(a != b for a, b in zip(wandered.walk.actions, wandered.labels, strict=True)) > 3
-    assert wandered.labels[-1] == Move.STOP and wandered.walk.distances[-1] < 0.4
+    noisy = teach(ContinuousEnv(), episode(world), world, noisy_actions(0.5, rng))
+    assert sum(a != b for a, b in zip(noisy.trajectory.actions, noisy.labels, strict=True)) > 3
+    assert noisy.labels[-1] == HabitatAction.STOP and noisy.trajectory.distances[-1] < 0.4
 
 
 def test_what_stands_before_a_goal_hides_it(taught):
-    k, lens = taught.labels.index(Move.FORWARD), Lens(48, 64, 79.0)
+    k, camera = taught.labels.index(HabitatAction.FORWARD), CameraConfig(48, 64, 79.0)
     pose = pose_of(taught, k, 30)
-    assert pixel_goal(taught, k, pose, np.full((48, 64), np.inf), lens)[1] > 0
-    assert pixel_goal(taught, k, pose, np.full((48, 64), 0.2), lens) == ((-1, -1), -1)
+    assert pixel_goal(taught, k, pose, np.full((48, 64), np.inf), camera)[1] > 0
+    assert pixel_goal(taught, k, pose, np.full((48, 64), 0.2), camera) == ((-1, -1), -1)
 
 
 def test_a_folder_with_files_and_wandering_poses_are_refused(world, tmp_path):
     (tmp_path / "note").write_text("mine")
     with pytest.raises(ValueError, match="not empty"):
-        export_walks("streamvln", tmp_path, [excursion(world)], {world.name: world}, seed=0)
+        export_walks("streamvln", tmp_path, [episode(world)], {world.name: world}, seed=0)
     with pytest.raises(ValueError, match="poses"):
-        export_walks("internnav", tmp_path / "x", [excursion(world)], {world.name: world}, seed=0, wander=0.1)
+        export_walks("internnav", tmp_path / "x", [episode(world)], {world.name: world}, seed=0, action_noise=0.1)

@@ -16,7 +16,7 @@ from embodied.assets.catalogue import Catalogue
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, measure, one_core, share
 from embodied.generate import generate_house
-from embodied.gym.driving import DriveSettings, Driving, guided
+from embodied.gym.driving import DriveSettings, Driving, expert_action
 from embodied.render.camera import Camera
 from embodied.render.classic import Renderer
 from embodied.seeds import stream
@@ -56,7 +56,7 @@ def recorded(driving: Driving, seed: int) -> tuple[list[tuple[int, np.ndarray]],
     while len(commands) < STEPS:
         driving.reset(stream(seed, "bench", "drive", episode))
         while driving.ended is None and len(commands) < STEPS:
-            commands.append((episode, guided(driving)))
+            commands.append((episode, expert_action(driving)))
             cameras.append(driving.camera())
             driving.step(commands[-1][1])
         episode += 1

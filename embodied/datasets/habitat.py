@@ -16,7 +16,7 @@ import math
 import re
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,16 @@ import numpy as np
 from embodied.assets.cache import write_bytes
 from embodied.assets.json_file import RecordError, parse, shown
 from embodied.datasets.matterport import tokenised
-from embodied.envs.continuous import Aim, ContinuousEnv, Excursion, Follower, Grounds, Point, Walk, seen_from
+from embodied.envs.continuous import (
+    ContinuousEnv,
+    ContinuousEpisode,
+    NavigationGoal,
+    NavMeshCache,
+    Point,
+    ShortestPathFollower,
+    Trajectory,
+    seen_from,
+)
 from embodied.interface import FollowRoute, Place, Task
 from embodied.seeds import stream
 
@@ -38,6 +47,8 @@ SPECIAL = ("<pad>", "<unk>")
 """Words 0 and 1 of the vocabulary."""
 REACH = 1.0
 """ObjectNav: an object is found within so many metres of its outline, in its room."""
+UPRIGHT = 0.01
+"""How far a rotation may be from one about the vertical axis: files have a few digits."""
 AT_VIEW = 0.1
 """ObjectNav: metres from a viewpoint that count as standing there, as in Habitat's evaluator."""
 FARTHEST, NEAREST = 30.0, 1.0
@@ -65,16 +76,24 @@ def rotation_of(yaw: float) -> list[float]:
 
 
 def yaw_of(rotation: Sequence[float]) -> float:
-    """Where such a rotation looks; its horizontal part where it is tilted."""
+    """Yaw of an agent with such a rotation.
+
+    Raises:
+      ValueError: it is no unit quaternion, or one of an agent that does not stand upright, as in another order.
+    """
     x, y, z, w = (float(v) for v in rotation)
-    ahead_x, ahead_z = -2 * (x * z + w * y), -(1 - 2 * (x * x + y * y))
-    return math.atan2(-ahead_z, ahead_x)
+    if not (abs(math.hypot(x, y, z, w) - 1) < UPRIGHT and math.hypot(x, z) < UPRIGHT):
+        raise ValueError(
+            f"start_rotation is {list(rotation)}; expected a unit quaternion (x, y, z, w) that turns about y, which is "
+            "up: (0, sin, 0, cos) of half the angle"
+        )
+    return math.atan2(1 - 2 * y * y, -2 * w * y)
 
 
 # Episodes of ours --------------------------------------------------------------------------------
 
 
-def route_excursions(tasks: Iterable[Task], places: Mapping[str, Place]) -> list[Excursion]:
+def route_episodes(tasks: Iterable[Task], places: Mapping[str, Place]) -> list[ContinuousEpisode]:
     """VLN tasks as continuous episodes: the same starts, paths and words."""
     found = []
     for number, task in enumerate(tasks, 1):
@@ -82,62 +101,64 @@ def route_excursions(tasks: Iterable[Task], places: Mapping[str, Place]) -> list
         place = places[task.world]
         floor = float(place.house.storeys[0].elevation)
         path = tuple((float(x), float(y), floor) for x, y, _ in place.graph.positions[list(task.goal.path)])
-        start, aims, route = (path[0], task.start.yaw), (Aim(path[-1]),), task.goal.route
+        start, goals, route = (path[0], task.start.yaw), (NavigationGoal(path[-1]),), task.goal.route
         found.append(
-            Excursion(str(number), task.world, *start, task.request, aims, task.radius, path, trajectory=route)
+            ContinuousEpisode(str(number), task.world, *start, task.request, goals, task.radius, path, trajectory=route)
         )
     return found
 
 
-def object_excursions(place: Place, count: int, *, seed: int, grounds: Grounds | None = None) -> list[Excursion]:
+def object_episodes(
+    place: Place, count: int, *, seed: int, navmeshes: NavMeshCache | None = None
+) -> list[ContinuousEpisode]:
     """ObjectNav in one house: starts anywhere on the floor, every class of object that can be come near to.
 
     Raises:
       ValueError: the house has no object far enough from any start.
     """
-    ground, found, far = (grounds or Grounds()).of(place.house), [], {}
+    ground, found, far = (navmeshes or NavMeshCache()).of(place.house), [], {}
     floor, rng = float(place.house.storeys[0].elevation), stream(seed, "objectnav", place.name)
     for name in sorted({p.object_class for p in place.house.placements}):
-        if aims := seen_from(place.house, ground, name, REACH):
-            cells = [ground.cell_at(np.array(v)) for a in aims for v in a.views]
+        if goals := seen_from(place.house, ground, name, REACH):
+            cells = [ground.cell_at(np.array(v)) for a in goals for v in a.views]
             metres = ground.ways(np.unique(cells)).metres
             starts = np.flatnonzero((metres >= NEAREST) & (metres <= FARTHEST))
             if len(starts):
-                far[name] = aims, starts
+                far[name] = goals, starts
     if not far:
         raise ValueError(f"{place.name!r} has no object that is {NEAREST} to {FARTHEST} m away from a start")
     names = sorted(far)
     for number in range(count):
         name = names[int(rng.integers(len(names)))]
-        aims, starts = far[name]
+        goals, starts = far[name]
         x, y = ground.xy[int(rng.choice(starts))]
         yaw = float(rng.uniform(-math.pi, math.pi))
         start = (float(x), float(y), floor)
-        found.append(Excursion(str(number), place.name, start, yaw, name, aims, AT_VIEW, object_class=name))
+        found.append(ContinuousEpisode(str(number), place.name, start, yaw, name, goals, AT_VIEW, object_class=name))
     return found
 
 
 def with_experts(
-    excursions: Iterable[Excursion], places: Mapping[str, Place], env: ContinuousEnv
-) -> list[tuple[Excursion, Walk]]:
+    episodes: Iterable[ContinuousEpisode], places: Mapping[str, Place], env: ContinuousEnv
+) -> list[tuple[ContinuousEpisode, Trajectory]]:
     """Each episode with the walk of an expert along its path, and its positions written into the episode."""
     found = []
-    for e in excursions:
+    for e in episodes:
         env.reset(e, places[e.world])
-        expert = Follower(env, along=bool(e.reference))
+        expert = ShortestPathFollower(env, along=bool(e.reference))
         while not env.ended:
             env.step(expert.action())
-        walk = env.walk()
-        passed = itertools.groupby((x, y, z) for x, y, z in walk.positions.tolist())
+        trajectory = env.trajectory()
+        passed = itertools.groupby((x, y, z) for x, y, z in trajectory.positions.tolist())
         whole = replace(e, expert=tuple(place for place, _ in passed))
-        found.append((whole, replace(walk, excursion=whole)))
+        found.append((whole, replace(trajectory, episode=whole)))
     return found
 
 
 # Files -------------------------------------------------------------------------------------------
 
 
-def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[Excursion, Walk]]) -> list[Path]:
+def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[ContinuousEpisode, Trajectory]]) -> list[Path]:
     """<split>.json.gz and <split>_gt.json.gz of VLN-CE; returns both.
 
     Args:
@@ -147,7 +168,7 @@ def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[Excursion, Walk
     word_list = [*SPECIAL, *words]
     number = {w: k for k, w in enumerate(word_list)}
     episodes, experts = [], {}
-    for e, walk in walked:
+    for e, trajectory in walked:
         tokens = [number[w] for w in tokenised(e.instruction).split()][:LONGEST]
         episodes.append(
             {
@@ -156,8 +177,8 @@ def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[Excursion, Walk
                 "scene_id": f"embodied/{e.world}/{e.world}.glb",
                 "start_position": to_habitat(e.start),
                 "start_rotation": rotation_of(e.yaw),
-                "info": {"geodesic_distance": float(walk.distances[0])},
-                "goals": [{"position": to_habitat(a.position), "radius": e.radius} for a in e.aims],
+                "info": {"geodesic_distance": float(trajectory.distances[0])},
+                "goals": [{"position": to_habitat(a.position), "radius": e.radius} for a in e.goals],
                 "instruction": {
                     "instruction_text": e.instruction,
                     "instruction_tokens": tokens + [0] * (LONGEST - len(tokens)),
@@ -167,8 +188,8 @@ def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[Excursion, Walk
         )
         experts[e.id] = {
             "locations": [to_habitat(p) for p in e.expert],
-            "forward_steps": sum(a == 1 for a in walk.actions),
-            "actions": list(walk.actions),
+            "forward_steps": sum(a == 1 for a in trajectory.actions),
+            "actions": list(trajectory.actions),
         }
     vocabulary = {
         "word_list": word_list,
@@ -186,60 +207,73 @@ def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[Excursion, Walk
     ]
 
 
-def read_vlnce(path: Path) -> list[Excursion]:
+def read_vlnce(path: Path) -> list[ContinuousEpisode]:
     """The episodes of a VLN-CE file, with the experts of <name>_gt.json.gz beside it where there is one.
 
     Raises:
       RecordError: it is no such file; says where.
     """
     path = Path(path)
-    whole = _read(path)
     beside = path.with_name(path.name.replace(".json.gz", "_gt.json.gz"))
     experts = _read(beside) if beside != path and beside.exists() else {}
-    found = []
-    for k, item in enumerate(_field(whole, "episodes", list, str(path))):
-        where = f"{path}: episode {k}"
-        goals = _field(item, "goals", list, where)
-        expert = experts.get(str(item.get("episode_id")), {"locations": ()})
-        try:
-            aims, radius = tuple(Aim(from_habitat(g["position"])) for g in goals), float(goals[0].get("radius") or 3.0)
-            reference = tuple(from_habitat(p) for p in item.get("reference_path") or ())
-            passed, route = tuple(from_habitat(p) for p in expert["locations"]), str(item.get("trajectory_id", ""))
-            text = item["instruction"]["instruction_text"]
-            found.append(Excursion(*_begun(item), text, aims, radius, reference, passed, trajectory=route))
-        except (KeyError, TypeError, ValueError, IndexError) as e:
-            raise RecordError(f"{where} is not one of VLN-CE's: {type(e).__name__} {e}") from e
-    return found
+
+    def episode(item: Mapping[str, Any]) -> ContinuousEpisode:
+        places, text = _field(item, "goals", list, "it"), item["instruction"]["instruction_text"]
+        if not places or not isinstance(text, str):
+            raise ValueError(f"expected goals and an instruction_text, got {shown(places)} and {shown(text)}")
+        return ContinuousEpisode(
+            *_begun(item),
+            text,
+            tuple(NavigationGoal(from_habitat(g["position"])) for g in places),
+            float(places[0].get("radius") or 3.0),
+            tuple(from_habitat(p) for p in item.get("reference_path") or ()),
+            tuple(from_habitat(p) for p in experts.get(str(item["episode_id"]), {"locations": ()})["locations"]),
+            trajectory=str(item.get("trajectory_id", "")),
+        )
+
+    return _episodes(path, _read(path), episode, "VLN-CE")
 
 
-def read_objectnav(path: Path) -> list[Excursion]:
+def read_objectnav(path: Path) -> list[ContinuousEpisode]:
     """The episodes of an ObjectNav file and of those in content/ beside it.
 
     Raises:
       RecordError: it is no such file; says where.
     """
-    path = Path(path)
-    files = [path, *sorted((path.parent / "content").glob("*.json.gz"))]
-    found = []
-    for file in files:
+
+    def goal(item: Mapping[str, Any]) -> NavigationGoal:
+        views = tuple(from_habitat(v["agent_state"]["position"]) for v in item["view_points"])
+        return NavigationGoal(from_habitat(item["position"]), views, str(item["object_id"]))
+
+    episodes = []
+    for file in (Path(path), *sorted((Path(path).parent / "content").glob("*.json.gz"))):
         whole = _read(file)
-        goals = whole.get("goals_by_category", {})
-        for k, item in enumerate(_field(whole, "episodes", list, str(file))):
-            where = f"{file}: episode {k}"
-            try:
-                scene, name = item["scene_id"], item["object_category"]
-                aims = tuple(
-                    Aim(
-                        from_habitat(g["position"]),
-                        tuple(from_habitat(v["agent_state"]["position"]) for v in g["view_points"]),
-                        str(g["object_id"]),
-                    )
-                    for g in goals[f"{scene.rsplit('/', 1)[-1]}_{name}"]
-                )
-                found.append(Excursion(*_begun(item), name, aims, AT_VIEW, object_class=name))
-            except (KeyError, TypeError, ValueError, AttributeError) as e:
-                raise RecordError(f"{where} is not one of ObjectNav's: {type(e).__name__} {e}") from e
-    return found
+
+        def episode(item: Mapping[str, Any], known: Mapping[str, Any] = whole.get("goals_by_category", {})) -> Any:
+            scene, name = item["scene_id"], item["object_category"]
+            goals = tuple(goal(g) for g in known[f"{scene.rsplit('/', 1)[-1]}_{name}"])
+            return ContinuousEpisode(*_begun(item), name, goals, AT_VIEW, object_class=name)
+
+        episodes += _episodes(file, whole, episode, "ObjectNav")
+    return episodes
+
+
+def _episodes(
+    path: Path, whole: Mapping[str, Any], episode: Callable[[Mapping[str, Any]], ContinuousEpisode], task: str
+) -> list[ContinuousEpisode]:
+    """Those that a file lists, each made by `episode`.
+
+    Raises:
+      RecordError: one of them is not as the files of `task` have it.
+    """
+    episodes = []
+    for k, item in enumerate(_field(whole, "episodes", list, str(path))):
+        try:
+            episodes.append(episode(item))
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as e:
+            name = f" ({item['episode_id']!r})" if isinstance(item, dict) and "episode_id" in item else ""
+            raise RecordError(f"{path}: episode {k}{name} is not one of {task}'s: {type(e).__name__} {e}") from e
+    return episodes
 
 
 def _begun(item: Mapping[str, Any]) -> tuple[str, str, Point, float]:
@@ -250,7 +284,7 @@ def _begun(item: Mapping[str, Any]) -> tuple[str, str, Point, float]:
 
 def scene_name(scene_id: str) -> str:
     """The house of 'mp3d/flat_0/flat_0.glb'."""
-    return re.sub(r"\.[^./]*$", "", scene_id.rsplit("/", 1)[-1])
+    return re.sub(r"\.[^./]*$", "", re.split(r"[/\\]", scene_id)[-1])
 
 
 def _write(path: Path, value: object) -> Path:

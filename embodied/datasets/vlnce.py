@@ -31,14 +31,14 @@ from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, 
 from embodied.envs.continuous import (
     POSITION,
     Body,
+    CameraConfig,
     ContinuousEnv,
-    Excursion,
-    Follower,
-    Grounds,
-    Lens,
-    Move,
-    Walk,
-    own_way,
+    ContinuousEpisode,
+    HabitatAction,
+    NavMeshCache,
+    ShortestPathFollower,
+    Trajectory,
+    odometry,
 )
 from embodied.locks import LOCK
 from embodied.render.camera import camera_at
@@ -46,7 +46,12 @@ from embodied.seeds import stream
 from embodied.world import World
 
 FORMATS = ("vlnce", "streamvln", "uninavid", "internnav", "lerobot-vlnce")
-WORDS = {Move.STOP: "stop", Move.FORWARD: "forward", Move.LEFT: "left", Move.RIGHT: "right"}
+WORDS = {
+    HabitatAction.STOP: "stop",
+    HabitatAction.FORWARD: "forward",
+    HabitatAction.LEFT: "left",
+    HabitatAction.RIGHT: "right",
+}
 """Actions in Uni-NaVid's answers."""
 PROMPT = (
     "Imagine you are a robot programmed for navigation tasks. You have been given a video of historical observations "
@@ -62,7 +67,7 @@ PITCHES = (0, 30)
 HIDDEN = 0.15
 """A pixel goal is seen where nothing is nearer than it by more than this, metres."""
 NO_GOAL = (-1, -1)
-VLNCE, LENS = Body(), Lens(480, 640, 79.0)
+VLNCE, CAMERA_VLNCE = Body(), CameraConfig(480, 640, 79.0)
 STEPS = 4
 """Steps a second of LeRobot's data."""
 CARD = """$COUNT$ of continuous walks in generated, lit houses, written by `embodied export lerobot-vlnce`.
@@ -81,7 +86,7 @@ Chosen = Callable[[int], int]
 class Taught:
     """A walk and what the expert would have done before each of its actions."""
 
-    walk: Walk
+    trajectory: Trajectory
     labels: tuple[int, ...]
     world: World
     body: Body
@@ -89,111 +94,117 @@ class Taught:
     @property
     def key(self) -> str:
         """A name for files."""
-        return f"{self.walk.excursion.world}_{self.walk.excursion.id}"
+        return f"{self.trajectory.episode.world}_{self.trajectory.episode.id}"
 
 
-def wandering(share: float, rng: np.random.Generator) -> Chosen:
+def noisy_actions(share: float, rng: np.random.Generator) -> Chosen:
     """The expert plays, but this share of its steps and turns is drawn among steps and turns instead."""
 
     def chosen(label: int) -> int:
-        return int(rng.integers(1, 4)) if label != Move.STOP and rng.random() < share else label
+        return int(rng.integers(1, 4)) if label != HabitatAction.STOP and rng.random() < share else label
 
     return chosen
 
 
-def teach(env: ContinuousEnv, excursion: Excursion, world: World, chosen: Chosen = lambda label: label) -> Taught:
+def teach(env: ContinuousEnv, episode: ContinuousEpisode, world: World, chosen: Chosen = lambda label: label) -> Taught:
     """Play an episode, as the expert does unless told otherwise, and write down what the expert does at each of its
     states (Ross et al. 2011)."""
-    env.reset(excursion, world)
-    expert, labels = Follower(env, along=bool(excursion.reference)), []
+    env.reset(episode, world)
+    expert, labels = ShortestPathFollower(env, along=bool(episode.reference)), []
     while not env.ended:
         labels.append(expert.action())
         env.step(chosen(labels[-1]))
-    return Taught(env.walk(), tuple(labels), world, env.body)
+    return Taught(env.trajectory(), tuple(labels), world, env.body)
 
 
-def frames(taught: Taught, lens: Lens, down: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def frames(taught: Taught, camera: CameraConfig, down: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """(h, w, 3) uint8 and (h, w) float32 metres along the optical axis, before each action, `down` degrees down."""
-    walk, size = taught.walk, (lens.height, lens.width)
-    for (x, y, z), yaw in zip(walk.positions[:-1], walk.yaws[:-1], strict=True):
+    trajectory, size = taught.trajectory, (camera.height, camera.width)
+    for (x, y, z), yaw in zip(trajectory.positions[:-1], trajectory.yaws[:-1], strict=True):
         eye = (x, y, z + taught.body.eye)
-        view = taught.world.renderer.through(camera_at(eye, yaw, -math.radians(down), lens.vfov), size)
+        view = taught.world.renderer.through(camera_at(eye, yaw, -math.radians(down), camera.vfov), size)
         yield view.rgb, view.depth
 
 
 def export_walks(
     form: str,
     folder: Path,
-    excursions: Iterable[Excursion],
+    episodes: Iterable[ContinuousEpisode],
     worlds: dict[str, World],
     *,
     seed: int,
     body: Body = VLNCE,
-    lens: Lens = LENS,
-    wander: float = 0.0,
+    camera: CameraConfig = CAMERA_VLNCE,
+    action_noise: float = 0.0,
     split: str = "train",
     depth: bool = False,
-    watch: Callable[[Iterable[Excursion]], Iterable[Excursion]] = iter,
+    watch: Callable[[Iterable[ContinuousEpisode]], Iterable[ContinuousEpisode]] = iter,
 ) -> int:
     """Play episodes and write them in one of FORMATS; returns how many steps there are.
 
     Args:
       folder: new or empty.
-      wander: the share of actions, below 1, that are drawn instead of the expert's; what is written stays the expert's.
+      action_noise: the share of actions, below 1, that are drawn instead of the expert's; what is written stays his.
       depth: whether 'lerobot-vlnce' has videos of depth; policies that want colours alone cannot read them.
       watch: goes through the episodes, as a progress bar does.
 
     Raises:
-      ValueError: an unknown form, a folder with files, no episodes, or wandering where poses are what is learned from.
+      ValueError: an unknown form, a folder with files, no episodes, or noise where poses are what is learned from.
     """
     if form not in FORMATS:
         raise ValueError(f"unknown form {form!r}; use one of {FORMATS}")
-    if not 0 <= wander < 1:
-        raise ValueError(f"wander is a share from 0 to below 1, got {wander}")
-    if form == "internnav" and wander:
-        raise ValueError("InternData-N1 learns from the poses of a walk, which should be the expert's; leave wander 0")
-    folder, episodes = Path(folder), list(excursions)
+    if not 0 <= action_noise < 1:
+        raise ValueError(f"action_noise is a share from 0 to below 1, got {action_noise}")
+    if form == "internnav" and action_noise:
+        raise ValueError(
+            "InternData-N1 learns from the poses of a walk, which should be the expert's; leave action_noise 0"
+        )
+    folder, chosen_episodes = Path(folder), list(episodes)
     if folder.exists() and any(p.name != LOCK for p in folder.iterdir()):
         raise ValueError(f"{folder} is not empty; choose another folder")
-    if not episodes:
+    if not chosen_episodes:
         raise ValueError("there are no episodes to play; choose another split")
-    env = ContinuousEnv(body, Grounds())
-    chosen = wandering(wander, stream(seed, "wander"))
-    taught = (teach(env, e, worlds[e.world], chosen) for e in watch(episodes))
+    env = ContinuousEnv(body, NavMeshCache())
+    chosen = noisy_actions(action_noise, stream(seed, "wander"))
+    taught = (teach(env, e, worlds[e.world], chosen) for e in watch(chosen_episodes))
     if form == "vlnce":
-        write_vlnce(folder, split, with_experts(episodes, worlds, ContinuousEnv(body, Grounds())))
+        write_vlnce(folder, split, with_experts(chosen_episodes, worlds, ContinuousEnv(body, NavMeshCache())))
     if form == "lerobot-vlnce":
         with whole_folder(folder) as draft:
-            return _lerobot(draft, taught, lens, depth)
+            return _lerobot(draft, taught, camera, depth)
     writers = {"vlnce": _samples, "streamvln": _streamvln, "uninavid": _uninavid, "internnav": _internnav}
-    return writers[form](folder, taught, lens)
+    return writers[form](folder, taught, camera)
 
 
-def _samples(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
+def _samples(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> int:
     lines: list[str] = []
     for t in walks:
-        for k, (rgb, _) in enumerate(frames(t, lens)):
+        for k, (rgb, _) in enumerate(frames(t, camera)):
             image = f"images/{t.key}/{k:03d}.jpg"
             _jpeg(folder / image, rgb)
-            facts = {"episode": t.walk.excursion.id, "world": t.walk.excursion.world, "step": k, "image": image}
-            facts |= {"instruction": t.walk.excursion.instruction, "taken": t.walk.actions[k], "action": t.labels[k]}
+            facts = {"episode": t.trajectory.episode.id, "world": t.trajectory.episode.world, "step": k, "image": image}
+            facts |= {
+                "instruction": t.trajectory.episode.instruction,
+                "taken": t.trajectory.actions[k],
+                "action": t.labels[k],
+            }
             lines.append(json.dumps(facts))
     write_lines(folder / "samples.jsonl", lines)
     return len(lines)
 
 
-def _streamvln(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
+def _streamvln(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> int:
     """The action at a frame is the one that led there, -1 at first: the program shifts them by one and adds STOP."""
     rows, steps = [], 0
     for number, t in enumerate(walks):
         video = f"images/{t.key}"
-        for k, (rgb, _) in enumerate(frames(t, lens)):
+        for k, (rgb, _) in enumerate(frames(t, camera)):
             _jpeg(folder / video / "rgb" / f"{k:03d}.jpg", rgb)
         rows.append(
             {
                 "id": number,
                 "video": video,
-                "instructions": [t.walk.excursion.instruction],
+                "instructions": [t.trajectory.episode.instruction],
                 "actions": [-1, *t.labels[:-1]],
             }
         )
@@ -202,16 +213,16 @@ def _streamvln(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
     return steps
 
 
-def _uninavid(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
+def _uninavid(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> int:
     rows, steps = [], 0
     for number, t in enumerate(walks):
-        seen = [rgb for rgb, _ in frames(t, lens)]
+        seen = [rgb for rgb, _ in frames(t, camera)]
         for k in range(0, len(t.labels), AHEAD):
             video = f"nav_videos/{number}_{k:03d}.mp4"
             write_film(folder / video, seen[: k + 1], FPS)
-            answer = " ".join(WORDS[Move(a)] for a in t.labels[k : k + AHEAD])
+            answer = " ".join(WORDS[HabitatAction(a)] for a in t.labels[k : k + AHEAD])
             talk = [
-                {"from": "human", "value": PROMPT.format(t.walk.excursion.instruction)},
+                {"from": "human", "value": PROMPT.format(t.trajectory.episode.instruction)},
                 {"from": "gpt", "value": answer},
             ]
             rows.append({"id": f"NAV_ID_VLN_{number}_{k:03d}", "video": video, "conversations": talk})
@@ -229,49 +240,61 @@ LEROBOT: Columns = {
 }
 
 
-def _lerobot(folder: Path, walks: Iterable[Taught], lens: Lens, with_depth: bool) -> int:
-    camera = RecordedCamera(lens.height, lens.width, lens.vfov)
-    writer = Writer(folder, camera, LEROBOT, key="observation.image", fps=STEPS, depth=with_depth)
+def _lerobot(folder: Path, walks: Iterable[Taught], camera: CameraConfig, with_depth: bool) -> int:
+    writer = Writer(
+        folder,
+        RecordedCamera(camera.height, camera.width, camera.vfov),
+        LEROBOT,
+        key="observation.image",
+        fps=STEPS,
+        depth=with_depth,
+    )
     for t in walks:
-        walk, n = t.walk, len(t.labels)
-        poses = zip(walk.positions[:-1], walk.yaws[:-1], walk.pitches[:-1], strict=True)
+        trajectory, n = t.trajectory, len(t.labels)
+        poses = zip(trajectory.positions[:-1], trajectory.yaws[:-1], trajectory.pitches[:-1], strict=True)
         rows = {
-            "observation.state": np.stack([own_way(walk.excursion, p, y, math.radians(tilt)) for p, y, tilt in poses]),
+            "observation.state": np.stack(
+                [odometry(trajectory.episode, p, y, math.radians(tilt)) for p, y, tilt in poses]
+            ),
             "action": np.eye(len(SCORES), dtype=np.float32)[list(t.labels)],
         }
-        rgb, depth = zip(*frames(t, lens), strict=True)
-        facts = {"embodied/task": walk.excursion.id, "embodied/house": walk.excursion.world, "embodied/agent": "expert"}
-        reached = walk.stopped and bool(walk.distances[-1] < walk.excursion.radius)
-        writer.add(rows, rgb, depth, [walk.excursion.instruction] * n, [""] * n, reached, facts)
+        rgb, depth = zip(*frames(t, camera), strict=True)
+        facts = {
+            "embodied/task": trajectory.episode.id,
+            "embodied/house": trajectory.episode.world,
+            "embodied/agent": "expert",
+        }
+        reached = trajectory.stopped and bool(trajectory.distances[-1] < trajectory.episode.radius)
+        writer.add(rows, rgb, depth, [trajectory.episode.instruction] * n, [""] * n, reached, facts)
     return writer.finish("embodied vlnce", CARD)
 
 
 # InternData-N1 -----------------------------------------------------------------------------------
 
 
-def _internnav(folder: Path, walks: Iterable[Taught], lens: Lens) -> int:
+def _internnav(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> int:
     houses: dict[str, list[dict[str, Any]]] = {}
     steps = 0
     for t in walks:
-        known = houses.setdefault(t.walk.excursion.world, [])
-        known.append(_intern_episode(folder / t.walk.excursion.world, len(known), steps, t, lens))
+        known = houses.setdefault(t.trajectory.episode.world, [])
+        known.append(_intern_episode(folder / t.trajectory.episode.world, len(known), steps, t, camera))
         steps += len(t.labels)
     for name, episodes in houses.items():
-        _intern_meta(folder / name / "meta", episodes, lens)
+        _intern_meta(folder / name / "meta", episodes, camera)
     return steps
 
 
-def _intern_episode(home: Path, number: int, first: int, t: Taught, lens: Lens) -> dict[str, Any]:
+def _intern_episode(home: Path, number: int, first: int, t: Taught, camera: CameraConfig) -> dict[str, Any]:
     n, columns = len(t.labels), {}
     for pitch in PITCHES:
         setting = f"{round(100 * t.body.eye)}cm_{pitch}deg"
         depths, where = [], home / "videos" / "chunk-000"
-        for k, (rgb, depth) in enumerate(frames(t, lens, pitch)):
+        for k, (rgb, depth) in enumerate(frames(t, camera, pitch)):
             _jpeg(where / f"observation.images.rgb.{setting}" / f"episode_{number:06d}_{k}.jpg", rgb)
             _png(where / f"observation.images.depth.{setting}" / f"episode_{number:06d}_{k}.png", depth)
             depths.append(depth)
         poses = [pose_of(t, k, pitch) for k in range(n)]
-        goals = [pixel_goal(t, k, poses[k], depths[k], lens) for k in range(n)]
+        goals = [pixel_goal(t, k, poses[k], depths[k], camera) for k in range(n)]
         columns[f"pose.{setting}"] = pa.array([p.tolist() for p in poses], pa.list_(pa.list_(pa.float32())))
         columns[f"goal.{setting}"] = pa.array([list(g[0]) for g in goals], pa.list_(pa.int32()))
         columns[f"relative_goal_frame_id.{setting}"] = pa.array([g[1] for g in goals], pa.int32())
@@ -289,10 +312,10 @@ def _intern_episode(home: Path, number: int, first: int, t: Taught, lens: Lens) 
     path = home / "data" / "chunk-000" / f"episode_{number:06d}.parquet"
     path.parent.mkdir(parents=True, exist_ok=True)
     pq.write_table(table, path)
-    return {"episode_index": number, "tasks": [t.walk.excursion.instruction], "length": n, "columns": table.schema}
+    return {"episode_index": number, "tasks": [t.trajectory.episode.instruction], "length": n, "columns": table.schema}
 
 
-def _intern_meta(meta: Path, episodes: list[dict[str, Any]], lens: Lens) -> None:
+def _intern_meta(meta: Path, episodes: list[dict[str, Any]], camera: CameraConfig) -> None:
     schema = [e.pop("columns") for e in episodes][0]
     write_lines(meta / "episodes.jsonl", [json.dumps(e) for e in episodes])
     tasks = [{"task_index": e["episode_index"], "task": e["tasks"][0]} for e in episodes]
@@ -309,7 +332,7 @@ def _intern_meta(meta: Path, episodes: list[dict[str, Any]], lens: Lens) -> None
         if field.name.startswith("pose."):
             setting = field.name.removeprefix("pose.")
             for what, channels in (("rgb", 3), ("depth", 1)):
-                shape = [lens.height, lens.width, channels]
+                shape = [camera.height, camera.width, channels]
                 names = ["height", "width", "channel"]
                 features[f"observation.images.{what}.{setting}"] = {"dtype": "image", "shape": shape, "names": names}
     total = sum(e["length"] for e in episodes)
@@ -333,26 +356,28 @@ def _intern_meta(meta: Path, episodes: list[dict[str, Any]], lens: Lens) -> None
 
 def pose_of(taught: Taught, k: int, down: int) -> np.ndarray:
     """(4, 4) camera to world, z up: columns right, down, ahead (OpenCV's axes) and where the camera is, metres."""
-    yaw, tilt = float(taught.walk.yaws[k]), -math.radians(down)
+    yaw, tilt = float(taught.trajectory.yaws[k]), -math.radians(down)
     ahead = np.array([math.cos(yaw) * math.cos(tilt), math.sin(yaw) * math.cos(tilt), math.sin(tilt)])
     right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
     pose = np.eye(4)
     pose[:3, 0], pose[:3, 1], pose[:3, 2] = right, np.cross(ahead, right), ahead
-    pose[:3, 3] = taught.walk.positions[k] + (0.0, 0.0, taught.body.eye)
+    pose[:3, 3] = taught.trajectory.positions[k] + (0.0, 0.0, taught.body.eye)
     return pose
 
 
-def pixel_goal(taught: Taught, k: int, pose: np.ndarray, depth: np.ndarray, lens: Lens) -> tuple[tuple[int, int], int]:
+def pixel_goal(
+    taught: Taught, k: int, pose: np.ndarray, depth: np.ndarray, camera: CameraConfig
+) -> tuple[tuple[int, int], int]:
     """The farthest later position of the walk whose floor is seen: its (column, row), and how many frames ahead it is;
     (-1, -1) and -1 where none is seen."""
-    focal = lens.width / 2 / math.tan(math.radians(lens.hfov) / 2)
-    later = taught.walk.positions[k + 1 : len(taught.labels)]
+    focal = camera.width / 2 / math.tan(math.radians(camera.hfov) / 2)
+    later = taught.trajectory.positions[k + 1 : len(taught.labels)]
     for ahead in range(len(later), 0, -1):
         x, y, z = pose[:3, :3].T @ (later[ahead - 1] - pose[:3, 3])
         if z <= 0.1:
             continue
-        u, v = int(lens.width / 2 + focal * x / z), int(lens.height / 2 + focal * y / z)
-        if 0 <= u < lens.width and 0 <= v < lens.height and depth[v, u] > z - HIDDEN:
+        u, v = int(camera.width / 2 + focal * x / z), int(camera.height / 2 + focal * y / z)
+        if 0 <= u < camera.width and 0 <= v < camera.height and depth[v, u] > z - HIDDEN:
             return (u, v), ahead
     return NO_GOAL, -1
 

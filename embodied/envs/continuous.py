@@ -25,7 +25,7 @@ STEEPEST = 60
 Point = tuple[float, float, float]
 
 
-class Move(enum.IntEnum):
+class HabitatAction(enum.IntEnum):
     """Habitat's actions, by number."""
 
     STOP = 0
@@ -75,7 +75,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Lens:
+class CameraConfig:
     """How the pictures that it sees are framed."""
 
     height: int = 256
@@ -95,19 +95,24 @@ class Lens:
 
 
 @dataclass(frozen=True)
-class Aim:
+class NavigationGoal:
     """One place that satisfies an episode."""
 
     position: Point
     """On the floor, metres, world; of an object, its own position."""
     views: tuple[Point, ...] = ()
-    """Where the object counts as found from; empty where the position itself is to be reached."""
+    """Viewpoints from which the object counts as found; empty where the position itself is to be reached."""
     placement: str = ""
     """Id of the object."""
 
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """Places on the floor that satisfy the episode."""
+        return self.views or (self.position,)
+
 
 @dataclass(frozen=True)
-class Excursion:
+class ContinuousEpisode:
     """An episode of Habitat's: where it begins, what is asked, where it should end."""
 
     id: str
@@ -118,7 +123,7 @@ class Excursion:
     yaw: float
     """Radians counter-clockwise from +x."""
     instruction: str
-    aims: tuple[Aim, ...]
+    goals: tuple[NavigationGoal, ...]
     radius: float = 3.0
     """An agent that stops nearer than this, along the floor in metres, succeeded."""
     reference: tuple[Point, ...] = ()
@@ -132,10 +137,10 @@ class Excursion:
 
 
 @dataclass(frozen=True)
-class Walk:
-    """What an agent did in an excursion."""
+class Trajectory:
+    """What an agent did in an episode."""
 
-    excursion: Excursion
+    episode: ContinuousEpisode
     positions: np.ndarray
     """(n + 1, 3) float64 metres, on the floor: before each action and after the last."""
     yaws: np.ndarray
@@ -144,15 +149,15 @@ class Walk:
     """(n + 1,) degrees, integers."""
     actions: tuple[int, ...]
     distances: np.ndarray
-    """(n + 1,) metres along the floor to the nearest aim."""
+    """(n + 1,) metres along the floor to the nearest goal."""
     collisions: int
 
     @property
     def stopped(self) -> bool:
-        return bool(self.actions) and self.actions[-1] == Move.STOP
+        return bool(self.actions) and self.actions[-1] == HabitatAction.STOP
 
 
-class Grounds:
+class NavMeshCache:
     """The floors of houses, made when they are first walked on."""
 
     def __init__(self) -> None:
@@ -165,27 +170,28 @@ class Grounds:
 
 
 class ContinuousEnv:
-    """Owns the pose of a body in one excursion after another."""
+    """Owns the pose of a body in one episode after another."""
 
-    def __init__(self, body: Body = Body(), grounds: Grounds | None = None) -> None:
-        self.body, self._grounds = body, grounds or Grounds()
+    def __init__(self, body: Body = Body(), navmeshes: NavMeshCache | None = None) -> None:
+        self.body, self._grounds = body, navmeshes or NavMeshCache()
 
-    def reset(self, excursion: Excursion, place: Place) -> None:
+    def reset(self, episode: ContinuousEpisode, place: Place) -> None:
         """Put the body at the start; one that is not on the free floor is moved to the nearest point of it.
 
         Raises:
-          ValueError: there is no way from the start to any aim.
+          ValueError: start or goals are not on the floor of the house, or no goal can be reached from the start.
         """
-        self.excursion, self.place = excursion, place
+        self.episode, self.place = episode, place
         self.ground = self._grounds.of(place.house)
-        self.ways = self.ground.ways(aimed_cells(excursion, self.ground))
-        self.position = self.ground.nearest_free(np.array(excursion.start[:2]))
-        self.yaw, self.tilt, self.collided, self.collisions, self.ended = excursion.yaw, 0, False, 0, False
+        check_on_floor(episode, place.house, self.ground, self.body.forward)
+        self.ways = self.ground.ways(goal_cells(episode, self.ground))
+        self.position = self.ground.nearest_free(np.array(episode.start[:2]))
+        self.yaw, self.tilt, self.collided, self.collisions, self.ended = episode.yaw, 0, False, 0, False
         self._actions: list[int] = []
         self._poses = [(*self.position, self.yaw, self.tilt)]
         self._distances = [self.ways.length_from(self.position)]
         if not math.isfinite(self._distances[0]):
-            raise ValueError(f"no aim of episode {excursion.id!r} can be reached in {excursion.world!r}")
+            raise ValueError(f"no goal of episode {episode.id!r} can be reached in {episode.world!r}")
 
     def step(self, action: int) -> None:
         """One action of Move.
@@ -199,22 +205,22 @@ class ContinuousEnv:
         if self.ended:
             raise RuntimeError("the episode is over; reset before another action")
         self.collided = False
-        if action == Move.FORWARD:
+        if action == HabitatAction.FORWARD:
             there = self.after(self.yaw)
             short = self.body.forward - float(np.linalg.norm(there - self.position))
             self.collided = short > COLLIDED
             self.collisions += self.collided
             self.position = there
-        elif action in (Move.LEFT, Move.RIGHT):
-            self.yaw += math.radians(self.body.turn) * (1 if action == Move.LEFT else -1)
-        elif action in (Move.UP, Move.DOWN):
-            change = self.body.tilt * (1 if action == Move.UP else -1)
+        elif action in (HabitatAction.LEFT, HabitatAction.RIGHT):
+            self.yaw += math.radians(self.body.turn) * (1 if action == HabitatAction.LEFT else -1)
+        elif action in (HabitatAction.UP, HabitatAction.DOWN):
+            change = self.body.tilt * (1 if action == HabitatAction.UP else -1)
             self.tilt = max(-STEEPEST, min(STEEPEST, self.tilt + change))
         self._actions.append(int(action))
         self._poses.append((*self.position, self.yaw, self.tilt))
-        moved = action == Move.FORWARD
+        moved = action == HabitatAction.FORWARD
         self._distances.append(self.ways.length_from(self.position) if moved else self._distances[-1])
-        self.ended = action == Move.STOP or len(self._actions) >= self.body.steps
+        self.ended = action == HabitatAction.STOP or len(self._actions) >= self.body.steps
 
     def after(self, yaw: float) -> np.ndarray:
         """(2,) where a step along `yaw` would end."""
@@ -223,7 +229,7 @@ class ContinuousEnv:
 
     @property
     def distance(self) -> float:
-        """Metres along the floor to the nearest aim. Privileged."""
+        """Metres along the floor to the nearest goal. Privileged."""
         return self._distances[-1]
 
     @property
@@ -246,12 +252,12 @@ class ContinuousEnv:
         """Actions taken."""
         return len(self._actions)
 
-    def walk(self) -> Walk:
+    def trajectory(self) -> Trajectory:
         """What was done since the last reset."""
         poses = np.array(self._poses, float)
         positions = np.column_stack([poses[:, :2], np.full(len(poses), self.floor)])
-        return Walk(
-            self.excursion,
+        return Trajectory(
+            self.episode,
             positions,
             poses[:, 2],
             poses[:, 3].astype(int),
@@ -266,22 +272,42 @@ POSITION = ("ahead", "left", "sin", "cos", "tilt")
 camera's tilt."""
 
 
-def own_way(excursion: Excursion, position: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
+def odometry(episode: ContinuousEpisode, position: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
     """(5,) float32, POSITION, at (x, y); yaw and pitch in radians."""
-    dx, dy = np.asarray(position)[:2] - np.array(excursion.start[:2])
-    c, s, turned = math.cos(excursion.yaw), math.sin(excursion.yaw), yaw - excursion.yaw
+    dx, dy = np.asarray(position)[:2] - np.array(episode.start[:2])
+    c, s, turned = math.cos(episode.yaw), math.sin(episode.yaw), yaw - episode.yaw
     return np.array([c * dx + s * dy, c * dy - s * dx, math.sin(turned), math.cos(turned), pitch], np.float32)
 
 
-def aimed_cells(excursion: Excursion, ground: FloorWays) -> np.ndarray:
-    """Indices of the floor's cells at the aims."""
-    points = [p for aim in excursion.aims for p in (aim.views or (aim.position,))]
-    if not points:
-        raise ValueError(f"episode {excursion.id!r} has no goal; every episode needs one")
-    return np.unique([ground.cell_at(np.array(p)) for p in points])
+def check_on_floor(episode: ContinuousEpisode, house: House, ground: FloorWays, step: float) -> None:
+    """Refuse an episode of another house or in another frame, whose start or goal is more than `step` metres from where
+    the body can be.
+
+    Raises:
+      ValueError: says which point, and what was expected.
+    """
+    if not episode.goals:
+        raise ValueError(f"episode {episode.id!r} has no goal; every episode needs one")
+    floor = float(house.storeys[0].elevation)
+    places = {"start": (episode.start,), **{f"goal {k}": g.points for k, g in enumerate(episode.goals)}}
+    for name, points in places.items():
+        xyz = np.array(points, float)
+        away = np.linalg.norm(xyz[:, :2] - ground.xy[ground.cells_at(xyz[:, :2])], axis=1)
+        if not (np.hypot(away, xyz[:, 2] - floor) <= step).any():
+            low, high = ground.xy.min(0).round(1).tolist(), ground.xy.max(0).round(1).tolist()
+            raise ValueError(
+                f"the {name} of episode {episode.id!r} is at {xyz[0].round(2).tolist()}, where nobody can stand in "
+                f"house {house.name!r}: its floor goes from {low} to {high} at height {floor:g}; expected metres, z "
+                "up, which in Habitat's files are [x, z, -y], y up"
+            )
 
 
-def seen_from(house: House, ground: FloorWays, object_class: str, reach: float) -> tuple[Aim, ...]:
+def goal_cells(episode: ContinuousEpisode, ground: FloorWays) -> np.ndarray:
+    """Indices of the floor's cells at the goals."""
+    return np.unique([ground.cell_at(np.array(p)) for goal in episode.goals for p in goal.points])
+
+
+def seen_from(house: House, ground: FloorWays, object_class: str, reach: float) -> tuple[NavigationGoal, ...]:
     """The objects of a class that can be come near to, with the cells in their rooms within `reach` metres of them."""
     floor, found = float(house.storeys[0].elevation), []
     for p in house.placements:
@@ -290,12 +316,14 @@ def seen_from(house: House, ground: FloorWays, object_class: str, reach: float) 
         near = (footprint_distance(p, ground.xy) <= reach) & (ground.room_of_cell == p.room)
         views = tuple((float(x), float(y), floor) for x, y in ground.xy[near])
         if views:
-            found.append(Aim((float(p.position[0]), float(p.position[1]), float(p.position[2])), views, p.id))
+            found.append(
+                NavigationGoal((float(p.position[0]), float(p.position[1]), float(p.position[2])), views, p.id)
+            )
     return tuple(found)
 
 
-class Follower:
-    """An expert that knows the house: along the described path, or straight to the nearest aim, then STOP.
+class ShortestPathFollower:
+    """An expert that knows the house: along the described path, or straight to the nearest goal, then STOP.
 
     It has no memory but the part of the path that it has left behind, and answers at any pose that an agent comes to:
     that is what DAgger asks for.
@@ -305,14 +333,14 @@ class Follower:
         """
         Args:
           along: keep to the reference path, point by point.
-          near: STOP within so many metres of an aim, or within the episode's radius where that is less.
+          near: STOP within so many metres of a goal, or within the episode's radius where that is less.
         """
-        self._env, self._near = env, min(near, 0.9 * env.excursion.radius)
-        points = env.excursion.reference[1:-1] if along else ()
+        self._env, self._near = env, min(near, 0.9 * env.episode.radius)
+        points = env.episode.reference[1:-1] if along else ()
         cells = [np.array([env.ground.cell_at(np.array(p))]) for p in points]
-        aims = tuple(replace(a, views=_middle(a)) for a in env.excursion.aims)
+        goals = tuple(replace(a, views=_middle(a)) for a in env.episode.goals)
         self._plan: list[tuple[np.ndarray, int]] = []
-        last = aimed_cells(replace(env.excursion, aims=aims), env.ground)
+        last = goal_cells(replace(env.episode, goals=goals), env.ground)
         self._legs: list[DrivingWays] = [env.ground.wide_ways(c) for c in (*cells, last)]
 
     def action(self) -> int:
@@ -322,13 +350,13 @@ class Follower:
             self._legs.pop(0)
             self._plan = []
         if len(self._legs) == 1 and env.distance <= self._near:
-            return Move.STOP
+            return HabitatAction.STOP
         turns = self._turns()
         if turns:
-            return Move.LEFT if turns > 0 else Move.RIGHT
+            return HabitatAction.LEFT if turns > 0 else HabitatAction.RIGHT
         if self._plan:
             self._plan.pop(0)
-        return Move.FORWARD
+        return HabitatAction.FORWARD
 
     def _left(self) -> float:
         return self._legs[0].length_from(self._env.position)
@@ -348,18 +376,18 @@ class Follower:
     @property
     def _heading(self) -> int:
         """Turns to the left that the body has made since the start."""
-        return round((self._env.yaw - self._env.excursion.yaw) / math.radians(self._env.body.turn))
+        return round((self._env.yaw - self._env.episode.yaw) / math.radians(self._env.body.turn))
 
     def _ends(self, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(headings, 2) where a step along each heading ends, from heading 0 on, and whether it touches nothing."""
-        body, start = self._env.body, self._env.excursion.yaw
+        body, start = self._env.body, self._env.episode.yaw
         angles = start + np.arange(360 // body.turn) * math.radians(body.turn)
         ends = here + body.forward * np.stack([np.cos(angles), np.sin(angles)], 1)
         return ends, self._env.ground.is_free(here, ends)
 
     def _direct(self) -> int | None:
         """The heading whose step comes nearest to the farthest point of the way that is in sight; None where no step
-        leads nearer to the aim."""
+        leads nearer to the goal."""
         env, ways, here = self._env, self._legs[0], self._env.position
         way = env.ground.xy[ways.cells(env.ground.cell_at(here))[: LOOK + 1]]
         free = np.flatnonzero(env.ground.is_free(here, way))
@@ -409,9 +437,9 @@ def _square(point: np.ndarray) -> tuple[int, int]:
     return int(point[0] // 0.05), int(point[1] // 0.05)
 
 
-def _middle(aim: Aim) -> tuple[Point, ...]:
+def _middle(goal: NavigationGoal) -> tuple[Point, ...]:
     """The half of an object's viewpoints that is nearest to it: a step towards them ends among the others."""
-    near = sorted(aim.views, key=lambda v: math.dist(v[:2], aim.position[:2]))
+    near = sorted(goal.views, key=lambda v: math.dist(v[:2], goal.position[:2]))
     return tuple(near[: (len(near) + 1) // 2])
 
 

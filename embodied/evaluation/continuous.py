@@ -11,78 +11,80 @@ from collections.abc import Callable
 
 import numpy as np
 
-from embodied.envs.continuous import Excursion, Move, Walk
-from embodied.metrics import warping
+from embodied.envs.continuous import ContinuousEpisode, HabitatAction, Trajectory
+from embodied.metrics import warping, weighted_by_path, within
 
 WARPING = 3.0
 """Metres that nDTW is normalised by (Magalhaes et al. 2019)."""
 
 
-def distance_to_goal(walk: Walk) -> float:
+def distance_to_goal(trajectory: Trajectory) -> float:
     """Metres along the floor at the end."""
-    return float(walk.distances[-1])
+    return float(trajectory.distances[-1])
 
 
-def success(walk: Walk) -> float:
+def success(trajectory: Trajectory) -> float:
     """1 after STOP strictly nearer than the radius."""
-    return float(walk.stopped and walk.distances[-1] < walk.excursion.radius)
+    return float(trajectory.stopped and within(trajectory.distances[-1], trajectory.episode.radius, strict=True))
 
 
-def lengths(walk: Walk) -> np.ndarray:
+def lengths(trajectory: Trajectory) -> np.ndarray:
     """(n + 1,) metres gone before each position."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(walk.positions, axis=0), axis=1))])
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(trajectory.positions, axis=0), axis=1))])
 
 
-def path_length(walk: Walk) -> float:
-    return float(lengths(walk)[-1])
+def path_length(trajectory: Trajectory) -> float:
+    return float(lengths(trajectory)[-1])
 
 
-def spl(walk: Walk) -> float:
+def spl(trajectory: Trajectory) -> float:
     """Success weighted by path length; the shortest way is that of the floor from the start."""
-    return success(walk) * _share(float(walk.distances[0]), path_length(walk))
+    return weighted_by_path(success(trajectory), float(trajectory.distances[0]), path_length(trajectory))
 
 
-def oracle_success(walk: Walk) -> float:
+def oracle_success(trajectory: Trajectory) -> float:
     """1 if any position after the first action was strictly nearer than the radius."""
-    return float((walk.distances[1:] < walk.excursion.radius).any())
+    return float(within(trajectory.distances[1:].min(initial=np.inf), trajectory.episode.radius, strict=True))
 
 
-def oracle_navigation_error(walk: Walk) -> float:
-    return float(walk.distances[1:].min()) if len(walk.actions) else float("inf")
+def oracle_navigation_error(trajectory: Trajectory) -> float:
+    return float(trajectory.distances[1:].min()) if len(trajectory.actions) else float("inf")
 
 
-def oracle_spl(walk: Walk) -> float:
+def oracle_spl(trajectory: Trajectory) -> float:
     """SPL at the first position that is near enough."""
-    near = np.flatnonzero(walk.distances[1:] < walk.excursion.radius)
-    return _share(float(walk.distances[0]), float(lengths(walk)[near[0] + 1])) if len(near) else 0.0
+    near = np.flatnonzero(trajectory.distances[1:] < trajectory.episode.radius)
+    if not len(near):
+        return 0.0
+    return weighted_by_path(1.0, float(trajectory.distances[0]), float(lengths(trajectory)[near[0] + 1]))
 
 
-def ndtw(walk: Walk) -> float:
+def ndtw(trajectory: Trajectory) -> float:
     """exp(-DTW / (3 m |expert|)) of the positions after each action, without repeats; the episode needs a path."""
-    reference = expert_path(walk.excursion)
-    after = walk.positions[1:] if len(walk.actions) else walk.positions
+    reference = expert_path(trajectory.episode)
+    after = trajectory.positions[1:] if len(trajectory.actions) else trajectory.positions
     kept = np.concatenate([[True], (np.diff(after, axis=0) != 0).any(1)])
     metres = np.linalg.norm(after[kept][:, None] - reference[None], axis=2)
     return float(np.exp(-warping(metres) / (len(reference) * WARPING)))
 
 
-def sdtw(walk: Walk) -> float:
+def sdtw(trajectory: Trajectory) -> float:
     """nDTW of a success, else 0."""
-    return ndtw(walk) * success(walk)
+    return ndtw(trajectory) * success(trajectory)
 
 
-def steps_taken(walk: Walk) -> float:
+def steps_taken(trajectory: Trajectory) -> float:
     """Actions, STOP included."""
-    return float(len(walk.actions))
+    return float(len(trajectory.actions))
 
 
-def collisions(walk: Walk) -> float:
+def collisions(trajectory: Trajectory) -> float:
     """Share of the steps ahead that touched something (collision rate)."""
-    steps = sum(a == Move.FORWARD for a in walk.actions)
-    return walk.collisions / steps if steps else 0.0
+    steps = sum(a == HabitatAction.FORWARD for a in trajectory.actions)
+    return trajectory.collisions / steps if steps else 0.0
 
 
-MEASURES: dict[str, Callable[[Walk], float]] = {
+MEASURES: dict[str, Callable[[Trajectory], float]] = {
     "success": success,
     "spl": spl,
     "ndtw": ndtw,
@@ -98,17 +100,12 @@ MEASURES: dict[str, Callable[[Walk], float]] = {
 """By the names of the published programs."""
 
 
-def judged(walk: Walk) -> dict[str, float]:
+def judged(trajectory: Trajectory) -> dict[str, float]:
     """Every measure of one walk; of nDTW and SDTW, those of an episode with a path."""
-    pathless = () if len(expert_path(walk.excursion)) else ("ndtw", "sdtw")
-    return {name: measure(walk) for name, measure in MEASURES.items() if name not in pathless}
+    pathless = () if len(expert_path(trajectory.episode)) else ("ndtw", "sdtw")
+    return {name: measure(trajectory) for name, measure in MEASURES.items() if name not in pathless}
 
 
-def expert_path(excursion: Excursion) -> np.ndarray:
+def expert_path(episode: ContinuousEpisode) -> np.ndarray:
     """(m, 3) metres that nDTW compares with; (0, 3) without."""
-    return np.array(excursion.expert or excursion.reference, float).reshape(-1, 3)
-
-
-def _share(shortest: float, walked: float) -> float:
-    longest = max(shortest, walked)
-    return shortest / longest if longest > 0 else 1.0
+    return np.array(episode.expert or episode.reference, float).reshape(-1, 3)

@@ -22,9 +22,19 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.assets.cache import default_cache
-from embodied.datasets.habitat import object_excursions, read_objectnav, read_vlnce, route_excursions
+from embodied.datasets.habitat import object_episodes, read_objectnav, read_vlnce, route_episodes
 from embodied.datasets.store import Dataset
-from embodied.envs.continuous import Body, ContinuousEnv, Excursion, Follower, Grounds, Lens, Move, own_way
+from embodied.envs.continuous import (
+    Body,
+    CameraConfig,
+    ContinuousEnv,
+    ContinuousEpisode,
+    HabitatAction,
+    NavMeshCache,
+    ShortestPathFollower,
+    check_on_floor,
+    odometry,
+)
 from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
@@ -47,35 +57,35 @@ KEPT = 4
 OBJECTS = 100
 """Episodes of ObjectNav in each house where no file says otherwise."""
 SEES = ("rgb", "depth")
-PRESETS: dict[str, tuple[Body, Lens]] = {
-    "vlnce": (Body(), Lens()),
-    "streamvln": (Body(), Lens(480, 640, 79.0)),
-    "uninavid": (Body(turn=30), Lens(480, 640, 120.0)),
-    "objectnav": (Body(turn=30, looks=True, eye=0.88), Lens(480, 640, 79.0)),
+PRESETS: dict[str, tuple[Body, CameraConfig]] = {
+    "vlnce": (Body(), CameraConfig()),
+    "streamvln": (Body(), CameraConfig(480, 640, 79.0)),
+    "uninavid": (Body(turn=30), CameraConfig(480, 640, 120.0)),
+    "objectnav": (Body(turn=30, looks=True, eye=0.88), CameraConfig(480, 640, 79.0)),
 }
 """Bodies and cameras of published programs, by name."""
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class EpisodeDataset:
     """What environments of one batch share: houses, episodes, floors."""
 
     kind: str
     worlds: Mapping[str, World]
-    excursions: tuple[Excursion, ...]
+    episodes: tuple[ContinuousEpisode, ...]
     body: Body = Body()
-    lens: Lens = Lens()
+    camera: CameraConfig = CameraConfig()
     sees: tuple[str, ...] = SEES
-    grounds: Grounds = dataclasses.field(default_factory=Grounds)
+    navmeshes: NavMeshCache = dataclasses.field(default_factory=NavMeshCache)
     opened: OrderedDict[str, World] = dataclasses.field(default_factory=OrderedDict)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise ValueError(f"kind is {self.kind!r}; use one of {KINDS}")
-        if not self.excursions:
+        if not self.episodes:
             raise ValueError("there are no episodes to play; choose another split or file")
-        check_live(self.sees, SEES, self.lens.height, self.lens.width)
-        if lost := sorted({e.world for e in self.excursions} - set(self.worlds)):
+        check_live(self.sees, SEES, self.camera.height, self.camera.width)
+        if lost := sorted({e.world for e in self.episodes} - set(self.worlds)):
             raise ValueError(
                 f"episodes play in houses that are not here: {lost[:4]}; there are {sorted(self.worlds)[:4]}"
             )
@@ -100,24 +110,24 @@ class ContinuousGymEnv(LiveEnv):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
 
-    def __init__(self, course: Course, *, render_mode: str | None = None) -> None:
+    def __init__(self, dataset: EpisodeDataset, *, render_mode: str | None = None) -> None:
         super().__init__(render_mode)
-        self.course = course
-        self.play = ContinuousEnv(course.body, course.grounds)
+        self.dataset = dataset
+        self.play = ContinuousEnv(dataset.body, dataset.navmeshes)
         """The pose of the body, and what is privileged: distance, ways, the walk so far."""
-        self.action_space: gym.Space[Any] = spaces.Discrete(course.body.actions)
-        self.observation_space = observation_space(course)
-        self._max_episode_steps = course.body.steps
+        self.action_space: gym.Space[Any] = spaces.Discrete(dataset.body.actions)
+        self.observation_space = observation_space(dataset)
+        self._max_episode_steps = dataset.body.steps
 
     @property
-    def excursions(self) -> tuple[Excursion, ...]:
+    def episodes(self) -> tuple[ContinuousEpisode, ...]:
         """All episodes; reset(options={"episode": k}) plays number k."""
-        return self.course.excursions
+        return self.dataset.episodes
 
     @property
     def task_description(self) -> str:
         """What the agent is asked to do."""
-        return self.play.excursion.instruction
+        return self.play.episode.instruction
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -127,21 +137,21 @@ class ContinuousGymEnv(LiveEnv):
         Raises:
           ValueError: there is no such episode.
         """
-        number, last = (options or {}).get("episode"), len(self.excursions) - 1
+        number, last = (options or {}).get("episode"), len(self.episodes) - 1
         if number is not None and not (isinstance(number, (int, np.integer)) and 0 <= number <= last):
             raise ValueError(f"options['episode'] should be a number from 0 to {last}, got {number!r:.80}")
         super().reset(seed=None if seed is None else checked_seed(seed))
-        drawn = int(self.np_random.integers(len(self.excursions)))
-        excursion = self.excursions[drawn if number is None else int(number)]
-        self.play.reset(excursion, self.course.worlds[excursion.world])
-        return self.look(), self._told() | {"episode": excursion.id, "instruction": excursion.instruction}
+        drawn = int(self.np_random.integers(len(self.episodes)))
+        episode = self.episodes[drawn if number is None else int(number)]
+        self.play.reset(episode, self.dataset.worlds[episode.world])
+        return self.look(), self._facts() | {"episode": episode.id, "instruction": episode.instruction}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         before = self.play.distance
         self.play.step(int(action))
-        stopped, info = action == Move.STOP, self._told()
+        stopped, info = action == HabitatAction.STOP, self._facts()
         if self.play.ended:
-            info |= judged(self.play.walk())
+            info |= judged(self.play.trajectory())
             info["is_success"] = info["success"] > 0
         reward = float(info["is_success"]) - STEP_COST + PER_METRE * (before - self.play.distance)
         return self.look(), reward, bool(stopped), self.play.ended and not stopped, info
@@ -150,43 +160,43 @@ class ContinuousGymEnv(LiveEnv):
         """What the agent knows."""
         found: dict[str, Any] = self.pixels()
         found["instruction"] = codes_of(self.task_description, TEXT).copy()
-        if self.course.kind == "objectnav":
+        if self.dataset.kind == "objectnav":
             found["gps"], found["compass"] = self.gps(), np.array([self.turned()], np.float32)
         return found
 
     def pixels(self) -> dict[str, np.ndarray]:
         """rgb (h, w, 3) uint8 and depth (h, w) float32, metres along the optical axis."""
-        lens, world = self.course.lens, self.course.world(self.play.excursion.world)
-        camera = camera_at(self.play.eye, self.play.yaw, self.play.pitch, lens.vfov)
-        return live_pixels(world, camera, (lens.height, lens.width), self.course.sees)
+        camera, world = self.dataset.camera, self.dataset.world(self.play.episode.world)
+        pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
+        return live_pixels(world, pose, (camera.height, camera.width), self.dataset.sees)
 
     def gps(self) -> np.ndarray:
         """(2,) float32 metres ahead and to the left of the start, in the start's frame."""
-        return self.own_way()[:2]
+        return self.odometry()[:2]
 
     def turned(self) -> float:
         """Radians turned to the left since the start, in [-pi, pi)."""
-        return float(wrap(self.play.yaw - self.play.excursion.yaw))
+        return float(wrap(self.play.yaw - self.play.episode.yaw))
 
-    def own_way(self) -> np.ndarray:
+    def odometry(self) -> np.ndarray:
         """(5,) float32 of embodied.envs.continuous.POSITION."""
-        return own_way(self.play.excursion, self.play.position, self.play.yaw, self.play.pitch)
+        return odometry(self.play.episode, self.play.position, self.play.yaw, self.play.pitch)
 
-    def expert(self, *, along: bool = False) -> Follower:
+    def expert(self, *, along: bool = False) -> ShortestPathFollower:
         """Who knows the way from wherever the body is, for training."""
-        return Follower(self.play, along=along)
+        return ShortestPathFollower(self.play, along=along)
 
     def _picture(self) -> np.ndarray:
-        lens = dataclasses.replace(self.course.lens, height=VIEW[0], width=VIEW[1])
-        camera = camera_at(self.play.eye, self.play.yaw, self.play.pitch, lens.vfov)
-        return self.course.world(self.play.excursion.world).renderer.rgb(camera, VIEW)
+        camera = dataclasses.replace(self.dataset.camera, height=VIEW[0], width=VIEW[1])
+        pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
+        return self.dataset.world(self.play.episode.world).renderer.rgb(pose, VIEW)
 
     def close(self) -> None:
-        for world in self.course.opened.values():
+        for world in self.dataset.opened.values():
             world.close()
-        self.course.opened.clear()
+        self.dataset.opened.clear()
 
-    def _told(self) -> dict[str, Any]:
+    def _facts(self) -> dict[str, Any]:
         play = self.play
         return {
             "success": 0.0,
@@ -198,18 +208,18 @@ class ContinuousGymEnv(LiveEnv):
         }
 
 
-def observation_space(course: Course) -> spaces.Dict:
-    whole: dict[str, spaces.Space[Any]] = {**pixel_spaces((course.lens.height, course.lens.width), course.sees)}
+def observation_space(dataset: EpisodeDataset) -> spaces.Dict:
+    whole: dict[str, spaces.Space[Any]] = {**pixel_spaces((dataset.camera.height, dataset.camera.width), dataset.sees)}
     whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
-    if course.kind == "objectnav":
+    if dataset.kind == "objectnav":
         whole["gps"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
         whole["compass"] = spaces.Box(-4.0, 4.0, (1,), np.float32)
     return spaces.Dict(whole)
 
 
 def make(kind: str, *, render_mode: str | None = None, **options: Any) -> ContinuousGymEnv:
-    """The environment; options as of `make_course`."""
-    return ContinuousGymEnv(make_course(kind, **options), render_mode=render_mode)
+    """The environment; options as of `open_episodes`."""
+    return ContinuousGymEnv(open_episodes(kind, **options), render_mode=render_mode)
 
 
 def make_vec(
@@ -224,18 +234,18 @@ def make_vec(
     """So many environments in this process that share houses and floors; arguments as of embodied.gym.in_step.make_vec.
 
     Raises:
-      ValueError: no such limit, and what `make_course` raises.
+      ValueError: no such limit, and what `open_episodes` raises.
     """
-    limit, course = checked_limit(max_episode_steps), make_course(kind, **options)
+    limit, dataset = checked_limit(max_episode_steps), open_episodes(kind, **options)
 
     def one() -> gym.Env[Any, Any]:
-        env = ContinuousGymEnv(course, render_mode=render_mode)
+        env = ContinuousGymEnv(dataset, render_mode=render_mode)
         return env if limit is None else gym.wrappers.TimeLimit(env, limit)
 
     return gym.vector.SyncVectorEnv([one] * num_envs)
 
 
-def make_course(
+def open_episodes(
     kind: str,
     *,
     data: str | Path | None = None,
@@ -248,7 +258,7 @@ def make_course(
     preset: str | None = None,
     sees: str | Sequence[str] = SEES,
     **changes: Any,
-) -> Course:
+) -> EpisodeDataset:
     """Houses and episodes: of a data set, of given worlds, or of one flat that is generated from `seed` and lit.
 
     Args:
@@ -260,29 +270,36 @@ def make_course(
       changes: fields of Body and Lens that differ from the preset's.
 
     Raises:
-      ValueError: an unknown preset or option, or episodes of houses that are not here.
+      ValueError: an unknown preset or option, or episodes of other houses or in another frame.
     """
-    body, lens = chosen(preset or kind, changes)
-    where, grounds = Path(cache) if cache else default_cache(), Grounds()
+    body, camera = chosen(preset or kind, changes)
+    where, navmeshes = Path(cache) if cache else default_cache(), NavMeshCache()
     given = worlds is not None
     if worlds is None:
         worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
     if episodes is not None:
         found = (read_vlnce if kind == "vlnce" else read_objectnav)(Path(episodes))
     elif kind == "objectnav":
-        found = [e for w in worlds.values() for e in object_excursions(w, OBJECTS, seed=seed, grounds=grounds)]
+        found = [e for w in worlds.values() for e in object_episodes(w, OBJECTS, seed=seed, navmeshes=navmeshes)]
     elif data is not None and not given:
         whole = Dataset(Path(data))
         if whole.kind != "vln":
             raise ValueError(f"{data} is a data set of {whole.kind!r}; VLNCE-v0 plays those of 'vln', or give episodes")
-        found = route_excursions(whole.tasks(split), worlds)
+        found = route_episodes(whole.tasks(split), worlds)
     else:
-        found = route_excursions(flat_playground("vln", seed, Asked(where, worlds)).tasks, worlds)
+        found = route_episodes(flat_playground("vln", seed, Asked(where, worlds)).tasks, worlds)
+    if episodes is not None:
+        for e in (e for e in found if e.world in worlds):
+            house = worlds[e.world].house
+            try:
+                check_on_floor(e, house, navmeshes.of(house), body.forward)
+            except ValueError as error:
+                raise ValueError(f"{episodes}: {error}") from error
     seen = (sees,) if isinstance(sees, str) else tuple(sees)
-    return Course(kind, dict(worlds), tuple(found), body, lens, seen, grounds)
+    return EpisodeDataset(kind, dict(worlds), tuple(found), body, camera, seen, navmeshes)
 
 
-def chosen(preset: str, changes: Mapping[str, Any]) -> tuple[Body, Lens]:
+def chosen(preset: str, changes: Mapping[str, Any]) -> tuple[Body, CameraConfig]:
     """A preset with some fields changed.
 
     Raises:
@@ -290,9 +307,9 @@ def chosen(preset: str, changes: Mapping[str, Any]) -> tuple[Body, Lens]:
     """
     if preset not in PRESETS:
         raise ValueError(f"preset is {preset!r}; use one of {sorted(PRESETS)}")
-    body, lens = PRESETS[preset]
-    names = [{f.name for f in dataclasses.fields(x)} for x in (body, lens)]
+    body, camera = PRESETS[preset]
+    names = [{f.name for f in dataclasses.fields(x)} for x in (body, camera)]
     if unknown := sorted(set(changes) - names[0] - names[1]):
         raise ValueError(f"unknown options {unknown}; expected some of {sorted(names[0] | names[1])}")
     mine = [{k: v for k, v in changes.items() if k in n} for n in names]
-    return dataclasses.replace(body, **mine[0]), dataclasses.replace(lens, **mine[1])
+    return dataclasses.replace(body, **mine[0]), dataclasses.replace(camera, **mine[1])

@@ -218,7 +218,7 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
         return whole
 
     def _seen(self) -> dict[str, Any]:
-        felt = [d.feel() for d in self._all]
+        felt = [d.proprioception() for d in self._all]
         found = {name: wp.array(np.stack([f[name] for f in felt]), device=self._device) for name in felt[0]}
         if self._renderer is not None:
             eyes = [d.camera() for d in self._all]

@@ -19,6 +19,7 @@ from embodied.geometry import wrap
 from embodied.gym.eyes import PIXELS, check_live, live_pixels
 from embodied.gym.spaces import codes_of
 from embodied.language.plain_language import with_article
+from embodied.metrics import weighted_by_path, within
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import Camera, camera_at
@@ -206,7 +207,7 @@ class Driving:
     def is_there(self) -> bool:
         """Whether it is where it should be, said or not."""
         if self.settings.task == "reach":
-            return bool(np.linalg.norm(self._goal - self.driver.position) <= self.settings.reached)
+            return within(float(np.linalg.norm(self._goal - self.driver.position)), self.settings.reached)
         return self._ways.metres[self._ground.cell_at(self.driver.position)] == 0.0
 
     @property
@@ -225,9 +226,9 @@ class Driving:
     def look(self) -> dict[str, np.ndarray]:
         """What the body knows: pixels, its motion, whether it touches something, and its goal."""
         s = self.settings
-        return {**live_pixels(self.world, self.camera(), (s.height, s.width), s.sees), **self.feel()}
+        return {**live_pixels(self.world, self.camera(), (s.height, s.width), s.sees), **self.proprioception()}
 
-    def feel(self) -> dict[str, np.ndarray]:
+    def proprioception(self) -> dict[str, np.ndarray]:
         """`look` with closed eyes."""
         found = {}
         found["motion"] = np.array(self.driver.motion, np.float32)
@@ -256,10 +257,9 @@ class Driving:
 
     def _facts(self, success: float) -> dict[str, float]:
         """SPL as (4.17), of metres (docs/sources.md, S125)."""
-        longer = max(self.metres, self.shortest)
         return {
             "success": success,
-            "spl": success * (self.shortest / longer if longer > 0 else 1.0),
+            "spl": weighted_by_path(success, self.shortest, self.metres),
             "collisions": float(len(self.collisions)),
             "metres": self.metres,
             "seconds": self.seconds,
@@ -301,7 +301,7 @@ class Driving:
                 yield np.flatnonzero(near)
 
 
-def guided(driving: Driving) -> np.ndarray:
+def expert_action(driving: Driving) -> np.ndarray:
     """The command of somebody who knows the house and the goal: along a wide way, and 'here' when it is."""
     way, here = driving.way(), driving.driver.position
     to = way[min(AHEAD, len(way) - 1)] - here

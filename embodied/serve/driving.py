@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from embodied.envs.continuous import Body, Grounds
+from embodied.envs.continuous import Body, NavMeshCache
 from embodied.errors import UnableError
 from embodied.interface import Place, Pose
 from embodied.render.camera import camera_at
@@ -42,7 +42,7 @@ Eye = tuple[str, float, float, float, float]
 class BrowserBody:
     """Where a body is in one episode. What it does follows from the order of its actions."""
 
-    def __init__(self, place: Place, pose: Pose, grounds: Grounds) -> None:
+    def __init__(self, place: Place, pose: Pose, grounds: NavMeshCache) -> None:
         """
         Raises:
           ValueError: a house of several storeys, whose stairs cannot be driven.

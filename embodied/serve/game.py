@@ -12,7 +12,7 @@ from typing import Any
 from embodied.action_spaces import PanoramicMoves
 from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError, HelpEnv
-from embodied.envs.continuous import Grounds
+from embodied.envs.continuous import NavMeshCache
 from embodied.interface import (
     Action,
     Agent,
@@ -60,7 +60,7 @@ class Table:
     make_env: Callable[[], tuple[HelpEnv, Relay]]
     agent: Agent | None
     assistant: Any
-    grounds: Grounds = field(default_factory=Grounds)
+    grounds: NavMeshCache = field(default_factory=NavMeshCache)
     """The floors to drive on."""
 
 

@@ -20,7 +20,7 @@ class DriveOptions(OfData, Cached):
     """The split whose houses are driven in."""
     drives: Count = 100
     """Drive N times, as often in each house."""
-    wander: Annotated[float, Option(not_negative, "SHARE")] = 0.0
+    action_noise: Annotated[float, Option(not_negative, "SHARE")] = 0.0
     """Share of the commands that are random; the stored command is always the expert's, as in DAgger."""
     pictures: Annotated[str | None, drawn_as(PICTURES)] = None
     """How houses are drawn (default: as the data set's pictures are)."""
@@ -38,7 +38,7 @@ def run_drives(args: DriveOptions) -> None:
     env = DriveForLeRobot(make(data=args.data, split=args.split, cache=args.cache, **seen))
     watch = functools.partial(bar, name="drives", unit="drive")
     seed = Dataset(args.data).config.seed
-    steps = export_drives(env, args.out, args.drives, seed=seed, wander=args.wander, watch=watch)
+    steps = export_drives(env, args.out, args.drives, seed=seed, action_noise=args.action_noise, watch=watch)
     env.close()
     facts = {"drives": args.drives, "steps": steps, "out": str(args.out)}
     show(args, facts, f"{args.drives} drives, {steps} steps in {args.out}")

@@ -21,7 +21,7 @@ class WalkOptions(OfData, Cached):
     """The split whose tasks are walked."""
     tasks: Count | None = None
     """Walk the first N tasks (default: all)."""
-    wander: Annotated[float, Option(not_negative, "SHARE")] = 0.0
+    action_noise: Annotated[float, Option(not_negative, "SHARE")] = 0.0
     """Share of the actions that are random; the stored action is always the expert's, as in DAgger."""
     width: Annotated[int | None, Option(video_side, "PIXELS")] = None
     """Width of the pictures (default: that of the program)."""
@@ -30,7 +30,7 @@ class WalkOptions(OfData, Cached):
 
 
 def run_walks(form: str, preset: str, args: WalkOptions) -> None:
-    from embodied.datasets.habitat import route_excursions
+    from embodied.datasets.habitat import route_episodes
     from embodied.datasets.store import dataset_of
     from embodied.datasets.vlnce import export_walks
     from embodied.gym.continuous import PRESETS
@@ -38,16 +38,16 @@ def run_walks(form: str, preset: str, args: WalkOptions) -> None:
     from embodied.locks import locked
 
     data = dataset_of(args.data, "vln")
-    body, lens = PRESETS[preset]
-    width = args.width or lens.width
-    lens = dataclasses.replace(lens, height=2 * round(lens.height * width / lens.width / 2), width=width)
+    body, camera = PRESETS[preset]
+    width = args.width or camera.width
+    camera = dataclasses.replace(camera, height=2 * round(camera.height * width / camera.width / 2), width=width)
     whole = form == "lerobot-vlnce"  # written under another name; the others are written file by file
     with contextlib.nullcontext() if whole else locked(args.out):
         worlds = data_worlds(args.data, args.split, args.cache, None)
-        walks = route_excursions(data.tasks(args.split), worlds)[: args.tasks]
-        how: dict[str, Any] = {"wander": args.wander, "split": args.split, "depth": args.depth}
+        walks = route_episodes(data.tasks(args.split), worlds)[: args.tasks]
+        how: dict[str, Any] = {"action_noise": args.action_noise, "split": args.split, "depth": args.depth}
         how["watch"] = functools.partial(bar, name="walks", unit="walk")
-        steps = export_walks(form, args.out, walks, worlds, seed=data.config.seed, body=body, lens=lens, **how)
+        steps = export_walks(form, args.out, walks, worlds, seed=data.config.seed, body=body, camera=camera, **how)
         for world in worlds.values():
             world.close()
     facts = {"walks": len(walks), "steps": steps, "out": str(args.out)}

@@ -76,8 +76,8 @@ class ContinuousForLeRobot(_ForLeRobot):
     """VLNCE-v0 or ObjectNav-v0 for LeRobot's policies; agent_pos is embodied.envs.continuous.POSITION."""
 
     def __init__(self, env: continuous.ContinuousGymEnv) -> None:
-        lens, body = env.course.lens, env.course.body
-        super().__init__(env, lens.height, lens.width, len(POSITION))
+        camera, body = env.dataset.camera, env.dataset.body
+        super().__init__(env, camera.height, camera.width, len(POSITION))
         self.action_space = spaces.Box(-1.0, 1.0, (body.actions,), np.float32)
         self._max_episode_steps = body.steps
 
@@ -89,13 +89,13 @@ class ContinuousForLeRobot(_ForLeRobot):
     @property
     def task(self) -> str:
         """The name of the task."""
-        return self.env.course.kind
+        return self.env.dataset.kind
 
     def _command(self, action: np.ndarray) -> int:
         return int(np.argmax(action))
 
     def _state(self, o: dict[str, Any]) -> np.ndarray:
-        return self.env.own_way()
+        return self.env.odometry()
 
 
 class DriveForLeRobot(_ForLeRobot):
@@ -162,9 +162,9 @@ def make_env(
     elif env == "Drive":
         envs = gym.vector.SyncVectorEnv([functools.partial(make_one, env, **options)] * n_envs)
     else:
-        course = continuous.make_course(env.lower(), **{"sees": ("rgb",)} | options)
+        dataset = continuous.open_episodes(env.lower(), **{"sees": ("rgb",)} | options)
         envs = gym.vector.SyncVectorEnv(
-            [lambda: ContinuousForLeRobot(continuous.ContinuousGymEnv(course, render_mode="rgb_array"))] * n_envs
+            [lambda: ContinuousForLeRobot(continuous.ContinuousGymEnv(dataset, render_mode="rgb_array"))] * n_envs
         )
     return {suite: {0: envs}}
 

@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
-from embodied.gym.driving import guided
+from embodied.gym.driving import expert_action
 from embodied.gym.lerobot import DriveForLeRobot
 from embodied.seeds import stream
 
@@ -42,21 +42,21 @@ def export_drives(
     drives: int,
     *,
     seed: int,
-    wander: float = 0.0,
+    action_noise: float = 0.0,
     watch: Callable[[Iterable[int]], Iterable[int]] = iter,
 ) -> int:
     """Play episodes, as many in each house, and write them; returns how many steps there are.
 
     Args:
       folder: new or empty.
-      wander: the share of commands, below 1, that are drawn instead; what is written stays the expert's.
+      action_noise: the share of commands, below 1, that are drawn instead; what is written stays the expert's.
       watch: goes through the numbers of the drives, as a progress bar does.
 
     Raises:
       ValueError: a folder with files, or an impossible share.
     """
-    if not 0 <= wander < 1:
-        raise ValueError(f"wander is a share from 0 to below 1, got {wander}")
+    if not 0 <= action_noise < 1:
+        raise ValueError(f"action_noise is a share from 0 to below 1, got {action_noise}")
     settings, names = env.env.driving.settings, sorted(env.env.driving.worlds)
     camera = RecordedCamera(settings.height, settings.width, settings.vfov)
     with whole_folder(folder) as draft:
@@ -65,7 +65,7 @@ def export_drives(
         for k in watch(range(drives)):
             name, rng = names[k * len(names) // drives], stream(seed, "drives", k)
             first, _ = env.reset(seed=int(rng.integers(2**31)), options={"world": name})
-            seen, labels, infos = zip(*_driven(env, first, wander, rng), strict=True)
+            seen, labels, infos = zip(*_driven(env, first, action_noise, rng), strict=True)
             rows = {"observation.state": np.stack([o["agent_pos"] for o in seen]), "action": np.stack(labels)}
             facts = {"embodied/task": f"{name}_{k}", "embodied/house": name, "embodied/agent": "expert"}
             words = [env.task_description] * len(seen)
@@ -75,13 +75,13 @@ def export_drives(
 
 
 def _driven(
-    env: DriveForLeRobot, seen: dict[str, Any], wander: float, rng: np.random.Generator
+    env: DriveForLeRobot, seen: dict[str, Any], action_noise: float, rng: np.random.Generator
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, dict[str, Any]]]:
     """What is seen before each command, what the expert commands there, and info after what is done."""
     held, drawn, ended = 0, np.zeros(len(COMMAND)), False
-    begin = wander / (HELD * (1 - wander))
+    begin = action_noise / (HELD * (1 - action_noise))
     while not ended:
-        label = guided(env.env.driving)
+        label = expert_action(env.env.driving)
         if not held and rng.random() < begin:
             held, drawn = HELD, rng.uniform(-1.0, 1.0, len(COMMAND))
         command = drawn if held else label
