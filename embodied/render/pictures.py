@@ -79,7 +79,12 @@ class Baked(_CubeFaces):
 
 @dataclass(frozen=True)
 class Traced(_CubeFaces):
-    """Ray-traced panoramas, from the viewpoints only."""
+    """Ray-traced panoramas, from the viewpoints only.
+
+    Examples:
+      >>> embodied.Traced(rays=16, reference=True).word
+      'reference'
+    """
 
     rays: int | None = None
     """Per pixel; as many as embodied.light.tracing.reference.RAYS has where None."""
