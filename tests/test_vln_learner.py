@@ -19,7 +19,7 @@ from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.training_data import Split
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
-from embodied.agents.vln.network import Said
+from embodied.agents.vln.network import FollowerOutputs
 from embodied.agents.vln.policy import VlnMoment, channels_of
 from embodied.agents.vln.run import VlnLearner, losses_of, mixed, teacher_share
 from embodied.agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
@@ -58,7 +58,7 @@ def walks(episodes):
 def test_losses_are_sums_over_steps_and_means_over_episodes():
     half = torch.tensor([[0.0, 0.0, -math.inf], [0.0, 0.0, 0.0]])
     rooms = torch.zeros(2, 3, 4)
-    said = Said(half, torch.tensor([0.5, 1.0]), rooms, torch.zeros(2, 3, 8))
+    said = FollowerOutputs(half, torch.tensor([0.5, 1.0]), rooms, torch.zeros(2, 3, 8))
     moment = VlnMoment(said, torch.tensor([1, 2]), torch.tensor([0.0, 1.0]), torch.tensor([[0, 1, IGNORE], [2, 3, 1]]))
     moves, left, near = losses_of([moment, moment], episodes=4)
     assert moves.item() == pytest.approx(2 * (math.log(2) + math.log(3)) / 4)

@@ -38,7 +38,7 @@ class AskerConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class AskEvaluation:
-    """Where all agents are evaluated: houses that nobody learned in."""
+    """The houses in which all agents are evaluated, that nobody learned in."""
 
     test_houses: int = 8
     """Houses to evaluate in, of 90 to 140 square metres."""

@@ -40,7 +40,7 @@ LABELLED = 0.5
 IMAGINED = 3
 """Things that one who doubts weighs at a time."""
 SLOW = 0.0003
-"""What a step is worth: of two ways that succeed alike, the shorter one."""
+"""The worth of a step: of two ways that succeed alike, the shorter one."""
 Choice = Intention | str
 """A question, 'go' or 'stop'."""
 CHOICES: tuple[Choice, ...] = (
@@ -68,7 +68,7 @@ def possible(o: Observation, trail: Mind) -> list[Choice]:
 
 
 def thinks(o: Observation, trail: Mind) -> bool:
-    """Whether this is a moment to decide; between them, and on a route, one goes on."""
+    """True if this is a moment to decide; between them, and on a route, one goes on."""
     return o.extras.advised is None and (reached(o) is not None or o.time % EVERY == 0)
 
 

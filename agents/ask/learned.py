@@ -133,12 +133,12 @@ def train(
     note: Callable[[str], None] = print,
 ) -> nn.Sequential:
     """Imitate the oracle in decisions of its own, then in those of the learner while it plays the rounds."""
-    found = [first]
+    recorded = [first]
     net = fit(first, config)
     for number, tasks in enumerate(rounds):
-        found.append(shown(make_env, tasks, LearnedAsker(net), seed=config.seed))
-        net = fit((np.concatenate([x for x, _ in found]), np.concatenate([v for _, v in found])), config)
-        note(f"round {number + 1} of {len(rounds)}: {sum(len(x) for x, _ in found)} decisions")
+        recorded.append(shown(make_env, tasks, LearnedAsker(net), seed=config.seed))
+        net = fit((np.concatenate([x for x, _ in recorded]), np.concatenate([v for _, v in recorded])), config)
+        note(f"round {number + 1} of {len(rounds)}: {sum(len(x) for x, _ in recorded)} decisions")
     return net
 
 

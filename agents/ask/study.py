@@ -181,7 +181,7 @@ def houses(name: str, seed: int, count: int, cache: Path) -> tuple[dict[str, Sto
 def training_decisions(
     count: int, tasks: int, rounds: int, round_tasks: int, cache: Path
 ) -> tuple[Decisions, list[list[Task]], Callable[[], HelpEnv]]:
-    """What all training seeds share: the oracle's own decisions, and the tasks of the further rounds."""
+    """Data that all training seeds share: the oracle's own decisions, and the tasks of the further rounds."""
     places, make_env, look = houses("ask_train", FIRST, count, cache)
     first = shown(make_env, ask_split(places, look, tasks, seed=FIRST, unseen=False), seed=0)
     further = [ask_split(places, look, round_tasks, seed=FIRST + 1 + k, unseen=False) for k in range(rounds)]

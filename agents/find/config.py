@@ -11,7 +11,7 @@ THINGS = (
     *("bed", "dining chair", "potted plant", "sofa", "television", "toilet"),
     *("bathtub", "cooker", "desk", "fridge", "wardrobe", "washing machine"),
 )
-"""What is looked for: the six categories of Habitat's ObjectNav challenge of 2022 and six more of its kind."""
+"""Classes that are looked for: the six categories of Habitat's ObjectNav challenge of 2022 and six more of its kind."""
 AGENTS = ("network", "detector")
 
 

@@ -1,4 +1,4 @@
-"""What an agent that looks for something thinks of a place: how good its ways are, and whether to stop there.
+"""Networks of an agent that looks for something: how good its ways are, and whether to stop there.
 
 N places, A ways of the one that has most, D size of a view's features, h hidden size, L words, C classes of things.
 """
@@ -31,7 +31,7 @@ AROUND = _around()
 
 
 READ = ("visible", "within reach", "leads there")
-"""What is read of each view for each class of things: whether one can be seen in it; whether one is there at which to
+"""Reading of each view for each class of things: whether one can be seen in it; whether one is there at which to
 stop; and whether the way in that view is the shortest to one."""
 OTHER = 8
 """Numbers of a view, and of a class, that mean whatever helps."""
@@ -124,5 +124,5 @@ class Explorer(SeekNetwork):
         """As SeekNetwork."""
         read = self.wanted(seen, request)[0]
         near = read[torch.arange(len(seen))[:, None, None], AROUND[views], 0].amax(2)
-        found = read[..., 1].amax(1) > self.bar
-        return F.logsigmoid(near), torch.where(found, 100.0, -100.0)
+        visible = read[..., 1].amax(1) > self.bar
+        return F.logsigmoid(near), torch.where(visible, 100.0, -100.0)

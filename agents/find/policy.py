@@ -34,7 +34,7 @@ CERTAIN = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """What was weighed once, and what a teacher thinks of it."""
+    """A decision with its options, and the teacher's label."""
 
     options: np.ndarray
     """(m, 2) int64 spots and ways."""
@@ -65,7 +65,7 @@ class Search:
     ends: list[tuple[int, ...]] = field(default_factory=list)
     """Node at the end of each way of each spot, as `nodes`."""
     right: list[tuple[bool, np.ndarray]] = field(default_factory=list)
-    """Whether stopping at each spot is right, and (n,) how likely each of its ways should be, as `nodes`."""
+    """Labels: whether stopping at each spot is right, and (n,) how likely each of its ways should be, as `nodes`."""
     decisions: list[Decision] = field(default_factory=list)
     """All so far, where a teacher watches."""
 
@@ -91,9 +91,9 @@ class FindPolicy:
     scorer: SeekNetwork
     vocabulary: Vocabulary
     bank: FeatureBank
-    """What the network sees."""
+    """Features for the network."""
     looks: FeatureBank
-    """What places are known again by."""
+    """Features by which places are recognised."""
     choose: Chooser = choose_greedily
 
     def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, dict[int, Search]]:
@@ -211,7 +211,7 @@ def padded(rows: Sequence[np.ndarray]) -> Tensor:
 
 
 def imitation_loss(scorer: SeekNetwork, searches: Sequence[Search]) -> tuple[Tensor, Tensor]:
-    """What is to be descended, and the share of decisions that the teacher would take too.
+    """The loss, and the share of decisions that the teacher would take too.
 
     The loss is the cross-entropy of all decisions with what the teacher wants, and, since decisions alone teach slowly,
     that of the ways of each spot among themselves and of stopping at it, each averaged.

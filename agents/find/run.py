@@ -56,17 +56,17 @@ SEEN_PIXELS = 12
 LOOKS = 64
 """Viewpoints whose views are read in one update."""
 BARS, PATIENCES = (-2.0, -1.0, 0.0, 1.0), (0.1, 0.3, 1.0)
-"""What the explorer's bar and patience are chosen from, in validation houses."""
+"""Values among which the explorer's bar and patience are chosen, in validation houses."""
 
 
 def tasks_in(places: Mapping[str, Place], per_house: int, things: Collection[str] = THINGS) -> list[Task]:
     """At most so many find tasks of each house, all for one of `things`."""
-    language, found = PlainLanguage(), []
+    language, fitting_tasks = PlainLanguage(), []
     for place in places.values():
         pool = find_pool(place, seed=0)
         fitting = [k for k, (c, _) in enumerate(pool.pairs) if pool.classes[c].object_class in things]
-        found += [find_task(pool, k, seed=0, language=language) for k in fitting[:per_house]]
-    return found
+        fitting_tasks += [find_task(pool, k, seed=0, language=language) for k in fitting[:per_house]]
+    return fitting_tasks
 
 
 def find_split(source: TrainingData, name: str, per_house: int, houses: int | None = None) -> Split:
@@ -174,7 +174,7 @@ def train_finder(source: TrainingData, config: FinderConfig, folder: Path, cache
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """What is true of all views of some houses: n viewpoints."""
+    """Labels of all views of some houses: n viewpoints."""
 
     seen: torch.Tensor
     """(n, 36, D) features."""

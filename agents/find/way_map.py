@@ -31,7 +31,7 @@ class Spot:
     """The spot at which each way ends; None for a way that was not tried."""
 
     def goes(self, ways: np.ndarray) -> bool:
-        """Whether its ways go in these directions."""
+        """True if its ways go in these directions."""
         if len(ways) != len(self.ways):
             return False
         return bool((np.abs(wrap(self.ways[:, None] - ways)).min(0) <= ALIKE).all())

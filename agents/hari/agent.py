@@ -21,7 +21,7 @@ REMEDY = "train it again with `embodied train hari`"
 
 @dataclass(frozen=True)
 class HariAbout:
-    """What stands beside the weights in a file."""
+    """Metadata beside the weights in a file."""
 
     names: tuple[str, ...]
     """The words that the policies know."""
@@ -96,21 +96,21 @@ def load_executor(path: Path) -> Executor:
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    tensors, told = load_weights(path, "hari", HariAbout, REMEDY)
-    executor = new_executor(told.execution, FeatureWords(told.names))
+    tensors, about = load_weights(path, "hari", HariAbout, REMEDY)
+    executor = new_executor(about.execution, FeatureWords(about.names))
     load_into(executor.network, _of("execution", tensors), path)
     executor.network.eval()
     return executor
 
 
 def load_agent(path: Path) -> HariAgent:
-    """What `save_agent` wrote.
+    """Load an agent that `save_agent` wrote.
 
     Raises:
       FileNotFoundError, ValueError: missing, damaged, of another format, or an execution policy alone.
     """
-    tensors, told = load_weights(path, "hari", HariAbout, REMEDY)
-    config = told.intention
+    tensors, about = load_weights(path, "hari", HariAbout, REMEDY)
+    config = about.intention
     if config is None:
         raise ValueError(
             f"{path} holds an execution policy alone; teach it to ask: "

@@ -78,7 +78,7 @@ class IntentionRun:
 
     @property
     def parts(self) -> dict[str, Stateful]:
-        """What is in its checkpoints."""
+        """The content of its checkpoints."""
         heads = {"actor": self.agent.actor, "critic": self.critic}
         return {**heads, "actor optimizer": self.actor_optimizer, "critic optimizer": self.critic_optimizer}
 

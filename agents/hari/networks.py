@@ -22,7 +22,7 @@ SHOWN = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Encoded:
+class EncodedDescriptions:
     """B descriptions as the encoder reads them."""
 
     rows: Tensor
@@ -30,16 +30,16 @@ class Encoded:
     present: Tensor
     """(B, M) bool: False for padding."""
 
-    def __getitem__(self, which: list[int]) -> Encoded:
+    def __getitem__(self, which: list[int]) -> EncodedDescriptions:
         """Those of some of the B."""
-        return Encoded(self.rows[which], self.present[which])
+        return EncodedDescriptions(self.rows[which], self.present[which])
 
-    def upto(self, width: int) -> Encoded:
+    def upto(self, width: int) -> EncodedDescriptions:
         """The same with no more than `width` rows, where the others are padding."""
-        return Encoded(self.rows[:, :width], self.present[:, :width])
+        return EncodedDescriptions(self.rows[:, :width], self.present[:, :width])
 
     @classmethod
-    def together(cls, alone: Sequence[Tensor]) -> Encoded:
+    def together(cls, alone: Sequence[Tensor]) -> EncodedDescriptions:
         """B tensors (m, h) of different lengths m, padded to the longest."""
         lengths = torch.tensor([len(r) for r in alone])
         rows = nn.utils.rnn.pad_sequence(list(alone), batch_first=True)
@@ -72,7 +72,7 @@ class ExecutionNetwork(nn.Module):
         self.roles = nn.Parameter(torch.randn(3, h) * h**-0.5)
         """Which of the three a row is: the belief, of d^s, of d^g."""
         self.shared = nn.Embedding(3, h)
-        """Whether a row's name, or all of it, stands in the other description, too (docs/sources.md, S80)."""
+        """True where a row's name, or all of it, stands in the other description, too (docs/sources.md, S80)."""
         nn.init.normal_(self.shared.weight, std=h**-0.5)
         self.first = nn.Parameter(torch.zeros(h))
         """b^s_0."""
@@ -85,7 +85,11 @@ class ExecutionNetwork(nn.Module):
         return self.first.expand(batch, -1)
 
     def forward(
-        self, before: Tensor, inputs: Inputs, state: Encoded | None = None, goal: Encoded | None = None
+        self,
+        before: Tensor,
+        inputs: Inputs,
+        state: EncodedDescriptions | None = None,
+        goal: EncodedDescriptions | None = None,
     ) -> tuple[Tensor, Tensor]:
         """One step.
 
@@ -114,10 +118,10 @@ class ExecutionNetwork(nn.Module):
         scores = torch.einsum("bh,bch->bc", self.query(belief), keys) / math.sqrt(keys.shape[-1])
         return belief, scores.masked_fill(~allowed, -torch.inf).log_softmax(-1)
 
-    def encode(self, rows: Tensor) -> Encoded:
+    def encode(self, rows: Tensor) -> EncodedDescriptions:
         """(B, M, 5) int64 of descriptions, each of one row or more -> what the encoder makes of them."""
         packing = Packing.of(rows[..., 1] != 0)
-        return Encoded(packing.pad(self.encoder(self.embed(packing.pack(rows)), packing)), packing.present)
+        return EncodedDescriptions(packing.pad(self.encoder(self.embed(packing.pack(rows)), packing)), packing.present)
 
     def embed(self, rows: Tensor) -> Tensor:
         """(..., 5) int64 -> (..., h): "sum all the embeddings into a single vector"."""

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from embodied.agents.hari.agent import Executor, HariAgent
-from embodied.agents.hari.networks import INTENTIONS, Encoded, RecurrentHead, shown_probabilities
+from embodied.agents.hari.networks import INTENTIONS, EncodedDescriptions, RecurrentHead, shown_probabilities
 from embodied.agents.hari.words import collate, percept_of_rows
 from embodied.interface import (
     Action,
@@ -61,17 +61,17 @@ class Reader:
 
     def __call__(self, what: str, description: Description) -> Reading:
         """A description of the 'state' or the 'goal'; describers give the same tuple for the same thing."""
-        found = self.read.get((what, id(description)))
-        if found is None:
+        reading = self.read.get((what, id(description)))
+        if reading is None:
             rows = self.executor.words.rows(description, what)
             encoded = self.executor.network.encode(torch.from_numpy(rows[None])).rows[0]
-            found = self.read[what, id(description)] = Reading(description, rows, encoded)
-        return found
+            reading = self.read[what, id(description)] = Reading(description, rows, encoded)
+        return reading
 
 
 @dataclass
 class Belief:
-    """What the execution policy carries along for B agents."""
+    """The recurrent state of the execution policy for B agents."""
 
     carried: Tensor
     """(B, h) b^s of the step before."""
@@ -81,7 +81,7 @@ class Belief:
 
 @dataclass(frozen=True, eq=False)
 class Considered:
-    """What the execution policy thinks of b agents at one step."""
+    """Outputs of the execution policy for b agents at one step."""
 
     rows: list[int]
     """Which of the B agents, those that have not ended."""
@@ -91,7 +91,7 @@ class Considered:
     """(b, C + 1) log-probabilities, stopping last."""
 
     def move(self, k: int) -> int:
-        """Where the k-th agent most probably goes, stopping aside."""
+        """The likeliest move of the k-th agent, stopping aside."""
         return int(self.log_moves[k, :-1].argmax())
 
     @property
@@ -114,7 +114,7 @@ def consider(reader: Reader, observations: Observations, memory: Belief | None) 
     goals = [reader("goal", o.extras.goal_descriptions[-1]) for o in seen]
     together = zip(states, goals, seen, strict=True)
     inputs = collate([percept_of_rows(words, s.rows, g.rows, o.candidates, o.turn) for s, g, o in together])
-    state, goal = (Encoded.together([r.encoded for r in some]) for some in (states, goals))
+    state, goal = (EncodedDescriptions.together([r.encoded for r in some]) for some in (states, goals))
     belief, log_moves = network(memory.carried[rows], inputs, state, goal)
     return Considered(rows, belief, log_moves), memory
 
@@ -147,8 +147,8 @@ def action_of(intention: int, move: int | None, thought: Thought | None = None) 
 
 
 @dataclass
-class Mind:
-    """What a learned agent carries along for B episodes."""
+class HariMemory:
+    """The recurrent state of a learned agent in B episodes."""
 
     belief: Belief
     actor: tuple[Tensor, Tensor]
@@ -182,12 +182,12 @@ class HariPolicy:
     sample: bool = True
     """Intentions are drawn from psi; False takes the likeliest. Open in the text: docs/sources.md, S78."""
     choices: list[Choice] | None = field(default=None, repr=False)
-    """Where each step is written down for training; None: nowhere."""
+    """The list that takes each step, for training; None: steps are not kept."""
 
     def __post_init__(self) -> None:
         self._reader = Reader(self.executor)
 
-    def act(self, observations: Observations, memory: Mind | None, *, rngs: Rngs) -> tuple[Actions, Mind]:
+    def act(self, observations: Observations, memory: HariMemory | None, *, rngs: Rngs) -> tuple[Actions, HariMemory]:
         """See embodied.interface.Policy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)
         return self._choose(observations, considered, {}, belief, memory, rngs)
@@ -198,10 +198,10 @@ class HariPolicy:
         considered: Considered,
         led: Mapping[int, int | None],
         belief: Belief,
-        memory: Mind | None,
+        memory: HariMemory | None,
         rngs: Rngs,
-    ) -> tuple[Actions, Mind]:
-        mind = memory or Mind(
+    ) -> tuple[Actions, HariMemory]:
+        mind = memory or HariMemory(
             belief, self.actor.begin(len(observations)), torch.zeros(len(observations), dtype=torch.long)
         )
         rows = considered.rows
@@ -231,7 +231,7 @@ class HariPolicy:
         index = torch.tensor(rows)
         actor = tuple(old.index_put((index,), new) for old, new in zip(mind.actor, after, strict=True))
         last = mind.last.index_put((index,), intentions + 1)
-        return actions, Mind(carry(considered, belief), (actor[0], actor[1]), last)
+        return actions, HariMemory(carry(considered, belief), (actor[0], actor[1]), last)
 
 
 @dataclass(eq=False)
@@ -239,8 +239,8 @@ class PerfectOnSubgoals(HariPolicy):
     """The skyline of Table 4.7: on a sub-goal, DO walks the shortest path to it, one node each, and stops there."""
 
     def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Mind | None, *, rngs: Rngs
-    ) -> tuple[Actions, Mind]:
+        self, observations: Observations, situations: Situations, memory: HariMemory | None, *, rngs: Rngs
+    ) -> tuple[Actions, HariMemory]:
         """See embodied.interface.PrivilegedPolicy."""
         considered, belief = consider(self._reader, observations, memory.belief if memory else None)
         led: dict[int, int | None] = {}

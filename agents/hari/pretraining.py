@@ -48,7 +48,7 @@ MAY_CHANGE = ("iterations", "cooldown", "checkpoint_minutes", "validate_every", 
 
 @dataclass(frozen=True, eq=False)
 class PretrainingData:
-    """Where pre-training takes place."""
+    """The data of pre-training."""
 
     places: Mapping[str, Place]
     describer: Describer
@@ -58,7 +58,7 @@ class PretrainingData:
 
 
 @dataclass
-class Walk:
+class ExecutionWalk:
     """One pre-training episode as it goes on."""
 
     task: Task
@@ -125,7 +125,7 @@ def guided_share(config: ExecutionConfig, update: int) -> float:
 
 
 def _play(
-    executor: Executor, source: PretrainingData, walks: Sequence[Walk], horizon: int, beta: float
+    executor: Executor, source: PretrainingData, walks: Sequence[ExecutionWalk], horizon: int, beta: float
 ) -> tuple[list[Tensor], list[Tensor]]:
     """Walk by the policy's own draws; per step (b,) cross-entropies against the shortest path, (b,) whether right.
 
@@ -142,11 +142,11 @@ def _play(
             break
         standing = [config.stay_fraction > 0 and walks[i].rng.random() < config.stay_fraction for i in alive]
         reach = [source.moves.at(walks[i].place, walks[i].pose) for i in alive]
-        told = [
+        descriptions = [
             describer.sparse(walks[i].place, walks[i].pose.node) if still else _thinned(describer, walks[i])
             for i, still in zip(alive, standing, strict=True)
         ]
-        batch = perceived(executor, [walks[i] for i in alive], told, [candidates for candidates, _ in reach])
+        batch = perceived(executor, [walks[i] for i in alive], descriptions, [candidates for candidates, _ in reach])
         new, log_moves = executor.network(beliefs[alive], batch, goal=goals[alive])  # (b, h), (b, C + 1)
         stop = log_moves.shape[1] - 1
         wanted = torch.tensor([_right(walks[i], poses, stop) for i, (_, poses) in zip(alive, reach, strict=True)])
@@ -161,40 +161,43 @@ def _play(
     return losses, right
 
 
-def _begin(source: PretrainingData, task: Task, rng: np.random.Generator) -> Walk:
+def _begin(source: PretrainingData, task: Task, rng: np.random.Generator) -> ExecutionWalk:
     """An episode with its goal described as in pre-training."""
     place, goal = source.places[task.world], task.goal_nodes[0]
     if not isinstance(task.goal, FindObject):
         raise TypeError(f"HARI's tasks ask for objects; task {task.id!r} asks for {task.goal}")
     described = source.describer.pretraining_goal(place, goal, task.start.node, task.goal.object_class, rng=rng)
-    return Walk(task, place, task.start, described, rng)
+    return ExecutionWalk(task, place, task.start, described, rng)
 
 
-def give_subgoal(walk: Walk, describer: Describer, longest: int = LONGEST) -> None:
+def give_subgoal(walk: ExecutionWalk, describer: Describer, longest: int = LONGEST) -> None:
     """Let the walk go no farther than to the sub-goal that the assistant would name where it is."""
     way, walk.goal = described_subgoal(describer, walk.place, walk.pose.node, walk.task.goal_nodes[0], longest)
     walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
 
 
 def perceived(
-    executor: Executor, walks: Sequence[Walk], told: Sequence[Description], candidates: Sequence[Candidates]
+    executor: Executor,
+    walks: Sequence[ExecutionWalk],
+    descriptions: Sequence[Description],
+    candidates: Sequence[Candidates],
 ) -> Inputs:
-    """What some walks are told of where they are."""
-    some = zip(walks, told, candidates, strict=True)
+    """State descriptions that some walks are given."""
+    some = zip(walks, descriptions, candidates, strict=True)
     return collate([percept(executor.words, d, w.goal, c, w.pose.turn) for w, d, c in some])
 
 
-def _thinned(describer: Describer, walk: Walk) -> Description:
+def _thinned(describer: Describer, walk: ExecutionWalk) -> Description:
     return dropped(describer.dense(walk.place, walk.pose.node), rng=walk.rng)
 
 
-def _right(walk: Walk, poses: Sequence[Pose], stop: int) -> int:
+def _right(walk: ExecutionWalk, poses: Sequence[Pose], stop: int) -> int:
     """Column of the shortest path's action."""
     action = shortest_action(walk.place.graph, walk.pose, walk.task.goal_nodes, tuple(p.node for p in poses))
     return action.candidate if isinstance(action, Move) else stop
 
 
-def _go(walk: Walk, column: int, poses: Sequence[Pose], stop: int) -> None:
+def _go(walk: ExecutionWalk, column: int, poses: Sequence[Pose], stop: int) -> None:
     if column == stop:
         walk.ended = True
     else:
@@ -212,7 +215,7 @@ def pretraining_success(executor: Executor, source: PretrainingData, tasks: Sequ
     return sum(w.ended and w.pose.node in w.task.goal_nodes for w in walks) / len(walks)
 
 
-def _play_greedily(executor: Executor, source: PretrainingData, walks: Sequence[Walk], horizon: int) -> None:
+def _play_greedily(executor: Executor, source: PretrainingData, walks: Sequence[ExecutionWalk], horizon: int) -> None:
     beliefs = executor.network.begin(len(walks)).clone()
     for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
@@ -220,8 +223,8 @@ def _play_greedily(executor: Executor, source: PretrainingData, walks: Sequence[
             return
         reach = [source.moves.at(walks[i].place, walks[i].pose) for i in alive]
         some = [walks[i] for i in alive]
-        told = [source.describer.dense(w.place, w.pose.node) for w in some]
-        batch = perceived(executor, some, told, [candidates for candidates, _ in reach])
+        descriptions = [source.describer.dense(w.place, w.pose.node) for w in some]
+        batch = perceived(executor, some, descriptions, [candidates for candidates, _ in reach])
         beliefs[alive], log_moves = executor.network(beliefs[alive], batch)
         for i, column, (_, poses) in zip(alive, log_moves.argmax(1).tolist(), reach, strict=True):
             _go(walks[i], column, poses, log_moves.shape[1] - 1)

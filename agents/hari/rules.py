@@ -17,14 +17,14 @@ CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]
 
 @dataclass(frozen=True, eq=False)
 class RuleMoment:
-    """What a rule may look at."""
+    """The facts that a rule may use."""
 
     taken: np.ndarray
     """(5,) int64: how often each intention was chosen in this episode."""
     described: bool
-    """Whether CUR was answered since the last move."""
+    """True if CUR was answered since the last move."""
     would_stop: bool
-    """Whether stopping is the execution policy's likeliest action."""
+    """True if stopping is the execution policy's likeliest action."""
     possible: np.ndarray
     """(5,) bool: what the environment allows."""
     budget: np.ndarray
@@ -113,7 +113,7 @@ RULES: Mapping[str, Rule] = {
 
 @dataclass
 class RuleMemory:
-    """What a rule's agent remembers of B episodes."""
+    """Memory of a rule's agent in B episodes."""
 
     belief: Belief
     taken: np.ndarray

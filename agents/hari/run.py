@@ -1,4 +1,4 @@
-"""What the commands of HARI do: a data set becomes training data and task sets, and these agents."""
+"""The steps of HARI's commands: a data set becomes training data and task sets, and these agents."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from embodied.identity import identity_of
 from embodied.interface import Place
 
 CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
-"""What validation and test splits are named by, after 'val_' and 'test_' (4.3.5)."""
+"""Names of validation and test splits, after 'val_' and 'test_' (4.3.5)."""
 
 
 def rules_of(config: IntentionConfig) -> HariRules:

@@ -92,7 +92,7 @@ class HariStudy(EpisodeStudy):
 
     execution: ExecutionConfig
     config: IntentionConfig
-    """Where the rows start from."""
+    """The policy that all rows begin with."""
     executor: Path | None = None
     """A trained execution policy; None trains one in the study's folder."""
     eval_data: Path | None = None
@@ -106,12 +106,12 @@ class HariStudy(EpisodeStudy):
     def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution come beside those of the tests; elsewhere, houses may all be unknown."""
         known = self.judged_in({}).lessons == dataset_of(self.data, "hari").lessons
-        ood, found = self.judged_in({}).ood, {}
+        ood, tables = self.judged_in({}).ood, {}
         for name, table in TABLES.items():
             splits = [s for s in table.splits if known or s.endswith("_env")]
             splits += ood if table.splits == TEST else ()
-            found[name] = dataclasses.replace(table, splits=tuple(splits))
-        return found
+            tables[name] = dataclasses.replace(table, splits=tuple(splits))
+        return tables
 
     def settings(self, train: Mapping[str, Any], seed: int) -> IntentionConfig:
         return dataclasses.replace(self.config, seed=seed, **train)
@@ -160,13 +160,13 @@ class HariStudy(EpisodeStudy):
         """The execution policy that intention policies use."""
         if self.executor is not None:
             return self.executor
-        mine = identity_of(settings=self.execution, data=dataset_of(self.data, "hari").digest)
-        return folder / f"execution_{key_of(mine)}" / "best.safetensors"
+        identity = identity_of(settings=self.execution, data=dataset_of(self.data, "hari").digest)
+        return folder / f"execution_{key_of(identity)}" / "best.safetensors"
 
 
 def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, Samples]:
     """'cur at 3': the share of the episodes that run at time step 3 that choose CUR; of each intention and step."""
-    found: dict[str, tuple[list[float], list[float]]] = {}
+    totals: dict[str, tuple[list[float], list[float]]] = {}
     for episode in episodes:
         chosen = [
             s.action.intention.value if isinstance(s.action, Ask) else "do" if isinstance(s.action, Move) else "done"
@@ -174,8 +174,8 @@ def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, S
         ]
         for t in range(horizon):
             for name in INTENTIONS:
-                some, all_ = found.setdefault(f"{name} at {t + 1}", ([], []))
+                some, all_ = totals.setdefault(f"{name} at {t + 1}", ([], []))
                 some.append(float(t < len(chosen) and chosen[t] == name))
                 all_.append(float(t < len(chosen)))
     houses = tuple(e.task.world for e in episodes)
-    return {name: Samples(tuple(some), houses, tuple(all_)) for name, (some, all_) in found.items()}
+    return {name: Samples(tuple(some), houses, tuple(all_)) for name, (some, all_) in totals.items()}

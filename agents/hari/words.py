@@ -83,7 +83,7 @@ def move_angles(candidates: Candidates, turn: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class PerceptRows:
-    """What one agent has before it, or B agents side by side, whose padding rows are zeros."""
+    """The descriptions of one agent, or B agents side by side, whose padding rows are zeros."""
 
     state: np.ndarray
     """(S, 5) or (B, S, 5) int64: d^s."""
@@ -99,7 +99,7 @@ class PerceptRows:
 
 @dataclass(frozen=True, eq=False)
 class Inputs(PerceptRows):
-    """What the execution policy reads of B agents at one step."""
+    """Inputs of the execution policy for B agents at one step."""
 
     state_shared: np.ndarray
     """(B, S) int64: 1 where a feature set's name stands in the other description, too, 2 where the whole set does."""

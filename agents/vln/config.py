@@ -20,7 +20,7 @@ from embodied.agents.common.settings import (
 MEASURES = ("success", "spl", "nDTW", "SDTW", "navigation error")
 """Columns of tables."""
 FORCING = ("teacher", "student", "dagger")
-"""Whose actions an episode of training takes: the teacher's; the follower's own, sampled; or at first the teacher's,
+"""Who acts in an episode of training: the teacher's; the follower's own, sampled; or at first the teacher's,
 then more and more its own (Ross et al. 2011). The label is always the teacher's."""
 
 
@@ -33,7 +33,7 @@ class FollowerSettings(ImitationSettings):
     dropout: float = 0.2
     """Dropout rate in training."""
     forcing: str = "dagger"
-    """Whose actions are executed in training: 'teacher', 'student' or 'dagger'."""
+    """Who acts in training: 'teacher', 'student' or 'dagger'."""
     blind: bool = False
     """Ablation without vision: all features are zero."""
     wordless: bool = False
@@ -47,7 +47,7 @@ class FollowerSettings(ImitationSettings):
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
     speakers: str = EVERYBODY
-    """Whose instructions are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
+    """Speakers of the training instructions: 'everybody', or 'familiar' to hear some people only when evaluated."""
     least_teacher: float = 0.0
     """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
     iterations: int = 20_000

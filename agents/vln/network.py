@@ -25,8 +25,8 @@ COPIES = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """What B agents see in one step."""
+class FollowerViews:
+    """The views of B agents in one step."""
 
     views: Tensor
     """(B, 36, D + 4 COPIES) features and directions, relative to where they look, of all views."""
@@ -37,7 +37,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Heard(Rows):
+class FollowerState(Rows):
     """The instructions of B agents, read, and what they remember of the way."""
 
     words: Tensor
@@ -54,8 +54,8 @@ class Heard(Rows):
 
 
 @dataclass(frozen=True, eq=False)
-class Said:
-    """What the network says in one step."""
+class FollowerOutputs:
+    """Outputs of the network in one step."""
 
     moves: Tensor
     """(B, A) logits, -inf where there is no action."""
@@ -83,7 +83,7 @@ class FollowerNetwork(nn.Module):
         self.drawn = nn.Parameter(torch.ones(()))
         self.want, self.stop, self.left = nn.Linear(h, h), nn.Linear(h, 1), nn.Linear(h, 1)
 
-    def begin(self, numbers: Tensor) -> Heard:
+    def begin(self, numbers: Tensor) -> FollowerState:
         """Read (B, L) int64 words; 0 is padding."""
         mask = numbers != 0
         packed = nn.utils.rnn.pack_padded_sequence(
@@ -92,10 +92,10 @@ class FollowerNetwork(nn.Module):
         read, (last, _) = self.read(packed)
         words = self.dropout(nn.utils.rnn.pad_packed_sequence(read, batch_first=True)[0])
         hidden, cell = torch.tanh(self.begins(last.transpose(0, 1).flatten(1))).chunk(2, -1)
-        return Heard(words, mask, hidden, cell, hidden, torch.zeros_like(hidden))
+        return FollowerState(words, mask, hidden, cell, hidden, torch.zeros_like(hidden))
 
-    def forward(self, heard: Heard, seen: Seen) -> tuple[Said, Heard]:
-        """What is said of one step, and what is remembered; `taken` is the caller's to fill in."""
+    def forward(self, heard: FollowerState, seen: FollowerViews) -> tuple[FollowerOutputs, FollowerState]:
+        """Outputs of one step, and the next state; `taken` is the caller's to fill in."""
         around = self.enter(self.look(heard.meant, seen.views))
         hidden, cell = self.act(self.dropout(torch.cat([heard.taken, around], -1)), (heard.hidden, heard.cell))
         left = self.left(hidden)[:, 0].sigmoid()
@@ -107,8 +107,8 @@ class FollowerNetwork(nn.Module):
         tokens = self.enter(torch.cat([here, seen.actions], 1))  # (B, A, h)
         scores = torch.einsum("bah,bh->ba", self.dropout(tokens), self.want(meant)) / tokens.shape[-1] ** 0.5
         moves = torch.cat([scores[:, :1] + self.stop(meant), scores[:, 1:]], 1).masked_fill(~seen.mask, -torch.inf)
-        said = Said(moves, left, self.room(tokens), tokens)
-        return said, dataclasses.replace(heard, hidden=hidden, cell=cell, meant=meant)
+        outputs = FollowerOutputs(moves, left, self.room(tokens), tokens)
+        return outputs, dataclasses.replace(heard, hidden=hidden, cell=cell, meant=meant)
 
     def near(self, mask: Tensor, left: Tensor) -> Tensor:
         """(B, L) by how much attention is drawn to the words that are as far from the end as the agent is."""

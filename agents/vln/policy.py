@@ -16,7 +16,7 @@ from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.percept import action_index, candidate_rows, orientation
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vln.network import COPIES, FollowerNetwork, Heard, Said, Seen
+from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerState, FollowerViews
 from embodied.assets.records import ROOM_KINDS
 from embodied.geometry import wrap
 from embodied.interface import (
@@ -38,14 +38,14 @@ from embodied.teachers.shortest import shortest_of
 SPOKEN = "_spoken_"
 """In the ids of tasks that a speaker worded."""
 Guided = Callable[[Situation, np.random.Generator], bool]
-"""Whether the teacher acts in the follower's place."""
+"""True where the teacher acts in the follower's place."""
 
 
 @dataclass(frozen=True, eq=False)
 class VlnMoment:
-    """What the network said in one step of the k episodes that still run, and what is the case."""
+    """Outputs of the network in one step of the k episodes that still run, and the truth."""
 
-    said: Said
+    said: FollowerOutputs
     moves: Tensor
     """(k,) int64, the teacher's action; 0 is stop."""
     left: Tensor
@@ -56,9 +56,9 @@ class VlnMoment:
 
 @dataclass(frozen=True, eq=False)
 class VlnMemory(RunningRows):
-    """What the policy carries between steps; rows belong to the episodes that still run."""
+    """The policy's state between steps; rows belong to the episodes that still run."""
 
-    heard: Heard
+    heard: FollowerState
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class VlnPolicy:
     choose: Chooser = choose_greedily
     instruction_length: int = 80
     wordless: bool = False
-    """Whether the instruction is empty to it."""
+    """True if the instruction is empty to it."""
     environment_dropout: float = 0.0
     """Share of feature channels that an episode does not see at all (Tan et al. 2019). For training."""
 
@@ -102,21 +102,21 @@ class VlnPolicy:
             return actions, memory.keep(positions)
         with torch.set_grad_enabled(situations is not None and torch.is_grad_enabled()):
             memory = self._begin(positions, seen, situations) if memory is None else memory.keep(positions)
-            said, heard = self.network(memory.heard, self._look(seen, memory.channels))
-            chances = said.moves.detach().softmax(-1).cpu().numpy()  # (k, A)
+            outputs, heard = self.network(memory.heard, self._look(seen, memory.channels))
+            chances = outputs.moves.detach().softmax(-1).cpu().numpy()  # (k, A)
             numbers = [
                 self.choose(chance[: 1 + len(o.candidates)], rngs[p])
                 for chance, o, p in zip(chances, seen, positions, strict=True)
             ]
             if situations is not None:
                 now = [s for p in positions if (s := situations[p]) is not None]
-                moment = _moment(said, now)
+                moment = _moment(outputs, now)
                 memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
                 if guided is not None:
                     labels = moment.moves.tolist()
                     drawn = zip(numbers, labels, now, positions, strict=True)
                     numbers = [wanted if guided(s, rngs[p]) else own for own, wanted, s, p in drawn]
-            taken = said.tokens[torch.arange(len(seen)), torch.tensor(numbers)]
+            taken = outputs.tokens[torch.arange(len(seen)), torch.tensor(numbers)]
         for position, number, chance, o in zip(positions, numbers, chances, seen, strict=True):
             thought = Thought(np.append(chance[1 : 1 + len(o.candidates)], chance[0]))
             actions[position] = Stop(thought) if number == 0 else Move(number - 1, thought)
@@ -138,14 +138,14 @@ class VlnPolicy:
             channels = channels.to(device)
         return VlnMemory(positions=positions, heard=self.network.begin(words), channels=channels)
 
-    def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> Seen:
+    def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> FollowerViews:
         views = self.bank.gather([o.sight for o in seen])  # (k, 36, D)
         views = views if channels is None else views * channels[:, None]
         view, angles, mask = candidate_rows(seen)
         yaws = wrap(VIEW_YAWS - np.array([o.turn for o in seen])[:, None] * (np.pi / 6)).astype(np.float32)
         pitches = np.broadcast_to(VIEW_PITCHES.astype(np.float32), yaws.shape)
         towards = views[torch.arange(len(seen))[:, None], torch.from_numpy(view[:, 1:])]
-        return Seen(
+        return FollowerViews(
             torch.cat([views, _directions(views, yaws, pitches)], -1),
             torch.cat([towards, _directions(views, *angles[:, :, 1:])], -1),
             torch.from_numpy(mask).to(views.device),
@@ -175,10 +175,10 @@ def _directions(like: Tensor, yaws: np.ndarray, pitches: np.ndarray) -> Tensor:
     return orientation(torch.tensor(yaws, device=like.device), torch.tensor(pitches, device=like.device), COPIES)
 
 
-def _moment(said: Said, situations: Sequence[Situation]) -> VlnMoment:
-    device = said.moves.device
+def _moment(outputs: FollowerOutputs, situations: Sequence[Situation]) -> VlnMoment:
+    device = outputs.moves.device
     moves, left = [], []
-    rooms = torch.full(said.moves.shape, IGNORE)
+    rooms = torch.full(outputs.moves.shape, IGNORE)
     for row, s in enumerate(situations):
         graph, house, goal = s.world.graph, s.world.house, s.targets
         moves.append(action_index(shortest_of(s)))
@@ -186,4 +186,4 @@ def _moment(said: Said, situations: Sequence[Situation]) -> VlnMoment:
         left.append(min(1.0, rest / max(whole, 1e-6)))
         for k, node in enumerate((s.pose.node, *s.candidate_nodes)):
             rooms[row, k] = ROOM_KINDS.index(house.room_by_id[str(graph.room_of_node[node])].kind)
-    return VlnMoment(said, torch.tensor(moves, device=device), torch.tensor(left, device=device), rooms.to(device))
+    return VlnMoment(outputs, torch.tensor(moves, device=device), torch.tensor(left, device=device), rooms.to(device))

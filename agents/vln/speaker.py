@@ -50,7 +50,7 @@ BATCH = 64
 
 @dataclass(frozen=True)
 class SpeakerAbout:
-    """What stands beside the weights in a speaker's file."""
+    """Metadata beside the weights in a speaker's file."""
 
     config: SpeakerSettings
     encoder: str
@@ -60,12 +60,12 @@ class SpeakerAbout:
 
 
 @dataclass(frozen=True, eq=False)
-class Speaker:
+class InstructionSpeaker:
     network: WalkDescriber
     about: SpeakerAbout
 
     def eyes(self, places: dict[str, Place], bank: FeatureBank) -> NavEyes:
-        """What it sees in some houses.
+        """The features of some houses.
 
         Raises:
           ValueError: features of another encoder.
@@ -74,16 +74,16 @@ class Speaker:
         return NavEyes(places, bank, Vocabulary(self.about.words))
 
 
-def new_speaker(about: SpeakerAbout) -> Speaker:
+def new_speaker(about: SpeakerAbout) -> InstructionSpeaker:
     """An untrained speaker; its weights follow from the seed."""
     c = about.config
     with seeded(int(stream(c.seed, "speaker", "begin").integers(2**31))):
         seen = about.feature_size + 4 * COPIES
         network = WalkDescriber(len(about.words), c.hidden_size, c.heads, seen, HORIZON)
-    return Speaker(network, about)
+    return InstructionSpeaker(network, about)
 
 
-def load_speaker(path: Path) -> Speaker:
+def load_speaker(path: Path) -> InstructionSpeaker:
     """
     Raises:
       FileNotFoundError, OSError.
@@ -133,7 +133,7 @@ def _path(task: Task) -> tuple[int, ...]:
 
 
 def _scored(
-    speaker: Speaker, eyes: NavEyes, tasks: Sequence[Task], paths: Sequence[Sequence[int]]
+    speaker: InstructionSpeaker, eyes: NavEyes, tasks: Sequence[Task], paths: Sequence[Sequence[int]]
 ) -> tuple[Tensor, Tensor]:
     """(B, W) log L0 of each word of the tasks' requests, given walks along `paths`, and the words."""
     trips = [Trip(t.world, t.start, tuple(p), (t.request,)) for t, p in zip(tasks, paths, strict=True)]
@@ -147,7 +147,7 @@ def reranked(
     split: SplitData,
     tasks: Sequence[Task],
     follower: VlnAgent,
-    speaker: Speaker,
+    speaker: InstructionSpeaker,
     bank: FeatureBank,
     *,
     candidates: int,
@@ -178,7 +178,7 @@ def reranked(
 
 
 @torch.no_grad()
-def spoken_tasks(speaker: Speaker, training: Split, dropout: float, *, seed: int) -> list[Task]:
+def spoken_tasks(speaker: InstructionSpeaker, training: Split, dropout: float, *, seed: int) -> list[Task]:
     """Every path of 4 to 6 edges between random nodes, as many in each house as it has tasks, in the speaker's words:
     what it says of a house of which it sees only some channels, those that a follower will see (`channels_of`)."""
     tasks: list[Task] = []

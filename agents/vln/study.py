@@ -101,12 +101,12 @@ class VlnStudy(SightedStudy):
             return super().judge(weights, row, split, seed, folder, keep)
         source, speaker, agent = self.training_data(), load_speaker(_file(folder)), self.load(weights)
         whole, bank = source.data.split(split), source.split(split).bank
-        tasks, found = spread(whole.tasks, self.tasks), []
+        tasks, played = spread(whole.tasks, self.tasks), []
         for k in self.eval_seeds:
             episodes = reranked(whole, tasks, agent, speaker, bank, candidates=CANDIDATES, seed=k)
             save_lines(keep.with_name(f"{keep.name}_{k}.jsonl"), episodes)
-            found += episodes
-        return self.count(found, whole, row.judge)
+            played += episodes
+        return self.count(played, whole, row.judge)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         about = super().judged(row, split)

@@ -58,5 +58,5 @@ class VnlaAgent(SightedAgent):
 
 
 def rules_of(config: VnlaSettings) -> AskRules:
-    """What its asking teacher goes by."""
+    """The facts that its asking teacher uses."""
     return AskRules(only=ASK_RULES[config.ask_rules])

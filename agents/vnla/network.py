@@ -48,8 +48,8 @@ class ReadText(Rows):
         if len(rows) == len(self.mask):
             return other
         longest = max(self.mask.shape[1], other.mask.shape[1])
-        mine, new = self._padded(longest), other._padded(longest)
-        return mine._each(lambda a, b: a.index_copy(0, rows, b), new)
+        padded, new = self._padded(longest), other._padded(longest)
+        return padded._each(lambda a, b: a.index_copy(0, rows, b), new)
 
     def _padded(self, length: int) -> ReadText:
         more = length - self.mask.shape[1]

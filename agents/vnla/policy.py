@@ -52,7 +52,7 @@ from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 
 @dataclass(frozen=True, eq=False)
 class VnlaMoment:
-    """What the networks said in one call, for the episodes that were asked, and what the teacher said of it."""
+    """Outputs of the networks in one call, for the episodes that were asked, and the teacher's labels."""
 
     asks: Tensor
     """(m, 2) logits of the episodes that could ask."""
@@ -66,7 +66,7 @@ class VnlaMoment:
 
 @dataclass(frozen=True, eq=False)
 class VnlaMemory(RunningRows):
-    """What the policy carries between steps; rows belong to the episodes that still run."""
+    """The policy's state between steps; rows belong to the episodes that still run."""
 
     state: DecoderState
     text: ReadText
@@ -75,7 +75,7 @@ class VnlaMemory(RunningRows):
     previous_ask: Tensor
     """(k,) int64."""
     before: tuple[Observation | None, ...]
-    """What each saw when it acted last, to know what was carried out; None before, and after asking."""
+    """The last view of each, from which the executed action is inferred; None before, and after asking."""
     times: tuple[frozenset[int], ...]
     """When the asker 'random' asks."""
 
@@ -107,7 +107,7 @@ class VnlaPolicy:
     def wants(
         self, position: int, observation: Observation, thought: Thought, times: frozenset[int], rng: np.random.Generator
     ) -> bool:
-        """Whether to ask now, where that is possible."""
+        """True to ask now, where that is possible."""
         if self.asker == "learned":
             return (thought.asks or {})["help"] > self.ask_threshold
         return self.asker == "first"
@@ -152,8 +152,8 @@ class VnlaPolicy:
         chances = moves.detach().softmax(-1).cpu().numpy()  # (n, 6)
         for chance, row in zip(chances, acting, strict=True):
             place = positions[row]
-            said = thoughts[row].asks if row in thoughts else None
-            number, thought = self.choose(chance, rngs[place]), Thought(chance, said)
+            asked = thoughts[row].asks if row in thoughts else None
+            number, thought = self.choose(chance, rngs[place]), Thought(chance, asked)
             actions[place] = Stop(thought) if number == STOP else Move(number, thought)
         if teacher is not None:
             moment = _moment(teacher, now, thoughts, asks, able, moves, acting)
@@ -237,8 +237,8 @@ class VnlaPolicy:
         index = torch.tensor(rows, device=device)
         acts = torch.zeros(len(seen), dtype=torch.bool, device=device).index_fill(0, index, True)
         just_asked = [b is None and not o.can_ask for b, o in zip(memory.before, seen, strict=True)]
-        told = torch.tensor(just_asked, device=device) & (percept.previous_ask == ASK)
-        asked = torch.where(acts, torch.where(told, ASK, DONT), percept.previous_ask)
+        just_told = torch.tensor(just_asked, device=device) & (percept.previous_ask == ASK)
+        asked = torch.where(acts, torch.where(just_told, ASK, DONT), percept.previous_ask)
         now = dataclasses.replace(percept, previous_ask=asked)
         moves, state, text = self.network.navigate(now, memory.state, memory.text)  # who asks acts later: not kept
         if len(rows) < len(seen):
@@ -255,7 +255,7 @@ class SupervisedVnla:
     policy: VnlaPolicy
     rules: AskRules = AskRules()
     teacher: VnlaTeacher | None = None
-    """Whose labels are kept: for training."""
+    """The teacher whose labels are kept, for training."""
     forced: bool = False
     """The learned asker asks when the teacher would, as in training."""
 
@@ -313,7 +313,7 @@ def _moment(
     moves: Tensor,
     acting: Sequence[int],
 ) -> VnlaMoment:
-    """What was said, beside what the teacher says: whether to ask by the first pass, where to go by the second."""
+    """Decisions beside the teacher's: whether to ask by the first pass, where to go by the second."""
     there = [s for s in situations if s is not None]
     assert len(there) == len(situations), "a teacher sees situations"
     wished = [int(ask_reason(there[row], thoughts[row], teacher.rules) is not None) for row in able]

@@ -77,10 +77,10 @@ def vocabulary_of(data: Dataset, houses: int | None = None, reword: Callable[[st
     """Words of the requests in the training split's first `houses` houses, and of all that the advisor can say."""
     names = data.names("train")[:houses]
     requests = [t.request for t in data.tasks("train") if t.world in names]
-    said = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
-    heard = [*requests, *said, *(s.text for s in data.utterances(names))]
+    answers = [PlainLanguage().subgoal([w] * n + ["stop"]) for w in WORDS for n in range(1, HELP_STEPS + 1)]
+    heard = [*requests, *answers, *(s.text for s in data.utterances(names))]
     if reword:  # advice is said before a request
-        heard += [f"{s} . {r}" for s, r in zip(itertools.cycle(said), requests)]
+        heard += [f"{s} . {r}" for s, r in zip(itertools.cycle(answers), requests)]
     return build_vocabulary(heard, reword=reword)
 
 

@@ -20,7 +20,7 @@ from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.world import MOVES, NavWalk, Trip, share_left, walk_along, without_loops
 from embodied.agents.iliad.protocol import ExecutionScores
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vln.network import COPIES, FollowerNetwork, Said, Seen
+from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerViews
 from embodied.assets.records import ROOM_KINDS
 from embodied.geometry import wrap
 from embodied.interface import TURNS, VIEW_PITCHES, VIEW_YAWS, Place, Pose, Sight
@@ -81,7 +81,7 @@ class NavEyes:
             known[key] = self._look(world, pose)
         return known[key]
 
-    def see(self, tracks: Sequence[Track], channels: Tensor | None = None) -> Seen:
+    def see(self, tracks: Sequence[Track], channels: Tensor | None = None) -> FollowerViews:
         """The views of agents where they are.
 
         Args:
@@ -97,7 +97,7 @@ class NavEyes:
         if channels is not None:
             shown = F.pad(channels, (0, 4 * COPIES), value=1.0)[:, None]
             views, actions = views * shown, actions * shown
-        return Seen(views, actions, mask)
+        return FollowerViews(views, actions, mask)
 
     def _look(self, world: str, pose: Pose) -> Ways:
         moves: PanoramicMoves = self._moves  # type: ignore[attr-defined]
@@ -168,7 +168,7 @@ class NavStudent:
         mask = torch.zeros(len(tasks), steps, dtype=torch.bool).index_put(at, torch.tensor(True))
         return ExecutionScores(log_probabilities, entropies, mask, besides)
 
-    def _besides(self, outputs: Said, tracks: Sequence[Track], ends: Sequence[int]) -> Tensor:
+    def _besides(self, outputs: FollowerOutputs, tracks: Sequence[Track], ends: Sequence[int]) -> Tensor:
         """(k,) losses of the guesses which share of the way to `ends` is left, and what kinds of rooms are near."""
         c = self.config
         left = [share_left(self.eyes.places[k.world].graph, k.nodes, end) for k, end in zip(tracks, ends)]
