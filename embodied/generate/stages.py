@@ -257,7 +257,7 @@ def generate_house(
     """
     seed, catalogue = checked_seed(seed), (catalogue or load_catalogue()).furnishing
     best: tuple[int, House] | None = None
-    tried: set[object] = set()
+    tried: list[object] = []
     for attempt in range(RETRIES.house):
         draft = Draft(seed, config, catalogue, attempt=attempt)
         try:
@@ -272,7 +272,7 @@ def generate_house(
             best = len(short), house
         if not short or not house.placements or (draft.plan, short) in tried:
             break
-        tried.add((draft.plan, short))
+        tried.append((draft.plan, short))
     if best is None:
         raise dead_end
     return best[1]
