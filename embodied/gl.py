@@ -40,7 +40,7 @@ ELSEWHERE = (
     "0",
 )
 """Values of MUJOCO_GL that mujoco can be imported with, though nothing is drawn off-screen through them."""
-REMEDY = (
+GL_REMEDY = (
     "Install EGL and Mesa's software OpenGL (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri libopengl0), "
     "or, without root on Linux x86-64, run: embodied doctor --fix"
 )
@@ -116,7 +116,7 @@ def _first_available() -> str:
         return "egl"
     if ctypes.util.find_library("OSMesa") or software.bundled("OSMesa"):
         return "osmesa"
-    raise GLError(f"neither EGL nor OSMesa works here. {REMEDY}")
+    raise GLError(f"neither EGL nor OSMesa works here. {GL_REMEDY}")
 
 
 def _egl_works() -> bool:
@@ -226,11 +226,11 @@ def _create(backend: str) -> Any:
             from mujoco.osmesa import GLContext
         from OpenGL.error import Error
     except (ImportError, AttributeError, OSError) as e:
-        raise GLError(f"cannot load OpenGL through {backend} ({e}). {REMEDY}") from e
+        raise GLError(f"cannot load OpenGL through {backend} ({e}). {GL_REMEDY}") from e
     try:
         return GLContext(64, 64)
     except (ImportError, RuntimeError, AttributeError, OSError, Error) as e:
-        remedy = "Unset MUJOCO_EGL_DEVICE_ID" if "MUJOCO_EGL_DEVICE_ID" in str(e) else REMEDY
+        remedy = "Unset MUJOCO_EGL_DEVICE_ID" if "MUJOCO_EGL_DEVICE_ID" in str(e) else GL_REMEDY
         raise GLError(f"cannot open an OpenGL context through {backend} ({e}). {remedy}") from e
 
 

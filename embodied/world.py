@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from embodied.light.tracing.reference import Tracer
     from embodied.render.gloss import Gloss
 
-KEPT = 8
+PANORAMAS_KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
 log = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ class World:
         self._file: PanoramaFile | None = None
         self._bake: Bake | None = None
         self._refused = False
-        self._recent = functools.lru_cache(maxsize=KEPT)(self._load)
+        self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
 
     def __reduce__(self) -> tuple[Callable[[], World], tuple[()]]:
         """Pickled as what it was made of; nothing is open in the process that reads it."""

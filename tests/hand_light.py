@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from embodied.light.settings import Settings
+from embodied.light.settings import LightSettings
 
-TINY = Settings(
+TINY = LightSettings(
     12.0,
     400.0,
     sky_rays=12,

@@ -28,4 +28,4 @@ def test_views_turn_round_and_round():
     turns = iter(itertools.count(0.01, 1.01))
     for _ in range(5):
         views._look(panorama, ("rgb", "depth", "ids"), (6, 8), turns)
-    assert next(turns) > 5 * views.VIEWS
+    assert next(turns) > 5 * views.HEADINGS

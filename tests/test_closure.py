@@ -129,9 +129,9 @@ def test_what_code_does_counts_and_not_how_it_is_written(tmp_path, one, other, s
 
 
 PRODUCTS = {
-    "bakes": ("embodied.light.baking.house", settings.APART),
-    "unwrappings": ("embodied.light.pages.unwrap", unwrap.APART),
-    "halved maps": ("embodied.light.pages.colours", colours.APART),
+    "bakes": ("embodied.light.baking.house", settings.UNCOUNTED_BY_LIGHT),
+    "unwrappings": ("embodied.light.pages.unwrap", unwrap.UNCOUNTED_BY_UNWRAPPING),
+    "halved maps": ("embodied.light.pages.colours", colours.UNCOUNTED_BY_MAPS),
     "boxes": ("embodied.scene.collision", collision.UNCOUNTED_MODULES),
     "models": (importer.READER, importer.APART),
 }
@@ -169,11 +169,11 @@ def test_products_follow_the_code_that_makes_them_and_no_other(tree):
 
 
 def test_versions_of_libraries_that_decide_bakes_are_in_their_key(monkeypatch):
-    libraries = closure("embodied.light.baking.house", without=settings.APART).libraries
+    libraries = closure("embodied.light.baking.house", without=settings.UNCOUNTED_BY_LIGHT).libraries
     assert {"drjit", "mitsuba", "numpy", "xatlas", "cv2"} <= set(libraries) and "tqdm" not in libraries
-    before = key(ROOT, "embodied.light.baking.house", without=settings.APART)
+    before = key(ROOT, "embodied.light.baking.house", without=settings.UNCOUNTED_BY_LIGHT)
     monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == "mitsuba" else "")
-    assert key(ROOT, "embodied.light.baking.house", without=settings.APART) != before
+    assert key(ROOT, "embodied.light.baking.house", without=settings.UNCOUNTED_BY_LIGHT) != before
     code_digest.cache_clear()
 
 

@@ -132,10 +132,10 @@ def test_what_a_data_set_holds_is_read_under_other_drivers_and_later_versions_an
     pretend_drawn(data, name, SMALL, renderer="another card")
     os.utime(pano(data, name), ns=(1, 1))
     unit = next(u for u in building.units(data.scale) if u.name == name)
-    building.draw_unit(unit, data.folder, data.folder / "cache", SMALL, ())
+    building.draw_unit(unit, data.folder, data.folder / "cache", SMALL)
     assert pano(data, name).stat().st_mtime_ns == 1, "nodes of a cluster differ in their drivers"
     pretend_drawn(data, name, SMALL, code="an earlier version")
-    building.draw_unit(unit, data.folder, data.folder / "cache", SMALL, ())
+    building.draw_unit(unit, data.folder, data.folder / "cache", SMALL)
     with data.open_world(name, HandCatalogue(), data.folder / "cache", SMALL) as world:
         assert len(np.unique(world.panorama(3).rgb)) > 3, "one data set is of one version"
 

@@ -87,7 +87,7 @@ def test_a_closed_box_absorbs_exactly_what_its_lamp_gives():
 def test_sky_through_a_hole_matches_the_form_factor_of_a_rectangle():
     """Under the middle of a w x w uniform opening at height h, e / L is the textbook configuration factor."""
     w, h = 2.0, 1.5
-    from embodied.light.tracing.emitters import GLASS, Portal
+    from embodied.light.tracing.emitters import GLAZING, Portal
 
     portal = Portal("p", "r", np.array([-w / 2, -w / 2, h]), np.array([0.0, w, 0.0]), np.array([w, 0.0, 0.0]))
     assert portal.normal == pytest.approx([0, 0, -1])
@@ -97,7 +97,7 @@ def test_sky_through_a_hole_matches_the_form_factor_of_a_rectangle():
     space = radiosity.with_env(space, np.full((64, 128, 3), 3.0, np.float32))
     up = np.tile([[0.0, 0.0, 1.0]], (64, 1))
     p = radiosity.points_of(np.zeros((64, 3)), up, up, np.zeros(64, bool))
-    e = array(radiosity.sky_light(space, p, portal, 256)).mean(0) / (3.0 * GLASS)
+    e = array(radiosity.sky_light(space, p, portal, 256)).mean(0) / (3.0 * GLAZING)
     x = (w / 2) / h
     quarter = 2 * x / np.sqrt(1 + x * x) * np.arctan(x / np.sqrt(1 + x * x)) / (2 * np.pi)  # Siegel & Howell, C-11
     assert e == pytest.approx(np.full(3, 4 * quarter), rel=0.02)

@@ -34,7 +34,7 @@ LEARN = ("--data", "d", "--out", "o")
         (("light", "x", "--time", "25:00"), "such as 17:30 or 17.5, got '25:00'"),
         (("light", "x", "--time", "nan"), "--time: should be one of dawn"),
         (("light", __file__), "is a file; name the folder that it is in"),
-        (("light", "/no/such/folder"), "holds no house.json"),
+        (("light", "/no/such/folder"), "house.json does not exist; make one with"),
         (("render", "x", "--node", "1", "--view", "v.mp4"), "--view: should end in .png, which is written"),
         (("export", "glb", "--house", "x", "--out", "x/house.json"), "--out: should end in .glb"),
         (("rollout", "--video", "house.json"), "--video: should end in .mp4"),

@@ -22,7 +22,7 @@ from embodied.render.panorama import (
     perspective_grid,
     ray_stretch,
 )
-from embodied.render.panorama_file import FARTHEST, PanoramaFile, PanoramaFileError, write_panoramas
+from embodied.render.panorama_file import FARTHEST_STORED, PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.sampling import FACES
 
 S = 64
@@ -264,9 +264,9 @@ def test_the_file_gives_back_what_was_written(stored):
         for node in (2, 0, 1):
             back, sent = file.read(node), panoramas[node]
             assert np.array_equal(back.ids, sent.ids)
-            near = sent.depth < FARTHEST
+            near = sent.depth < FARTHEST_STORED
             assert np.abs(back.depth[near] - sent.depth[near]).max() <= 0.0005 + 1e-6
-            assert np.isinf(back.depth[4, 0, 0]) and back.depth[4, 5, 5] == pytest.approx(FARTHEST)
+            assert np.isinf(back.depth[4, 0, 0]) and back.depth[4, 5, 5] == pytest.approx(FARTHEST_STORED)
             assert np.mean((back.rgb.astype(float) - sent.rgb) ** 2) < 6.5, "JPEG below 40 dB"
 
 

@@ -83,7 +83,7 @@ def test_a_program_that_drew_its_pictures_may_load_them_with_workers(tmp_path, m
     monkeypatch.setattr(building, "load_catalogue", lambda *_: HandCatalogue())
     data = build(tmp_path / "data", tmp_path / "cache", "find", size="1x4", make_house=small_house)
     unit = Unit("train", 0)
-    building.draw_unit(unit, data.folder, tmp_path / "cache", Unlit(size=64), ())
+    building.draw_unit(unit, data.folder, tmp_path / "cache", Unlit(size=64))
     view = ViewSettings("view", 24, 32)
     pictures = ViewpointPictures(data, "train", view=view, channels=("rgb", "depth"))
     loader = torch.utils.data.DataLoader(pictures, batch_size=64, num_workers=2, timeout=600)

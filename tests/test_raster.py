@@ -171,7 +171,7 @@ def corners_of(xyz: np.ndarray, faces: np.ndarray) -> coarser.Corners:
 
 def test_copies_are_smaller_stay_within_a_cell_and_keep_their_texture():
     whole, counts = sphere(60, 0.2), []
-    for cell, copy in zip(coarser.CELLS, coarser.copies(whole, 1, np.ones(1, bool)), strict=True):
+    for cell, copy in zip(coarser.COPY_CELLS, coarser.copies(whole, 1, np.ones(1, bool)), strict=True):
         if not len(copy.faces):
             continue
         counts.append(len(copy.faces))

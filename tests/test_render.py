@@ -16,7 +16,7 @@ from handmade import HandCatalogue, furnished
 from embodied import gl
 from embodied.light.settings import QUALITIES
 from embodied.render import visibility
-from embodied.render.camera import FAR, NEAR, camera_at, face_cameras
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, camera_at, face_cameras
 from embodied.render.classic import Renderer
 from embodied.render.geoms import depth_of_reversed_z
 from embodied.render.panorama import face_rays, ray_stretch
@@ -250,7 +250,7 @@ def test_rooms_seen_through_two_windows_of_an_l_shape_are_kept():
 
 def test_depth_buffer_is_inverted_exactly():
     z = np.array([0.03, 0.5, 3.0, 50.0, 199.0])
-    near, far = NEAR, FAR
+    near, far = NEAR_PLANE, FAR_PLANE
     buffer = near * (far - z) / (z * (far - near))
     assert np.allclose(depth_of_reversed_z(buffer.astype(np.float32)), z, rtol=1e-3)
     assert np.isinf(depth_of_reversed_z(np.zeros(1, np.float32)))

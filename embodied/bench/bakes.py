@@ -24,7 +24,7 @@ QUALITIES = {"fast": 12.0, "normal": 30.0}
 """And the seconds that the project promises for the flat."""
 WHOLE = 90.0
 """Seconds that it promises for the house."""
-REPEATS = 3
+TIMED_BAKES = 3
 LIGHTINGS = 3
 FURTHER = 0.25
 """Share of the first lighting's time that a further one is to take."""
@@ -35,7 +35,7 @@ def bakes(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
     house = generate_house(seed, FLAT, catalogue=catalogue)
     house_parts(house, catalogue)  # imports the furniture
     took: dict[str, list[float]] = {q: [] for q in QUALITIES}
-    for repeat in range(REPEATS + 1):
+    for repeat in range(TIMED_BAKES + 1):
         for quality in QUALITIES:
             seconds = _seconds((house,), catalogue, cache, quality)
             if repeat:  # the first compiles and unwraps
@@ -44,13 +44,13 @@ def bakes(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
         yield from_values(f"bake, {quality}, processor time", seconds, "s", aim=QUALITIES[quality])
     yield from_values("bake, fast of normal", [a / b for a, b in zip(*took.values(), strict=True)], "share")
     several = lightings_of(house, LIGHTINGS)
-    rounds = [_seconds(several, catalogue, cache, "fast") for _ in range(REPEATS)]
+    rounds = [_seconds(several, catalogue, cache, "fast") for _ in range(TIMED_BAKES)]
     for k in range(1, LIGHTINGS):
         shares = [one[k] / one[0] for one in rounds]
         yield from_values(f"bake, fast, lighting {k + 1} of lighting 1", shares, "share", aim=FURTHER)
     body = functools.partial(_panoramas, catalogue, cache, seed)
     name = "house of 100 m², from its seed to its lit panoramas, processor time"
-    yield measure(name, body, "s", repeats=REPEATS, aim=WHOLE, clock=time.process_time)
+    yield measure(name, body, "s", repeats=TIMED_BAKES, aim=WHOLE, clock=time.process_time)
 
 
 def _panoramas(catalogue: Catalogue, cache: Path, seed: int) -> None:

@@ -24,7 +24,7 @@ from embodied.world import open_world
 
 STEPS = 60
 """Of one timed call; a command is held for a tenth of a second."""
-FRAMES = (((128, 128), 200.0), ((480, 640), 60.0))
+LIVE_SIZES = (((128, 128), 200.0), ((480, 640), 60.0))
 """Height and width of live pictures, and how many per second the project promises."""
 TOGETHER = 1.4
 """Times that rgb, depth and ids may take of rgb alone."""
@@ -38,7 +38,7 @@ def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterat
         driving = Driving({world.name: world}, DriveSettings(sees=()))
         commands, cameras = recorded(driving, seed)
         rate = functools.partial(measure, unit="1/s", per=STEPS, clock=time.process_time)
-        for size, aim in FRAMES:
+        for size, aim in LIVE_SIZES:
             name = f"frames of {size[1]} x {size[0]}"
             colours = rate(f"{name}, rgb", functools.partial(_film, world.renderer, cameras, size, False), aim=aim)
             whole = rate(f"{name}, rgb, depth and ids", functools.partial(_film, world.renderer, cameras, size, True))

@@ -18,7 +18,7 @@ from embodied.task_kind import EnvInputs, TaskInputs, kind_named
 
 AIMS = {"find": 20_000.0, "hanna": 10_000.0, "vnla": None, "hari": None}
 """Steps per second that the project promises; HANNA's include the assistant's replies."""
-TASKS = 60
+TASKS_PLAYED = 60
 
 
 def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
@@ -29,7 +29,9 @@ def plays(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
         house, graph = make_dataset_house(seed, "bench", HouseConfig(area=DatasetConfig(kind).area), catalogue)
         place = StoredPlace(house, graph)
         routes = build_routes(place, seed=seed, language=language, house_split="test") if known.routes else ()
-        tasks = known.tasks(TaskInputs(place, routes, seed, language), [(known.unseen_part, TASKS)])[known.unseen_part]
+        tasks = known.tasks(TaskInputs(place, routes, seed, language), [(known.unseen_part, TASKS_PLAYED)])[
+            known.unseen_part
+        ]
         env = known.environments(EnvInputs({"bench": place}, {"bench": routes}.__getitem__))()
         counts = walk(env, tasks)
         asked = counts[1] / counts[0]

@@ -33,16 +33,16 @@ from embodied.world import World, open_world
 CONTEXTS = (1, 4, 16)
 """Processes that draw pictures of LIVE pixels at once by OpenGL, each with a context of its own."""
 LIVE = 128
-SIZES, WORLDS = (64, 128, 256), (64, 256, 1024)
+PICTURE_SIDES, WORLDS = (64, 128, 256), (64, 256, 1024)
 """Sides of square pictures, pixels, and how many Warp draws at once."""
-SEES = (("rgb",), ("rgb", "depth", "ids"))
+CHANNELS_DRAWN = (("rgb",), ("rgb", "depth", "ids"))
 BODIES = (64, 256, 1024)
 """On wheels at once, each with a camera of LIVE pixels."""
-SMALL = HouseConfig(area=(34.0, 44.0))
+CPU_FLAT = HouseConfig(area=(34.0, 44.0))
 """The flat of the check on the CPU."""
-SECONDS = 3.0
+DRAWING_SECONDS = 3.0
 """How long a process draws."""
-REPEATS = 5
+TIMED_CALLS = 5
 
 Works = Callable[[str], Mapping[str, tuple[Callable[[], object], int]]]
 """From a device of PyTorch to what learners do there: by name, one call, and how many things it does."""
@@ -64,8 +64,8 @@ def gpu(
     card = warp.card()
     if card is None:
         progress("There is no CUDA device here: a small check on the CPU, whose numbers say nothing about a GPU.")
-    contexts, sizes, worlds = (CONTEXTS, SIZES, WORLDS) if card else (CONTEXTS[:1], SIZES[:1], (8,))
-    house = generate_house(seed, FLAT if card else SMALL, catalogue)
+    contexts, sizes, worlds = (CONTEXTS, PICTURE_SIDES, WORLDS) if card else (CONTEXTS[:1], PICTURE_SIDES[:1], (8,))
+    house = generate_house(seed, FLAT if card else CPU_FLAT, catalogue)
     with open_world(house, catalogue, cache, pictures=f"{light}-matte") as world:
         assert world.lit is not None
         for count in contexts:
@@ -76,12 +76,12 @@ def gpu(
             )
         for size in sizes:
             with warp.WarpRenderer(house, catalogue, world.lit, worlds=max(worlds), size=(size, size)) as renderer:
-                for count, sees in itertools.product(worlds, SEES):
+                for count, sees in itertools.product(worlds, CHANNELS_DRAWN):
                     look = functools.partial(_look, renderer, _poses(world, count, seed), sees)
                     name = f"Warp, {card or 'CPU'}, {count} worlds, {size} x {size}, {', '.join(sees)}"
-                    yield measure(name, look, "1/s", repeats=REPEATS, per=count)
+                    yield measure(name, look, "1/s", repeats=TIMED_CALLS, per=count)
         for name, (body, per) in works("cuda" if card else "cpu").items():
-            yield measure(f"{name}, {card or 'CPU'}", body, "1/s", repeats=REPEATS, per=per)
+            yield measure(f"{name}, {card or 'CPU'}", body, "1/s", repeats=TIMED_CALLS, per=per)
         for quality in QUALITIES if card else ():
             name = f"light of a flat of {house.area:.0f} m², {quality}, {card if device() == 'cuda' else device()}"
             yield measure(name, functools.partial(_light, house, catalogue, cache, quality), "s", repeats=3)
@@ -108,7 +108,7 @@ def _drive(world: World, count: int, name: str) -> Measure:
     try:
         envs.reset(seed=0)
         step = lambda: envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))
-        return measure(name, step, "1/s", repeats=2 * REPEATS, warm=3, per=count)
+        return measure(name, step, "1/s", repeats=2 * TIMED_CALLS, warm=3, per=count)
     finally:
         envs.close()
 
@@ -146,7 +146,7 @@ def _by_processes(
 def _film(
     begin: Any, results: Any, house: House, catalogue: Catalogue, cache: Path, light: str, size: int, seed: int
 ) -> None:
-    """Draw for SECONDS, together with the other processes; tells the frames per second."""
+    """Draw for DRAWING_SECONDS, together with the other processes; tells the frames per second."""
     try:
         with (
             open_world(house, catalogue, cache, pictures=f"{light}-matte") as world,
@@ -157,7 +157,7 @@ def _film(
                 renderer.rgb(camera, (size, size))
             begin.wait()
             start, frames = time.perf_counter(), 0
-            while time.perf_counter() < start + SECONDS:
+            while time.perf_counter() < start + DRAWING_SECONDS:
                 renderer.rgb(cameras[frames % len(cameras)], (size, size))
                 frames += 1
             results.put(frames / (time.perf_counter() - start))

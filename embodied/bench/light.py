@@ -33,13 +33,13 @@ from embodied.world import gloss_of
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
 
-HOUSES, VIEWS = 4, 3
+HOUSES, ROOMS_SHOWN = 4, 3
 """How many houses are compared, and rooms of each."""
-SIZE = (160, 240)
+VIEW_SIZE = (160, 240)
 """Height and width of the pictures."""
 RAYS = 64
 """Per pixel of the path-traced ways."""
-AREA = (35.0, 70.0)
+FLAT_AREA = (35.0, 70.0)
 """Square metres of the bench's flats, each of which is baked and path-traced."""
 BAKES = ("fast", "normal")
 """Light qualities that are compared; what is traced reads the last one."""
@@ -48,7 +48,7 @@ WAYS_DRAWN = ("unlit", *BAKES, "gloss")
 WAYS = (*WAYS_DRAWN, "glossy", "diffuse", "reference")
 TIMES = ((10.5, "clear"), (13.0, "overcast"), (18.6, "clear"), (22.0, "clear"))
 """Morning sun, grey noon, dusk, night; the views are dealt out over them."""
-VFOV = math.radians(65.0)
+VIEW_ANGLE = math.radians(65.0)
 SHOWN = 0.005
 """Share of a view's pixels that mirrors and metals have to fill before they are judged by themselves."""
 
@@ -71,7 +71,7 @@ class Shot:
 def compare(
     catalogue: Catalogue, cache: Path, out: Path, *, seed: int = 1, progress: Callable[[str], None] = lambda text: None
 ) -> Report:
-    """Draw VIEWS rooms of each of HOUSES houses in every way, measure, write `out`/light.jpg and `out`/light.json.
+    """Draw ROOMS_SHOWN rooms of each of HOUSES houses in every way, measure, write light.jpg and light.json to `out`.
 
     Args:
       seed: of the first house; the others have the next ones, each at another time of day.
@@ -81,7 +81,7 @@ def compare(
     kinds: list[str] = []
     for k in range(HOUSES):
         hour, weather = TIMES[k % len(TIMES)]
-        house = generate_house(seed + k, HouseConfig(area=AREA, hour=hour, weather=weather), catalogue=catalogue)
+        house = generate_house(seed + k, HouseConfig(area=FLAT_AREA, hour=hour, weather=weather), catalogue=catalogue)
         progress(
             f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects"
         )
@@ -112,7 +112,7 @@ def viewpoints(house: House, shown: Sequence[str] = ()) -> list[tuple[str, np.nd
     kinds: set[str] = set()
     for room in sorted(house.rooms, key=lambda r: (shown.count(r.kind), -area[r.id])):
         nodes = [i for i, r in enumerate(graph.room_of_node) if r == room.id]
-        if not nodes or room.kind in kinds or len(viewpoints_by_room) == VIEWS:
+        if not nodes or room.kind in kinds or len(viewpoints_by_room) == ROOMS_SHOWN:
             continue
         kinds.add(room.kind)
         corner = np.array(max(room.polygon, key=lambda c: min(np.hypot(*(graph.positions[i][:2] - c)) for i in nodes)))
@@ -140,18 +140,18 @@ def draw(
 
 def _drawn(r: Renderer, way: str, view: tuple[str, np.ndarray, float], hour: float) -> Shot:
     room, eye, yaw = view
-    rgb = r.view(eye, yaw, -0.1, VFOV, SIZE).rgb
+    rgb = r.view(eye, yaw, -0.1, VIEW_ANGLE, VIEW_SIZE).rgb
     return Shot(room, hour, way, rgb, _median_ms(functools.partial(r.rgb, camera_at(eye, yaw), (256, 256))))
 
 
 def _traced(t: Tracer, way: str, view: tuple[str, np.ndarray, float], hour: float) -> Shot:
     room, eye, yaw = view
-    camera = camera_at(eye, yaw, -0.1, VFOV)
+    camera = camera_at(eye, yaw, -0.1, VIEW_ANGLE)
     start, used = time.perf_counter(), time.process_time()
-    rgb, _, _ = t.picture(eye, camera.forward, camera.up, VFOV, SIZE)
-    ms = 1e3 * (time.perf_counter() - start) * 256 * 256 / (SIZE[0] * SIZE[1])
+    rgb, _, _ = t.picture(eye, camera.forward, camera.up, VIEW_ANGLE, VIEW_SIZE)
+    ms = 1e3 * (time.perf_counter() - start) * 256 * 256 / (VIEW_SIZE[0] * VIEW_SIZE[1])
     used = time.process_time() - used
-    plain = t.plain(eye, camera.forward, camera.up, VFOV, SIZE) if way == "diffuse" else None
+    plain = t.plain(eye, camera.forward, camera.up, VIEW_ANGLE, VIEW_SIZE) if way == "diffuse" else None
     return Shot(room, hour, way, rgb, ms, plain, used)
 
 
@@ -223,7 +223,7 @@ def table(facts: dict) -> str:
     lines.append(
         "\nProcessor time of a flat's light, furniture unwrapped: "
         + ", ".join(f"{q} {spent[q]:.0f} s ({spent[q] / last:.2f})" for q in BAKES)
-        + f"; of one view of {SIZE[1]} × {SIZE[0]} by the path tracer: {spent['reference']:.0f} s."
+        + f"; of one view of {VIEW_SIZE[1]} × {VIEW_SIZE[0]} by the path tracer: {spent['reference']:.0f} s."
     )
     lines.append(
         f"\nMedians of {len(facts['views'])} views of one run, {facts['shiny']:.1%} of whose pixels show mirrors or "

@@ -32,7 +32,7 @@ THINKING = 1.0
 """Mean seconds that somebody looks before the next step; people take longer."""
 ASKING = 4
 """Every so many steps the agent asks."""
-LONGEST = 12
+MOST_STEPS = 12
 """Steps after which an agent stops."""
 STUDY = """
 title = "Load"
@@ -117,7 +117,7 @@ def _next(screen: dict[str, Any], rng: np.random.Generator) -> dict[str, Any] | 
         return {"do": "answered", "text": "Go through the door and turn left.", "picture": None, **common}
     if screen["turn"] % ASKING == 0 and screen["canAsk"]:
         return {"do": "asked", "text": "Which way do I go?", **common}
-    if screen["turn"] > LONGEST or not screen["moves"]:
+    if screen["turn"] > MOST_STEPS or not screen["moves"]:
         return {"do": "stopped", **common}
     move = screen["moves"][int(rng.integers(len(screen["moves"])))]
     return {"do": "moved", "candidate": move["candidate"], **common}

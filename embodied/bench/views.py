@@ -19,52 +19,49 @@ from embodied.mattersim.pictures import Skyboxes, skybox_folder
 from embodied.render.panorama import VFOV36, Panorama, perspective_grid
 from embodied.world import open_world
 
-SIZE = 512
+SKYBOX_SIDE = 512
 """Side of a face, pixels."""
-VIEWS = 12
+HEADINGS = 12
 """Headings of one timed call."""
 VIEWPOINTS = ("here", "there")
 """Two, of which one fits into memory."""
 AIMS = (((480, 640), 1200.0, 700.0), ((224, 224), 5000.0, 3000.0))
 """Height and width, and how many views per second are aimed at: of rgb; of rgb, depth and ids."""
-SHOWN = {"rgb": ("rgb",), "depth": ("depth",), "ids": ("ids",), "rgb, depth and ids": ("rgb", "depth", "ids")}
+SHOWN = {"rgb": ("rgb",), "rgb, depth and ids": ("rgb", "depth", "ids")}
 
 
 def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
     """Views per second of processor time of one viewpoint of a flat, on one core."""
-    with open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, size=SIZE, pictures="unlit") as world:
+    with open_world(
+        generate_house(seed, FLAT, catalogue), catalogue, cache, size=SKYBOX_SIDE, pictures="unlit"
+    ) as world:
         panorama = world.renderer.panorama(world.graph.positions[0])
     with one_core(), tempfile.TemporaryDirectory() as folder:
         for (height, width), colours, everything in AIMS:
             size, name = (height, width), f"views of {width} x {height}"
-            for shown, channels in SHOWN.items():
-                aim = {"rgb": colours, "rgb, depth and ids": everything}.get(shown)
-                yield _rate(
-                    f"{name}, {shown}",
-                    functools.partial(_look, panorama, channels, size, itertools.cycle(range(VIEWS))),
-                    aim,
-                )
-            for shown in ("rgb", "rgb, depth and ids"):
-                look = functools.partial(_look, panorama, SHOWN[shown], size, itertools.count(0.01, 1.01))
-                yield _rate(f"{name}, {shown}, new angles", look)
+            for (shown, channels), aim in zip(SHOWN.items(), (colours, everything), strict=True):
+                again = functools.partial(_look, panorama, channels, size, itertools.cycle(range(HEADINGS)))
+                yield _rate(f"{name}, {shown}", again, aim)
+                anew = functools.partial(_look, panorama, channels, size, itertools.count(0.01, 1.01))
+                yield _rate(f"{name}, {shown}, new angles", anew)
         for viewpoint in VIEWPOINTS:
             write_skybox(panorama, viewpoint, skybox_folder(folder, "scan"))
         skyboxes = Skyboxes(folder, 1)
         for shown, depth in (("rgb", False), ("rgb and depth", True)):
             for (height, width), *_ in AIMS:
                 again = functools.partial(_open, skyboxes, itertools.repeat(VIEWPOINTS[0]), depth, (height, width))
-                yield _rate(f"skyboxes of {SIZE} in memory, {width} x {height}, {shown}", again)
+                yield _rate(f"skyboxes of {SKYBOX_SIDE} in memory, {width} x {height}, {shown}", again)
             anew = functools.partial(_open, skyboxes, itertools.cycle(VIEWPOINTS), depth, (480, 640))
-            yield _rate(f"skyboxes of {SIZE} not in memory, {shown}", anew)
+            yield _rate(f"skyboxes of {SKYBOX_SIDE} not in memory, {shown}", anew)
 
 
 def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Measure:
-    return measure(name, body, "1/s", per=VIEWS, aim=aim, clock=time.process_time)
+    return measure(name, body, "1/s", per=HEADINGS, aim=aim, clock=time.process_time)
 
 
 def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], turns: Iterator[float]) -> None:
     """VIEWS level views, so many `turns` of 30 degrees to the left."""
-    for turn in itertools.islice(turns, VIEWS):
+    for turn in itertools.islice(turns, HEADINGS):
         grid = perspective_grid(panorama.size, turn * math.pi / 6 % math.tau, 0.0, VFOV36, *size)
         for channel in channels:
             panorama.through(grid, channel)
@@ -72,7 +69,7 @@ def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], 
 
 def _open(skyboxes: Skyboxes, viewpoints: Iterator[str], depth: bool, size: tuple[int, int]) -> None:
     """VIEWS times a picture of a skybox."""
-    for viewpoint in itertools.islice(viewpoints, VIEWS):
+    for viewpoint in itertools.islice(viewpoints, HEADINGS):
         skyboxes.rgb("scan", viewpoint, 0.0, 0.0, VFOV36, size)
         if depth:
             skyboxes.metres("scan", viewpoint, 0.0, 0.0, VFOV36, size)

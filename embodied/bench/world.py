@@ -10,13 +10,12 @@ import numpy as np
 from embodied.assets.catalogue import Catalogue
 from embodied.bench.timing import Measure, measure, share
 from embodied.generate import HouseConfig, generate_house
-from embodied.navigation.graph import build_graph
 from embodied.render.camera import Camera, face_cameras
 from embodied.render.classic import Renderer
 from embodied.scene.model import compile_scene
 from embodied.world import open_world
 
-LARGE = HouseConfig(area=(400.0, 440.0))
+LARGE_HOUSE = HouseConfig(area=(400.0, 440.0))
 """A house of about 125 viewpoints; Matterport3D has 117 per building."""
 
 
@@ -25,19 +24,18 @@ def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
     seeds = iter(range(seed, seed + 10_000))
     yield measure(
         "layout and furnishing, 125-node house",
-        lambda: generate_house(next(seeds), LARGE, catalogue),
+        lambda: generate_house(next(seeds), LARGE_HOUSE, catalogue),
         "s",
         repeats=7,
         aim=1.0,
     )
-    house = generate_house(seed, LARGE, catalogue)
-    yield measure("navigation graph of it", lambda: build_graph(house), "s", repeats=5)
+    house = generate_house(seed, LARGE_HOUSE, catalogue)
     yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5, aim=4.0)
 
 
 def pictures(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
     """Cube faces, panoramas and resampled views."""
-    house = generate_house(seed, LARGE, catalogue)
+    house = generate_house(seed, LARGE_HOUSE, catalogue)
     with open_world(house, catalogue, cache, size=256, pictures=kind) as world:
         renderer, eyes = world.renderer, world.graph.positions
         nodes = np.linspace(0, len(eyes) - 1, 12).astype(int)

@@ -16,7 +16,7 @@ from typing import Annotated
 from embodied.cli.common import Printed, show
 from embodied.options import Cached, Option, whole
 
-KINDS = (
+CACHE_FOLDERS = (
     "assets",
     "materials",
     "collision",
@@ -35,7 +35,7 @@ KINDS = (
 class Options(Cached, Printed):
     prune: Annotated[int | None, Option(whole(), "DAYS")] = None
     """Remove files that nobody has read for DAYS days."""
-    clear: tuple[Annotated[str, Option(words=KINDS)], ...] = ()
+    clear: tuple[Annotated[str, Option(words=CACHE_FOLDERS)], ...] = ()
     """Remove all files of these kinds."""
 
 
@@ -48,7 +48,7 @@ def run(args: Options) -> None:
         for path in files(args.cache):
             if max(path.lstat().st_atime, path.lstat().st_mtime) < before:
                 path.unlink(missing_ok=True)
-    counts = {kind: measured(args.cache / kind) for kind in KINDS}
+    counts = {kind: measured(args.cache / kind) for kind in CACHE_FOLDERS}
     total = sum(size for _, size in counts.values())
     lines = [f"{kind:<12} {size / 2**20:9.1f} MiB in {n} files" for kind, (n, size) in counts.items() if n]
     kinds = {k: {"files": n, "bytes": s} for k, (n, s) in counts.items()}
@@ -58,7 +58,7 @@ def run(args: Options) -> None:
 
 def files(cache: Path) -> list[Path]:
     """The program's files in a cache, those it only links to included; folders that are links are somebody else's."""
-    own = [cache / kind for kind in KINDS if not (cache / kind).is_symlink()]
+    own = [cache / kind for kind in CACHE_FOLDERS if not (cache / kind).is_symlink()]
     return [p for folder in own for p in sorted(folder.rglob("*")) if p.is_symlink() or p.is_file()]
 
 

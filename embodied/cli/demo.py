@@ -97,7 +97,7 @@ def as_typed(program: Path) -> str:
     return program.name if shutil.which(program.name) == str(program) else str(program)
 
 
-SMALL = (32.0, 36.0)
+SMALL_FLAT = (32.0, 36.0)
 """Area of the flat of --small, square metres."""
 
 
@@ -114,7 +114,7 @@ def show_a_room(args: Options) -> None:
     seconds: dict[str, float] = {}
     args.out.mkdir(parents=True, exist_ok=True)
     with timed("a small flat (about 10 s)", seconds):
-        house = generate_house(args.seed, HouseConfig(area=SMALL, hour=11.0, weather="clear"), catalogue)
+        house = generate_house(args.seed, HouseConfig(area=SMALL_FLAT, hour=11.0, weather="clear"), catalogue)
         house.save(args.out / "house.json")
         fetch(catalogue, house)
     note(f"{house.name}: {len(house.rooms)} rooms, {len(house.placements)} objects")

@@ -109,7 +109,7 @@ def fix(libraries: tuple[Path, ...] = ()) -> Iterator[str]:
     if sys.platform == "linux" and platform.machine() == "x86_64" and not (gl.available() and find_llvm()):
         yield "pip install lavavu-osmesa"
         if not _pip("lavavu-osmesa"):
-            yield f"that failed. {gl.REMEDY}"
+            yield f"that failed. {gl.GL_REMEDY}"
     if not load_atomic():
         yield "apt-get download libatomic1, of which the library goes into this environment"
         if not bring_atomic():
@@ -162,7 +162,7 @@ def renderer(_: Options) -> Finding:
     try:
         device = gl.info()
     except gl.GLError as e:
-        return Finding("renderer", False, str(e), gl.REMEDY)
+        return Finding("renderer", False, str(e), gl.GL_REMEDY)
     return Finding("renderer", True, str(device))
 
 

@@ -66,9 +66,9 @@ def run(args: Options) -> None:
     from embodied.light.backend import device
     from embodied.locks import locked
 
+    device()  # or LightError, before any work
     catalogue = catalogue_of(args)
     house = load_lit_house(args.folder, catalogue)
-    device()  # says what is missing
     changed = with_sky(house, args.time, args.weather, args.lamps, args.landscape, args.season)
     lightings = lightings_of(changed, args.lights)
     if args.lights > 1 or changed != house:

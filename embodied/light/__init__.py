@@ -10,5 +10,5 @@ from embodied.light.pages.files import Bake as Bake
 from embodied.light.pages.files import StaleBake as StaleBake
 from embodied.light.pages.files import open_bake as open_bake
 from embodied.light.settings import QUALITIES as QUALITIES
-from embodied.light.settings import Settings as Settings
+from embodied.light.settings import LightSettings as LightSettings
 from embodied.light.settings import settings_of as settings_of

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from embodied.assets.closure import code_digest
 
-APART = (
+UNCOUNTED_BY_LIGHT = (
     "embodied.assets",
     "embodied.assets.catalogue",
     "embodied.assets.data",
@@ -22,11 +22,11 @@ settings themselves are in a bake's key; what packages offer by name; the progre
 
 def light_code() -> str:
     """Digest of the code and the libraries that bake; bakes made by others are made anew."""
-    return code_digest("embodied.light.baking.house", without=APART)
+    return code_digest("embodied.light.baking.house", without=UNCOUNTED_BY_LIGHT)
 
 
 @dataclass(frozen=True)
-class Settings:
+class LightSettings:
     """Everything a bake depends on besides the house."""
 
     density: float = 32.0
@@ -60,7 +60,7 @@ class Settings:
 
 
 QUALITIES = {
-    "fast": Settings(
+    "fast": LightSettings(
         density=20.0,
         budget=800.0,
         sky_rays=8,
@@ -73,8 +73,8 @@ QUALITIES = {
         jpeg=88,
         rows=512,
     ),
-    "normal": Settings(),
-    "high": Settings(
+    "normal": LightSettings(),
+    "high": LightSettings(
         density=56.0,
         budget=14000.0,
         sky_rays=16,
@@ -91,7 +91,7 @@ QUALITIES = {
 """Named settings: for data sets, for looking, for pictures of single houses."""
 
 
-def settings_of(quality: str) -> Settings:
+def settings_of(quality: str) -> LightSettings:
     """Settings by name.
 
     Raises:

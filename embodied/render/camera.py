@@ -10,7 +10,7 @@ import numpy as np
 
 from embodied.render.sampling import FACES
 
-NEAR, FAR = 0.03, 200.0
+NEAR_PLANE, FAR_PLANE = 0.03, 200.0
 """Nothing nearer or farther is drawn, metres."""
 
 

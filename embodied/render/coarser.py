@@ -15,9 +15,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 Normals: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
-CELLS = (0.004, 0.008, 0.016, 0.032)
+COPY_CELLS = (0.004, 0.008, 0.016, 0.032)
 """Sides of the cells, metres, each twice the last: what lies in one cell lies in one of every wider kind."""
-KEPT = 0.93
+SURFACE_KEPT = 0.93
 """Share of a mesh's surface that a copy must have."""
 WORTH = 0.7
 """Share of the triangles of the last copy above which another is not worth its memory."""
@@ -71,7 +71,7 @@ class _Groups:
 
 
 def copies(meshes: Corners, count: int, wanted: np.ndarray) -> list[Corners]:
-    """For each of CELLS the copies of those of `count` meshes that are worth one.
+    """For each of COPY_CELLS the copies of those of `count` meshes that are worth one.
 
     Args:
       wanted: (count,) bool: of which meshes there may be copies.
@@ -85,14 +85,14 @@ def copies(meshes: Corners, count: int, wanted: np.ndarray) -> list[Corners]:
     shape, surface, made = _shape(meshes, across), _surface(meshes, across, count), []
     places, corners = np.arange(len(shape.xyz)), np.arange(len(meshes.xyz))
     groups = _Groups(places, corners, places, corners, meshes.faces)
-    for cell in CELLS:
+    for cell in COPY_CELLS:
         groups = _clustered(groups, meshes, shape, cell)
         copy = _copy(groups, meshes, shape)
         faces = np.bincount(copy.mesh[copy.faces[:, 0]], minlength=count)
         good = (
             (faces > 0)
             & (faces <= WORTH * most)
-            & (_surface(copy, normals(copy.xyz, copy.faces), count) >= KEPT * surface)
+            & (_surface(copy, normals(copy.xyz, copy.faces), count) >= SURFACE_KEPT * surface)
         )
         most = np.where(good, faces, most)
         made.append(_some(copy, good))

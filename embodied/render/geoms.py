@@ -12,7 +12,7 @@ import cv2
 import mujoco
 import numpy as np
 
-from embodied.render.camera import FAR, NEAR, Camera
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera
 from embodied.scene.model import VISUAL, Scene
 
 HIDDEN = 5
@@ -103,10 +103,10 @@ class Geoms:
 
     def _aim(self, camera: Camera, size: tuple[int, int]) -> None:
         """Write `camera` into both eyes of the scene."""
-        top = NEAR * math.tan(camera.vfov / 2)
+        top = NEAR_PLANE * math.tan(camera.vfov / 2)
         for eye in self._drawn.camera:
             eye.pos, eye.forward, eye.up = camera.position, camera.forward, camera.up
-            eye.frustum_near, eye.frustum_far = NEAR, FAR
+            eye.frustum_near, eye.frustum_far = NEAR_PLANE, FAR_PLANE
             eye.frustum_bottom, eye.frustum_top = -top, top
             eye.frustum_center, eye.frustum_width = 0.0, top * size[1] / size[0]
 
@@ -119,10 +119,10 @@ def world_boxes(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[np.ndarray,
 
 
 def depth_of_reversed_z(z: np.ndarray) -> np.ndarray:
-    """Metres along the optical axis (float32) from a depth buffer that is 1 at NEAR and 0 at FAR; inf at 0.
+    """Metres along the optical axis (float32) from a depth buffer that is 1 at NEAR_PLANE and 0 at FAR_PLANE; inf at 0.
 
     Source: the inverse of glFrustum's mapping with both ends exchanged (OpenGL 2.1 reference, glFrustum).
     """
-    depth = NEAR * FAR / (NEAR + z * np.float32(FAR - NEAR))
+    depth = NEAR_PLANE * FAR_PLANE / (NEAR_PLANE + z * np.float32(FAR_PLANE - NEAR_PLANE))
     depth[z <= 0] = np.inf
     return depth

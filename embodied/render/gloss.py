@@ -35,7 +35,7 @@ FAINT = 0.006
 """Share of the light that has to be mirrored for a ray to be worth it."""
 SMOOTH = 0.12
 """Roughness below which every pixel looks for itself: mirrors, panes, tiles, polished metal."""
-METAL = 0.3
+METALLIC = 0.3
 """Metallic share from which on a page wears a picture of what the face mirrors for somebody in the middle of the
 room."""
 BRIGHTEST = 12.0
@@ -61,7 +61,7 @@ BRUSHED = 4
 """Rays of each pixel of polished metal that is not smooth, in each of SUBPIXEL_OFFSETS."""
 WHITE = 5.0
 """Light that is shown as full white: no more of it counts where a pixel is averaged, or edges would be ragged."""
-GLASS = 0.81
+DOUBLE_GLAZING = 0.81
 """Share of the outdoors' light that comes in through double glazing, as the bake has it."""
 PANE_F0 = 0.04
 """Share of the light that one surface of glass mirrors straight ahead (refractive index 1.5)."""
@@ -136,7 +136,7 @@ class Gloss:
         self._mirrors = np.append((gloss[:, 0] < MATTE) & (gloss[:, 1] > 0), False)  # nothing that is met is face -1
         self._first = rays_among(self._faces.corners)
         self._panes = _panes_of(lit, rays_among)
-        self._gain_at, self._beyond = data.gain_at, data.outdoors / GLASS
+        self._gain_at, self._beyond = data.gain_at, data.outdoors / DOUBLE_GLAZING
         some_of_page = {m.page: m.vertices.mean(0)[None] for m in lit.meshes if len(m.vertices)}
         gains = [data.gain_at(some_of_page[i])[0] if i in some_of_page else None for i in range(len(lit.pages))]
         small = [_coarse(*one) for one in zip(lit.pages, data.glow, gains, strict=True)]
@@ -191,7 +191,7 @@ class Gloss:
         f0 = 0.08 * gloss[:, 1] * (1 - metal) + metal
         worth = schlick(f0, np.abs(cos), gloss[:, 0]) > FAINT
         pixels = hit if pixels is None else pixels[hit]
-        sharp = (gloss[:, 0] < SMOOTH) | (metal > METAL)
+        sharp = (gloss[:, 0] < SMOOTH) | (metal > METALLIC)
         normal = faces.normal[face] * facing[:, None]
         return _Seen(pixels, face, distance[hit], ahead, normal, gloss[:, 0], worth & ~sharp, worth & sharp, hit)
 

@@ -40,7 +40,7 @@ TAIL = struct.Struct("<Q32s8s")
 JPEG_QUALITY = 90
 SMOOTH = (cv2.IMWRITE_PNG_COMPRESSION, 6, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP)
 """For planes and areas: a fifth smaller, and read sooner, than with OpenCV's own choice."""
-FARTHEST = 65.535
+FARTHEST_STORED = 65.535
 """Metres beyond which depths are stored as this."""
 CHANNELS = ("rgb", "depth", "ids")
 
@@ -233,7 +233,7 @@ def encode(panorama: Panorama, lossless: bool = False) -> tuple[bytes, bytes, by
             cv2.IMWRITE_JPEG_OPTIMIZE,
             1,
         )
-    metres = np.where(np.isfinite(panorama.depth), np.minimum(panorama.depth, FARTHEST), 0)
+    metres = np.where(np.isfinite(panorama.depth), np.minimum(panorama.depth, FARTHEST_STORED), 0)
     depth = _encoded(".png", beside(np.rint(metres * 1000).astype(np.uint16)), *SMOOTH)
     if panorama.ids.max() > 65535:
         raise ValueError(f"instance id {panorama.ids.max()} does not fit into 16 bits; a house may have 65535 owners")

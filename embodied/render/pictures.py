@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-SIZES = (8, 4096)
+FACE_SIZES = (8, 4096)
 """Smallest and largest side of a cube face, pixels."""
 BAKED_QUALITIES = ("fast", "normal", "high")
 """Names of embodied.light.settings.QUALITIES."""
@@ -20,8 +20,8 @@ def check_size(size: int) -> None:
     Raises:
       ValueError: says what can.
     """
-    if not SIZES[0] <= size <= SIZES[1]:
-        raise ValueError(f"size is {size} pixels; a cube face needs {SIZES[0]} to {SIZES[1]}")
+    if not FACE_SIZES[0] <= size <= FACE_SIZES[1]:
+        raise ValueError(f"size is {size} pixels; a cube face needs {FACE_SIZES[0]} to {FACE_SIZES[1]}")
 
 
 def _check_quality(quality: str) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 from OpenGL import GL
 
 from embodied.render import atlas, coarser, shaders
-from embodied.render.camera import FAR, NEAR, Camera
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, Camera
 from embodied.render.supersampling import nearest, step_of
 from embodied.scene.lit_pages import LitMesh
 
@@ -33,14 +33,14 @@ VERSION = (4, 5)
 """Of OpenGL, the oldest."""
 NOWHERE = -9.0
 """Column and row of a pixel that shows nothing."""
-PICTURES = {
+SHADER_OUTPUTS = {
     "column": (GL.GL_R32F, GL.GL_RED, GL.GL_FLOAT, np.float32, NOWHERE),
     "row": (GL.GL_R32F, GL.GL_RED, GL.GL_FLOAT, np.float32, NOWHERE),
     "number": (GL.GL_R32UI, GL.GL_RED_INTEGER, GL.GL_INT, np.int32, 0),
     "near": (GL.GL_R32F, GL.GL_RED, GL.GL_FLOAT, np.float32, 0.0),
 }
 """How what shaders write is kept and read, and what it is where nothing is; `near` is 1 over metres."""
-FRAMES = {"places": ("column", "row"), "numbers": ("number", "near"), "all": tuple(PICTURES)}
+FRAME_BUFFERS = {"places": ("column", "row"), "numbers": ("number", "near"), "all": tuple(SHADER_OUTPUTS)}
 """Numbers that shaders write, in their order."""
 EDGE = 0.01
 """Metres before the eye from which on it is known where a point is seen."""
@@ -81,8 +81,8 @@ class Raster:
         pixels = {"through": shaders.THROUGH, "numbers": shaders.NUMBERS, "places": shaders.PLACES, "all": shaders.ALL}
         size_of = {"through": pictures[1].shape, "numbers": (0, 0)}
         self._programs = {name: _program(p, size_of.get(name, pictures[0].shape)) for name, p in pixels.items()}
-        self._frames = {name: int(GL.glGenFramebuffers(1)) for name in (*FRAMES, "canvas")}
-        self._pictures = {name: int(GL.glGenRenderbuffers(1)) for name in (*PICTURES, "depth")}
+        self._frames = {name: int(GL.glGenFramebuffers(1)) for name in (*FRAME_BUFFERS, "canvas")}
+        self._pictures = {name: int(GL.glGenRenderbuffers(1)) for name in (*SHADER_OUTPUTS, "depth")}
         GL.glUseProgram(0)
         self._size = (0, 0)
 
@@ -102,7 +102,7 @@ class Raster:
         in `rgb`."""
         self._begin("numbers", size)
         self._draw("numbers", self._matrix(camera, size), self._ranges(camera, size, chosen))
-        ids, near = (_read("numbers", name, size) for name in FRAMES["numbers"])
+        ids, near = (_read("numbers", name, size) for name in FRAME_BUFFERS["numbers"])
         self._end()
         return _metres(near), ids
 
@@ -125,7 +125,7 @@ class Raster:
         if len(clear):
             GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._frames["all"])
             self._draw("all", self._matrix(camera, drawn), clear)
-        ids, near = (nearest(_read("all", name, drawn), size) for name in FRAMES["numbers"])
+        ids, near = (nearest(_read("all", name, drawn), size) for name in FRAME_BUFFERS["numbers"])
         self._end()
         return picture, _metres(near), ids
 
@@ -155,7 +155,7 @@ class Raster:
         near = (self.middles[chosen] - np.array(camera.position)) @ forward - self.reaches[chosen] @ np.abs(forward)
         widest = COARSE * 2 * math.tan(camera.vfov / 2) / size[0] * np.maximum(near, 0)
         counts = self._counts[:, chosen]
-        fits = (CELLS[: len(counts), None] <= widest) & (counts > 0)
+        fits = (MESH_CELLS[: len(counts), None] <= widest) & (counts > 0)
         level = len(fits) - 1 - fits[::-1].argmax(0)
         return np.stack([self._starts[level, chosen], counts[level, np.arange(len(chosen))]], axis=1)
 
@@ -167,7 +167,7 @@ class Raster:
         matrix = self._matrix(camera, size)
         self._begin(frame, size)
         self._draw(frame, matrix, solid)
-        column, row = (_read(frame, name, size) for name in FRAMES["places"])
+        column, row = (_read(frame, name, size) for name in FRAME_BUFFERS["places"])
         picture = cv2.remap(self._atlas, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
         left, low, width, height = extent(self.middles[panes], self.reaches[panes], matrix, size)
         if width * height:
@@ -214,9 +214,9 @@ class Raster:
         GL.glDepthFunc(GL.GL_GREATER)
         GL.glDisable(GL.GL_DITHER)
         GL.glClearBufferfv(GL.GL_DEPTH, 0, (0.0,))
-        for k, name in enumerate(FRAMES[frame]):
-            clear = GL.glClearBufferiv if PICTURES[name][3] is np.int32 else GL.glClearBufferfv
-            clear(GL.GL_COLOR, k, (PICTURES[name][4], 0, 0, 0))
+        for k, name in enumerate(FRAME_BUFFERS[frame]):
+            clear = GL.glClearBufferiv if SHADER_OUTPUTS[name][3] is np.int32 else GL.glClearBufferfv
+            clear(GL.GL_COLOR, k, (SHADER_OUTPUTS[name][4], 0, 0, 0))
 
     def _draw(self, program: str, matrix: np.ndarray, ranges: np.ndarray) -> None:
         """Triangles of `ranges` (k, 2), those that face the other way left out before OpenGL looks at their corners."""
@@ -241,15 +241,17 @@ class Raster:
 
     def _make_frames(self) -> None:
         """Frame buffers of `_size`, which share their pictures and one buffer of depths; the canvas is a texture."""
-        forms = {name: form for name, (form, *_) in PICTURES.items()} | {"depth": GL.GL_DEPTH_COMPONENT32F}
+        forms = {name: form for name, (form, *_) in SHADER_OUTPUTS.items()} | {"depth": GL.GL_DEPTH_COMPONENT32F}
         for name, picture in self._pictures.items():
             GL.glBindRenderbuffer(GL.GL_RENDERBUFFER, picture)
             GL.glRenderbufferStorage(GL.GL_RENDERBUFFER, forms[name], *self._size[::-1])
         _make_texture(self._canvas, self._size, None)
         for frame, number in self._frames.items():
             GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, number)
-            places = [GL.GL_COLOR_ATTACHMENT0 + k for k in range(len(FRAMES.get(frame, "1")))]
-            for place, name in zip((GL.GL_DEPTH_ATTACHMENT, *places), ("depth", *FRAMES.get(frame, ())), strict=False):
+            places = [GL.GL_COLOR_ATTACHMENT0 + k for k in range(len(FRAME_BUFFERS.get(frame, "1")))]
+            for place, name in zip(
+                (GL.GL_DEPTH_ATTACHMENT, *places), ("depth", *FRAME_BUFFERS.get(frame, ())), strict=False
+            ):
                 GL.glFramebufferRenderbuffer(GL.GL_FRAMEBUFFER, place, GL.GL_RENDERBUFFER, self._pictures[name])
             if frame == "canvas":
                 GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, places[0], self._canvas, 0)
@@ -266,14 +268,14 @@ def able() -> bool:
 
 
 def projection(camera: Camera, size: tuple[int, int], lowest: float) -> np.ndarray:
-    """(4, 4) float32 from metres of the world to clip space, with a depth of 1 at NEAR and `lowest` at FAR."""
+    """(4, 4) float32 from metres of the world to clip space, of depth 1 at NEAR_PLANE and `lowest` at FAR_PLANE."""
     forward, up = np.array(camera.forward), np.array(camera.up)
     tall = math.tan(camera.vfov / 2)
     rows = np.empty((4, 4))
     rows[0, :3], rows[1, :3] = camera.right / (tall * size[1] / size[0]), up / tall
-    rows[2, :3], rows[3, :3] = forward * ((lowest * FAR - NEAR) / (FAR - NEAR)), forward
+    rows[2, :3], rows[3, :3] = forward * ((lowest * FAR_PLANE - NEAR_PLANE) / (FAR_PLANE - NEAR_PLANE)), forward
     rows[:, 3] = -rows[:, :3] @ np.array(camera.position)
-    rows[2, 3] += (1 - lowest) * NEAR * FAR / (FAR - NEAR)
+    rows[2, 3] += (1 - lowest) * NEAR_PLANE * FAR_PLANE / (FAR_PLANE - NEAR_PLANE)
     return rows.astype(np.float32)
 
 
@@ -302,7 +304,7 @@ def extent(
 
 SIGNS = np.array(list(itertools.product((-1, 1), repeat=3)))
 """(8, 3) of the corners of a box."""
-CELLS = np.array([0.0, *coarser.CELLS])
+MESH_CELLS = np.array([0.0, *coarser.COPY_CELLS])
 
 
 def _arranged(
@@ -313,7 +315,7 @@ def _arranged(
     copied: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(n,) CORNER and (m, 3) triangles of all meshes and of coarser copies of the things among them; and where those
-    of each mesh begin and how many they are, (CELLS, meshes) each."""
+    of each mesh begin and how many they are, (MESH_CELLS, meshes) each."""
     sizes = [len(m.vertices) for m in meshes]
     corners, number = np.zeros(sum(sizes), CORNER), np.repeat(np.arange(len(meshes)), sizes)
     first = np.cumsum(sizes) - sizes
@@ -377,9 +379,9 @@ def _make_texture(texture: int, size: tuple[int, int], picture: np.ndarray | Non
 
 def _read(frame: str, name: str, size: tuple[int, int]) -> np.ndarray:
     """(h, w) of a picture of the bound frame."""
-    _, kind, number, dtype, _ = PICTURES[name]
+    _, kind, number, dtype, _ = SHADER_OUTPUTS[name]
     out = np.empty(size, dtype)
-    GL.glReadBuffer(GL.GL_COLOR_ATTACHMENT0 + FRAMES[frame].index(name))
+    GL.glReadBuffer(GL.GL_COLOR_ATTACHMENT0 + FRAME_BUFFERS[frame].index(name))
     GL.glReadPixels(0, 0, size[1], size[0], kind, number, out)
     return out
 

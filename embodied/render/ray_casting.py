@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from embodied.house.house import House
-from embodied.render.camera import FAR
+from embodied.render.camera import FAR_PLANE
 from embodied.render.panorama import face_rays, ray_stretch
 from embodied.scene.model import VISUAL, compile_scene
 
@@ -38,7 +38,9 @@ class RayCaster:
         groups[VISUAL] = 1
         geoms, distances = np.empty(count, np.int32), np.empty(count)
         eye = np.array(position, float)
-        mujoco.mj_multiRay(self._scene.model, self._data, eye, rays, groups, 1, -1, geoms, distances, None, count, FAR)
+        mujoco.mj_multiRay(
+            self._scene.model, self._data, eye, rays, groups, 1, -1, geoms, distances, None, count, FAR_PLANE
+        )
         met = geoms >= 0
         ids = np.where(met, self._scene.owner_of_geom[geoms], 0).astype(np.int32).reshape(shape)
         depth = np.where(met, distances, np.inf).reshape(shape) / ray_stretch(size)

@@ -35,11 +35,11 @@ class SightingTable:
         first, last = np.searchsorted(self.node, [node, node + 1])
         return tuple(
             Sighting(house.placements[o].id, house.placements[o].object_class, float(y), float(p), float(d), int(n))
-            for o, y, p, d, n in zip(*(getattr(self, name)[first:last] for name in COLUMNS[1:]), strict=True)
+            for o, y, p, d, n in zip(*(getattr(self, name)[first:last] for name in SIGHTING_COLUMNS[1:]), strict=True)
         )
 
 
-COLUMNS = ("node", "owner", "yaw", "pitch", "distance", "pixels")
+SIGHTING_COLUMNS = ("node", "owner", "yaw", "pitch", "distance", "pixels")
 
 
 def sightings_table(pictures: Sequence[tuple[np.ndarray, np.ndarray]], placements: int) -> SightingTable:
@@ -50,7 +50,7 @@ def sightings_table(pictures: Sequence[tuple[np.ndarray, np.ndarray]], placement
       placements: number of placements; ids above it belong to the shell and are not counted.
     """
     rows = [_rows(node, depth, ids, placements) for node, (depth, ids) in enumerate(pictures)]
-    columns = [np.concatenate([r[i] for r in rows]) if rows else np.zeros(0) for i in range(len(COLUMNS))]
+    columns = [np.concatenate([r[i] for r in rows]) if rows else np.zeros(0) for i in range(len(SIGHTING_COLUMNS))]
     kinds = (np.int32, np.int32, np.float32, np.float32, np.float32, np.int32)
     return SightingTable(*(c.astype(k) for c, k in zip(columns, kinds, strict=True)))
 
@@ -74,14 +74,14 @@ def _rows(node: int, depth: np.ndarray, ids: np.ndarray, placements: int) -> tup
 def save_table(path: Path, table: SightingTable) -> None:
     """Write `table` to `path` (.npz) atomically."""
     with atomic_path(path) as temporary, open(temporary, "wb") as f:
-        np.savez_compressed(f, **{name: getattr(table, name) for name in COLUMNS})
+        np.savez_compressed(f, **{name: getattr(table, name) for name in SIGHTING_COLUMNS})
 
 
 def load_table(path: Path) -> SightingTable | None:
     """Table that `save_table` wrote; None where there is no such file or it is damaged, so that it is made again."""
     try:
         with open_arrays(path) as file:
-            columns = [file[name] for name in COLUMNS]
+            columns = [file[name] for name in SIGHTING_COLUMNS]
     except (OSError, *DAMAGED):
         return None
     if len({len(c) for c in columns}) != 1:

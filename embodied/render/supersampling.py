@@ -11,7 +11,7 @@ import math
 import cv2
 import numpy as np
 
-SMALL, LARGE = 3, 5
+SMALL_STEP, LARGE_STEP = 3, 5
 """Pixels drawn, along a side, for every 2 of a small picture and for every 4 of a large one. Against one drawn four
 times as large, a picture of 640 x 480 has 36.0 dB so, and 37.5 as a small one, for a quarter more time."""
 FROM = 200_000
@@ -20,13 +20,13 @@ FROM = 200_000
 
 def drawn_size(size: tuple[int, int]) -> tuple[int, int]:
     """(height, width) at which a picture of `size` is drawn."""
-    step = LARGE if size[0] * size[1] >= FROM else SMALL
+    step = LARGE_STEP if size[0] * size[1] >= FROM else SMALL_STEP
     return math.ceil(size[0] * step / (step - 1)), math.ceil(size[1] * step / (step - 1))
 
 
 def step_of(size: tuple[int, int], drawn: tuple[int, int]) -> int | None:
     """The number of pixels drawn for every one fewer that is wanted; None where they do not come out even."""
-    for step in (SMALL, LARGE):
+    for step in (SMALL_STEP, LARGE_STEP):
         if all(d * (step - 1) == s * step and d % step == 0 for s, d in zip(size, drawn, strict=True)):
             return step
     return None

@@ -18,11 +18,11 @@ from embodied.house.house import House
 from embodied.house.shapes import inward, room_at
 
 OUTDOORS = ""
-NEAR = 0.25
+BESIDE_OPENING = 0.25
 """Closer than this to an opening, in metres, one sees all around through it."""
 MARGIN = 1e-3
 """Added to both ends of a field of view, radians: pixels at the edge."""
-DEEPEST = 16
+MOST_OPENINGS = 16
 """Openings looked through one behind another before the search calls everything behind visible."""
 
 FRAME = 0.02
@@ -118,7 +118,7 @@ def _look(
     if any(s[0] <= low and high <= s[1] and s[2] <= bottom and top <= s[3] for s in seen.get(room, ())):
         return True
     seen.setdefault(room, []).append(sector)
-    if len(path) > DEEPEST:
+    if len(path) > MOST_OPENINGS:
         return False
     for portal in portals.of_room[room]:
         if portal.opening in path:
@@ -138,7 +138,7 @@ def _through(eye: Eye, portal: Passage, sector: Sector) -> list[Sector]:
     ux, uy = (bx - ax) / portal.width, (by - ay) / portal.width
     reach = min(max(-(ax * ux + ay * uy), 0.0), portal.width)
     nearest, farthest = math.hypot(ax + reach * ux, ay + reach * uy), math.hypot(ax, ay)
-    if nearest < NEAR:
+    if nearest < BESIDE_OPENING:
         return [sector]
     if away < 0:
         return []

@@ -25,7 +25,7 @@ import numpy as np
 
 from embodied.errors import UnableError
 from embodied.house.house import House
-from embodied.render.camera import FAR, NEAR, View
+from embodied.render.camera import FAR_PLANE, NEAR_PLANE, View
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
 from embodied.render.sampling import FACES
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
 
 SEEN = ("rgb", "depth", "ids")
-APART = 5e-4
+FACE_GAP = 5e-4
 """How far the two faces of a thin thing are moved apart, metres: of two faces in one place a ray meets either."""
 FACE_YAWS = tuple(math.atan2(f[1], f[0]) if f[2] == 0 else 0.0 for f, _ in FACES)
 FACE_PITCHES = tuple(math.asin(f[2]) for f, _ in FACES)
@@ -255,7 +255,7 @@ def _context(model: mujoco.MjModel, worlds: int, size: tuple[int, int]) -> Any:
     )
     context.use_textures, context.textures_registry = True, [_texture(model, t) for t in range(model.ntex)]
     context.textures = wp.array(context.textures_registry, dtype=wp.Texture2D)
-    context.znear, context.zfar = NEAR, FAR  # part of the compiled kernel, so one for all houses
+    context.znear, context.zfar = NEAR_PLANE, FAR_PLANE  # part of the compiled kernel, so one for all houses
     return context
 
 
@@ -291,7 +291,7 @@ def _part_faces(model: mujoco.MjModel) -> None:
     shift = np.zeros(model.mesh_vert.shape)
     np.add.at(shift, faces[twins].reshape(-1), np.repeat(normals, 3, axis=0))
     shift /= np.maximum(np.linalg.norm(shift, axis=1, keepdims=True), 1e-12)
-    model.mesh_vert[:] += APART * shift
+    model.mesh_vert[:] += FACE_GAP * shift
 
 
 def _texture(model: mujoco.MjModel, index: int) -> Any:

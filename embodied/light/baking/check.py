@@ -19,7 +19,7 @@ AGAIN, AGAIN_PATHS = 100, 1200
 LIMIT = 0.10
 """Largest relative difference that passes: for the median of the signed differences (a bias) always, and luxel by
 luxel, beyond twice the path tracer's own standard error, where the settings allow no more (`Settings.tolerance`)."""
-MOST = 0.25
+MOST_BEYOND = 0.25
 """Share of luxels that may differ by more than that.
 
 Why not none: light is interpolated and smoothed along surfaces, which is what makes it quick and takes the noise out,
@@ -39,7 +39,7 @@ def compare(
     """
     s = solution
     y = np.array([0.2126, 0.7152, 0.0722])
-    whole = s.light.soft + AMBIENT + s.light.sun[:, None] * s.outdoors.sun * radiosity.GLASS
+    whole = s.light.soft + AMBIENT + s.light.sun[:, None] * s.outdoors.sun * radiosity.GLAZING
     bright = whole @ y
     level = {u: np.median(bright[s.lux.shell & (s.lux.unit == u)]) for u in np.unique(s.lux.unit[s.lux.shell])}
     lit = np.array([level.get(u, 0.0) for u in range(int(s.lux.unit.max()) + 1)]) > 0.05 * np.median(
@@ -67,7 +67,7 @@ def check(solution: LightSolution, tolerance: float = LIMIT) -> dict:
       tolerance: largest relative difference of a luxel.
 
     Raises:
-      LightError: their bias is over `LIMIT` or the share that is off over `MOST`.
+      LightError: their bias is over `LIMIT` or the share that is off over `MOST_BEYOND`.
     """
     if not solution.lux.shell.any():
         return {"luxels": 0}
@@ -80,7 +80,8 @@ def check(solution: LightSolution, tolerance: float = LIMIT) -> dict:
         raise LightError(
             f"the bake of house {solution.house.name!r} disagrees with the path tracer at {result['luxels']} luxels: "
             f"bias {result['bias']:+.1%} (at most {LIMIT:.0%}), {result['beyond']:.0%} of them by more than "
-            f"{tolerance:.0%} (at most {MOST:.0%}); {complaint}; raise the settings' rays, or report the house's seed"
+            f"{tolerance:.0%} (at most {MOST_BEYOND:.0%}); {complaint}; raise the settings' rays, or report the "
+            "house's seed"
         )
     return result
 
@@ -96,7 +97,7 @@ def judge(
         "bias": round(float(np.median(off)), 4),
         "beyond": round(float(np.mean(beyond > 0)), 4),
     }
-    if abs(result["bias"]) <= LIMIT and result["beyond"] <= MOST:
+    if abs(result["bias"]) <= LIMIT and result["beyond"] <= MOST_BEYOND:
         return result, ""
     worst = int(np.argmax(beyond))
     return result, f"worst at {position[worst].round(2).tolist()}: baked {baked[worst]:.3g}, traced {traced[worst]:.3g}"

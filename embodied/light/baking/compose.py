@@ -33,14 +33,14 @@ from embodied.light.pages.colours import ColourMaps, colour_at, linear, paints_o
 from embodied.light.pages.cover import Cover, Texels, cover, sources, surface
 from embodied.light.pages.files import Ingredients
 from embodied.light.pages.tone import Exposure, developed
-from embodied.light.settings import Settings
+from embodied.light.settings import LightSettings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, portals_of
 from embodied.light.tracing.luxels import AMBIENT, Luxels, glow_of
 from embodied.light.tracing.radiosity import Space, points_of, woven
 from embodied.light.tracing.sky import Outdoors
 
-METAL = 0.3
+METAL_SHARE = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
 DULL, SHARP_RAYS, DULL_RAYS = 0.1, 1 / 3, 2
 """Roughness from which a metal's picture is so blurred that it is made per luxel, with many rays lest grain is left;
@@ -76,7 +76,7 @@ class Composer:
     """Makes the pages of a solved house; owns what all of them share on the device."""
 
     def __init__(
-        self, solution: LightSolution, settings: Settings, maps: ColourMaps, memory: LightingCache | None = None
+        self, solution: LightSolution, settings: LightSettings, maps: ColourMaps, memory: LightingCache | None = None
     ) -> None:
         self.solution, self.space, self.settings, self.maps = solution, solution.space, settings, maps
         self.memory = memory
@@ -84,7 +84,7 @@ class Composer:
         self._starts = np.cumsum([0, *counts])
         self.soft = solution.light.soft + AMBIENT.astype(np.float32)
         """(n, 3) all light but the sun's own."""
-        self.sun = (solution.outdoors.sun * radiosity.GLASS).astype(np.float32)
+        self.sun = (solution.outdoors.sun * radiosity.GLAZING).astype(np.float32)
         """(3,) e of the sun behind the glass."""
 
     def kept(self, what: str, number: int, make: Callable[[], T]) -> T:
@@ -242,7 +242,7 @@ def _mirrors(composer: Composer, page: Page, coarse: Texels, c: Cover) -> Mirror
     """
     metal = np.array([1.0 if f.mirror else f.metallic for f in page.finishes], np.float32)[page.finish]
     rough = np.array([0.015 if f.mirror else f.roughness for f in page.finishes], np.float32)[page.finish]
-    metal = np.where(metal > METAL, metal, 0.0).astype(np.float32)
+    metal = np.where(metal > METAL_SHARE, metal, 0.0).astype(np.float32)
     if not metal.any():
         return None
     dull = rough > DULL
@@ -293,7 +293,7 @@ def _mirrored(
         d = dr.normalize(straight + mi.warp.square_to_uniform_sphere(p.sample(k)) * spread_of)
         d = dr.select(dr.dot(d, p.normal) < 0.02, straight, d)
         near, hit = radiosity.hit_colour(space, table, mi.Ray3f(p.position + p.normal * radiosity.LIFT, d))
-        return (dr.select(hit, near, radiosity.env_lookup(space.env, d, ~hit) * radiosity.GLASS),)
+        return (dr.select(hit, near, radiosity.env_lookup(space.env, d, ~hit) * radiosity.GLAZING),)
 
     return np.minimum(array(accumulate(rays, one, dr.zeros(mi.Color3f, p.n))[0]) / rays, limit)
 

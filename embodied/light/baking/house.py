@@ -35,7 +35,7 @@ from embodied.light.pages.colours import ColourMaps
 from embodied.light.pages.files import Bake, StaleBake, open_bake, packed_meshes, page_files, reopened, write_pages
 from embodied.light.pages.meshes import meshes_of
 from embodied.light.pages.tone import expose
-from embodied.light.settings import QUALITIES, Settings, light_code, settings_of
+from embodied.light.settings import QUALITIES, LightSettings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
 from embodied.light.tracing.luxels import Luxels, luxels_of, with_glow
 from embodied.light.tracing.radiosity import scenes_without, space_of, with_env
@@ -52,7 +52,7 @@ log = logging.getLogger(__name__)
 Progress = Callable[[str, float], None]
 
 
-SECONDS = {"fast": 1.0, "normal": 2.5, "high": 8.0}
+SECONDS_PER_SQUARE_METRE = {"fast": 1.0, "normal": 2.5, "high": 8.0}
 """Of one core per square metre of a house, by quality, with furniture that is new to the cache."""
 MOST_CORES = 8
 """More shorten it little."""
@@ -72,7 +72,7 @@ TOGETHER = 8
 def duration(house: House, quality: str) -> str:
     """About how long `bake` takes on this machine, in words."""
     cores = min(processors(), MOST_CORES)
-    seconds = house.area * SECONDS.get(quality, SECONDS["normal"]) / cores
+    seconds = house.area * SECONDS_PER_SQUARE_METRE.get(quality, SECONDS_PER_SQUARE_METRE["normal"]) / cores
     return f"about {math.ceil(seconds / 60)} minutes" if seconds > 60 else "about a minute"
 
 
@@ -95,7 +95,7 @@ def progress_bar(*, shown: bool = True) -> Iterator[Progress]:
         yield tell
 
 
-def key_of(house: House, looks: str, settings: Settings) -> str:
+def key_of(house: House, looks: str, settings: LightSettings) -> str:
     """Name of a bake's file: another catalogue, model or material makes another bake. `looks`: of its parts."""
     return digest("light", light_code(), house.digest, owners(house), looks, dataclasses.asdict(settings))[:24]
 
@@ -122,7 +122,7 @@ def bake(
     house: House,
     catalogue: Catalogue,
     cache: Path,
-    settings: Settings | str = "normal",
+    settings: LightSettings | str = "normal",
     *,
     progress: Progress = lambda stage, done: None,
 ) -> Bake:
@@ -142,7 +142,7 @@ def bake_all(
     lightings: Sequence[House],
     catalogue: Catalogue,
     cache: Path,
-    settings: Settings | str = "normal",
+    settings: LightSettings | str = "normal",
     *,
     progress: Progress = lambda stage, done: None,
 ) -> tuple[Bake, ...]:
@@ -214,7 +214,7 @@ class BakeContext:
         house: House,
         parts: Sequence[Part],
         cache: Path,
-        settings: Settings,
+        settings: LightSettings,
         *,
         several: bool = False,
         progress: Progress = lambda stage, done: None,
@@ -266,7 +266,7 @@ class BakeContext:
 def solve_house(
     house: House,
     context: BakeContext,
-    settings: Settings,
+    settings: LightSettings,
     folder: Path | None = None,
     *,
     progress: Progress = lambda s, d: None,
@@ -298,7 +298,7 @@ def solve_house(
     return LightSolution(house, atlas, lux, light, outdoors, lamps, exposure, space, without)
 
 
-def _make(house: House, context: BakeContext, folder: Path, settings: Settings, progress: Progress) -> Bake:
+def _make(house: House, context: BakeContext, folder: Path, settings: LightSettings, progress: Progress) -> Bake:
     from embodied.light.baking.check import check
 
     took, context.took = context.took, {}
@@ -377,16 +377,16 @@ def brightest(e: np.ndarray) -> np.ndarray:
     return np.exp(np.log(np.maximum(tail, 1e-9)).mean(axis=0))
 
 
-def forget(cache: Path, house: House, catalogue: Catalogue, settings: Settings | str) -> None:
+def forget(cache: Path, house: House, catalogue: Catalogue, settings: LightSettings | str) -> None:
     """Delete the bake of `house`, finished or not."""
     settings = settings_of(settings) if isinstance(settings, str) else settings
     shutil.rmtree(_folder(cache, house, looks_of(house_parts(house, catalogue)), settings), ignore_errors=True)
 
 
-def _folder(cache: Path, house: House, looks: str, settings: Settings) -> Path:
+def _folder(cache: Path, house: House, looks: str, settings: LightSettings) -> Path:
     """Folder of the bake of `house`, there or not; its name begins with the quality's. `looks`: of its parts."""
     return Path(cache) / "light" / f"{_name_of(settings)}-{key_of(house, looks, settings)}"
 
 
-def _name_of(settings: Settings) -> str:
+def _name_of(settings: LightSettings) -> str:
     return next((name for name, known in QUALITIES.items() if known == settings), "custom")

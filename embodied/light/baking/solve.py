@@ -15,7 +15,7 @@ from embodied.light.backend import array, brightness, floats, mi
 from embodied.light.baking import denoise
 from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages.atlas import Atlas
-from embodied.light.settings import Settings
+from embodied.light.settings import LightSettings
 from embodied.light.tracing import radiosity
 from embodied.light.tracing.emitters import Lamp, Portal, portals_of
 from embodied.light.tracing.luxels import AMBIENT, Luxels, points
@@ -24,9 +24,9 @@ from embodied.light.tracing.sky import Outdoors
 
 SPARKS = 0.01
 """Share of a room's light that may be lost to keep its brightest spots from sparkling."""
-TRIES = 300
+LUXELS_TRIED = 300
 """Luxels of every room and opening that are asked whether a light reaches them."""
-ROUNDS = 3
+BOUNCE_ROUNDS = 3
 """Of gathering along the same rays, before what is seen is gathered."""
 
 
@@ -61,7 +61,7 @@ class BakeInput:
     space: Space
     outdoors: Outdoors
     lamps: tuple[Lamp, ...]
-    settings: Settings
+    settings: LightSettings
     memory: LightingCache | None = None
     """Results that lightings share; None where the house is lit once."""
     without: Mapping[str, RayScene] = field(default_factory=dict)
@@ -93,7 +93,7 @@ class BakeInput:
             self.memory, "far", lambda: radiosity.meet(self.space, self.at(self.free), last - first, first)
         )
 
-    def reached(self, sees: Callable[[np.ndarray], np.ndarray], tries: int = TRIES) -> np.ndarray:
+    def reached(self, sees: Callable[[np.ndarray], np.ndarray], tries: int = LUXELS_TRIED) -> np.ndarray:
         """Numbers of the luxels that may be seen and that a light may reach.
 
         Args:
@@ -193,7 +193,7 @@ def sun_light(inputs: BakeInput) -> tuple[np.ndarray, np.ndarray]:
     facing = facing[lux.thin[facing] | (lux.face_normal[facing] @ towards.astype(np.float32) > 0)]
     if len(facing):
         share[facing] = seen(facing, 4)
-    flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLASS)
+    flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLAZING)
     for u in np.unique(lux.unit[share > 0]):
         patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], inputs.settings.patches)
         if patches is not None:
@@ -243,13 +243,16 @@ def bounce(inputs: BakeInput, soft: np.ndarray, tell: Callable[[float], None]) -
         np.float32
     )
     e = np.zeros_like(soft)
-    for k in range(ROUNDS):
-        tell(k / (ROUNDS + 1))
+    for k in range(BOUNCE_ROUNDS):
+        tell(k / (BOUNCE_ROUNDS + 1))
         table = seen + lux.albedo * e
-        e = radiosity.gather(near, floats(table if k < ROUNDS - 1 else _clamp_fireflies(lux, table)))[0] / near.rays
+        e = (
+            radiosity.gather(near, floats(table if k < BOUNCE_ROUNDS - 1 else _clamp_fireflies(lux, table)))[0]
+            / near.rays
+        )
         if k == 0:
             e += _infinite_bounces(lux, e, near.bad < 0.5 * near.rays)
-    tell(ROUNDS / (ROUNDS + 1))
+    tell(BOUNCE_ROUNDS / (BOUNCE_ROUNDS + 1))
     last = floats(_clamp_fireflies(lux, seen + lux.albedo * e))
     total, square = radiosity.gather(near, last)
     bad, rays = near.bad.copy(), np.full(len(e), near.rays, np.float32)

@@ -27,7 +27,7 @@ from embodied.scene.far_towns import GLOW
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 
-FAR = ("outdoor/neighbours", "outdoor/windows", "outdoor/street")
+BEYOND_THE_PLOT = ("outdoor/neighbours", "outdoor/windows", "outdoor/street")
 COARSER = 0.8
 """Owners of what stands beyond the plot, and how many luxels it gets along a metre against the rest."""
 LIT_WINDOWS = "outdoor/windows"
@@ -60,8 +60,8 @@ def outside_of(
     """
     if not parts:
         return None
-    far = [p for p in parts if p.owner in FAR]
-    near = [p for p in parts if p.owner not in FAR]
+    far = [p for p in parts if p.owner in BEYOND_THE_PLOT]
+    near = [p for p in parts if p.owner not in BEYOND_THE_PLOT]
     area = _area(near) + COARSER**2 * _area(far)
     density = float(min(14.0, np.sqrt(LUXELS * sharpness**2 / max(area, 1.0))))
     budget = round(min(1500.0, (density / SPARSEST) ** 2))  # of trees and hedges, no finer than the rest

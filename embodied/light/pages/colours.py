@@ -21,7 +21,7 @@ from embodied.light.pages.cover import Cover
 
 DARKEST, LIGHTEST = 0.02, 0.88
 """Reflectances are kept between these."""
-APART = (
+UNCOUNTED_BY_MAPS = (
     "embodied.assets",
     "embodied.assets.data",
     "embodied",
@@ -65,7 +65,7 @@ class ColourMaps:
         if self._cache is None or not source.is_file():
             return make()
         stat = source.stat()
-        key = digest(code_digest(__name__, without=APART), str(source), stat.st_size, stat.st_mtime_ns)
+        key = digest(code_digest(__name__, without=UNCOUNTED_BY_MAPS), str(source), stat.st_size, stat.st_mtime_ns)
         file = self._cache / f"{key[:32]}.npy"
         with contextlib.suppress(OSError, ValueError, EOFError):
             return np.load(file, mmap_mode="r", allow_pickle=False)

@@ -50,7 +50,7 @@ class Exposure:
     def at(self, position: np.ndarray) -> np.ndarray:
         """(n, 3) float32 gains at points (n, 3)."""
         grid, low = self._grid
-        where = ((np.asarray(position, float) - low) / CELL).T
+        where = ((np.asarray(position, float) - low) / GAIN_SPACING).T
         return np.exp(
             np.stack([map_coordinates(grid[k], where, order=1, mode="nearest") for k in range(3)], axis=-1)
         ).astype(np.float32)
@@ -59,14 +59,14 @@ class Exposure:
         """`at` for many points, on Mitsuba's device."""
         grid, low = self._grid
         count = np.array(grid.shape[1:])
-        where = ((np.asarray(position, np.float32) - low) / CELL + 0.5) / count
+        where = ((np.asarray(position, np.float32) - low) / GAIN_SPACING + 0.5) / count
         field = mi.Texture3f(mi.TensorXf(np.ascontiguousarray(grid.transpose(3, 2, 1, 0))), False)
         return array(mi.Color3f(*(dr.exp(x) for x in field.eval(mi.Point3f(vector(where))))))
 
     def near(self, position: np.ndarray) -> np.ndarray:
         """(n, 3) float32 gains of the grid's points that are nearest to points (n, 3): `at` for many of them."""
         gains, low = self._near
-        k = np.rint((np.asarray(position, np.float32) - low) / CELL.astype(np.float32)).astype(np.int64)
+        k = np.rint((np.asarray(position, np.float32) - low) / GAIN_SPACING.astype(np.float32)).astype(np.int64)
         return gains[tuple(np.clip(k, 0, np.array(gains.shape[:3]) - 1).T)]
 
     @functools.cached_property
@@ -76,7 +76,7 @@ class Exposure:
 
     @functools.cached_property
     def _grid(self) -> tuple[np.ndarray, np.ndarray]:
-        """Log gains (3, nx, ny, nz) on a grid of `CELL` over the house, and its lowest corner."""
+        """Log gains (3, nx, ny, nz) on a grid of `GAIN_SPACING` over the house, and its lowest corner."""
         weights, low = _weights(self.polygons, tuple(map(tuple, self.levels.tolist())))
         log = np.zeros((3, *weights[0].shape))
         for w, gain in zip(weights, self.gains, strict=True):
@@ -84,7 +84,7 @@ class Exposure:
         return (log / np.sum(weights, axis=0)).astype(np.float32), low
 
 
-CELL = np.array([0.1, 0.1, 0.4])
+GAIN_SPACING = np.array([0.1, 0.1, 0.4])
 """Spacing of the gain grid, metres."""
 
 
@@ -92,13 +92,13 @@ CELL = np.array([0.1, 0.1, 0.4])
 def _weights(
     polygons: tuple[tuple[tuple[float, float], ...], ...], levels: tuple[tuple[float, float], ...]
 ) -> tuple[list[np.ndarray], np.ndarray]:
-    """How much each room's gain counts, (nx, ny, nz) on a grid of `CELL` over the house, and the grid's lowest corner;
-    the same in every light."""
+    """Weights of each room's gain, (nx, ny, nz) on a grid of `GAIN_SPACING` over the house, and the grid's lowest
+    corner; the same in every light."""
     corners, heights = np.array([c for p in polygons for c in p]), np.array(levels)
     low = np.array([*(corners.min(0) - 1.0), heights[:, 0].min() - 1.0])
     high = np.array([*(corners.max(0) + 1.0), heights[:, 1].max() + 1.0])
-    n = np.ceil((high - low) / CELL).astype(int) + 1
-    x, y, z = (low[k] + np.arange(n[k]) * CELL[k] for k in range(3))
+    n = np.ceil((high - low) / GAIN_SPACING).astype(int) + 1
+    x, y, z = (low[k] + np.arange(n[k]) * GAIN_SPACING[k] for k in range(3))
     points = shapely.points(*np.meshgrid(x, y, indexing="ij"))
     weights = []
     for polygon, (bottom, top) in zip(polygons, levels, strict=True):

@@ -34,7 +34,7 @@ REST = 0.05
 """Seconds after which the threads of an atlas are surely asleep."""
 _retired: list[tuple[Any, float]] = []
 """The atlas that is freed next, and since when it rests."""
-APART = ("embodied.assets", "embodied.assets.data", "embodied", "embodied.light")
+UNCOUNTED_BY_UNWRAPPING = ("embodied.assets", "embodied.assets.data", "embodied", "embodied.light")
 """Modules that the code of an unwrapping does not count: what packages offer by name, and the catalogue's rows."""
 
 
@@ -263,7 +263,7 @@ def cached_model(
     shapes = [digest(*(np.ascontiguousarray(a).tobytes() for a in of_part)) for of_part in arrays]
 
     def known(budget: float, make: Callable[[], Unwrapped]) -> Unwrapped:
-        key = digest(code_digest(__name__, without=APART), round(budget), trusted, alone, shapes)
+        key = digest(code_digest(__name__, without=UNCOUNTED_BY_UNWRAPPING), round(budget), trusted, alone, shapes)
         path = Path(cache) / "unwrapped" / f"{key[:32]}.npz"
         if (stored := load_record(Unwrapped, path)) is not None:
             return stored

@@ -25,7 +25,7 @@ from embodied.light.pages.records import packed
 from embodied.light.pages.unwrap import areas_of, face_normals
 
 GLAZED = ("window", "french_window")
-GLASS = 0.88
+GLAZING = 0.88
 """Share of light that clean double glazing lets through."""
 UNIT = 100.0
 """cd/m2 per unit of radiance."""

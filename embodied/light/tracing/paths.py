@@ -30,7 +30,7 @@ from embodied.light.tracing.luxels import AMBIENT, Luxels
 from embodied.light.tracing.radiosity import Points, Space
 from embodied.light.tracing.sky import Outdoors
 
-DEEPEST = 14
+MOST_BOUNCES = 14
 """Diffuse bounces followed; Russian roulette begins at the third."""
 DENSE = 0.8
 """Share of the paths that must be alive for the ended ones to be carried along."""
@@ -129,7 +129,7 @@ def lights_of(
         floats([p.along for p in portals] + none),
         floats([p.up for p in portals] + none),
         floats([p.normal for p in portals] + none),
-        floats([p.area * radiosity.GLASS / np.pi for p in portals] + [x.area / np.pi for x in lamps]),
+        floats([p.area * radiosity.GLAZING / np.pi for p in portals] + [x.area / np.pi for x in lamps]),
         floats([zero] * len(portals) + [x.radiance for x in lamps]),
         floats([np.zeros((POINTS, 3))] * len(portals) + [fill(x.points) for x in lamps]),
         floats([np.zeros((POINTS, 3))] * len(portals) + [fill(x.normals) for x in lamps]),
@@ -140,7 +140,7 @@ def lights_of(
         unsigned(index or [0]),
         ways,
         outdoors.sun_direction,
-        outdoors.sun * radiosity.GLASS,
+        outdoors.sun * radiosity.GLAZING,
     )
 
 
@@ -210,7 +210,7 @@ def irradiance(
     p: Points,
     *,
     rng: np.random.Generator,
-    deepest: int = DEEPEST,
+    deepest: int = MOST_BOUNCES,
     active: Array = True,
 ) -> Array:
     """e (a Color3f) at points, 0 where not `active`, from all lights and any number of diffuse bounces: a path each."""

@@ -35,7 +35,7 @@ from embodied.light.lighting_cache import LightingCache
 from embodied.light.pages.atlas import Atlas
 from embodied.light.pages.cover import Texels, sources
 from embodied.light.pages.unwrap import face_normals
-from embodied.light.tracing.emitters import GLASS, Lamp, Portal
+from embodied.light.tracing.emitters import GLAZING, Lamp, Portal
 
 LIFT = 2e-3
 """Metres by which rays start above their surface."""
@@ -225,7 +225,7 @@ def sky_light(space: Space, p: Points, portal: Portal, samples: int, memory: Lig
     """
     sides = portal.corner, portal.along, portal.up, portal.normal
     corner, along, up, n = (mi.Vector3f(*(opaque_float(x) for x in a)) for a in sides)
-    area, share = opaque_float(portal.area / np.pi / samples * GLASS), opaque_float(10.0 / samples)
+    area, share = opaque_float(portal.area / np.pi / samples * GLAZING), opaque_float(10.0 / samples)
 
     def one(k: Array) -> tuple[Array, ...]:
         u = p.sample(k)

@@ -146,7 +146,7 @@ class Tracer:
         keep = np.asarray(inside)[:, None]
         there, seen = array(hit.position), np.nan_to_num(array(radiance), posinf=0.0)
         gain = world.exposure.at(np.where(keep, there, 0.0))
-        most = np.maximum(SPARK, gain * (world.outdoors.sun * radiosity.GLASS).astype(np.float32))
+        most = np.maximum(SPARK, gain * (world.outdoors.sun * radiosity.GLAZING).astype(np.float32))
         x = np.where(keep, np.minimum(seen * gain, most), 0.0)
         elsewhere, share, square = (
             np.where(keep, 0.0, array(shown)),
@@ -181,7 +181,7 @@ class Tracer:
         at, d = ray.o + ray.d * dr.select(there, first, 0.0), ray.d - 2 * c * normal
         onward = mi.Ray3f(at + d * radiosity.LIFT, d)
         second = look(world, onward, there)
-        far = picture_at(world.sky, world.rows, d, there) * radiosity.GLASS
+        far = picture_at(world.sky, world.rows, d, there) * radiosity.GLAZING
         e = second.e if self.quality == "glossy" else self._traced(second, second.ok & ~second.outdoor, rng)
         seen = dr.select(second.ok & ~second.outdoor, second.albedo * e + second.glow, far)
         points = np.where(np.asarray(there)[:, None], array(at), 0.0)
@@ -224,7 +224,7 @@ class Tracer:
             return diffuse, hit.albedo
         onward = mi.Ray3f(hit.position + hit.normal * radiosity.LIFT, d)
         second = look(world, onward, active)
-        far = picture_at(world.sky, world.rows, d, active) * radiosity.GLASS
+        far = picture_at(world.sky, world.rows, d, active) * radiosity.GLAZING
         seen = dr.select(second.ok, second.albedo * second.e + second.glow, far)
         seen = dr.select(second.ok & second.outdoor, far * 0.3, seen)
         if self.quality != "glossy":

@@ -140,7 +140,7 @@ def world_of(bake: Bake, house: House) -> BakedScene:
     owner = np.concatenate([np.full(len(m.faces), number.get(m.owner, 0), np.int32) for m, _ in solid])
     outer = np.concatenate([np.full(len(m.faces), m.kind == "outdoor") for m, _ in solid])
     sun = outdoors(house, len(lit.pages[-1]))  # the dome's rows
-    pages = _pages_of(bake, bake.manifest["own_pages"], (sun.sun * radiosity.GLASS).astype(np.float32))
+    pages = _pages_of(bake, bake.manifest["own_pages"], (sun.sun * radiosity.GLAZING).astype(np.float32))
     lw, lh = pages.luxels.T
     thin = np.concatenate([_listed_twice(m.faces) for m, _ in solid])
     texels = pages.sizes.prod(1)
