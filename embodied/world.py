@@ -60,19 +60,19 @@ class World:
         pictures: PictureSettings = Unlit(),
         *,
         file: Path | None = None,
-        may_differ: Collection[str] = (),
+        ignore_fields: Collection[str] = (),
     ) -> None:
         """See `open_world`.
 
         Args:
           file: where the panoramas go, or lie, instead of the cache.
-          may_differ: fields of `fingerprint` in which panoramas in `file` may differ from those that would be drawn
+          ignore_fields: fields of `fingerprint` in which panoramas in `file` may differ from those that would be drawn
             here and now: a data set is read with other drivers ('renderer') and later versions ('code') than drew it.
             With 'renderer' among them, stored ones are read without OpenGL.
         """
         self.house, self.catalogue, self.graph, self.cache = house, catalogue, graph, Path(cache)
         self.pictures = pictures
-        self._path, self._may_differ = file, frozenset(may_differ)
+        self._path, self._ignore_fields = file, frozenset(ignore_fields)
         self._renderer: Renderer | None = None
         self._tracer: Tracer | None = None
         self._file: PanoramaFile | None = None
@@ -83,7 +83,7 @@ class World:
     def __reduce__(self) -> tuple[Callable[[], World], tuple[()]]:
         """Pickled as what it was made of; nothing is open in the process that reads it."""
         made_of = self.house, self.catalogue, self.graph, self.cache, self.pictures
-        return functools.partial(World, *made_of, file=self._path, may_differ=self._may_differ), ()
+        return functools.partial(World, *made_of, file=self._path, ignore_fields=self._ignore_fields), ()
 
     def __deepcopy__(self, memo: object) -> World:
         """Copies of an environment share its houses."""
@@ -139,7 +139,7 @@ class World:
     def fingerprint(self) -> dict[str, object]:
         """All that the panoramas depend on, and what draws them, or drew those that are stored where that may differ.
         Opens OpenGL only where nothing is stored."""
-        stored = self._open_file() if "renderer" in self._may_differ and self._path is not None else None
+        stored = self._open_file() if "renderer" in self._ignore_fields and self._path is not None else None
         return self._made_of | {"renderer": str(gl.info()) if stored is None else stored.meta.get("renderer")}
 
     @functools.cached_property
@@ -289,8 +289,8 @@ class World:
             except PanoramaFileError as e:
                 log.warning("%s", e)
                 return None
-            wanted = self._made_of if "renderer" in self._may_differ else self.fingerprint
-            if others := differing(file.meta, wanted, self._may_differ):
+            wanted = self._made_of if "renderer" in self._ignore_fields else self.fingerprint
+            if others := differing(file.meta, wanted, self._ignore_fields):
                 log.warning("%s holds other pictures (%s); drawing again", self.path, others)
                 file.close()
                 return None
@@ -372,16 +372,16 @@ def open_folder(
     house = load_lit_house(folder, catalogue)
     graph, pictures = build_graph(house), parse_pictures(pictures, size)
     file = folder / "panoramas.pano"
-    return World(house, catalogue, graph, cache, pictures, file=file, may_differ=("renderer",))
+    return World(house, catalogue, graph, cache, pictures, file=file, ignore_fields=("renderer",))
 
 
-def differing(held: Mapping[str, object], wanted: Mapping[str, object], may_differ: Collection[str] = ()) -> str:
+def differing(held: Mapping[str, object], wanted: Mapping[str, object], ignore_fields: Collection[str] = ()) -> str:
     """Difference between what pictures were made of and what they should be made of: 'size 256 instead of 192'.
 
     Args:
-      may_differ: what is not looked at.
+      ignore_fields: what is not looked at.
     """
-    names = sorted({*held, *wanted} - {*may_differ}, key=str)
+    names = sorted({*held, *wanted} - {*ignore_fields}, key=str)
     facts = [(n, held.get(n), wanted.get(n)) for n in names if held.get(n) != wanted.get(n)]
     return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 

@@ -48,7 +48,7 @@ COMMANDS = (
 `COMMANDS`, or `commands(words)` of the command line."""
 
 REMEDIES = {
-    errno.ENOSPC: "the disk is full; free some space, or put --cache and --out on another disk. What is whole is kept",
+    errno.ENOSPC: "the disk is full; free some space, or put --cache and --out elsewhere. Finished files are kept",
     errno.EFBIG: "this disk, or the limit set with `ulimit -f`, holds no larger files; put --cache and --out elsewhere",
     errno.ELOOP: "a symbolic link leads to itself; remove it",
     errno.EDQUOT: "your share of the disk is used up; free some space, or put --cache and --out on another disk",
@@ -74,7 +74,7 @@ EXTRAS = {
 
 KILLED = (
     "a worker process was ended from outside, most often because memory ran out; run the same command again, "
-    "perhaps with fewer --workers. What is whole is kept"
+    "perhaps with fewer --workers. Finished files are kept"
 )
 """What a killed worker leaves to be said."""
 

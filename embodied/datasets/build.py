@@ -232,7 +232,7 @@ def draw_unit(unit: Unit, folder: Path, cache: Path, pictures: PictureSettings) 
     catalogue = load_catalogue(cache)
     path, may = home / "panoramas.pano", ("renderer",)  # nodes of a cluster may have other drivers
     new = not path.exists()
-    with World(house, catalogue, graph, cache, pictures, file=path, may_differ=may) as world:
+    with World(house, catalogue, graph, cache, pictures, file=path, ignore_fields=may) as world:
         share(world.cached_path, path)
         world.render_all()
         if new:

@@ -185,7 +185,7 @@ class Dataset:
             cache,
             parse_pictures(pictures, size),
             file=self.panoramas(name),
-            may_differ=may,
+            ignore_fields=may,
         )
 
     def panoramas(self, name: str) -> Path:
