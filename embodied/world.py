@@ -299,7 +299,7 @@ class World:
 
     @functools.cached_property
     def _sightings(self) -> SightingTable:
-        code = code_digest(*makers(Unlit()), "embodied.render.sightings")
+        code = code_digest(*makers(Unlit()), "embodied.render.ray_casting", "embodied.render.sightings")
         path = self.cache / "sightings" / f"{digest(self._origin, code)[:32]}.npz"
         table = load_table(path)
         if table is None:
