@@ -33,7 +33,7 @@ SHINY = 0.3
 """Metallic share from which on a surface shows its surroundings rather than its own colour."""
 CLEAR = 0.1
 """Roughness up to which what shines is a mirror: its noise is that of what is seen in it."""
-QUALITIES = ("glossy", "reference", "diffuse")
+TRACED_QUALITIES = ("glossy", "reference", "diffuse")
 """'diffuse' is the reference without gloss but for mirrors and metals; pages should equal it on all else."""
 RAYS = {"glossy": 16, "reference": 64, "diffuse": 64}
 """Rays per pixel."""
@@ -52,15 +52,15 @@ class Tracer:
         """Upload the bake.
 
         Args:
-          quality: one of QUALITIES.
+          quality: one of TRACED_QUALITIES.
           size: side of a cube face, pixels.
           rays: per pixel; RAYS[quality] if None.
 
         Raises:
           ValueError: unknown quality.
         """
-        if quality not in QUALITIES:
-            raise ValueError(f"quality {quality!r} is unknown to the tracer; use one of {QUALITIES}")
+        if quality not in TRACED_QUALITIES:
+            raise ValueError(f"quality {quality!r} is unknown to the tracer; use one of {TRACED_QUALITIES}")
         self.quality, self.size, self.rays = quality, size, rays or RAYS[quality]
         self._world, self._seed = world_of(bake, house), house.seed
 
