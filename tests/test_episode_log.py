@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hand_worlds import line_world
 
 from embodied.assistants.words import described
@@ -20,7 +21,8 @@ from embodied.interface import (
     Task,
     Viewpoint,
 )
-from embodied.viz.episode_log import EpisodeLog
+from embodied.viz.episode_log import QUESTIONS, EpisodeLog
+from embodied.viz.recording import event_text
 
 GOAL = FindObject("mug", "hall", ("mug_1",))
 
@@ -50,7 +52,7 @@ def test_the_route_is_spoken_of_until_it_is_left_and_then_the_goal_image_is_look
     assert asked.route == (0, 1, 2) and asked.image == Viewpoint("line", 1)
     told(asked, step_of(Move(0), at=1, to=2, targets=(2,)))
     assert asked.route == () and asked.image == Viewpoint("line", 2) and asked.nodes == [0, 1, 2]
-    assert "leaves the route" in asked.told()
+    assert "leaves the route" in asked.dialogue_text()
 
 
 def test_requests_that_are_counted_run_out():
@@ -91,14 +93,21 @@ def test_descriptions_name_the_side_as_seen_from_the_gaze():
 
 def test_a_long_dialogue_keeps_the_request_and_its_end():
     story = told(EpisodeLog(task_of("hanna")), *[step_of(Ask(), reply=Reply(f"answer {i}.")) for i in range(20)])
-    lines = story.told(11).split("\n\n")
+    lines = story.dialogue_text(11).split("\n\n")
     assert lines[0].startswith("**Requester:**") and lines[1] == "…" and lines[-1] == "**Assistant:** answer 19."
     assert len(lines) == 6, "six short lines and the gaps between them are eleven rows"
-    assert "…" not in story.told(1000) and len(story.told(1000).split("\n\n")) == 41
+    assert "…" not in story.dialogue_text(1000) and len(story.dialogue_text(1000).split("\n\n")) == 41
 
 
 def test_an_answer_too_long_for_the_pane_is_shown_all_the_same():
     story = told(
         EpisodeLog(task_of("hanna")), step_of(Ask(), reply=Reply("short.")), step_of(Ask(), reply=Reply("long " * 300))
     )
-    assert story.told(11).split("\n\n")[-1].startswith("**Assistant:** long")
+    assert story.dialogue_text(11).split("\n\n")[-1].startswith("**Assistant:** long")
+
+
+@pytest.mark.parametrize("intention", Intention)
+def test_every_question_is_an_event_in_words(intention):
+    step = step_of(Ask(intention))
+    assert event_text(line_world(), step) == f"asks in the hall 1: {QUESTIONS[intention]}"
+    assert event_text(line_world(), step_of(Ask(intention, question="Here?"))).endswith(": Here?")

@@ -26,7 +26,7 @@ from embodied.language.plain_language import with_article
 from embodied.language.route_clauses import legs_of, shortened
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.surroundings import Lookout, doorway
-from embodied.language.templates import TEMPLATES, WORDS
+from embodied.language.templates import SPOKEN, TEMPLATES
 from embodied.tasks.vln import vln_task
 from embodied.world import open_world
 
@@ -109,7 +109,7 @@ def test_every_template_means_the_clauses_it_is_for(lexicon):
 def test_slips_hedges_and_openings_change_nothing(lexicon):
     plain = parse("Turn left and walk straight into the kitchen. Stop by the table.", lexicon)
     assert parse("Okay so, turn left, I think and walk strait into the kichen. Stop by the tabel.", lexicon) == plain
-    assert all(normalised(wrong) == right for right, wrong in WORDS.slips.items())
+    assert all(normalised(wrong) == right for right, wrong in SPOKEN.slips.items())
 
 
 def test_text_without_an_instruction_is_refused(lexicon):

@@ -54,12 +54,12 @@ def blueprint_of(
             rrb.TextDocumentView(origin="/text/goals", name="Goals, what counts now first"),
         ]
     plots = _plots(thought, stack, budget=episode.budget is not None)
-    said = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
+    dialogue_view = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
         rrb.Horizontal(ahead, *(for_people or sent)),
         rrb.Horizontal(panorama, *sent) if for_people and sent else panorama,
         rrb.Horizontal(*texts),
-        *([said] if dialogue else []),
+        *([dialogue_view] if dialogue else []),
         row_shares=[5, 3, 2, *([3] if dialogue else [])],
     )
     body, *others = (TextLogColumn(kind, visible=kind == "Body") for kind in ("Body", "EntityPath", "LogLevel"))

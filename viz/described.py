@@ -1,4 +1,4 @@
-"""What is marked in pictures: what HARI's assistant spoke of, and what an agent recognises."""
+"""Marks in pictures: objects that HARI's assistant spoke of, and that an agent recognises."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def log_described(recording: rr.RecordingStream, world: Place, step: Step, heigh
     recording.log("task/described", boxes([p for _, p in there], [label(f) for f, _ in there], COLOUR))
 
 
-def log_recognised(recording: rr.RecordingStream, found: Sequence[Recognised], pose: Pose, height: int) -> None:
-    """What an agent recognises around it, in its panorama.
+def log_recognised(recording: rr.RecordingStream, objects: Sequence[Recognised], pose: Pose, height: int) -> None:
+    """Draw what an agent recognises around it, in its panorama.
 
     Args:
       height: of the panorama that is shown, pixels.
     """
-    at = pixels_towards(np.array([f.yaw for f in found]), np.array([f.pitch for f in found]), pose, height)
-    names = [f"{f.name.replace('_', ' ')} {f.probability:.0%}" for f in found]
+    at = pixels_towards(np.array([f.yaw for f in objects]), np.array([f.pitch for f in objects]), pose, height)
+    names = [f"{f.name.replace('_', ' ')} {f.probability:.0%}" for f in objects]
     recording.log("view/panorama/recognised", rr.Points2D(at, labels=names, show_labels=True, radii=3.0, colors=FOUND))
 
 
@@ -57,7 +57,7 @@ def boxes(things: Sequence[Placement], labels: Sequence[str], colour: tuple[int,
 
 
 def _marked(world: Place, step: Step) -> tuple[list[Marked], list[Marked]]:
-    """What the reply to `step` said of the agent's place, and of where it is to go."""
+    """Draw what the reply to `step` said of the agent's place, and of where it is to go."""
     reply = step.reply
     if reply is None or reply.description is None:
         return [], []
@@ -68,7 +68,7 @@ def _marked(world: Place, step: Step) -> tuple[list[Marked], list[Marked]]:
 
 
 def label(feature: Feature) -> str:
-    """What is said of an object: its name and how far it is in whole metres."""
+    """The label of an object: its name and how far it is in whole metres."""
     return f"{feature.name.replace('_', ' ')} ({feature.distance} m)"
 
 

@@ -1,4 +1,4 @@
-"""What a viewer must know at a step that the step alone does not say: who said what, and what is being aimed at."""
+"""Facts for a viewer at a step that the step alone does not say: who said what, and what is being aimed at."""
 
 from __future__ import annotations
 
@@ -21,8 +21,13 @@ QUESTIONS = {
 }
 
 
+def question_of(ask: Ask) -> str:
+    """A question in words: the agent's own, or those of its intention."""
+    return ask.question or QUESTIONS[ask.intention]
+
+
 class EpisodeLog:
-    """What has happened so far: dialogue, path, goals, the route spoken about and the image looked for.
+    """The episode so far: dialogue, path, goals, the route spoken about and the image looked for.
 
     Call `before` when a step is about to be taken and `after` when it was.
     """
@@ -37,7 +42,7 @@ class EpisodeLog:
         self.route: tuple[int, ...] = ()
         """Nodes of the route that the agent was told and has not left."""
         self.image: Viewpoint | None = None
-        """What the agent looks for: where to leave a route and, after leaving it, the goal (HANNA)."""
+        """The view that the agent looks for: where to leave a route and, after leaving it, the goal (HANNA)."""
         self.count = 0
         self.requests = 0
         self.cost = 0.0
@@ -65,9 +70,7 @@ class EpisodeLog:
         """Take in the action of `step` and the reply to it."""
         if isinstance(step.action, Ask):
             self.requests += 1
-            self.dialogue.append(
-                f"**Agent** (step {self.count}): {step.action.question or QUESTIONS[step.action.intention]}"
-            )
+            self.dialogue.append(f"**Agent** (step {self.count}): {question_of(step.action)}")
             if step.reply is not None:
                 self._heard(step.reply, step.pose)
         elif step.reply is not None:  # nobody asked: a teacher describes what was done (ILIAD)
@@ -79,15 +82,15 @@ class EpisodeLog:
         self.count += 1
 
     def _heard(self, reply: Reply, pose: Pose) -> None:
-        said = reply.text or described(reply.description or (), pose if reply.intention is Intention.CUR else None)
-        self.dialogue.append(f"**Assistant:** {detokenized(said)}")
+        words = reply.text or described(reply.description or (), pose if reply.intention is Intention.CUR else None)
+        self.dialogue.append(f"**Assistant:** {detokenized(words)}")
         self.image = reply.image or self.image
         if reply.subtask is not None:
             self.route = reply.subtask.path
             if reply.intention is Intention.SUB:
                 self.goals.append(reply.subtask.target)
 
-    def told(self, rows: int = 11, width: int = 95) -> str:
+    def dialogue_text(self, rows: int = 11, width: int = 95) -> str:
         """The dialogue as Markdown; only its end when it is long, because the viewer does not scroll by itself.
 
         Args:

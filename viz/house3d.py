@@ -88,15 +88,15 @@ def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int 
     for mesh in lit.meshes:
         if mesh.kind not in ("ceiling", "outdoor") and mesh.owner not in hidden:
             by_owner.setdefault((mesh.room, mesh.owner, mesh.kind in ("floor", "wall")), []).append(mesh)
-    found: list[LightMesh] = []
+    meshes: list[LightMesh] = []
     for (room, owner, flat), group in by_owner.items():
         path = f"house/{room or 'shared'}/{owner.split('/')[-1]}"
         if flat:
-            found += [_surface(f"{path}/{i}" if i else path, m, lit.pages[m.page]) for i, m in enumerate(group)]
+            meshes += [_surface(f"{path}/{i}" if i else path, m, lit.pages[m.page]) for i, m in enumerate(group)]
         else:
             pieces = [_lit_piece(m, lit.pages[m.page], _share(owner, budget, len(group))) for m in group]
-            found.append(_joined(path, pieces, shaded=False))
-    return tuple(found)
+            meshes.append(_joined(path, pieces, shaded=False))
+    return tuple(meshes)
 
 
 def _surface(path: str, mesh: LitMesh, page: np.ndarray) -> LightMesh:
@@ -118,8 +118,8 @@ def _share(owner: str, budget: int, meshes: int) -> int:
 
 
 SPOTS = np.array([(1, 1, 1), (4, 1, 1), (1, 4, 1), (1, 1, 4), (2, 2, 1), (2, 1, 2), (1, 2, 2)], np.float32)
-"""Where in a face its colour is read, barycentric up to scale: never on its rim, beside which a page may hold something
-else."""
+"""Spots in a face where its colour is read, barycentric up to scale: never on its rim, beside which a page may hold
+something else."""
 
 
 def _lit_piece(mesh: LitMesh, page: np.ndarray, budget: int) -> tuple:

@@ -20,7 +20,7 @@ import numpy as np
 import rerun as rr
 from scipy.spatial.transform import Rotation
 
-from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Step, Stop, Task
+from embodied.interface import Ask, Episode, Mode, Move, Pose, Step, Stop, Task
 from embodied.language.detokenize import detokenized
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
@@ -30,7 +30,7 @@ from embodied.render.photograph import PhotoCamera
 from embodied.task_kind import kind_named
 from embodied.viz.blueprint import blueprint_of
 from embodied.viz.described import boxes, log_described, log_recognised
-from embodied.viz.episode_log import EpisodeLog
+from embodied.viz.episode_log import EpisodeLog, question_of
 from embodied.viz.house3d import light_meshes, lit_meshes, log_house
 from embodied.viz.sinks import Sinks, open_recording
 from embodied.world import World
@@ -46,7 +46,7 @@ PALETTE = {
 }
 HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20}
 """Metres above the floor that things are drawn at, so that none hides another."""
-VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)
+VIEW_VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)
 """How high the picture along the gaze reaches: for people, and for an agent that sees this one view only (VNLA)."""
 Recognise = Callable[[Panorama], Sequence[Recognised]]
 """Names what is in a panorama (embodied.agents.vision.recognise.Recogniser)."""
@@ -65,22 +65,22 @@ class PictureSizes:
     jpeg: int = 85
     """JPEG quality, 1 to 100."""
     camera: PhotoCamera = PhotoCamera()
-    """What takes the first-person views; panoramas and targets stay as they are drawn."""
+    """The camera of the first-person views; panoramas and targets stay as they are drawn."""
 
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """Where the pictures in a recording come from."""
+    """Sources of the pictures in a recording."""
 
     seen: World
     """The house as the agent sees it: its features come from these very panoramas, where it looks at any."""
     shown: World | None
     """The same house as people are to see it; None where that is no other."""
     sizes: PictureSizes
-    vfov: float = VFOV
+    vfov: float = VIEW_VFOV
     """Of the picture along the gaze, radians."""
     recognise: Recognise | None = None
-    """What the agent's encoder recognises in what it sees."""
+    """Names what the agent's encoder recognises."""
 
 
 def views_of(world: World, eyes: World | None, sizes: PictureSizes = PictureSizes()) -> Views:
@@ -234,8 +234,7 @@ def log_step(
     state.before(step)
     mode = "asks" if isinstance(step.action, Ask) else "sub-task" if step.mode is Mode.SUB else "main task"
     recording.log("mode", rr.StateChange(state=mode))
-    told = instruction_text(step, state.left)
-    recording.log("text/instruction", markdown(told))
+    recording.log("text/instruction", markdown(instruction_text(step, state.left)))
     if kind_named(task.kind).story.goal_stack:
         recording.log("text/goals", markdown(state.stack(world, step)))
         recording.log("plot/cost", rr.Scalars(state.cost + step.cost))
@@ -248,12 +247,12 @@ def log_step(
         recording.log("plot/budget/left", rr.Scalars(state.left))
     level = "WARN" if isinstance(step.action, Ask) else "INFO"  # asking stands out
     recording.log("events", rr.TextLog(event_text(world, step), level=level))
-    recording.log("text/dialogue", markdown(state.told()))
+    recording.log("text/dialogue", markdown(state.dialogue_text()))
     log_aim(recording, world, state, views)
 
 
 def log_end(recording: rr.RecordingStream, world: World, task: Task, state: EpisodeLog, views: Views) -> None:
-    """Where it ended, and whether that was right; `state` has seen a step."""
+    """Log where it ended, and whether that was right; `state` has seen a step."""
     assert state.last is not None
     end = state.last.next_pose
     log_sight(recording, views, end)
@@ -262,7 +261,7 @@ def log_end(recording: rr.RecordingStream, world: World, task: Task, state: Epis
     recording.log("plot/distance/goal", rr.Scalars(distance))
     verdict = "reached the goal" if distance <= task.radius else f"missed the goal by {distance:.1f} m"
     state.dialogue.append(f"**Judge:** the agent {verdict}, after {state.count} steps and {state.requests} requests.")
-    recording.log("text/dialogue", markdown(state.told()))
+    recording.log("text/dialogue", markdown(state.dialogue_text()))
     recording.log("events", rr.TextLog(verdict, level="INFO" if distance <= task.radius else "ERROR"))
 
 
@@ -301,7 +300,7 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
     )
 
 
-def ahead(panorama: Panorama, pose: Pose, sizes: PictureSizes, vfov: float = VFOV) -> rr.EncodedImage:
+def ahead(panorama: Panorama, pose: Pose, sizes: PictureSizes, vfov: float = VIEW_VFOV) -> rr.EncodedImage:
     """The first-person view from a panorama along the gaze, `vfov` radians high."""
     rgb = panorama.view_rgb(pose.yaw, pose.pitch, vfov, sizes.view)
     return encoded(sizes.camera.photographed(rgb, vfov, pose.node, round(np.degrees(pose.yaw))), sizes.jpeg)
@@ -355,7 +354,7 @@ def markdown(text: str) -> rr.TextDocument:
 
 
 def instruction_text(step: Step, left: int | None = None) -> str:
-    """What the agent is trying to carry out right now, as Markdown; `left` requests remain where they are counted."""
+    """The instruction that the agent carries out now, as Markdown; `left` requests remain where they are counted."""
     mode = "Sub-task, from an assistant" if step.mode is Mode.SUB else "Main task"
     if isinstance(step.action, Ask):
         return f"**{mode}**\n\n> {detokenized(step.instruction)}\n\n**The agent asks for help.**"
@@ -363,15 +362,6 @@ def instruction_text(step: Step, left: int | None = None) -> str:
     if left is not None:
         helpers = f"\n\n*{left} request{'s' * (left != 1)} left.*"
     return f"**{mode}**\n\n> {detokenized(step.instruction)}{helpers}"
-
-
-WANTED = {
-    Intention.HELP: "for help",
-    Intention.CUR: "where it is",
-    Intention.GOAL: "where to go",
-    Intention.SUB: "for a nearer goal",
-}
-"""What a request is for, in the event log."""
 
 
 def event_text(world: World, step: Step) -> str:
@@ -382,7 +372,7 @@ def event_text(world: World, step: Step) -> str:
         return f"goes on in the {room}" if to == room else f"goes from the {room} to the {to}"
     if isinstance(step.action, Stop):
         return f"stops in the {room}"
-    return f"asks {WANTED[step.action.intention]} in the {room}"
+    return f"asks in the {room}: {question_of(step.action)}"
 
 
 def camera_axes(yaw: float, pitch: float) -> np.ndarray:

@@ -33,7 +33,7 @@ class Listed:
 
     @property
     def arrived(self) -> bool:
-        """Whether it stopped at a goal node; the tables judge by distance, this is for orientation."""
+        """Tells whether it stopped at a goal node; the tables judge by distance, this is for orientation."""
         return self.episode.nodes[-1] in self.episode.task.goal_nodes
 
 
@@ -50,14 +50,14 @@ def load_run(folder: Path) -> list[Listed]:
             f"{folder} holds no episodes*.jsonl; make a run with `embodied evaluate --out {folder}`, or name a .rrd "
             "file"
         )
-    found = []
+    episodes = []
     for path in files:
-        found += [Listed(_name(path.name), e) for e in load_lines(path, Episode)]
-    return found
+        episodes += [Listed(_name(path.name), e) for e in load_lines(path, Episode)]
+    return episodes
 
 
 def _name(file: str) -> str:
-    """Whose episodes a file holds: 'val seen learned no ask' of 'episodes_val_seen_learned_no_ask.jsonl'."""
+    """Split and agent of a file of episodes: 'val seen learned' of 'episodes_val_seen_learned.jsonl'."""
     return Path(file).stem.removeprefix("episodes").strip("_").replace("_", " ") or "agent"
 
 
@@ -69,11 +69,11 @@ def summary_line(number: int, listed: Listed) -> str:
     return f"{number:4}  {end:<10} {counts}  {listed.agent:<28} {e.task.id:<28} {detokenized(e.task.request)}"
 
 
-def write_page(folder: Path, found: Sequence[Listed]) -> Path:
+def write_page(folder: Path, episodes: Sequence[Listed]) -> Path:
     """Write folder/index.html, plots included; returns its path."""
-    agents = sorted({x.agent for x in found})
+    agents = sorted({x.agent for x in episodes})
     rows = []
-    for number, x in enumerate(found):
+    for number, x in enumerate(episodes):
         recording = Path("recordings") / f"{number}.rrd"
         link = (
             f'<a href="{recording}">recording</a>'
@@ -98,8 +98,9 @@ def write_page(folder: Path, found: Sequence[Listed]) -> Path:
         )
     page = (
         f"<!doctype html><meta charset=utf-8><title>{html.escape(Path(folder).name)}</title><style>{STYLE}</style>"
-        f"<h1>{html.escape(Path(folder).name)}</h1><p>{len(found)} episodes of {len(agents)} agents.</p>"
-        f'<img alt="steps and requests by agent" src="data:image/png;base64,{_plots(found, agents, judged(folder))}">'
+        f"<h1>{html.escape(Path(folder).name)}</h1><p>{len(episodes)} episodes of {len(agents)} agents.</p>"
+        '<img alt="steps and requests by agent" '
+        f'src="data:image/png;base64,{_plots(episodes, agents, judged(folder))}">'
         "<table><tr><th>#<th>agent<th>request, and the first instruction heard<th>end<th>steps<th>requests<th></tr>"
         + "".join(rows)
         + "</table>"
@@ -129,11 +130,11 @@ def judged(folder: Path) -> dict[str, tuple[float, float]]:
         raise RecordError(f"{table} is no table of `embodied evaluate` ({e!r}); make it again") from e
 
 
-def _plots(found: Sequence[Listed], agents: Sequence[str], success: Mapping[str, tuple[float, float]]) -> str:
+def _plots(episodes: Sequence[Listed], agents: Sequence[str], success: Mapping[str, tuple[float, float]]) -> str:
     """Success, steps and requests per agent, as a PNG in base64."""
     figure = Figure(figsize=(11, 0.6 + 0.45 * len(agents)), layout="constrained")
     axes = figure.subplots(1, 3, sharey=True)
-    of = {a: [x for x in found if x.agent == a] for a in agents}
+    of = {a: [x for x in episodes if x.agent == a] for a in agents}
     if set(agents) <= set(success):
         axes[0].barh(
             range(len(agents)),

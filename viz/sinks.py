@@ -1,4 +1,4 @@
-"""Where a recording goes: a file, a running viewer, a new viewer, the browser, or several of them."""
+"""Targets of a recording: a file, a running viewer, a new viewer, the browser, or several of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from embodied.errors import UnableError
 
 APPLICATION = "embodied"
 LIMITS = ("--memory-limit", "1GiB", "--server-memory-limit", "1GiB")
-"""What a viewer or server that we start may keep before it drops the oldest data."""
+"""Memory that a viewer or server that we start may keep before it drops the oldest data."""
 
 EVERYWHERE = "0.0.0.0"
 """All addresses of this machine."""
@@ -33,20 +33,20 @@ PORT, WEB_PORT = 9876, 9090
 """Rerun's own: where viewers and servers listen for recordings, where a browser finds the web viewer."""
 
 HERE = "127.0.0.1"
-"""Where we listen unless told otherwise: nobody on other machines can look or write."""
+"""The address to listen on unless another is given: nobody on other machines can look or write."""
 
-PATIENCE = 60.0
+VIEWER_SECONDS = 60.0
 """Seconds that a viewer may take to accept the last of a recording."""
 
 MAGIC = b"RRF"
-"""What a .rrd file begins with, before the number of its format."""
+"""The first bytes of a .rrd file, before the number of its format."""
 FOOTER = b"RRF2FOOT"
-"""What stands 12 bytes before the end of a .rrd file that was finished (Rerun 0.41)."""
+"""The bytes 12 before the end of a .rrd file that was finished (Rerun 0.41)."""
 
 
 @dataclass(frozen=True)
 class Sinks:
-    """Where to send one recording; all that are set are served."""
+    """Targets of one recording; all that are set are served."""
 
     rrd: Path | None = None
     """File to write; it appears complete or not at all."""
@@ -125,7 +125,7 @@ def open_recording(
             recording.send_property("fingerprint", rr.AnyValues(drop_untyped_nones=True, **properties))
         yield recording
         try:
-            recording.flush(timeout_sec=PATIENCE)
+            recording.flush(timeout_sec=VIEWER_SECONDS)
         except RuntimeError as e:
             raise OSError(
                 f"the recording could not be sent or written to its end ({e}); free some disk space, or look "
@@ -188,7 +188,7 @@ def send_file(rrd: Path, viewers: tuple[str, ...]) -> None:
         recording.set_sinks(rr.GrpcSink(url))
         recording.log_file_from_path(rrd)
         try:
-            recording.flush(timeout_sec=PATIENCE)
+            recording.flush(timeout_sec=VIEWER_SECONDS)
         except RuntimeError as e:
             raise OSError(f"{rrd} could not be sent to {url} ({e}); look whether the viewer still runs") from e
         recording.disconnect()
@@ -257,7 +257,7 @@ def _wait_for(program: subprocess.Popen, host: str, ports: tuple[int, ...], reme
     Raises:
       UnableError: it ended, or does not listen after a minute.
     """
-    until = time.monotonic() + PATIENCE
+    until = time.monotonic() + VIEWER_SECONDS
     while not all(listens(host, p) for p in ports):
         if program.poll() is not None or time.monotonic() > until:
             program.kill()
@@ -303,7 +303,7 @@ def _refuse_taken(bind: str) -> None:
 
 
 def listens(host: str, port: int) -> bool:
-    """Whether a connection is accepted within three seconds."""
+    """Tells whether a connection is accepted within three seconds."""
     try:
         socket.create_connection((host, port), timeout=3.0).close()
     except OSError:

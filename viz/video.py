@@ -95,25 +95,25 @@ def film_episode(
     track = camera_track(
         graph.positions,
         [episode.task.start, *(s.next_pose for s in episode.steps)],
-        [SPEECH, *(SPEECH if said else PAUSE for said in spoken)],
+        [SPEECH, *(SPEECH if line else PAUSE for line in spoken)],
     )
     frames = [(words, at) for words, stretch in zip(_captions(episode), track, strict=True) for at in stretch]
     return write_video(path, (captioned(draw(i, c), text) for i, (text, c) in enumerate(watch(frames))), size)
 
 
 def _captions(episode: Episode) -> list[str]:
-    """What is said at the start and after each step: the request, the question, or what the assistant answered."""
-    told = [f"Task: {episode.task.request}"]
+    """The captions at the start and after each step: the request, the question, or what the assistant answered."""
+    captions = [f"Task: {episode.task.request}"]
     for step, after in zip(episode.steps, (*(s.instruction for s in episode.steps[1:]), None), strict=True):
         if step.reply is not None and step.reply.text:
-            told.append(f"Agent asks. Assistant: {step.reply.text}")
+            captions.append(f"Agent asks. Assistant: {step.reply.text}")
         elif after == step.instruction or after is None:
-            told.append(told[-1].removeprefix("Agent asks. "))
+            captions.append(captions[-1].removeprefix("Agent asks. "))
         else:
-            told.append(f"Task: {episode.task.request}" if after == episode.task.request else f"Assistant: {after}")
+            captions.append(f"Task: {episode.task.request}" if after == episode.task.request else f"Assistant: {after}")
     if episode.ended == "stop":
-        told[-1] = f"Agent stops. {told[-1]}"
-    return [detokenized(words) for words in told]
+        captions[-1] = f"Agent stops. {captions[-1]}"
+    return [detokenized(words) for words in captions]
 
 
 def captioned(rgb: np.ndarray, caption: str) -> np.ndarray:

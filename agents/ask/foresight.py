@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from embodied.assistants.ask import NEAR, in_view
+from embodied.assistants.ask import CONFIRM_DISTANCE, in_view
 from embodied.envs.ask import AskEnv
 from embodied.envs.base import HelpEnv
 from embodied.interface import (
@@ -144,7 +144,7 @@ def imagined(env: HelpEnv, rng: np.random.Generator) -> list[HelpEnv]:
     minds = []
     for placement in (possible[i] for i in sorted(chosen)):
         near = ((node, in_view(world, node, task.goal)[:1]) for node in range(len(world.graph.positions)))
-        nodes = tuple(v for v, seen in near if seen and seen[0][0] == placement and seen[0][2] <= NEAR)
+        nodes = tuple(v for v, seen in near if seen and seen[0][0] == placement and seen[0][2] <= CONFIRM_DISTANCE)
         if not nodes:
             continue
         other = _copy(env)

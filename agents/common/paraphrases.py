@@ -25,7 +25,7 @@ from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, 
 from embodied.language.grammar import kind_of, normalised, parse
 from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
 from embodied.language.plain_language import PlainLanguage, heard_subgoal
-from embodied.language.templates import WORDS
+from embodied.language.templates import SPOKEN
 from embodied.seeds import stream
 
 BACKWARD_SHARE = 0.15
@@ -118,10 +118,10 @@ def _slots(clauses: Sequence[Clause], text: str, lexicon: Lexicon) -> dict[str, 
         if (side := side_of(c)) is not None:
             slots["side"] = side
         if isinstance(c, Metres):
-            number = WORDS.numbers[c.count] if c.count < len(WORDS.numbers) else str(c.count)
+            number = SPOKEN.numbers[c.count] if c.count < len(SPOKEN.numbers) else str(c.count)
             slots["metres"] = f"{number} meter{'s' * (c.count != 1)}"
         if isinstance(c, Enter) and c.nth:
-            slots["nth"] = WORDS.ordinals[c.nth]
+            slots["nth"] = SPOKEN.ordinals[c.nth]
         if (thing := getattr(c, "thing", None)) is not None:
             slots["thing"] = f"the {' '.join([*thing.words, _noun(thing, text, lexicon)])}"
     return slots

@@ -24,17 +24,17 @@ QUESTIONS = (
     Intention.DISAMBIGUATE,
     Intention.FREE,
 )
-NEAR = 2.0
+CONFIRM_DISTANCE = 2.0
 """Metres within which one is at a thing."""
-FARTHEST = 6.0
+SIGHT_DISTANCE = 6.0
 """Metres within which a thing is seen."""
-LONGEST = 6
+ROUTE_NODES = 6
 """Nodes of a route that one answer tells."""
 UNKNOWN = "I do not know."
 
 
 def in_view(world: Place, node: int, goal: FindDescribed) -> list[tuple[str, float, float]]:
-    """Things of the goal's class in the room and within FARTHEST, nearest first: (placement, yaw, metres)."""
+    """Things of the goal's class in the room and within SIGHT_DISTANCE, nearest first: (placement, yaw, metres)."""
     eye, room = np.asarray(world.graph.positions)[node], world.graph.room_of_node[node]
     things = []
     for name in (*goal.fitting, *goal.similar):
@@ -42,7 +42,7 @@ def in_view(world: Place, node: int, goal: FindDescribed) -> list[tuple[str, flo
         if p.room != room:
             continue
         distance = float(np.round(footprint_distance(p, eye[None])[0], 6))
-        if distance <= FARTHEST:
+        if distance <= SIGHT_DISTANCE:
             things.append((name, math.atan2(p.position[1] - eye[1], p.position[0] - eye[0]), distance))
     return sorted(things, key=lambda x: (x[2], x[0]))
 
@@ -59,7 +59,7 @@ class AskAssistant:
         seen = in_view(situation.world, situation.pose.node, _goal(situation))
         possible = [name for name, _, _ in seen if name in situation.extras.possible]
         cannot = set()
-        if not seen or seen[0][2] > NEAR:
+        if not seen or seen[0][2] > CONFIRM_DISTANCE:
             cannot.add(Intention.CONFIRM)
         if len(possible) < 2:
             cannot.add(Intention.DISAMBIGUATE)
@@ -108,7 +108,7 @@ class AskAssistant:
     def _route(self, s: Situation, rng: np.random.Generator) -> tuple[str, Subtask]:
         graph = s.world.graph
         whole = graph.path(s.pose.node, nearest(graph, s.pose.node, s.task.goal_nodes))
-        nodes = whole[:LONGEST]
+        nodes = whole[:ROUTE_NODES]
         subtask = Subtask("route", nodes[-1], path=nodes)
         if len(nodes) < 2:
             return "You are there.", subtask

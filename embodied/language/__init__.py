@@ -1,4 +1,4 @@
-"""What people say: requests, routes, sub-goals, and a listener who reads them."""
+"""People's words: requests, routes, sub-goals, and a listener who reads them."""
 
 from embodied.language.clauses import RouteInstruction as RouteInstruction
 from embodied.language.grammar import parse as parse

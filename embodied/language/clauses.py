@@ -1,4 +1,4 @@
-"""What a route instruction means, clause by clause, before anybody puts it into words."""
+"""Meaning of a route instruction, clause by clause, before anybody puts it into words."""
 
 from __future__ import annotations
 
@@ -77,12 +77,12 @@ class Past:
 
     thing: Referent
     side: str | None = None
-    """Where it is when one passes it."""
+    """The side on which it is passed."""
 
 
 @dataclass(frozen=True)
 class Avoid:
-    """What not to do: do not go into a room of this kind."""
+    """A warning: do not go into a room of this kind."""
 
     kind: str
 

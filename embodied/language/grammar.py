@@ -33,7 +33,7 @@ from embodied.language.clauses import (
 )
 from embodied.language.lexicon import PASSAGES, ROOM_NOUNS, ROOM_OF_NOUN, Lexicon, Word
 from embodied.language.speakers import NOVEL_HABIT
-from embodied.language.templates import TEMPLATES, WORDS, Template
+from embodied.language.templates import SPOKEN, TEMPLATES, Template
 from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ KIND_NAMES: Mapping[type, str] = {
     StopIn: "stop_in",
     StopHere: "stop_here",
 }
-"""What templates call the clauses that have one name only."""
+"""Names in templates of the clauses that have one name only."""
 _BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
     kinds: tuple(t for t in TEMPLATES if t.kinds == kinds) for kinds in {t.kinds: None for t in TEMPLATES}
 }
@@ -84,12 +84,12 @@ NOVEL_TEMPLATES = frozenset(
     for t in same
     if t.text in texts or t.habit == NOVEL_HABIT
 )
-"""What people who are kept from learning say; the first template of a clause is everybody's."""
+"""Templates of people who are kept from learning; the first template of a clause is everybody's."""
 NOVEL_WORDS = novel_among(
-    {*WORDS.verbs[1:], *WORDS.soon[1:], *(noun for nouns in ROOM_NOUNS.values() for noun in nouns[1:])}
+    {*SPOKEN.verbs[1:], *SPOKEN.soon[1:], *(noun for nouns in ROOM_NOUNS.values() for noun in nouns[1:])}
 )
 """Verbs, adverbs and nouns for rooms that only they use."""
-PLAIN = 3.0
+PLAIN_WEIGHT = 3.0
 """How much likelier than its other templates the first few of a clause are: what most people say."""
 
 
@@ -110,30 +110,30 @@ def say(phrases: Sequence[Phrase], speaker: Speaker, *, rng: np.random.Generator
         pieces.append((_fill(template, phrases[i:to], again[i:to], speaker, rng), kinds))
         i = to
     words = _sentences(pieces, speaker, rng).split(" ")  # now and then a misspelt one
-    return " ".join(WORDS.slips.get(w, w) if rng.random() < speaker.slips else w for w in words)
+    return " ".join(SPOKEN.slips.get(w, w) if rng.random() < speaker.slips else w for w in words)
 
 
 def _misleads(pair: tuple[str, ...], after: Sequence[Phrase]) -> bool:
-    """Whether the pair in one breath sounds as if nobody walked: 'turn right toward the sofa, then turn around'."""
+    """Tells whether the pair sounds as if nobody walked: 'turn right toward the sofa, then turn around'."""
     return pair[-1] == "to" and bool(after) and kind_of(after[0].clause) == "around"
 
 
 def _again(phrases: Sequence[Phrase]) -> list[str]:
-    """What goes before the room noun of each clause: 'next' or 'other' for a room entered from one of its own kind."""
-    found: list[str] = []
+    """The word before the room noun of each clause: 'next' or 'other' for a room entered from one of its own kind."""
+    befores: list[str] = []
     here: str | None = None
     for p in phrases:
         kind = room_of(p.clause)
         same = kind == here and isinstance(p.clause, Enter)
-        found.append(("next " if kind in PASSAGES else "other ") if same else "")
+        befores.append(("next " if kind in PASSAGES else "other ") if same else "")
         here = kind if isinstance(p.clause, Enter | Exit | Cross) else here
-    return found
+    return befores
 
 
 def _pick(templates: Sequence[Template], speaker: Speaker, rng: np.random.Generator) -> Template:
     spoken = [t for t in templates if t.habit in ("", speaker.habit)]
     fitting = of_novelty(spoken, NOVEL_TEMPLATES, speaker.novelty)
-    weights = np.array([3.0 if t.habit else PLAIN if i < 4 else 1.0 for i, t in enumerate(fitting)])
+    weights = np.array([3.0 if t.habit else PLAIN_WEIGHT if i < 4 else 1.0 for i, t in enumerate(fitting)])
     return fitting[int(rng.choice(len(fitting), p=weights / weights.sum()))]
 
 
@@ -141,9 +141,9 @@ def _fill(
     template: Template, phrases: Sequence[Phrase], again: Sequence[str], speaker: Speaker, rng: np.random.Generator
 ) -> str:
     own = functools.partial(of_novelty, novel=NOVEL_WORDS, novelty=speaker.novelty)
-    verbs, soon = own(WORDS.verbs + WORDS.playful if speaker.habit == "chatty" else WORDS.verbs), own(WORDS.soon)
+    verbs, soon = (own(SPOKEN.verbs + SPOKEN.playful if speaker.habit == "chatty" else SPOKEN.verbs), own(SPOKEN.soon))
     slots = {
-        "walk": WORDS.verbs[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
+        "walk": SPOKEN.verbs[0] if rng.random() < speaker.plainness else verbs[int(rng.integers(len(verbs)))],
         "soon": soon[int(rng.integers(len(soon)))],
     }
     rooms = [(kind, before) for p, before in zip(phrases, again) if (kind := room_of(p.clause)) is not None]
@@ -153,10 +153,10 @@ def _fill(
     for p in phrases:
         if isinstance(p.clause, Metres):
             n, many = p.clause.count, "s" * (p.clause.count != 1)
-            spelt = WORDS.numbers[n] if n < len(WORDS.numbers) and (n == 1 or rng.random() < 0.7) else str(n)
+            spelt = SPOKEN.numbers[n] if n < len(SPOKEN.numbers) and (n == 1 or rng.random() < 0.7) else str(n)
             slots |= {"metres": f"{spelt} meter{many}", "steps": f"{spelt} big step{many}"}
         if isinstance(p.clause, Enter) and p.clause.nth:
-            slots["nth"] = WORDS.ordinals[p.clause.nth]
+            slots["nth"] = SPOKEN.ordinals[p.clause.nth]
         if (side := side_of(p.clause)) is not None:
             slots["side"] = side
         if p.word is not None:
@@ -199,11 +199,11 @@ def _sentences(pieces: Sequence[tuple[str, tuple[str, ...]]], speaker: Speaker, 
         if (
             n == 0
             and rng.random() < speaker.openings
-            and (fillers := (*WORDS.fillers[speaker.habit], *WORDS.fillers[""]))
+            and (fillers := (*SPOKEN.fillers[speaker.habit], *SPOKEN.fillers[""]))
         ):
             current = f"{fillers[int(rng.integers(len(fillers)))]}, {text}"
         elif rng.random() < speaker.hedges:
-            current, hedged = f"{text}, {WORDS.hedges[int(rng.integers(len(WORDS.hedges)))]}", True
+            current, hedged = f"{text}, {SPOKEN.hedges[int(rng.integers(len(SPOKEN.hedges)))]}", True
     sentences.append(current)
     return " ".join(s[0].upper() + s[1:] + "." for s in sentences)
 
@@ -214,15 +214,15 @@ _SUBJECTS = re.compile(r"(you|you'll|your|that|that's|this|if|I|the|not|bingo|do
 
 
 def _stands_alone(text: str, kinds: tuple[str, ...], last: str, before: tuple[str, ...]) -> bool:
-    """Whether a piece is a sentence of its own: warnings, and what is no command or follows none."""
+    """Tells whether a piece is a sentence of its own: warnings, and what is no command or follows none."""
     return "avoid" in (*kinds, *before) or any(_SUBJECTS.match(t) for t in (text, last))
 
 
 def _link(speaker: Speaker, arrived: bool, rng: np.random.Generator) -> str:
-    """What joins a clause to the one before it."""
+    """A word that joins a clause to the one before it."""
     own = speaker.habit == "terse" or rng.random() < 0.6
-    links = WORDS.links[speaker.habit if own else ""]
-    if arrived and rng.random() < 0.25 and (more := WORDS.arrived_links[speaker.habit if own else ""]):
+    links = SPOKEN.links[speaker.habit if own else ""]
+    if arrived and rng.random() < 0.25 and (more := SPOKEN.arrived_links[speaker.habit if own else ""]):
         links = more
     return links[int(rng.integers(len(links)))]
 
@@ -242,8 +242,8 @@ def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
         if heard is None:
             rest = rest.partition(" ")[2]
             continue
-        rooms = iter([ROOM_OF_NOUN[noun] for slot in ("room", "other") if (noun := heard.said.get(slot))])
-        clauses += [MAKERS[kind](heard.said, rooms, heard.thing) for kind in heard.template.kinds]
+        rooms = iter([ROOM_OF_NOUN[noun] for slot in ("room", "other") if (noun := heard.slots.get(slot))])
+        clauses += [MAKERS[kind](heard.slots, rooms, heard.thing) for kind in heard.template.kinds]
         rest = rest[heard.length :].lstrip()
     if not clauses:
         raise ValueError(
@@ -256,16 +256,16 @@ def normalised(text: str) -> str:
     """Lower case without punctuation, slips mended, hedges and openings removed."""
     plain = re.sub(r"[.,;!?]+", " ", text)
     plain = " " + re.sub(r"\s+", " ", plain).strip().lower() + " "
-    for right, wrong in WORDS.slips.items():
+    for right, wrong in SPOKEN.slips.items():
         plain = plain.replace(f" {wrong} ", f" {right} ")
     for empty in _EMPTY:
         plain = plain.replace(f" {empty} ", " ")
     return plain.strip()
 
 
-_JOINING = (*WORDS.fillers.values(), *WORDS.links.values(), *WORDS.arrived_links.values())
+_JOINING = (*SPOKEN.fillers.values(), *SPOKEN.links.values(), *SPOKEN.arrived_links.values())
 _EMPTY = sorted(
-    {h.lower() for h in WORDS.hedges} | {f for fs in _JOINING for f in fs if " " in f}, key=lambda s: (-len(s), s)
+    {h.lower() for h in SPOKEN.hedges} | {f for fs in _JOINING for f in fs if " " in f}, key=lambda s: (-len(s), s)
 )
 
 
@@ -288,7 +288,7 @@ class _ParsedTemplate:
     template: Template
     length: int
     """Characters it accounts for."""
-    said: dict[str, str]
+    slots: dict[str, str]
     thing: Referent | None
 
 
@@ -324,13 +324,13 @@ def _patterns() -> tuple[_Pattern, ...]:
         "side": "(?P<side>left|right)",
         "room": f"{again}(?P<room>{rooms})",
         "other": f"{again}(?P<other>{rooms})",
-        "metres": rf"(?P<n>\d+|{_any(WORDS.numbers)}) meters?",
-        "steps": rf"(?P<n>\d+|{_any(WORDS.numbers)}) big steps?",
-        "nth": f"(?P<nth>{_any(WORDS.ordinals)})",
-        "walk": f"(?:{_any(WORDS.verbs + WORDS.playful)})",
-        "soon": f"(?:{_any(WORDS.soon)})",
+        "metres": rf"(?P<n>\d+|{_any(SPOKEN.numbers)}) meters?",
+        "steps": rf"(?P<n>\d+|{_any(SPOKEN.numbers)}) big steps?",
+        "nth": f"(?P<nth>{_any(SPOKEN.ordinals)})",
+        "walk": f"(?:{_any(SPOKEN.verbs + SPOKEN.playful)})",
+        "soon": f"(?:{_any(SPOKEN.soon)})",
     }
-    found = []
+    patterns = []
     for t in TEMPLATES:
         text = re.escape(t.text.lower()).replace(r"\ ", " ").replace(r"\{", "{").replace(r"\}", "}")
         for name, slot in slots.items():
@@ -338,7 +338,7 @@ def _patterns() -> tuple[_Pattern, ...]:
         before, thing, after = text.partition("{thing}")
         first = t.text.split(" ", 1)[0].lower()
         whole = r"(?![\w-])"
-        found.append(
+        patterns.append(
             _Pattern(
                 t,
                 "" if first.startswith("{") else first,
@@ -346,7 +346,7 @@ def _patterns() -> tuple[_Pattern, ...]:
                 re.compile(after + whole) if thing else None,
             )
         )
-    return tuple(found)
+    return tuple(patterns)
 
 
 def _any(words: Iterable[str]) -> str:
@@ -355,26 +355,26 @@ def _any(words: Iterable[str]) -> str:
 
 
 def _number(word: str) -> int:
-    return WORDS.numbers.index(word) if word in WORDS.numbers else int(word)
+    return SPOKEN.numbers.index(word) if word in SPOKEN.numbers else int(word)
 
 
 MAKERS: Mapping[str, Callable[[Mapping[str, str], Iterator[str], Any], Clause]] = {
-    "turn": lambda said, rooms, thing: Turn(said["side"]),
-    "slight": lambda said, rooms, thing: Turn(said["side"], 45),
-    "around": lambda said, rooms, thing: Turn(LEFT, 180),
-    "exit": lambda said, rooms, thing: Exit(next(rooms)),
-    "enter": lambda said, rooms, thing: Enter(next(rooms)),
-    "cross": lambda said, rooms, thing: Cross(next(rooms)),
-    "door": lambda said, rooms, thing: Enter(next(rooms), said["side"], WORDS.ordinals.index(said["nth"])),
-    "forward": lambda said, rooms, thing: Forward(),
-    "metres": lambda said, rooms, thing: Metres(_number(said["n"])),
-    "to": lambda said, rooms, thing: To(thing),
-    "past": lambda said, rooms, thing: Past(thing),
-    "past_side": lambda said, rooms, thing: Past(thing, said["side"]),
-    "avoid": lambda said, rooms, thing: Avoid(next(rooms)),
-    "notice": lambda said, rooms, thing: Notice(thing),
-    "stop_by": lambda said, rooms, thing: StopBy(thing),
-    "stop_in": lambda said, rooms, thing: StopIn(next(rooms)),
-    "stop_here": lambda said, rooms, thing: StopHere(),
+    "turn": lambda slots, rooms, thing: Turn(slots["side"]),
+    "slight": lambda slots, rooms, thing: Turn(slots["side"], 45),
+    "around": lambda slots, rooms, thing: Turn(LEFT, 180),
+    "exit": lambda slots, rooms, thing: Exit(next(rooms)),
+    "enter": lambda slots, rooms, thing: Enter(next(rooms)),
+    "cross": lambda slots, rooms, thing: Cross(next(rooms)),
+    "door": lambda slots, rooms, thing: Enter(next(rooms), slots["side"], SPOKEN.ordinals.index(slots["nth"])),
+    "forward": lambda slots, rooms, thing: Forward(),
+    "metres": lambda slots, rooms, thing: Metres(_number(slots["n"])),
+    "to": lambda slots, rooms, thing: To(thing),
+    "past": lambda slots, rooms, thing: Past(thing),
+    "past_side": lambda slots, rooms, thing: Past(thing, slots["side"]),
+    "avoid": lambda slots, rooms, thing: Avoid(next(rooms)),
+    "notice": lambda slots, rooms, thing: Notice(thing),
+    "stop_by": lambda slots, rooms, thing: StopBy(thing),
+    "stop_in": lambda slots, rooms, thing: StopIn(next(rooms)),
+    "stop_here": lambda slots, rooms, thing: StopHere(),
 }
 """The clause that each name of the templates means, of what its slots held: words, kinds of rooms in turn, a thing."""

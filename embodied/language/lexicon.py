@@ -11,45 +11,45 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.language.clauses import Referent
-from embodied.language.templates import WORDS
+from embodied.language.templates import SPOKEN
 from embodied.novelty import novel_among, of_novelty
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
     from embodied.assets.records import Asset
 
-ROOM_NOUNS = WORDS.rooms
+ROOM_NOUNS = SPOKEN.rooms
 ROOM_OF_NOUN = {noun.lower(): kind for kind, nouns in ROOM_NOUNS.items() for noun in nouns}
 PASSAGES = frozenset({"corridor", "hall", "stairwell"})
 """Kinds of room that one is in only to go elsewhere."""
 MOST_WORDS = 8
 """Longest wording of a thing: three adjectives of up to two words, then a noun."""
-UNFIT = frozenset(WORDS.unfit)
-EMPTY = frozenset({*WORDS.praise, *WORDS.seat_praise, *WORDS.body_praise, *WORDS.sizes})
+UNFIT = frozenset(SPOKEN.unfit)
+EMPTY = frozenset({*SPOKEN.praise, *SPOKEN.seat_praise, *SPOKEN.body_praise, *SPOKEN.sizes})
 """Adjectives that a listener passes over."""
 
 
 def sizes_of(asset: Asset) -> list[str]:
-    """The words of WORDS.sizes that are true of an asset."""
+    """The words of SPOKEN.sizes that are true of an asset."""
     w, d, h = asset.size
-    found = []
+    sizes = []
     if w * d > 1.4:
-        found += ["large", "big"] + ["huge", "massive"] * (w * d > 3)
+        sizes += ["large", "big"] + ["huge", "massive"] * (w * d > 3)
     if max(w, d, h) < 0.45:
-        found += ["small", "little", "compact"] + ["tiny"] * (max(w, d, h) < 0.2)
+        sizes += ["small", "little", "compact"] + ["tiny"] * (max(w, d, h) < 0.2)
     if h > 1.6:
-        found += ["tall", "high"]
+        sizes += ["tall", "high"]
     if max(w, d) > 1.8:
-        found += ["long", "wide"]
-    return found + ["low"] * (0.1 < h < 0.5 < w) + ["narrow"] * (min(w, d) < 0.35 < h) + ["thin"] * (min(w, d) < 0.06)
+        sizes += ["long", "wide"]
+    return sizes + ["low"] * (0.1 < h < 0.5 < w) + ["narrow"] * (min(w, d) < 0.35 < h) + ["thin"] * (min(w, d) < 0.06)
 
 
 def praise_of(asset: Asset) -> tuple[str, ...]:
     """Words of praise that somebody might use for an asset; comfort comes to mind three times as readily for a seat."""
     w, d, h = asset.size
-    seat = bool({*WORDS.seats} & {*asset.object_class.split()})
+    seat = bool({*SPOKEN.seats} & {*asset.object_class.split()})
     body = asset.support not in ("surface", "ceiling") and min(w, d) > 0.25 and h > 0.3
-    return (*WORDS.praise, *(WORDS.seat_praise * 3 if seat else ()), *(WORDS.body_praise if body else ()))
+    return (*SPOKEN.praise, *(SPOKEN.seat_praise * 3 if seat else ()), *(SPOKEN.body_praise if body else ()))
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Lexicon:
                 classes_of.setdefault(noun, set()).add(asset.object_class)
                 if noun not in nouns_of.setdefault(asset.object_class, []):
                     nouns_of[asset.object_class].append(noun)
-        self.classes_of = {noun: tuple(sorted(found)) for noun, found in sorted(classes_of.items())}
+        self.classes_of = {noun: tuple(sorted(names)) for noun, names in sorted(classes_of.items())}
         self.nouns_of = {name: tuple(nouns) for name, nouns in sorted(nouns_of.items())}
         self.adjectives = frozenset(adjectives - EMPTY)
         self.novel_nouns = novel_among(set(self.classes_of) - set(self.nouns_of))
@@ -88,10 +88,10 @@ class Lexicon:
     @staticmethod
     def _nouns(asset: Asset) -> tuple[str, ...]:
         """The class's name first, then the asset's synonyms, then what else people say."""
-        return (asset.object_class, *asset.synonyms, *WORDS.things.get(asset.object_class, ()))
+        return (asset.object_class, *asset.synonyms, *SPOKEN.things.get(asset.object_class, ()))
 
     def thing(self, word: Word) -> Referent:
-        """What a word may stand for.
+        """The things that a word may stand for.
 
         Raises:
           KeyError: no such noun.
@@ -124,7 +124,7 @@ class Lexicon:
         return Word(noun, (*more, *spare[:adjectives]))
 
     def things_at(self, text: str) -> Iterator[tuple[str, Referent]]:
-        """What the beginning of `text` may name, the longest wording first: (words, thing)."""
+        """Things that the beginning of `text` may name, the longest wording first: (words, thing)."""
         tokens = text.split(" ", MOST_WORDS)[:MOST_WORDS]
         for n in range(len(tokens), 0, -1):
             thing = self.heard(tokens[:n])
@@ -134,9 +134,9 @@ class Lexicon:
     def heard(self, tokens: list[str]) -> Referent | None:
         """The thing that adjectives and a noun mean, the longest noun at their end; None if they name nothing."""
         for i in range(len(tokens)):
-            found = self.classes_of.get(" ".join(tokens[i:]))
-            if found is not None and (words := self._adjectives_of(tokens[:i])) is not None:
-                return Referent(found, tuple(sorted(w for w in words if w not in EMPTY)))
+            classes = self.classes_of.get(" ".join(tokens[i:]))
+            if classes is not None and (words := self._adjectives_of(tokens[:i])) is not None:
+                return Referent(classes, tuple(sorted(w for w in words if w not in EMPTY)))
         return None
 
     def _adjectives_of(self, tokens: list[str]) -> list[str] | None:
@@ -165,6 +165,6 @@ def lexicon_of(catalogue: Catalogue) -> Lexicon:
 
 
 def says(asset: Asset, thing: Referent) -> bool:
-    """Whether `thing` may mean this asset."""
+    """Tells whether `thing` may mean this asset."""
     own = {w.lower() for w in (*asset.colours, *asset.materials)}
     return asset.object_class in thing.classes and all(w in own for w in thing.words)

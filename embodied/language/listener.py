@@ -37,11 +37,11 @@ from embodied.language.grammar import parse
 from embodied.language.lexicon import lexicon_of
 from embodied.language.surroundings import Lookout, Surroundings, Way, doorway
 
-LONGEST = 4
+STEPS_PER_CLAUSE = 4
 """Most steps that one clause may stand for."""
-PATIENCE = 2500
+MOST_WALKS = 2500
 """Most partial walks it thinks through before it settles for the best it has."""
-NEAR, BESIDE = 1.6, 2.6
+ARRIVAL_DISTANCE, PASSING_DISTANCE = 1.6, 2.6
 """Metres within which one is at a thing, or passes it."""
 MISSING = 4.0
 """Cost of a thing or room that is not there."""
@@ -49,7 +49,7 @@ MISSING = 4.0
 
 @dataclass(frozen=True)
 class Execution:
-    """What the listener did."""
+    """The walk of a listener."""
 
     path: tuple[int, ...]
     cost: float
@@ -73,7 +73,7 @@ def carry_out(eyes: Lookout, instruction: RouteInstruction, start: int, yaw: flo
     seen_states: set[tuple] = set()
     fallback: tuple[int, ...] = (start,)
     farthest = -1
-    for _ in range(PATIENCE):
+    for _ in range(MOST_WALKS):
         if not queue:
             break
         cost, _, walk = heapq.heappop(queue)
@@ -139,7 +139,7 @@ def _onward(eyes: Lookout, clause: Clause, walk: _Walk) -> Iterator[tuple[float,
         yield walk_cost(clause, eyes, path[walk.begun :]) + count_cost(clause, eyes, path), walk.next_clause(0.0)
     elif isinstance(clause, To | Past):
         yield 0.8 + walk_cost(clause, eyes, path[walk.begun :]), walk.next_clause(pending)
-    if steps < LONGEST:
+    if steps < STEPS_PER_CLAUSE:
         for way in eyes.at(path[-1]).ways:
             added = _step_cost(clause, way, walk) + 1.5 * (way.node in path)
             if way.leaves and not isinstance(clause, Exit | Enter):
@@ -193,14 +193,16 @@ def count_cost(clause: Clause, eyes: Lookout, path: Sequence[int]) -> float:
     """How badly the doorway of the last step fits 'the second door on your left'; `path` begins before the clause."""
     if not isinstance(clause, Enter) or not clause.nth:
         return 0.0
-    found = doorway(eyes, path)
-    return 2.0 if found is None or found[0] != clause.side else min(1.2 * abs(found[1] - clause.nth), 2.0)
+    door = doorway(eyes, path)
+    return 2.0 if door is None or door[0] != clause.side else min(1.2 * abs(door[1] - clause.nth), 2.0)
 
 
 def near_cost(seen: Surroundings, thing: Referent) -> float:
     """How far one is from being at a thing."""
-    found = seen.nearest(thing)
-    return MISSING if found is None else min(1.3 * max(found.distance - NEAR, 0.0) + 0.15 * found.distance, MISSING)
+    nearest = seen.nearest(thing)
+    if nearest is None:
+        return MISSING
+    return min(1.3 * max(nearest.distance - ARRIVAL_DISTANCE, 0.0) + 0.15 * nearest.distance, MISSING)
 
 
 def past_cost(clause: Past, eyes: Lookout, path: Sequence[int]) -> float:
@@ -209,12 +211,12 @@ def past_cost(clause: Past, eyes: Lookout, path: Sequence[int]) -> float:
     for a, b in itertools.pairwise(path):
         ahead = _way(eyes.at(a), b).yaw
         for node in (a, b):
-            found = eyes.at(node).nearest(clause.thing)
-            if found is None:
+            nearest = eyes.at(node).nearest(clause.thing)
+            if nearest is None:
                 continue
-            bearing = float(wrap(found.yaw - ahead))
+            bearing = float(wrap(nearest.yaw - ahead))
             wrong = clause.side is not None and (bearing > 0) != (clause.side == LEFT) and 0.2 < abs(bearing) < 2.9
-            best = min(best, max(found.distance - BESIDE, 0.0) + 2.0 * wrong)
+            best = min(best, max(nearest.distance - PASSING_DISTANCE, 0.0) + 2.0 * wrong)
     return best
 
 

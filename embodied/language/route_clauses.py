@@ -32,10 +32,10 @@ from embodied.language.clauses import (
 )
 from embodied.language.grammar import Phrase
 from embodied.language.lexicon import PASSAGES, Lexicon, Word, lexicon_of, says
-from embodied.language.listener import BESIDE, NEAR
+from embodied.language.listener import ARRIVAL_DISTANCE, PASSING_DISTANCE
 from embodied.language.speakers import Speaker
 from embodied.language.surroundings import Lookout, Surroundings, VisibleThing, doorway
-from embodied.language.templates import WORDS
+from embodied.language.templates import SPOKEN
 
 SLIGHT, SHARP, BACK = math.radians(38), math.radians(66), math.radians(140)
 """Smallest angles called 'slightly', a turn, and turning around."""
@@ -49,7 +49,7 @@ class Leg:
     turn: float
     """Radians turned before it, left positive."""
     crosses: bool
-    """Whether its last step leads into another room."""
+    """Its last step leads into another room."""
 
 
 def legs_of(world: SeenPlace, path: Sequence[int], yaw: float) -> list[Leg]:
@@ -165,7 +165,7 @@ _DROPPABLE = (
     lambda c, after: isinstance(c, Enter) and c.kind in PASSAGES and not c.nth and not isinstance(after, STOPS),
     lambda c, after: isinstance(c, To) and not isinstance(after, STOPS),
 )
-"""What may be left out before what follows it, the most dispensable first."""
+"""Clauses that may be left out before what follows it, the most dispensable first."""
 
 
 def _turn(angle: float) -> list[Phrase]:
@@ -190,10 +190,10 @@ def _crossing(telling: _Telling, leg: Leg, *, first: bool) -> list[Phrase]:
 
 def _counted(eyes: Lookout, walked: Sequence[int], crossing: list[Phrase]) -> list[Phrase]:
     """The crossing by 'the second door on the left', where there is more than one to choose from; else nothing."""
-    found = doorway(eyes, walked)
-    if found is None or found[2] < 2 or found[1] >= len(WORDS.ordinals) or not isinstance(crossing[-1].clause, Enter):
+    door = doorway(eyes, walked)
+    if door is None or door[2] < 2 or door[1] >= len(SPOKEN.ordinals) or not isinstance(crossing[-1].clause, Enter):
         return []
-    side, nth, _ = found
+    side, nth, _ = door
     return [Phrase(Enter(crossing[-1].clause.kind, side, nth))]
 
 
@@ -208,7 +208,7 @@ def _mark(telling: _Telling, leg: Leg, *, needed: bool) -> Phrase | None:
     good = [
         t
         for t in end.things
-        if t.distance <= NEAR
+        if t.distance <= ARRIVAL_DISTANCE
         and t.placement in at_start
         and t.placement not in used
         and abs(float(wrap(at_start[t.placement].yaw - heading))) < math.radians(50)
@@ -225,20 +225,20 @@ def _mark(telling: _Telling, leg: Leg, *, needed: bool) -> Phrase | None:
 def _passing(telling: _Telling, nodes: Sequence[int]) -> list[Phrase]:
     """Something beside the way, with its side where that is clear."""
     eyes, used = telling.eyes, telling.used
-    found: dict[str, tuple[VisibleThing, str, Surroundings]] = {}
+    beside: dict[str, tuple[VisibleThing, str, Surroundings]] = {}
     for a, b in itertools.pairwise(nodes):
         seen = eyes.at(b)
         ahead = next(w.yaw for w in eyes.at(a).ways if w.node == b)
         for t in seen.things:
             bearing = float(wrap(t.yaw - ahead))
             if (
-                t.distance <= BESIDE - 0.4
+                t.distance <= PASSING_DISTANCE - 0.4
                 and math.radians(40) < abs(bearing) < math.radians(150)
                 and t.placement not in used
             ):
-                found.setdefault(t.placement, (t, LEFT if bearing > 0 else RIGHT, eyes.at(a)))
-    for thing in _ranked([t for t, _, _ in found.values()], telling.rng):
-        _, side, before = found[thing.placement]
+                beside.setdefault(t.placement, (t, LEFT if bearing > 0 else RIGHT, eyes.at(a)))
+    for thing in _ranked([t for t, _, _ in beside.values()], telling.rng):
+        _, side, before = beside[thing.placement]
         if before.nearest(Referent((thing.asset.object_class,))) is None:
             continue
         if (word := _name(telling, thing, before)) is not None:
@@ -248,13 +248,13 @@ def _passing(telling: _Telling, nodes: Sequence[int]) -> list[Phrase]:
 
 
 def _stop(telling: _Telling, path: Sequence[int], crossed: bool, phrases: Sequence[Phrase]) -> Phrase:
-    """Where to stop: by something near the end that can be seen before, else in the room, else here."""
+    """The end: by something near the end that can be seen before, else in the room, else here."""
     last = phrases[-1].clause if phrases else None
     if isinstance(last, To) and telling.chance(0.7):
         return Phrase(StopHere())
     end = telling.eyes.at(path[-1])
     before = {t.placement for n in path[-3:-1] for t in telling.eyes.at(n).things}
-    near = [t for t in end.things if t.distance <= NEAR]
+    near = [t for t in end.things if t.distance <= ARRIVAL_DISTANCE]
     for pool in ([t for t in near if t.placement in before and t.placement not in telling.used], near):
         for thing in _ranked(pool, telling.rng):
             if (word := _name(telling, thing, end)) is not None:

@@ -1,4 +1,4 @@
-"""What somebody standing at a node can tell without any map: things, ways to go, the room around them."""
+"""Surroundings of a node, as one sees them without a map: things, ways to go, the room around them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from embodied.language.lexicon import UNFIT, says
 if TYPE_CHECKING:
     from embodied.assets.records import Asset
 
-SMALLEST = 5
+FEWEST_PIXELS = 5
 """Fewest pixels of a sighting (of 24576 around) by which a thing is noticed."""
 
 
@@ -47,7 +47,7 @@ class Way:
     kind: str
     """Kind of the room it leads into, as one sees through the doorway."""
     leaves: bool
-    """Whether it leads into another room."""
+    """It leads into another room."""
     door: str | None = None
     """The doorway it goes through; tells two apart."""
 
@@ -85,14 +85,14 @@ class Lookout:
         self._looks: dict[int, Surroundings] = {}
 
     def at(self, node: int) -> Surroundings:
-        """What is seen from `node`."""
+        """The surroundings of `node`."""
         if node not in self._looks:
             self._looks[node] = look(self._world, node)
         return self._looks[node]
 
 
 def look(world: SeenPlace, node: int) -> Surroundings:
-    """What is seen from `node`, the largest things first."""
+    """The surroundings of `node`, the largest things first."""
     graph, house, assets = world.graph, world.house, world.catalogue.assets
     things = tuple(
         VisibleThing(
@@ -103,7 +103,7 @@ def look(world: SeenPlace, node: int) -> Surroundings:
             pixels=s.pixels,
         )
         for s in world.sightings(node)
-        if s.pixels >= SMALLEST and s.object_class not in UNFIT
+        if s.pixels >= FEWEST_PIXELS and s.object_class not in UNFIT
     )
     here, room = np.asarray(graph.positions[node]), graph.room_of_node[node]
     ways, doors = [], _doors(world, room)
@@ -129,12 +129,12 @@ def look(world: SeenPlace, node: int) -> Surroundings:
 
 def _doors(world: SeenPlace, room: str) -> list[tuple[str, str, np.ndarray]]:
     """(id, room beyond, middle in x and y) of the doorways of a room that lead to another."""
-    found = []
+    doorways = []
     for o in world.house.openings:
         first, second = o.rooms
         if o.kind == "door" and room in o.rooms and second is not None:
-            found.append((o.id, first if second == room else second, (np.asarray(o.a) + np.asarray(o.b)) / 2))
-    return found
+            doorways.append((o.id, first if second == room else second, (np.asarray(o.a) + np.asarray(o.b)) / 2))
+    return doorways
 
 
 def doorway(eyes: Lookout, path: Sequence[int]) -> tuple[str, int, int] | None:
@@ -167,8 +167,8 @@ def doorway(eyes: Lookout, path: Sequence[int]) -> tuple[str, int, int] | None:
         )
         if ahead > 0.3 and abs(across) > 0.3:
             sides[LEFT if across > 0 else RIGHT].append((ahead, door.id))
-    for side, found in sides.items():
-        names = [name for _, name in sorted(found)]
+    for side, doors in sides.items():
+        names = [name for _, name in sorted(doors)]
         if steps[-1].door in names:
             return side, names.index(steps[-1].door) + 1, len(names)
     return None

@@ -26,14 +26,14 @@ class Template:
 
 @dataclass(frozen=True)
 class Words:
-    """What is in words.toml; where it goes by habit, '' is everybody's."""
+    """The content of words.toml; where it goes by habit, '' is everybody's."""
 
     verbs: tuple[str, ...]
-    """What {walk} may be, the plainest first."""
+    """Fill {walk}, the plainest first."""
     playful: tuple[str, ...]
-    """What it may be besides with chatty people."""
+    """Fill it besides with chatty people."""
     soon: tuple[str, ...]
-    """What {soon} may be."""
+    """Fill {soon}."""
     hedges: tuple[str, ...]
     """Signs of doubt; they mean nothing."""
     praise: tuple[str, ...]
@@ -53,9 +53,9 @@ class Words:
     fillers: Mapping[str, tuple[str, ...]]
     """Openings by habit; they mean nothing."""
     links: Mapping[str, tuple[str, ...]]
-    """What joins two clauses, by habit."""
+    """Join two clauses, by habit."""
     arrived_links: Mapping[str, tuple[str, ...]]
-    """What may join them besides, where the first has led somewhere."""
+    """Join them besides, where the first has led somewhere."""
     slips: Mapping[str, str]
     """Harmless slips of the keyboard."""
     rooms: Mapping[str, tuple[str, ...]]
@@ -67,14 +67,14 @@ class Words:
 
 def _templates(lines: Mapping[str, tuple[str, ...]]) -> tuple[Template, ...]:
     """By clause sequence; a line may begin with '<habit>: '."""
-    found = []
+    templates = []
     for kinds, texts in lines.items():
         for habit, _, text in (line.rpartition(": ") for line in texts):
-            found.append(Template(tuple(kinds.split()), text, habit))
-    return tuple(found)
+            templates.append(Template(tuple(kinds.split()), text, habit))
+    return tuple(templates)
 
 
 _HERE = Path(__file__)
 TEMPLATES = _templates(read_toml(_HERE.with_name("templates.toml")))
 """Every way of speaking."""
-WORDS = from_plain(Words, read_toml(_HERE.with_name("words.toml")))
+SPOKEN = from_plain(Words, read_toml(_HERE.with_name("words.toml")))

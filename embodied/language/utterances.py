@@ -15,7 +15,7 @@ from embodied.seeds import stream
 
 @dataclass(frozen=True)
 class Utterance:
-    """What somebody said and the primitive actions that were meant, without 'stop'."""
+    """Words of somebody and the primitive actions that were meant, without 'stop'."""
 
     words: tuple[str, ...]
     text: str
@@ -24,11 +24,11 @@ class Utterance:
 class PeoplesWords:
     """A `Language` with people's sub-goals where people meant the same actions, and another language's elsewhere."""
 
-    def __init__(self, said: Iterable[Utterance], other: Language) -> None:
+    def __init__(self, utterances: Iterable[Utterance], other: Language) -> None:
         self._other = other
         self._texts: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
-        for s in said:
-            self._texts[s.words].append(s.text)
+        for u in utterances:
+            self._texts[u.words].append(u.text)
 
     def request(self, goal: FindObject, *, rng: np.random.Generator) -> str:
         return self._other.request(goal, rng=rng)

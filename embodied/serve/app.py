@@ -46,7 +46,7 @@ JOIN_RATE, JOIN_BURST = 2.0, 60.0
 SOCKETS = 2000
 LOGGED_STRANGERS = 100
 """Addresses of other pages that are logged, each once."""
-PATIENCE = 30.0
+HELLO_SECONDS = 30.0
 """Seconds that a new connection has to say who it is."""
 SAFE = {
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -114,7 +114,7 @@ class Server:
         houses = houses_of(sessions)
         self._plan = functools.cache(lambda house: plan_of(houses[house], pictures))
         self.failed = False
-        """Whether something could not be written down; nothing is acknowledged any more."""
+        """Something could not be written down; nothing is acknowledged any more."""
 
     # Links and codes -----------------------------------------------------------------------------
 
@@ -206,7 +206,7 @@ class Server:
         self._open += 1
         person: Person | None = None
         try:
-            hello = read_message(await asyncio.wait_for(socket.receive_text(), PATIENCE))
+            hello = read_message(await asyncio.wait_for(socket.receive_text(), HELLO_SECONDS))
             if hello.get("admin") is not None:
                 await self._admin(socket, str(hello["admin"]))
                 return
@@ -497,7 +497,7 @@ def read_message(text: str) -> dict[str, Any]:
 
 
 def words(text: object) -> str:
-    """What somebody wrote, without blanks around it.
+    """The text that somebody wrote, without blanks around it.
 
     Raises:
       ActionError: nothing, or too much.
@@ -508,5 +508,5 @@ def words(text: object) -> str:
 
 
 def key_of(token: object) -> str:
-    """What is stored of a secret word."""
+    """The digest that is stored of a secret word."""
     return hashlib.sha256(str(token).encode()).hexdigest()

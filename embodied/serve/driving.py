@@ -24,23 +24,23 @@ from embodied.render.jpeg import jpeg
 from embodied.world import World
 
 ACTIONS = ("Go ahead", "Turn left", "Turn right")
-"""What somebody who drives can do, by number."""
+"""Actions of somebody who drives, by number."""
 BODY = Body()
 """VLN-CE's: steps of 0.25 m, turns of 15 degrees."""
-SIZE = (240, 320)
+LIVE_SIZE = (240, 320)
 """Height and width of a live picture, pixels."""
-VFOV = math.radians(62.0)
+LIVE_VFOV = math.radians(62.0)
 QUALITY = 70
 SLOWEST = 2.0
 """Seconds for a picture from which on a machine is too slow to drive on."""
-KEPT = 64
+LIVE_KEPT = 64
 """Live pictures in memory."""
 Eye = tuple[str, float, float, float, float]
 """World, x, y, z of the camera in metres, yaw in radians."""
 
 
 class BrowserBody:
-    """Where a body is in one episode. What it does follows from the order of its actions."""
+    """The body of somebody who drives, in one episode. Where it is follows from the order of its actions."""
 
     def __init__(self, place: Place, pose: Pose, grounds: NavMeshCache) -> None:
         """
@@ -102,11 +102,11 @@ class Live:
         """A JPEG of what is seen; one that is asked for again under the same name is not drawn again."""
         if name not in self._drawn:
             self._drawn[name] = asyncio.get_running_loop().run_in_executor(self._thread, self._draw, eye)
-            if len(self._drawn) > KEPT:
+            if len(self._drawn) > LIVE_KEPT:
                 self._drawn.popitem(last=False)
         return await asyncio.shield(self._drawn[name])
 
     def _draw(self, eye: Eye) -> bytes:
         name, x, y, z, yaw = eye
-        rgb = self._world(name).renderer.rgb(camera_at((x, y, z), yaw, 0.0, VFOV), SIZE)
+        rgb = self._world(name).renderer.rgb(camera_at((x, y, z), yaw, 0.0, LIVE_VFOV), LIVE_SIZE)
         return jpeg(rgb, QUALITY)

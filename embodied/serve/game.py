@@ -50,7 +50,7 @@ POLICIES: Mapping[str, AgentMaker] = {
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What all games of a part share: the places, the tasks, and who plays where no person does."""
+    """All that the games of a part share: the places, the tasks, and who plays where no person does."""
 
     part: StudyPart
     places: Mapping[str, Place]
@@ -131,9 +131,9 @@ class Game:
     task: Task
     seed: int
     said: list[dict[str, Any]] = field(default_factory=list)
-    """What was said: who ('agent', 'assistant'), text, picture (node or None)."""
+    """The conversation: who ('agent', 'assistant'), text, picture (node or None)."""
     question: str | None = None
-    """What the agent asked and nobody has answered yet."""
+    """A question of the agent that nobody has answered yet."""
     broken: str | None = None
     """Why it ended without an episode."""
     turn: int = 0
@@ -167,7 +167,7 @@ class Game:
 
     @property
     def mover(self) -> str | None:
-        """Whose turn it is: 'agent', 'assistant', or nobody's."""
+        """The role whose turn it is: 'agent', 'assistant', or nobody's."""
         return None if self.over else "assistant" if self.question is not None else "agent"
 
     @property
@@ -224,10 +224,10 @@ class Game:
         self.last_change = event.time
 
     def think(self) -> tuple[str, dict[str, Any]]:
-        """What the machine does whose turn it is: the kind and the body of its event. May take its time."""
+        """The action of the bot whose turn it is: the kind and the body of its event. May take its time."""
         if self.question is not None:
             return "answered", {"reply": self._answer(self.question)}
-        assert self.agent is not None, "a machine acts"
+        assert self.agent is not None, "a bot acts"
         action: Action | None = None
         for seen, situation in self._seen[self._thought :]:
             (action,), self._memory = act(self.agent, [seen], [situation], self._memory, rngs=[self._rng])
@@ -273,6 +273,6 @@ class Game:
 
 
 def _thought_of(event: Event) -> Thought | None:
-    """What a machine thought when it acted; nothing where it did not say, and of people."""
+    """The thought of a bot when it acted; nothing where it did not say, and of people."""
     thought = event.body.get("thought")
     return None if thought is None else from_plain(Thought, thought)

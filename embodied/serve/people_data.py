@@ -44,20 +44,20 @@ class Worded:
 
 
 def worded_by_people(folder: Path) -> list[Worded]:
-    """What people answered and described, from the folder of a study; the same words for the same way count once."""
-    found = [
+    """Answers and descriptions of people, from the folder of a study; the same words for the same way count once."""
+    worded = [
         w for path in sorted(folder.glob("episodes*.jsonl")) for e in load_lines(path, Episode) for w in answers(e)
     ]
     judged = folder / JUDGEMENTS
-    for told in load_lines(judged, Judgement) if judged.exists() else ():
-        path = without_repeats(told.episode.nodes)
-        if told.stars is None and len(path) > 1:
-            found.append(Worded(told.episode.task.world, path, told.episode.task.start.turn, told.text))
-    return list(dict.fromkeys(found))
+    for j in load_lines(judged, Judgement) if judged.exists() else ():
+        path = without_repeats(j.episode.nodes)
+        if j.stars is None and len(path) > 1:
+            worded.append(Worded(j.episode.task.world, path, j.episode.task.start.turn, j.text))
+    return list(dict.fromkeys(worded))
 
 
 def answers(episode: Episode) -> Iterator[Worded]:
-    """The answers of people in an episode, with the way that was meant; machines' have no such sub-task."""
+    """The answers of people in an episode, with the way that was meant; bots' have no such sub-task."""
     for step in episode.steps:
         reply, meant = step.reply, step.reply and step.reply.subtask
         if reply and reply.text and meant and meant.id.startswith(PERSON_SUBTASK) and len(meant.path) > 1:
@@ -66,13 +66,13 @@ def answers(episode: Episode) -> Iterator[Worded]:
 
 def rated_by_people(folder: Path, source: Dataset) -> list[tuple[float, int]]:
     """(SDTW of an episode against the shortest way, the stars somebody gave it), of the folder of a study."""
-    judged, found = folder / JUDGEMENTS, []
-    for told in load_lines(judged, Judgement) if judged.exists() else ():
-        if told.stars is not None:
-            task, graph = told.episode.task, source.place(told.episode.task.world).graph
+    judged, ratings = folder / JUDGEMENTS, []
+    for j in load_lines(judged, Judgement) if judged.exists() else ():
+        if j.stars is not None:
+            task, graph = j.episode.task, source.place(j.episode.task.world).graph
             way = graph.path(task.start.node, nearest(graph, task.start.node, task.goal_nodes))
-            found.append((sdtw(without_repeats(told.episode.nodes), way, graph, max(task.radius, 1e-6)), told.stars))
-    return found
+            ratings.append((sdtw(without_repeats(j.episode.nodes), way, graph, max(task.radius, 1e-6)), j.stars))
+    return ratings
 
 
 def write_people_dataset(source: Dataset, words: Sequence[Worded], out: Path, *, only: bool = False) -> Dataset:
@@ -124,22 +124,21 @@ def _write_house(source: Dataset, name: str, words: Sequence[Worded], home: Path
     share(old / "panoramas.pano", home / "panoramas.pano")
     facts = load_json(home / "unit.json", UnitFacts)
     if not source.task_kind.routes:
-        said = list(_subgoals(source, words))
-        if said:
-            save_lines(home / SUBGOALS, said)
+        if subgoals := list(_subgoals(source, words)):
+            save_lines(home / SUBGOALS, subgoals)
         return
     split, *_, held_out = WORDINGS[{"extra": "train", "ood": "test"}.get(facts.group, facts.group)]
-    mine = list(_routes(source, name, words, split, held_out))
+    spoken = list(_routes(source, name, words, split, held_out))
     kept = [] if only else list(source.routes(name))
-    save_lines(home / "routes.jsonl", [*kept, *mine])
+    save_lines(home / "routes.jsonl", [*kept, *spoken])
     tasks = dict(facts.tasks)
     if source.task_kind.from_routes:
         for part in tasks:
             heard = held_out if part != "train" and facts.group == "train" else split
             file = home / f"tasks_{part}.jsonl"
             old_tasks = [] if only else list(load_lines(file, Task))
-            tasks[part] = save_lines(file, [*old_tasks, *(vln_task(name, r) for r in mine if r.split == heard)])
-    save_facts(home, dataclasses.replace(facts, routes=len(kept) + len(mine), tasks=tasks))
+            tasks[part] = save_lines(file, [*old_tasks, *(vln_task(name, r) for r in spoken if r.split == heard)])
+    save_facts(home, dataclasses.replace(facts, routes=len(kept) + len(spoken), tasks=tasks))
 
 
 def _routes(source: Dataset, name: str, words: Sequence[Worded], split: str, held_out: str) -> Iterator[Route]:

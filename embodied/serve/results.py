@@ -1,4 +1,4 @@
-"""What a study left: episodes and judgements as JSON Lines, a summary, and how far people agree."""
+"""Results of a study: episodes and judgements as JSON Lines, a summary, and how far people agree."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from embodied.interface import Episode
 from embodied.records import episodes_file, save_lines, to_json
 from embodied.serve.game import Game
-from embodied.serve.sessions import Sessions, found
+from embodied.serve.sessions import Sessions, is_success
 from embodied.serve.store import Event
 
 JUDGEMENTS = "judgements.jsonl"
@@ -22,7 +22,7 @@ JUDGEMENTS = "judgements.jsonl"
 
 @dataclass(frozen=True)
 class Judgement:
-    """What somebody said of an episode."""
+    """Stars or words of somebody for an episode."""
 
     part: str
     unit: str
@@ -136,17 +136,17 @@ def part_summary(sessions: Sessions, name: str) -> dict[str, Any]:
             "done": len(whole),
             "running": sum(not g.over for g in games),
             "broken off": sum(g.broken is not None for g in games),
-            "success": ratio(sum(found(g) for g in whole), len(whole)),
+            "success": ratio(sum(is_success(g) for g in whole), len(whole)),
             "questions per episode": mean([g.env.requests for g in whole]),
             "words per answer": mean([len(a["text"].split()) for a in answers]),
             "seconds per answer": mean([a["seconds"] for a in answers]),
             "minutes per episode": mean([(g.last_change - g.begun) / 60 for g in whole]),
         }
-    told = [e for e in sessions.judgements if e.body["part"] == name]
-    facts = {"name": name, "wanted": len(sessions.episodes(part)) * part.answers, "done": len(told)}
+    judged = [e for e in sessions.judgements if e.body["part"] == name]
+    facts = {"name": name, "wanted": len(sessions.episodes(part)) * part.answers, "done": len(judged)}
     if part.kind == "describe":
-        return {**facts, "words per description": mean([len(e.body["text"].split()) for e in told])}
-    stars = [(e.body["unit"], e.body["stars"]) for e in told]
+        return {**facts, "words per description": mean([len(e.body["text"].split()) for e in judged])}
+    stars = [(e.body["unit"], e.body["stars"]) for e in judged]
     return {**facts, "stars, mean": mean([s for _, s in stars]), "agreement (alpha)": agreement(stars)}
 
 
@@ -162,6 +162,6 @@ def as_text(facts: Mapping[str, Any]) -> str:
     """A summary for a terminal."""
     lines = [facts["title"], ", ".join(f"{v} {k}" for k, v in facts["people"].items())]
     for part in facts["parts"]:
-        told = [f"{k} {v:.2f}" if isinstance(v, float) else f"{k} {v}" for k, v in part.items() if v is not None]
-        lines.append("  " + ", ".join(told[1:]).join((f"{part['name']}: ", "")))
+        figures = [f"{k} {v:.2f}" if isinstance(v, float) else f"{k} {v}" for k, v in part.items() if v is not None]
+        lines.append("  " + ", ".join(figures[1:]).join((f"{part['name']}: ", "")))
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""What a browser is told: everything on somebody's screen as one JSON object, so that a reload loses nothing."""
+"""Messages to a browser: everything on somebody's screen as one JSON object, so that a reload loses nothing."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def progress(sessions: Sessions, person: Person) -> Screen:
 
 
 def coming(sessions: Sessions, person: Person) -> Screen:
-    """What the next part asks, to be read before it begins."""
+    """The next part's request, to be read before it begins."""
     part = next_part(sessions, person)
     if part is None:
         return {"advice": "", "role": None, "practise": False}
@@ -69,10 +69,10 @@ def next_part(sessions: Sessions, person: Person) -> StudyPart | None:
 
 
 def game_of(game: Game, role: str, pictures: EncodedPanoramas) -> Screen:
-    """What both roles see."""
+    """The view of both roles of a game."""
     world = game.task.world
     shown = lambda node: None if node is None else pictures.name(world, node)
-    said = [{"who": s["who"], "text": detokenized(s["text"]), "pano": shown(s["picture"])} for s in game.said]
+    conversation = [{"who": s["who"], "text": detokenized(s["text"]), "pano": shown(s["picture"])} for s in game.said]
     return {
         "screen": role,
         "game": game.id,
@@ -80,7 +80,7 @@ def game_of(game: Game, role: str, pictures: EncodedPanoramas) -> Screen:
         "practice": game.practice,
         "advice": game.table.part.advice,
         "request": detokenized(game.task.request),
-        "said": said,
+        "said": conversation,
         "question": game.question,
         "yours": game.mover == role,
         "pano": pictures.name(world, game.situation.pose.node),
@@ -90,7 +90,7 @@ def game_of(game: Game, role: str, pictures: EncodedPanoramas) -> Screen:
 
 
 def agent_of(game: Game, pictures: EncodedPanoramas) -> Screen:
-    """What the agent sees, and nothing that an agent may not know."""
+    """The agent's view of a game, and nothing that an agent may not know."""
     part, seen = game.table.part, game.observation
     assert seen is not None
     aim = None if seen.target is None else viewpoint(seen.target)
@@ -134,7 +134,7 @@ def moves_of(seen: Observation, situation: Situation, pictures: EncodedPanoramas
 
 
 def assistant_of(game: Game) -> Screen:
-    """What the assistant sees."""
+    """The assistant's view of a game."""
     part, s = game.table.part, game.situation
     show_way, show_goal = part.show_way or game.practice, part.show_goal or game.practice
     return {

@@ -164,7 +164,7 @@ class Sessions:
         for role, pid in game.people.items():
             person = self.people[pid]
             person.game, person.ready = None, False
-            person.last = "broken" if game.broken is not None else "found" if found(game) else "missed"
+            person.last = "broken" if game.broken is not None else "found" if is_success(game) else "missed"
             if game.practice:
                 person.practised.add(role)
             elif game.broken is None:
@@ -182,13 +182,13 @@ class Sessions:
         return next(p for p in self.study.parts if p.name == name)
 
     def episodes(self, part: StudyPart) -> list[tuple[str, Episode]]:
-        """What a part judges: (unit, episode)."""
+        """The episodes that a part judges: (unit, episode)."""
         if part.episodes:
             return [(str(i), e) for i, e in enumerate(self.viewed[part.name])]
         return [(unit, game.episode) for unit, game in self._episodes[part.of]]
 
     def episode_of(self, part: str, unit: str) -> Episode:
-        """What a part judges under the name `unit`."""
+        """The episode that a part judges under the name `unit`."""
         return self.viewed[part][int(unit)] if self.part(part).episodes else self.games[unit].episode
 
     def wanted(self, part: StudyPart, *people: Person) -> str | None:
@@ -204,11 +204,11 @@ class Sessions:
         if part.episodes:
             yield from (str(i) for i in range(len(self.viewed[part.name])))
             return
-        mine = {p.id for p in people}
-        yield from (unit for unit, game in self._episodes[part.of] if not mine & set(game.people.values()))
+        ids = {p.id for p in people}
+        yield from (unit for unit, game in self._episodes[part.of] if not ids & set(game.people.values()))
 
     def next(self, person: Person, now: float) -> list[Event]:
-        """What begins for somebody: events to happen; none while they read or wait."""
+        """Events by which something begins for somebody; none while they read or wait."""
         waited, person.waiting = person.waiting, None
         if person.ended or not person.consented or person.game or person.viewing:
             return []
@@ -254,10 +254,10 @@ class Sessions:
             people = [self.people[p] for p in game.people.values()]
             quiet, together = now - game.last_change, len(people) > 1
             limit = self.study.absent_seconds if together else GONE_SECONDS
-            gone = [p for p in people if not p.connected and now - p.away_since > limit and quiet > limit]
+            absent = [p for p in people if not p.connected and now - p.away_since > limit and quiet > limit]
             why = None
-            if gone:
-                why = "gone: " + gone[0].id
+            if absent:
+                why = "gone: " + absent[0].id
             elif together and quiet > self.study.idle_seconds:
                 why = f"idle: {game.people[game.mover or 'agent']}"
             if any(p.ended for p in people):
@@ -288,8 +288,8 @@ class Sessions:
         return Event("began", now, body={**body, "practice": unit is None})
 
 
-def found(game: Game) -> bool:
-    """Whether an episode ended with a stop within the task's radius of a goal."""
+def is_success(game: Game) -> bool:
+    """Tells whether an episode ended with a stop within the task's radius of a goal."""
     return strict_success(game.episode, game.situation.world.graph) > 0
 
 

@@ -1,4 +1,4 @@
-"""What people did, as a log of events in SQLite: whatever was acknowledged is on disk."""
+"""Deeds of people, as a log of events in SQLite: whatever was acknowledged is on disk."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 
 from embodied.errors import UnableError
 
-SCHEMA = """
+EVENT_TABLES = """
 PRAGMA journal_mode = WAL;
 PRAGMA synchronous = FULL;
 CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -32,7 +32,7 @@ class Event:
     time: float
     """Seconds since 1970."""
     person: str | None = None
-    """Who did it; None for machines and the server."""
+    """Who did it; None for bots and the server."""
     message: str | None = None
     """The browser's own name of the message, so that it counts once however often it is sent."""
     body: dict[str, Any] = field(default_factory=dict)
@@ -45,7 +45,7 @@ class Store:
         self._path = path
         with self._readable():
             self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
-            self._db.executescript(SCHEMA)
+            self._db.executescript(EVENT_TABLES)
         self._thread = ThreadPoolExecutor(1, "store")
         self._waiting: list[tuple[Event, asyncio.Future[None]]] = []
         self._writing: asyncio.Task[None] | None = None

@@ -8,7 +8,7 @@ from pathlib import Path
 from embodied.assets.json_file import read_toml
 from embodied.records import RecordError, from_plain
 
-KINDS = ("play", "rate", "describe")
+PART_KINDS = ("play", "rate", "describe")
 MOVES = ("viewpoints", "drive")
 PERSON = "person"
 LONGEST_TEXT = 2000
@@ -25,7 +25,7 @@ class Question:
 
     text: str
     price: float = 0.0
-    """What it costs, in points of the study; written down as the cost of the step."""
+    """The cost, in points of the study; written down as the cost of the step."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,11 @@ class StudyPart:
     send_pictures: bool = True
     """The assistant may show the view of a viewpoint, chosen on the plan."""
     of: str = ""
-    """What is judged: the episodes of this part of the study; or, with `episodes`, those of a file."""
+    """The episodes that are judged: those of this part of the study; or, with `episodes`, of a file."""
     episodes: str = ""
     """A file episodes*.jsonl that `embodied evaluate` or a study wrote."""
     ask: str = ""
-    """What raters and describers are asked."""
+    """The question to raters and describers."""
     advice: str = ""
     """Shown to everybody in this part, before it begins."""
 
@@ -75,8 +75,8 @@ class StudyPart:
         numbers = {"tasks": self.tasks, "answers": self.answers, "per_person": self.per_person}
         if low := [n for n, v in numbers.items() if v < 1]:
             raise ValueError(f"{low[0]} should be at least 1")
-        if self.kind not in KINDS:
-            raise ValueError(f"kind should be one of {list(KINDS)}, got {self.kind!r}")
+        if self.kind not in PART_KINDS:
+            raise ValueError(f"kind should be one of {list(PART_KINDS)}, got {self.kind!r}")
         if self.kind == "play" and not self.roles:
             raise ValueError("agent or assistant should be 'person'; nobody would take part")
         if self.moves not in MOVES or (self.moves == "drive" and (self.kind != "play" or self.agent != PERSON)):
@@ -100,7 +100,7 @@ class Study:
     data: str
     """The data set that tasks and houses come from; relative to the file."""
     consent: str
-    """What people agree to, in paragraphs."""
+    """The text that people agree to, in paragraphs."""
     parts: tuple[StudyPart, ...]
     contact: str = ""
     thanks: str = "Thank you for taking part."
@@ -116,7 +116,7 @@ class Study:
     idle_seconds: float = 180.0
     """How long a partner waits for somebody who does nothing."""
     pace: float = 1.0
-    """Seconds between the steps of a machine that a person watches."""
+    """Seconds between the steps of a bot that a person watches."""
     pictures: str = "unlit"
     """How panoramas are drawn that the data set does not hold: unlit, fast, normal, ..."""
     size: int = 768

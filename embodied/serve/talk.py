@@ -90,7 +90,7 @@ class TalkEnv(HelpEnv):
 
 
 def spoken_reply(situation: Situation, text: str, picture: int | None, number: int, way: int = 0) -> Reply:
-    """What a person's words mean to an environment: the way to what they show, or else the one they were shown.
+    """The meaning of a person's words to an environment: the way to what they show, or else the one they were shown.
 
     Args:
       picture: the node whose view they show, if any.
@@ -122,8 +122,8 @@ class PathSpeaker:
 
     def answer(self, situation: Situation, question: Intention, *, rng: np.random.Generator) -> Reply:
         path = way_to_goal(situation)
-        said = self._language.route(situation.world, path, situation.pose.yaw, rng=rng) if len(path) > 1 else None
-        reply = spoken_reply(situation, said or "You are there.", None, 0)
+        words = self._language.route(situation.world, path, situation.pose.yaw, rng=rng) if len(path) > 1 else None
+        reply = spoken_reply(situation, words or "You are there.", None, 0)
         return dataclasses.replace(reply, subtask=dataclasses.replace(required(reply.subtask, "way"), id="way"))
 
 
