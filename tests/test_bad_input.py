@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import errno
+import functools
 import json
 import os
 import signal
@@ -12,18 +13,15 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
 from conftest import two_rooms
 from tqdm import tqdm
 
-import embodied
 from embodied import cli
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.hanna.training_config import TrainingConfig
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.vision.config import VisionConfig
-from embodied.assets.cache import atomic_path
 from embodied.assets.materials import finish
 from embodied.datasets.build import for_each_unit
 from embodied.errors import UnableError
@@ -32,8 +30,6 @@ from embodied.gl import GLError
 from embodied.house.house import House, HouseError
 from embodied.light.backend import LightError
 from embodied.options import field_docs
-from embodied.render.panorama import Panorama
-from embodied.render.panorama_file import PanoramaFile, write_panoramas
 from embodied.scene.model import load_texture
 
 
@@ -143,28 +139,14 @@ def test_a_flipped_texture_is_noticed(tmp_path):
         load_texture(str(path))
 
 
-def test_a_flipped_byte_in_a_panorama_file_is_found(tmp_path):
-    faces = Panorama(np.full((6, 8, 8, 3), 90, np.uint8), np.ones((6, 8, 8), np.float32), np.zeros((6, 8, 8), np.int32))
-    path = tmp_path / "a.pano"
-    write_panoramas(path, [faces, faces], {})
-    with PanoramaFile(path) as file:
-        assert not file.damaged()
-        offset = file.index.nodes[1]["depth"][0]
-    data = bytearray(path.read_bytes())
-    data[offset + 3] ^= 1
-    path.write_bytes(data)
-    with PanoramaFile(path) as file:
-        assert file.damaged() == ((1, "depth"),)
-
-
 @pytest.mark.slow
 def test_no_opengl_is_one_line():
     for environment, message in (
         ({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL is 'nonsense'"),
         ({"MUJOCO_GL": "egl", "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}, "Install EGL"),
     ):
-        code = "from embodied import cli\nfrom embodied.cli import doctor\n"
-        code += "doctor.run = lambda a: __import__('embodied.gl').gl.info()\n"
+        code = "import functools\nfrom embodied import cli\nfrom embodied.cli import doctor\n"
+        code += "doctor.run = functools.wraps(doctor.run)(lambda a: __import__('embodied.gl').gl.info())\n"
         done = subprocess.run(
             [sys.executable, "-c", code + "raise SystemExit(cli.main(['doctor']))"],
             check=False,
@@ -194,7 +176,7 @@ def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys
     def fail(_):
         raise error
 
-    monkeypatch.setattr(doctor, "run", fail)
+    monkeypatch.setattr(doctor, "run", functools.wraps(doctor.run)(fail))
     assert cli.main(["doctor"]) == status
     err = capsys.readouterr().err.strip()
     assert message in err and "\n" not in err
@@ -210,7 +192,7 @@ def test_an_error_stands_on_a_line_of_its_own_below_a_progress_bar(capsys, monke
         for _ in panoramas:  # which the traceback keeps, and with it the bar
             raise OSError(errno.ENOSPC, "No space left on device", "/x/a.pano")
 
-    monkeypatch.setattr(doctor, "run", lambda _: write(drawn()))
+    monkeypatch.setattr(doctor, "run", functools.wraps(doctor.run)(lambda _: write(drawn())))
     assert cli.main(["doctor"]) == 2
     *_, last, end = capsys.readouterr().err.split("\n")
     assert last.startswith("error: /x/a.pano: No space left on device") and not end
@@ -223,14 +205,14 @@ def test_a_killed_worker_is_one_line(capsys, monkeypatch):
     def fail(_):
         for_each_unit(signal.raise_signal, [signal.SIGKILL] * 2, (), workers=2, watch=None, ray_address=None)
 
-    monkeypatch.setattr(doctor, "run", fail)
+    monkeypatch.setattr(doctor, "run", functools.wraps(doctor.run)(fail))
     assert cli.main(["doctor"]) == 2
     *_, last, end = capsys.readouterr().err.split("\n")
     assert last.startswith("error: a worker process was ended from outside") and "fewer --workers" in last and not end
 
 
 FULL = """
-import resource, signal, sys
+import functools, resource, signal, sys
 import numpy as np
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
 from embodied import cli
@@ -244,7 +226,8 @@ def drawn():
         yield Panorama(rng.integers(0, 255, (6, 32, 32, 3), np.uint8), np.ones((6, 32, 32), np.float32),
                        np.zeros((6, 32, 32), np.int32))
 resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
-doctor.run = lambda args: write_panoramas(__import__("pathlib").Path(sys.argv[1]), drawn(), {})
+write = lambda args: write_panoramas(__import__("pathlib").Path(sys.argv[1]), drawn(), {})
+doctor.run = functools.wraps(doctor.run)(write)
 raise SystemExit(cli.main(["doctor"]))
 """
 
@@ -327,15 +310,6 @@ def refused_at_once(words, message, capsys, tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["house"]
 
 
-def test_a_full_disk_leaves_no_file(tmp_path):
-    path = tmp_path / "a.json"
-    path.write_text("old")
-    with pytest.raises(OSError, match="full"), atomic_path(path) as temporary:
-        temporary.write_text("half")
-        raise OSError(errno.ENOSPC, "full")
-    assert [p.name for p in tmp_path.iterdir()] == ["a.json"] and path.read_text() == "old"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seconds", [0.0, 0.3, 1.0])
 def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
@@ -371,9 +345,3 @@ def test_help_imports_no_subcommand_and_import_embodied_is_light():
 )
 def test_every_field_that_is_an_option_is_explained(kind):
     assert [f.name for f in dataclasses.fields(kind) if not field_docs(kind).get(f.name)] == []
-
-
-def test_every_public_name_is_there():
-    assert all(getattr(embodied, name) is not None for name in embodied.__all__)
-    with pytest.raises(AttributeError, match="it offers"):
-        embodied.nothing  # noqa: B018  the access is the test

@@ -49,6 +49,8 @@ def test_import_embodied_loads_nothing_heavy_and_completes_names():
     missing = [name for name in embodied.__all__ if name not in embodied.__doc__ and name != "__version__"]
     assert missing == ["Renderer", "build_graph"], "help(embodied) names all but two"
     assert embodied.__version__.split(".")[0].isdigit()
+    with pytest.raises(AttributeError, match="it offers"):
+        embodied.nothing  # noqa: B018  the access is the test
 
 
 def drawn_house(*facts):

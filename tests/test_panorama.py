@@ -306,6 +306,7 @@ def test_a_flipped_byte_is_noticed_where_it_matters(stored):
     data[offset + length // 2] ^= 0xFF
     path.write_bytes(data)
     with PanoramaFile(path) as file:
+        assert file.damaged() == ((1, "depth"),)
         file.read(0)
         with pytest.raises(PanoramaFileError, match="depth of node 1"):
             file.depth(1)

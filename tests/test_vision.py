@@ -428,7 +428,7 @@ def test_settings_that_nothing_can_be_learned_with_are_refused():
 
 
 FULL = """
-import resource, signal, sys, torch
+import functools, resource, signal, sys, torch
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
 from embodied.agents.common.checkpoint import write_checkpoint
 from embodied.agents.vision.encoder import random_encoder, save_encoder
@@ -438,7 +438,7 @@ encoder = random_encoder(seed=0)
 writes = {"encoder.safetensors": lambda path: save_encoder(encoder, path),
           "checkpoint.pt": lambda path: write_checkpoint(path, {"parts": torch.zeros(100_000)})}
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
-doctor.run = lambda args: writes[sys.argv[1]](sys.argv[2])
+doctor.run = functools.wraps(doctor.run)(lambda args: writes[sys.argv[1]](sys.argv[2]))
 raise SystemExit(cli.main(["doctor"]))
 """
 
