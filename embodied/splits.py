@@ -68,7 +68,7 @@ def _small(train: int, extra: int, val: int, test: int, tasks: int, unseen: int)
     return SplitSizes({"train": train, "extra": extra, "val": val, "test": test}, tasks, unseen)
 
 
-SMALL: Mapping[str, SplitSizes] = {
+SMALL_SCALES: Mapping[str, SplitSizes] = {
     "maxi": _small(256, 16, 4, 20, 25_600, 500),
     "midi": _small(128, 8, 4, 20, 12_800, 500),
     "mini": _small(24, 8, 4, 20, 2_400, 500),
@@ -79,7 +79,7 @@ five times the houses to learn from, with as many tasks each, and 'maxi' twice t
 are those of the smaller; 'tiny' is for tests."""
 PAPER = "paper"
 """The scale of the paper that a kind of task is from (TaskKind.paper)."""
-SCALES = (PAPER, *SMALL)
+DATASET_SCALES = (PAPER, *SMALL_SCALES)
 
 
 @dataclass(frozen=True)
@@ -132,5 +132,5 @@ def described(name: str) -> str:
     """A scale in words: '24 + 4 + 20 houses, 2,400 tasks'."""
     if name == PAPER:
         return "as many as in the paper of the kind of task"
-    sizes = SMALL[name]
+    sizes = SMALL_SCALES[name]
     return f"{' + '.join(str(sizes.houses[g]) for g in ('train', 'val', 'test'))} houses, {sizes.tasks:,} tasks"

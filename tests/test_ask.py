@@ -34,7 +34,7 @@ from embodied.interface import Ask, Intention, Move, Pose, Stop
 from embodied.kinds.ask import ASK, ask_environments, price, success_progress, weighted_success
 from embodied.language.questions import intention_of
 from embodied.metrics import success
-from embodied.policies.ask import RULES, Asker, Mind, reached
+from embodied.policies.ask import ASKER_RULES, Asker, EpisodeMemory, reached
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks, look_of
 
@@ -185,7 +185,7 @@ def test_the_questions_that_agents_word_are_understood_as_they_are_meant():
 
 
 def test_following_told_routes_always_arrives(world, tasks, make_env):
-    episodes = play(make_env, Asker(RULES["always route"]), tasks, seed=0, batch=4)
+    episodes = play(make_env, Asker(ASKER_RULES["always route"]), tasks, seed=0, batch=4)
     assert all(success(e, world.graph) == 1 for e in episodes)
     assert all(price(e, world.graph) == pytest.approx(0.2 * e.requests) for e in episodes)
 
@@ -194,8 +194,8 @@ def test_asking_pays_and_episodes_do_not_depend_on_the_batch(world, tasks, make_
     """Here, where four chairs look alike, asking at each whether it is the one finds more than never asking."""
     rate = {}
     for name in ("never ask", "confirm on sight"):
-        alone = play(make_env, Asker(RULES[name]), tasks, seed=0)
-        assert [to_json(e) for e in play(make_env, Asker(RULES[name]), tasks, seed=0, batch=7)] == [
+        alone = play(make_env, Asker(ASKER_RULES[name]), tasks, seed=0)
+        assert [to_json(e) for e in play(make_env, Asker(ASKER_RULES[name]), tasks, seed=0, batch=7)] == [
             to_json(e) for e in alone
         ]
         rate[name] = np.mean([weighted_success(e, world.graph) for e in alone])
@@ -302,20 +302,22 @@ def test_the_oracle_of_asking_improves_on_the_rule_that_it_thinks_ahead_with(wor
     def value(agent) -> float:
         return float(np.mean([weighted_success(e, world.graph) for e in play(make_env, agent, tasks[:6], seed=0)]))
 
-    assert value(Foresight(make_env)) > value(Asker(RULES["confirm on sight"])), "which it goes on with in its head"
+    assert value(Foresight(make_env)) > value(Asker(ASKER_RULES["confirm on sight"])), (
+        "which it goes on with in its head"
+    )
 
 
 def test_thinking_ahead_changes_nothing_in_the_episode(tasks, make_env):
     env = make_env()
     env.reset(tasks[0])
     before = (len(env._steps), env.time, env.pose, env._fitting, set(env._denied))
-    Foresight(make_env)._value(env, env.observation, Mind(), Intention.APPEARANCE, np.random.default_rng(0))
+    Foresight(make_env)._value(env, env.observation, EpisodeMemory(), Intention.APPEARANCE, np.random.default_rng(0))
     assert (len(env._steps), env.time, env.pose, env._fitting, set(env._denied)) == before
 
 
 def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks, make_env):
     """It is taught that asking for the way at once is worth most, and does so."""
-    known = np.stack([facts(make_env().reset(t), Mind()) for t in tasks])
+    known = np.stack([facts(make_env().reset(t), EpisodeMemory()) for t in tasks])
     worth = np.zeros((len(tasks), len(CHOICES)))
     worth[:, CHOICES.index(Intention.ROUTE)], worth[:, CHOICES.index(Intention.CONFIRM)] = 1.0, np.nan
     net = fit((known, worth), LITTLE)
@@ -333,7 +335,7 @@ def test_what_it_knows_tells_a_yes_from_a_no(world, tasks, make_env):
     for placement in (t := next(t for t in tasks if len(t.goal.fitting) > 1)).goal.fitting:
         seen = ((n, in_view(world, n, t.goal)[:1]) for n in range(36))
         node = next(n for n, near in seen if near and near[0][0] == placement and near[0][2] <= 2.0)
-        env, trail = make_env(), Mind()
+        env, trail = make_env(), EpisodeMemory()
         o = env.reset(dataclasses.replace(t, start=dataclasses.replace(t.start, node=node)))
         o = env.step(trail.ask(Intention.CONFIRM, reached(o)))
         known[env.last_step.reply.text[:2]] = facts(o, trail)
@@ -345,7 +347,7 @@ def test_a_study_trains_by_dagger_judges_and_draws(world, tasks, make_env, tmp_p
     monkeypatch.setattr("embodied.agents.ask.study.houses", lambda *_: ({"grid": world}, make_env, look))
     config = dataclasses.replace(LITTLE, houses=1, tasks=2, rounds=1, round_tasks=2)
     sizes = AskEvaluation(test_houses=1, test_tasks=3, oracle_tasks=2, model_tasks=2)
-    model = lambda places: Asker(RULES["always route"])
+    model = lambda places: Asker(ASKER_RULES["always route"])
     study = AskStudy(tmp_path, config, sizes, (0, 1), model=model, model_about={"model": "scripted"})
     rows = ["never ask", "always route", "learned asker", "language model", "oracle of asking"]
     quiet = lambda line: None

@@ -14,7 +14,7 @@ from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
-from embodied.gym.playground import AREA
+from embodied.gym.playground import FLAT_AREA
 from embodied.interface import Route
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
 from embodied.language.detokenize import detokenized
@@ -43,7 +43,7 @@ def lexicon():
 @pytest.fixture(scope="module")
 def world(shared_cache):
     catalogue = load_catalogue(shared_cache)
-    house, graph = make_dataset_house(0, "flat_0", HouseConfig(area=AREA), catalogue)  # that of Gymnasium's seed 0
+    house, graph = make_dataset_house(0, "flat_0", HouseConfig(area=FLAT_AREA), catalogue)  # that of Gymnasium's seed 0
     with open_world(house, catalogue, catalogue.cache, graph=graph) as world:
         yield world
 

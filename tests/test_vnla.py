@@ -12,7 +12,7 @@ from embodied import metrics
 from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError
-from embodied.envs.vnla import RULES, Algorithm6Env, DirectVnlaEnv, MuteDirectVnlaEnv, VnlaEnv, fitted
+from embodied.envs.vnla import RULES_OF_PLAY, Algorithm6Env, DirectVnlaEnv, MuteDirectVnlaEnv, VnlaEnv, fitted
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
 from embodied.kinds.find import FIND
@@ -20,7 +20,7 @@ from embodied.kinds.vnla import VNLA
 from embodied.language.plain_language import PlainLanguage, heard_subgoal
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
 from embodied.task_kind import EnvInputs
-from embodied.tasks.vnla import VnlaConfig, time_limits, vnla_pool, vnla_task
+from embodied.tasks.vnla import MOST_ACTIONS, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 
 TASK = Task(
@@ -196,13 +196,13 @@ def test_direct_intervention_may_be_silent():
     assert env.pose == Pose(0, 7), "it was turned to the left all the same"
 
 
-@pytest.mark.parametrize("rules", RULES)
+@pytest.mark.parametrize("rules", RULES_OF_PLAY)
 def test_every_rule_is_chosen_by_name_and_the_teacher_wins_in_time(rules):
     world = grid_world()
     tasks = grid_setup()[2][:8]
     make = VNLA.environments(EnvInputs({"grid": world}, rules=rules))
     tasks = VNLA.tasks_under(tasks, {"grid": world}, rules)
-    assert type(make()) is RULES[rules]
+    assert type(make()) is RULES_OF_PLAY[rules]
     episodes = play(make, Shortest(VnlaTeacher()), tasks, seed=0)
     assert all(metrics.success(e, world.graph) and e.ended == "stop" for e in episodes)
 
@@ -300,7 +300,7 @@ def test_the_expert_has_the_time_that_it_needs():
     pool = vnla_pool(world, plan, seed=0)
     for i in range(20):
         task = vnla_task(pool, i, world, plan, seed=0, language=PlainLanguage())
-        assert plan.count(task.start, task.goal_nodes) == task.horizon <= VnlaConfig().most_actions
+        assert plan.count(task.start, task.goal_nodes) == task.horizon <= MOST_ACTIONS
 
 
 def test_every_pose_can_be_turned_to_and_from():

@@ -32,7 +32,7 @@ from embodied.agents.vnla.network import (
 )
 from embodied.agents.vnla.policy import SupervisedVnla, VnlaMoment, carried_out, for_training
 from embodied.agents.vnla.run import VnlaLearner, losses_of
-from embodied.envs.vnla import RULES
+from embodied.envs.vnla import RULES_OF_PLAY
 from embodied.evaluation.rollout import play
 from embodied.identity import identity_of
 from embodied.interface import Ask
@@ -254,7 +254,7 @@ def test_it_learns_one_batch_by_heart():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rules", RULES)
+@pytest.mark.parametrize("rules", RULES_OF_PLAY)
 def test_a_run_under_every_rule_writes_an_agent_that_plays(rules, tmp_path):
     agent, training, validation = lesson(dataclasses.replace(TINY, rules=rules, iterations=2, validate_every=2))
     progress = imitation.train(VnlaLearner(agent, training), validation, tmp_path, identity(agent), note=quiet)
@@ -306,5 +306,5 @@ def test_settings_refuse_what_they_cannot_be():
     for wrong in ({"asker": "every5"}, {"rules": "Algorithm 6"}, {"dropout": 1.0}, {"batch": 0}, {"ask_rules": "a"}):
         with pytest.raises(ValueError, match=next(iter(wrong))):
             dataclasses.replace(TINY, **wrong)
-    assert set(TRAINED_UNDER) == set(RULES) and DONT != ASK
+    assert set(TRAINED_UNDER) == set(RULES_OF_PLAY) and DONT != ASK
     assert split_under("algorithm-6", 3).tasks[0].horizon > split_under("indirect", 3).tasks[0].horizon

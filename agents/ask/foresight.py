@@ -31,7 +31,7 @@ from embodied.interface import (
 )
 from embodied.kinds.ask import price
 from embodied.metrics import success
-from embodied.policies.ask import Asker, Mind, confirm_on_sight, onward, reached
+from embodied.policies.ask import Asker, EpisodeMemory, confirm_on_sight, onward, reached
 
 EVERY = 4
 """Steps between two moments at which it thinks about asking; it also does whenever a thing was reached."""
@@ -60,14 +60,14 @@ HERE = (Intention.CONFIRM, Intention.DISAMBIGUATE)
 """Questions whose answers stay the same where one stands."""
 
 
-def possible(o: Observation, trail: Mind) -> list[Choice]:
+def possible(o: Observation, trail: EpisodeMemory) -> list[Choice]:
     """The choices that can be made; no question twice whose answer is known."""
     known = [q for q in ONCE if trail.asked.get(q)] + [q for q in HERE if trail.asked_at.get(q) == trail.moment]
     questions = [c for c in CHOICES if isinstance(c, Intention) and c in o.can_ask and c not in known]
     return ["go", *(["stop"] if reached(o) else []), *questions]
 
 
-def thinks(o: Observation, trail: Mind) -> bool:
+def thinks(o: Observation, trail: EpisodeMemory) -> bool:
     """True if this is a moment to decide; between them, and on a route, one goes on."""
     return o.extras.advised is None and (reached(o) is not None or o.time % EVERY == 0)
 
@@ -78,9 +78,9 @@ class Foresight:
     def __init__(
         self,
         make_env: Callable[[], HelpEnv],
-        note: Callable[[Observation, Mind, np.ndarray], None] | None = None,
+        note: Callable[[Observation, EpisodeMemory, np.ndarray], None] | None = None,
         doubts: bool = False,
-        learner: Callable[[Observation, Mind], Choice] | None = None,
+        learner: Callable[[Observation, EpisodeMemory], Choice] | None = None,
     ) -> None:
         """
         Args:
@@ -100,7 +100,7 @@ class Foresight:
                 assert s is not None, "episodes of a batch begin together"
                 env = self._make_env()
                 env.reset(s.task)
-                memory.append((env, Mind()))
+                memory.append((env, EpisodeMemory()))
         actions: Actions = [None] * len(observations)
         for i, (o, s) in enumerate(zip(observations, situations, strict=True)):
             if o is not None and s is not None:
@@ -109,7 +109,7 @@ class Foresight:
                 env.step(actions[i])
         return actions, memory
 
-    def _one(self, env: HelpEnv, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
+    def _one(self, env: HelpEnv, o: Observation, trail: EpisodeMemory, rng: np.random.Generator) -> Action:
         choice = CHOICES[0]
         if thinks(o, trail) and self._learner and copy.deepcopy(rng).random() > LABELLED:
             choice = self._learner(o, trail)
@@ -123,13 +123,15 @@ class Foresight:
             choice = self._learner(o, trail) if self._learner else CHOICES[int(np.nanargmax(values))]
         return carried_out(choice, env.situation, o, trail, rng)
 
-    def _value(self, env: HelpEnv, o: Observation, trail: Mind, choice: Choice, rng: np.random.Generator) -> float:
+    def _value(
+        self, env: HelpEnv, o: Observation, trail: EpisodeMemory, choice: Choice, rng: np.random.Generator
+    ) -> float:
         """Success less price in the end, after this choice, with the draws that will come."""
         ahead, mind, rng = _copy(env), copy.deepcopy(trail), copy.deepcopy(rng)
         seen = ahead.step(carried_out(choice, ahead.situation, o, mind, rng))
         asker = Asker(confirm_on_sight)
         while seen is not None:
-            seen = ahead.step(asker.one(seen, ahead.situation, mind, rng))
+            seen = ahead.step(asker.act_one(seen, ahead.situation, mind, rng))
         episode = ahead.episode()
         graph = env.world.graph
         return success(episode, graph) - price(episode, graph) - SLOW * len(episode.steps)
@@ -156,7 +158,7 @@ def imagined(env: HelpEnv, rng: np.random.Generator) -> list[HelpEnv]:
     return minds or [env]
 
 
-def carried_out(choice: Choice, s: Situation, o: Observation, trail: Mind, rng: np.random.Generator) -> Action:
+def carried_out(choice: Choice, s: Situation, o: Observation, trail: EpisodeMemory, rng: np.random.Generator) -> Action:
     """The action of a choice; notes it in the trail."""
     if choice == "stop":
         return Stop()

@@ -21,8 +21,8 @@ from embodied.agents.common.weights import load_weights, seeded
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import play
 from embodied.interface import Action, Detection, Intention, Observation, Situation, Task
-from embodied.policies.ask import LIKELY, REACH, Mind, reached
-from embodied.policies.baselines import OneByOne
+from embodied.policies.ask import LIKELY, REACH, EpisodeMemory, reached
+from embodied.policies.baselines import PerEpisodePolicy
 
 QUESTIONS = tuple(c for c in CHOICES if isinstance(c, Intention))
 SEEN = 3
@@ -37,7 +37,7 @@ Decisions = tuple[np.ndarray, np.ndarray]
 REMEDY = "train it again: embodied study ask"
 
 
-def facts(o: Observation, trail: Mind) -> np.ndarray:
+def facts(o: Observation, trail: EpisodeMemory) -> np.ndarray:
     """(37,) float32: time, the way so far, what is seen and reached, and what was asked. Nothing names a place."""
     seen, thing = o.extras.detections, reached(o)
     far = [d for d in seen if d.distance > REACH]
@@ -86,7 +86,7 @@ def fit(decisions: Decisions, config: AskerConfig) -> nn.Sequential:
     return net.eval()
 
 
-class LearnedAsker(OneByOne):
+class LearnedAsker(PerEpisodePolicy):
     """Explores as the baselines do and decides by the network."""
 
     def __init__(self, net: nn.Module, reserve: float = 0.0) -> None:
@@ -94,19 +94,19 @@ class LearnedAsker(OneByOne):
         self._net, self._reserve = net, reserve
 
     @torch.inference_mode()
-    def choose(self, o: Observation, trail: Mind) -> Choice:
+    def choose(self, o: Observation, trail: EpisodeMemory) -> Choice:
         """One of CHOICES that is possible."""
         logits = self._net(torch.from_numpy(facts(o, trail))[None])[0].numpy()
         worth = {c: float(logits[CHOICES.index(c)]) for c in possible(o, trail)}
         worth = {c: v - self._reserve * (c in QUESTIONS) for c, v in worth.items()}
         return max(worth, key=lambda c: worth[c])
 
-    def mind(self) -> Any:
-        return Mind()
+    def new_memory(self) -> Any:
+        return EpisodeMemory()
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
-        choice = self.choose(o, mind) if thinks(o, mind) else "go"
-        return carried_out(choice, s, o, mind, rng)
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
+        choice = self.choose(o, memory) if thinks(o, memory) else "go"
+        return carried_out(choice, s, o, memory, rng)
 
 
 def shown(
@@ -116,7 +116,7 @@ def shown(
     known: list[np.ndarray] = []
     worth: list[np.ndarray] = []
 
-    def note(o: Observation, trail: Mind, values: np.ndarray) -> None:
+    def note(o: Observation, trail: EpisodeMemory, values: np.ndarray) -> None:
         known.append(facts(o, trail))
         worth.append(values)
 

@@ -29,7 +29,7 @@ from embodied.generate import HouseConfig
 from embodied.identity import Identity, identity_of
 from embodied.interface import Action, Agent, Ask, Detection, Intention, Observation, Task
 from embodied.kinds.ask import ASK, ask_environments
-from embodied.policies.ask import Asker, AskRule, Mind, between, first
+from embodied.policies.ask import Asker, EpisodeMemory, PricedAskRule, between, first
 from embodied.records import save_lines
 from embodied.tasks.ask import look_of
 
@@ -46,18 +46,18 @@ Places = Mapping[str, StoredPlace]
 ModelMaker = Callable[[Places], Agent]
 
 
-def after(steps: int) -> AskRule:
+def after(steps: int) -> PricedAskRule:
     """Asks for the way once so many steps have passed, and again when it has been walked; before, by thresholds."""
     rule = between(0.55, 0.75)
 
-    def late(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
+    def late(o: Observation, thing: Detection | None, trail: EpisodeMemory) -> Action | None:
         return Ask(Intention.ROUTE) if o.extras.advised is None and o.time >= steps else rule(o, thing, trail)
 
     return late
 
 
 LEVELS = ((0.75, 0.75), (0.7, 0.85), (0.6, 0.85), (0.5, 0.95), (0.4, 2.0))
-FAMILIES: Mapping[str, tuple[Callable[..., AskRule], Sequence[tuple[float, ...]]]] = {
+FAMILIES: Mapping[str, tuple[Callable[..., PricedAskRule], Sequence[tuple[float, ...]]]] = {
     "thresholds on the score": (between, LEVELS),
     "region, then thresholds": (lambda low, high: first(Intention.REGION, between(low, high)), LEVELS),
     "route after some steps": (after, ((50,), (30,), (20,), (10,), (0,))),

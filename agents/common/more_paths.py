@@ -68,7 +68,7 @@ class SaidBy(Dataset):
 
     def tasks(self, split: str) -> tuple[Task, ...]:
         tasks = self.source.tasks(split)
-        return tuple(self._asked(tasks)) if self.kind == "vln" else tasks
+        return tuple(self._asked(tasks)) if self.task_kind.from_routes else tasks
 
     def _asked(self, tasks: Iterable[Task]) -> Iterator[Task]:
         for name, many in groupby(tasks, lambda task: task.world):

@@ -36,7 +36,7 @@ from embodied.agents.hari.agent import Executor, save_executor
 from embodied.agents.hari.config import ExecutionConfig
 from embodied.agents.hari.words import Inputs, collate, padded, percept
 from embodied.assistants.descriptions import Describer, dropped
-from embodied.assistants.hari import LONGEST, described_subgoal
+from embodied.assistants.hari import LONGEST_SUBGOAL, described_subgoal
 from embodied.identity import Identity
 from embodied.interface import Candidates, Description, Episode, FindObject, Move, Place, Pose, Task
 from embodied.seeds import stream
@@ -108,7 +108,7 @@ def train_step(
     if config.subgoals:
         for walk in walks:
             if walk.rng.random() < config.subgoals:
-                give_subgoal(walk, source.describer, longest=int(walk.rng.integers(1, LONGEST + 1)))
+                give_subgoal(walk, source.describer, longest=int(walk.rng.integers(1, LONGEST_SUBGOAL + 1)))
     executor.network.train()
     with seeded_dropout(config.seed, update):
         losses, right = _play(executor, source, walks, config.horizon, guided_share(config, update))
@@ -170,7 +170,7 @@ def _begin(source: PretrainingData, task: Task, rng: np.random.Generator) -> Exe
     return ExecutionWalk(task, place, task.start, described, rng)
 
 
-def give_subgoal(walk: ExecutionWalk, describer: Describer, longest: int = LONGEST) -> None:
+def give_subgoal(walk: ExecutionWalk, describer: Describer, longest: int = LONGEST_SUBGOAL) -> None:
     """Let the walk go no farther than to the sub-goal that the assistant would name where it is."""
     way, walk.goal = described_subgoal(describer, walk.place, walk.pose.node, walk.task.goal_nodes[0], longest)
     walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))

@@ -17,14 +17,14 @@ ACTION_WORDS = ("go", "stop")
 """Names of features of kind 'action'."""
 OWN_WORDS = 4096
 """Numbers for object classes of people's own."""
-ROWS = MOST_OBJECTS + 1
+DESCRIPTION_ROWS = MOST_OBJECTS + 1
 """Most feature sets of a description: a room and its objects."""
 
 
 def description_rows(description: Description) -> np.ndarray:
     """(ROWS, 5) float32: kind + 1 (0 is padding), name by `word_number`, horizontal, vertical + 1, distance."""
-    rows = np.zeros((ROWS, 5), dtype=np.float32)
-    for i, f in enumerate(description[:ROWS]):
+    rows = np.zeros((DESCRIPTION_ROWS, 5), dtype=np.float32)
+    for i, f in enumerate(description[:DESCRIPTION_ROWS]):
         rows[i] = FEATURE_KINDS.index(f.kind) + 1, word_number(f.name), f.horizontal, f.vertical + 1, f.distance
     return rows
 

@@ -12,9 +12,9 @@ from embodied.house.house import Placement
 from embodied.interface import STEP, TURNS, Description, Feature, Place
 from embodied.tasks.goals import NOT_OBJECTS
 
-KEPT = 0.1
+FREQUENT_SHARE = 0.1
 """Share of the object classes that sparse descriptions keep: the text's 100 of about 1,000 (4.3.5)."""
-FARTHEST = 4
+FARTHEST_BIN = 4
 """Largest distance bin: five values, metres rounded down (appendix E)."""
 
 
@@ -120,7 +120,7 @@ def spoken_of(world: Place, node: int, description: Description) -> list[tuple[F
     return [(f, p) for f, p in near_placements(world, node, STATE_RADIUS) if f in named]
 
 
-def frequent_classes(worlds: Iterable[Place], share: float = KEPT) -> tuple[str, ...]:
+def frequent_classes(worlds: Iterable[Place], share: float = FREQUENT_SHARE) -> tuple[str, ...]:
     """A share of the object classes of some (training) houses, the most frequent ones, most frequent first."""
     counts = Counter(p.object_class for w in worlds for p in w.house.placements if p.object_class not in NOT_OBJECTS)
     return tuple(
@@ -133,4 +133,4 @@ def _bins(offset: np.ndarray) -> tuple[int, int, int]:
     flat = math.hypot(offset[0], offset[1])
     turn = round(math.atan2(offset[1], offset[0]) / STEP) % TURNS
     tilt = max(-1, min(1, round(math.atan2(offset[2], flat) / STEP)))
-    return turn, tilt, min(FARTHEST, int(np.linalg.norm(offset)))
+    return turn, tilt, min(FARTHEST_BIN, int(np.linalg.norm(offset)))

@@ -9,11 +9,11 @@ from embodied.interface import Description, Intention, Place, Reply, Situation, 
 
 STACK = 2
 """L, the most goals on the stack (Table E.2)."""
-LONGEST = 3
+LONGEST_SUBGOAL = 3
 """l_max, nodes (Table E.2)."""
 
 
-def subgoal(path: tuple[int, ...], longest: int = LONGEST) -> int:
+def subgoal(path: tuple[int, ...], longest: int = LONGEST_SUBGOAL) -> int:
     """p_k with k = min(floor(|p| / 2), l_max) on the shortest path p to the goal (4.3.5).
 
     |p| counts nodes, so next to the goal k = 1 is the goal itself and at the goal k = 0 is here.
@@ -22,7 +22,7 @@ def subgoal(path: tuple[int, ...], longest: int = LONGEST) -> int:
 
 
 def described_subgoal(
-    describer: Describer, world: Place, here: int, goal: int, longest: int = LONGEST
+    describer: Describer, world: Place, here: int, goal: int, longest: int = LONGEST_SUBGOAL
 ) -> tuple[tuple[int, ...], Description]:
     """The way to a sub-goal, which it ends at, and its description: dense, or the next action when one step away."""
     path = world.graph.path(here, goal)
@@ -35,7 +35,7 @@ def described_subgoal(
 class HariAssistant:
     """Ever present; SUB is unavailable when the stack is full (4.3.4.2)."""
 
-    def __init__(self, describer: Describer, *, stack: int = STACK, longest: int = LONGEST) -> None:
+    def __init__(self, describer: Describer, *, stack: int = STACK, longest: int = LONGEST_SUBGOAL) -> None:
         self._describer, self._stack, self._longest = describer, stack, longest
 
     def intentions(self, situation: Situation) -> tuple[Intention, ...]:

@@ -14,7 +14,7 @@ from embodied.seeds import stream
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
 
-TRIES = 12
+ROUTE_TRIES = 12
 """How often a wording is asked for again when the house already has it."""
 
 WORDINGS: Mapping[str, tuple[str, ...]] = {
@@ -111,7 +111,7 @@ def worded(
         turn = int(stream(seed, "route", world.house.name, p).integers(TURNS))
         for k, split in enumerate(wordings):
             rng = stream(seed, "route", world.house.name, p, k)
-            for _ in range(TRIES):
+            for _ in range(ROUTE_TRIES):
                 text = language.route(world, path, turn * 2 * math.pi / TURNS, rng=rng)
                 if text not in used:
                     break

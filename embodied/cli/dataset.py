@@ -19,10 +19,10 @@ from typing import Annotated, Any
 from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
 from embodied.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import PICTURES, PictureSettings, in_words, parse_pictures
-from embodied.splits import SCALES, DatasetSize, described
+from embodied.splits import DATASET_SCALES, DatasetSize, described
 
 FROM_PEOPLE = "from-people"
-SIZES = {name: described(name) for name in SCALES}
+SCALE_HELP = {name: described(name) for name in DATASET_SCALES}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,7 @@ class Options(Furnished, Printed):
     """The kind of task: find, vln, vnla, hanna, hari, MODULE:NAME of your own, or from-people."""
     out: OutputFolder
     """Folder of the data set."""
-    scale: Annotated[str | None, Option(words=tuple(SCALES), helps=SIZES)] = None
+    scale: Annotated[str | None, Option(words=tuple(DATASET_SCALES), helps=SCALE_HELP)] = None
     """Size of the data set: houses to train + validate + test in, and training tasks (default: mini)."""
     houses: Annotated[int | None, Option(whole(1, HOUSES), "N")] = None
     """Instead of --scale: N houses to train in, a tenth to validate and a fifth to test in."""

@@ -258,11 +258,11 @@ def generated(args: Options, evaluation: Evaluation) -> SplitData:
     """A flat, or the houses of a list of seeds, which what is written down names by their place in the list alone."""
     from embodied.datasets.store import SplitData
     from embodied.evaluation.ask import read_seeds
-    from embodied.gym.playground import Asked, flat_playground, houses_playground
+    from embodied.gym.playground import PlaygroundSettings, flat_playground, houses_playground
 
     kind = evaluation.kind
     seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
-    how = Asked(args.cache, sees=seen, rules=evaluation.rules, assistant=evaluation.assistant)
+    how = PlaygroundSettings(args.cache, sees=seen, rules=evaluation.rules, assistant=evaluation.assistant)
     if args.seed_file is None:
         flat = flat_playground(args.kind, args.seed, how)
         return SplitData(f"flat_{args.seed}", flat.worlds, flat.tasks, flat.make_env)

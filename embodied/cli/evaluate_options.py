@@ -10,7 +10,7 @@ from embodied.agents.options import GOAL_IMAGES, Encoded, Threaded
 from embodied.cli.common import Furnished, Printed
 from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
-SEES = ("names", "strip", "panorama", "nothing")
+MODEL_SEES = ("names", "strip", "panorama", "nothing")
 TEMPLATE = "template"
 
 
@@ -74,6 +74,6 @@ class Options(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Fur
     of your own policy, MODULE:LEARNER=RUN of your own learner, a folder with an agent.py, or the http:// address
     of an agent (default: shipped, else all baselines)."""
     threads: Count = 2
-    sees: Annotated[str, Option(words=SEES)] = "names"
+    sees: Annotated[str, Option(words=MODEL_SEES)] = "names"
     """Input of a language model: the true names of what is visible (an oracle), the candidate views as one strip,
     the panorama with markers, or nothing."""

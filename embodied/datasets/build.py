@@ -33,7 +33,7 @@ from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import load_json, read_json, save_lines
 from embodied.render.pictures import PictureSettings, parse_pictures
 from embodied.seeds import stream
-from embodied.splits import SCALES, DatasetSize, SplitPlan
+from embodied.splits import DATASET_SCALES, DatasetSize, SplitPlan
 from embodied.task_kind import TaskInputs, TaskKind, kind_named
 from embodied.world import World, open_world
 
@@ -64,7 +64,7 @@ class DatasetConfig:
     kind: str
     """Kind of task: 'find', 'vln', 'vnla', 'hanna', 'hari', or 'module:NAME' of your own."""
     scale: DatasetSize | str = "mini"
-    """One of embodied.splits.SCALES, or a size of one's own."""
+    """One of embodied.splits.DATASET_SCALES, or a size of one's own."""
     seed: int = 0
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""
@@ -87,11 +87,11 @@ class DatasetConfig:
             raise ValueError(f"routes should be 'sampled' or 'spanning', got {self.routes!r}")
         if self.language not in VOICES:
             raise ValueError(f"language should be one of {sorted(VOICES)}, got {self.language!r}")
-        if isinstance(self.scale, str) and self.scale not in SCALES:  # as files have it
+        if isinstance(self.scale, str) and self.scale not in DATASET_SCALES:  # as files have it
             try:
                 object.__setattr__(self, "scale", DatasetSize.of(self.scale))
             except (TypeError, ValueError) as e:
-                raise ValueError(f"unknown scale {self.scale!r}; use one of {SCALES}, or a DatasetSize") from e
+                raise ValueError(f"unknown scale {self.scale!r}; use one of {DATASET_SCALES}, or a DatasetSize") from e
         if not self.rooms and not self.task_kind.roomless:
             raise ValueError(f"requests of kind {self.kind!r} always name what they name; leave rooms as it is")
         scale(self.scale, self.kind, self.ood)

@@ -45,7 +45,7 @@ from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import nearest
 from embodied.seeds import stream
 from embodied.tasks.goals import find_instances, goal_classes
-from embodied.tasks.vnla import VnlaConfig
+from embodied.tasks.vnla import FEWEST_NODES, VNLA_REACH
 from embodied.teachers.vnla import MonocularPlan, VnlaTeacher, state_of
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def largest_batch(data: Dataset) -> int:
 
 def _instructions(data: Dataset, split: str) -> int:
     tasks = data.tasks(split)
-    return 3 * len({(t.world, route_of(t).path) for t in tasks}) if data.kind == "vln" else len(tasks)
+    return 3 * len({(t.world, route_of(t).path) for t in tasks}) if data.task_kind.from_routes else len(tasks)
 
 
 def sought(task: Task) -> FindObject:
@@ -275,10 +275,10 @@ def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeac
 
 def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item | None:
     """The task without its room: any thing of the class in the house will do. None where that is too near."""
-    place, config, plan = data.place(task.world), VnlaConfig(by_room=False), teacher.plan(data.place(task.world))
-    goals = _anywhere(place, config)[sought(task).object_class]
+    place, plan = data.place(task.world), teacher.plan(data.place(task.world))
+    goals = _anywhere(place)[sought(task).object_class]
     goals = tuple(g for g in goals if plan.counts((g,))[state_of(task.start)] > 0)
-    if place.graph.hops[task.start.node, list(goals)].min() + 1 < config.fewest_nodes:
+    if place.graph.hops[task.start.node, list(goals)].min() + 1 < FEWEST_NODES:
         return None
     rng = stream(data.config.seed, "noroom", task.id)
     request = PlainLanguage().request(FindObject(sought(task).object_class), rng=rng)
@@ -287,9 +287,9 @@ def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeac
 
 
 @functools.lru_cache(maxsize=512)
-def _anywhere(place: StoredPlace, config: VnlaConfig) -> Mapping[str, tuple[int, ...]]:
+def _anywhere(place: StoredPlace) -> Mapping[str, tuple[int, ...]]:
     """Class to the nodes where one of its things is nearest."""
-    classes = goal_classes(find_instances(place, config.reach), by_room=False, nearest_only=True)
+    classes = goal_classes(find_instances(place, VNLA_REACH), by_room=False, nearest_only=True)
     return {c.object_class: c.goal_nodes for c in classes}
 
 

@@ -121,7 +121,7 @@ def export_parquet(data: Dataset, folder: Path, episodes: Sequence[Path] = ()) -
         names = data.names(split)
         files.append(_write(folder, "houses", split, ((data.place(n),) for n in names)))
         files.append(_write(folder, "tasks", split, ((t, data.place(t.world)) for t in data.tasks(split))))
-        if data.kind in ("hanna", "vln"):
+        if data.task_kind.routes:
             files.append(_write(folder, "routes", split, ((r, n) for n in names for r in data.routes(n))))
     for path, name in tables.items():
         files.append(_write(folder, "episodes", name, ((e,) for e in _played(data, path))))

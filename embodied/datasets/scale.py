@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from embodied.splits import PAPER, SCALES, SMALL, DatasetSize, SplitPlan
+from embodied.splits import DATASET_SCALES, PAPER, SMALL_SCALES, DatasetSize, SplitPlan
 from embodied.task_kind import kind_named
 
 OOD = "test_ood"
@@ -25,7 +25,7 @@ def scale(size: str | DatasetSize, kind: str, ood: int = 0) -> Scale:
     """The houses and splits of a kind of task.
 
     Args:
-      size: one of SCALES, or a size of one's own.
+      size: one of DATASET_SCALES, or a size of one's own.
       ood: houses out of distribution, with as many tasks each as the others to test in (split 'test_ood').
 
     Raises:
@@ -38,12 +38,12 @@ def scale(size: str | DatasetSize, kind: str, ood: int = 0) -> Scale:
         raise ValueError(f"there are no data sets of kind {kind!r}; its houses come from seeds")
     if isinstance(size, DatasetSize):
         houses, splits = known.splits(size.sizes)
-    elif size in SMALL:
-        houses, splits = known.splits(SMALL[size])
+    elif size in SMALL_SCALES:
+        houses, splits = known.splits(SMALL_SCALES[size])
     elif size != PAPER:
-        raise ValueError(f"unknown scale {size!r}; use one of {SCALES}, or a DatasetSize")
+        raise ValueError(f"unknown scale {size!r}; use one of {DATASET_SCALES}, or a DatasetSize")
     elif known.paper is None:
-        raise ValueError(f"no paper says how large data sets of kind {kind!r} are; use another of {SCALES}")
+        raise ValueError(f"no paper says how large data sets of kind {kind!r} are; use another of {DATASET_SCALES}")
     else:
         houses, splits = known.paper
     if ood:

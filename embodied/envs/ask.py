@@ -29,6 +29,12 @@ from embodied.interface import (
 )
 from embodied.seeds import stream
 
+FITS, OTHER, DENIED = 0.75, 0.35, 0.1
+"""Mean scores of what fits all that was said, of other things of the class, and of a thing of which was said that it is
+not it."""
+SCORE_NOISE = 0.15
+"""Standard deviation of a score."""
+
 
 @dataclass(frozen=True)
 class Prices:
@@ -57,13 +63,6 @@ class AskSettings:
     grounded: bool = True
     """The detector takes in what was answered, and the next step of a route is shown while it is followed. False leaves
     the agent with the words alone."""
-    fits: float = 0.75
-    other: float = 0.35
-    """Mean score of what fits all that was said, and of other things of the class."""
-    denied: float = 0.1
-    """Mean score of a thing of which was said that it is not it."""
-    noise: float = 0.15
-    """Standard deviation of a score."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +171,7 @@ class AskEnv(HelpEnv):
         detections = []
         for name, yaw, distance in in_view(self.world, self.pose.node, self._goal):
             rng = stream(0, "detector", self.task.world, name, self.pose.node)
-            mean = self.rules.denied if name in denied else self.rules.fits if name in known else self.rules.other
-            score = min(max(mean + self.rules.noise * float(rng.standard_normal()), 0.0), 1.0)
+            mean = DENIED if name in denied else FITS if name in known else OTHER
+            score = min(max(mean + SCORE_NOISE * float(rng.standard_normal()), 0.0), 1.0)
             detections.append(Detection(float(wrap(yaw - self.pose.yaw)), round(distance, 2), round(score, 2)))
         return tuple(sorted(detections, key=lambda d: (-d.score, d.distance)))

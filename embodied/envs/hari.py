@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from embodied.action_spaces import Moves
-from embodied.assistants.descriptions import KEPT, Describer
+from embodied.assistants.descriptions import FREQUENT_SHARE, Describer
 from embodied.assistants.words import features_in_words
 from embodied.envs.base import HelpEnv, required
 from embodied.interface import (
@@ -73,7 +73,7 @@ class HariRules:
     """False: the assistant answers a question drawn from those that could be asked (Table 4.7)."""
     horizon: int | None = None
     """H, the most steps of an episode; None: what its task says (30 in Table E.2)."""
-    kept: float = KEPT
+    kept: float = FREQUENT_SHARE
     """Share of the object classes, the commonest ones, that sparse descriptions keep (docs/sources.md, S170)."""
 
     def __post_init__(self) -> None:

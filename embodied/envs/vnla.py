@@ -85,7 +85,7 @@ class Algorithm6Env(HelpEnv):
         self.time_on_task = 0
 
 
-RULES: Mapping[str, type[HelpEnv]] = {
+RULES_OF_PLAY: Mapping[str, type[HelpEnv]] = {
     "indirect": VnlaEnv,
     "direct": DirectVnlaEnv,
     "direct-mute": MuteDirectVnlaEnv,
@@ -96,8 +96,8 @@ RULES: Mapping[str, type[HelpEnv]] = {
 
 def check_rules(rules: str) -> None:
     """Raises ValueError for a rule that is none."""
-    if rules not in RULES:
-        raise ValueError(f"unknown rules {rules!r} of VNLA; use one of {sorted(RULES)}")
+    if rules not in RULES_OF_PLAY:
+        raise ValueError(f"unknown rules {rules!r} of VNLA; use one of {sorted(RULES_OF_PLAY)}")
 
 
 def fitted(task: Task, world: Place, rules: str) -> Task:

@@ -32,7 +32,7 @@ from embodied.tasks.ask import Look, ask_pool, ask_tasks
 
 MOST_BYTES = 100_000
 """Of an answer over HTTP; more is not read."""
-SECONDS = 60.0
+ANSWER_SECONDS = 60.0
 """Time for an answer over HTTP."""
 
 
@@ -123,7 +123,7 @@ class HttpAgent:
     def _one(self, o: Observation, episode: str) -> Action:
         kind = http.client.HTTPSConnection if self._url.scheme == "https" else http.client.HTTPConnection
         try:
-            server = kind(self._url.hostname or "", self._url.port, timeout=SECONDS)
+            server = kind(self._url.hostname or "", self._url.port, timeout=ANSWER_SECONDS)
             try:
                 body = json.dumps({"episode": episode, **observed(o)})
                 server.request("POST", self._url.path or "/", body, {"Content-Type": "application/json"})

@@ -40,7 +40,7 @@ from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
 from embodied.gym.eyes import LARGE, check_live, live_pixels, pixel_spaces
 from embodied.gym.in_step import checked_limit
-from embodied.gym.playground import Asked, flat_playground
+from embodied.gym.playground import PlaygroundSettings, flat_playground
 from embodied.gym.spaces import codes_of
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
@@ -287,7 +287,7 @@ def open_episodes(
             raise ValueError(f"{data} is a data set of {whole.kind!r}; VLNCE-v0 plays those of 'vln', or give episodes")
         found = route_episodes(whole.tasks(split), worlds)
     else:
-        found = route_episodes(flat_playground("vln", seed, Asked(where, worlds)).tasks, worlds)
+        found = route_episodes(flat_playground("vln", seed, PlaygroundSettings(where, worlds)).tasks, worlds)
     if episodes is not None:
         for e in (e for e in found if e.world in worlds):
             house = worlds[e.world].house

@@ -23,7 +23,7 @@ from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
 from embodied.gym.driving import TEXT, DriveSettings, Driving
 from embodied.gym.eyes import LARGE, pixel_spaces
-from embodied.gym.playground import AREA, pictures_of
+from embodied.gym.playground import FLAT_AREA, pictures_of
 from embodied.render.pictures import PictureSettings, matte
 from embodied.seeds import checked_seed
 from embodied.world import World, open_world
@@ -153,5 +153,5 @@ def data_worlds(data: Path, split: str, cache: Path, pictures: PictureSettings |
 def flat_worlds(seed: int, cache: Path, pictures: PictureSettings | str | None) -> dict[str, World]:
     """The flat that the other environments play in, too."""
     name, catalogue = f"flat_{seed}", load_catalogue(cache)
-    house, graph = make_dataset_house(seed, name, HouseConfig(area=AREA), catalogue)
+    house, graph = make_dataset_house(seed, name, HouseConfig(area=FLAT_AREA), catalogue)
     return {name: open_world(house, catalogue, cache, pictures or "fast-matte", graph=graph)}

@@ -39,7 +39,7 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.playground import Asked, Playground, flat_playground, split_playground
+from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
@@ -61,7 +61,7 @@ VIEW = (480, 640)
 """Height and width of the rendered view, pixels."""
 PLAN = (480, 480)
 """Height and width that the plan is fitted into, pixels: whatever the house, pictures have one size."""
-WORDS = 64
+WORDS_HEIGHT = 64
 """Height of what is said, pixels."""
 VIEW_ANGLE = np.radians(78.0)
 """Vertical field of view of what `render` shows, radians: wider than the agent's 60 degrees; people need it."""
@@ -311,7 +311,7 @@ def picture(env: HelpEnv, o: Observation) -> np.ndarray:
         titles=False,
     )
     plan = ImageOps.pad(plan.convert("RGB"), PLAN[::-1], Image.Resampling.LANCZOS, "white")
-    sheet = Image.new("RGB", (view.width + plan.width, VIEW[0] + WORDS), "white")
+    sheet = Image.new("RGB", (view.width + plan.width, VIEW[0] + WORDS_HEIGHT), "white")
     sheet.paste(view, (0, 0))
     sheet.paste(plan, (view.width, 0))
     pen = ImageDraw.Draw(sheet)
@@ -401,7 +401,7 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
     seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
-    asked = Asked(
+    playground = PlaygroundSettings(
         cache=where,
         worlds=wanted.worlds,
         pictures=wanted.pictures,
@@ -411,9 +411,9 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
         assistant=assistant_of(wanted.assistant),
     )
     if wanted.data:
-        play = split_playground(kind, Path(wanted.data), wanted.split, asked)
+        play = split_playground(kind, Path(wanted.data), wanted.split, playground)
     else:
-        play = flat_playground(kind, wanted.seed, asked)
+        play = flat_playground(kind, wanted.seed, playground)
     layout = wanted.layout or SpaceLayout.of(kind_named(kind), wanted.rules)
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
     return SharedResources(play.make_env, play.tasks, _sensor_of(play, seen, wanted), layout, opened)

@@ -29,9 +29,9 @@ from embodied.world import makers, open_world
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
 
-TASKS = 200
+FLAT_TASKS = 200
 """Tasks of a generated house."""
-AREA = (70.0, 110.0)
+FLAT_AREA = (70.0, 110.0)
 """Size of a generated house, square metres: a flat, so that it is ready in seconds."""
 
 
@@ -45,7 +45,7 @@ class Playground:
 
 
 @dataclass(frozen=True)
-class Asked:
+class PlaygroundSettings:
     """How houses are opened, and what is played in them."""
 
     cache: Path
@@ -63,46 +63,46 @@ class Asked:
     """Who answers, instead of the kind's own assistant."""
 
 
-def split_playground(kind: str, data: Path, split: str, asked: Asked) -> Playground:
+def split_playground(kind: str, data: Path, split: str, settings: PlaygroundSettings) -> Playground:
     """A split of a data set.
 
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
     """
-    catalogue, whole = load_catalogue(asked.cache), Dataset(data)
+    catalogue, whole = load_catalogue(settings.cache), Dataset(data)
     if whole.kind != kind:
         raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
-    if (rooms := asked.rooms) != whole.config.rooms:
+    if (rooms := settings.rooms) != whole.config.rooms:
         raise ValueError(
             f"{data} was built with rooms={whole.config.rooms}, not {rooms}; say so, or build another data set"
         )
-    worlds = asked.worlds
+    worlds = settings.worlds
     if worlds is None:
         names = whole.names(split)
-        drawn = asked.pictures or pictures_of(whole, names, wanted=bool(set(asked.sees) - {"oracle"}))
-        worlds = {n: whole.open_world(n, catalogue, asked.cache, drawn) for n in names}
-    chosen = whole.split(split, worlds=worlds, rules=asked.rules, assistant=asked.assistant)
-    return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, asked))
+        drawn = settings.pictures or pictures_of(whole, names, wanted=bool(set(settings.sees) - {"oracle"}))
+        worlds = {n: whole.open_world(n, catalogue, settings.cache, drawn) for n in names}
+    chosen = whole.split(split, worlds=worlds, rules=settings.rules, assistant=settings.assistant)
+    return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, settings))
 
 
-def flat_playground(kind: str, seed: int, asked: Asked) -> Playground:
+def flat_playground(kind: str, seed: int, settings: PlaygroundSettings) -> Playground:
     """One world (generated from `seed` unless given) and tasks in it.
 
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
     """
-    catalogue = load_catalogue(asked.cache)
-    if asked.worlds is None:
-        return houses_playground(kind, [(f"flat_{seed}", seed)], seed, asked, catalogue, AREA, TASKS)
-    name, place = next(iter(asked.worlds.items()))
-    tasks, routes = _tasks_in(kind_named(kind), place, None, seed, PlainLanguage(), asked.rooms, TASKS, None)
-    return _playground(kind, asked.worlds, tasks, {name: routes}, asked, catalogue)
+    catalogue = load_catalogue(settings.cache)
+    if settings.worlds is None:
+        return houses_playground(kind, [(f"flat_{seed}", seed)], seed, settings, catalogue, FLAT_AREA, FLAT_TASKS)
+    name, place = next(iter(settings.worlds.items()))
+    tasks, routes = _tasks_in(kind_named(kind), place, None, seed, PlainLanguage(), settings.rooms, FLAT_TASKS, None)
+    return _playground(kind, settings.worlds, tasks, {name: routes}, settings, catalogue)
 
 
 def houses_playground(
     kind: str,
     houses: Iterable[tuple[str, int]],
     seed: int,
-    asked: Asked,
+    settings: PlaygroundSettings,
     catalogue: Catalogue,
     area: tuple[float, float],
     each: int,
@@ -117,7 +117,7 @@ def houses_playground(
       part: of the pool of tasks; that of unseen houses if None.
     """
     known, language = kind_named(kind), People(tries=1)
-    drawn = parse_pictures(asked.pictures or ("fast" if set(asked.sees) - {"oracle"} else "unlit"))
+    drawn = parse_pictures(settings.pictures or ("fast" if set(settings.sees) - {"oracle"} else "unlit"))
     worlds, tasks, routes = dict[str, SeenPlace](), list[Task](), dict[str, Sequence[Route]]()
     for name, house_seed in houses:
         house, graph = make_dataset_house(house_seed, name, HouseConfig(area=area), catalogue)
@@ -126,12 +126,12 @@ def houses_playground(
             met = place_people(house, graph, catalogue, seed=house_seed)
             paths = route_paths(graph, name, seed=house_seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
-        world = open_world(house, catalogue, asked.cache, graph=graph, pictures=drawn)
+        world = open_world(house, catalogue, settings.cache, graph=graph, pictures=drawn)
         if drawn.quality is not None:
             world.baked(progress=True)
-        more, routes[name] = _tasks_in(known, world, paths, seed, language, asked.rooms, each, part)
+        more, routes[name] = _tasks_in(known, world, paths, seed, language, settings.rooms, each, part)
         worlds[name], tasks = world, [*tasks, *more]
-    return _playground(kind, worlds, tasks, routes, asked, catalogue)
+    return _playground(kind, worlds, tasks, routes, settings, catalogue)
 
 
 def _tasks_in(
@@ -158,20 +158,22 @@ def _playground(
     worlds: Mapping[str, SeenPlace],
     tasks: Sequence[Task],
     routes: Mapping[str, Sequence[Route]],
-    asked: Asked,
+    settings: PlaygroundSettings,
     catalogue: Catalogue,
 ) -> Playground:
     known, routes_of = kind_named(kind), lambda name: routes.get(name, ())
-    make_env = known.environments(EnvInputs(worlds, routes_of, rules=asked.rules, assistant=asked.assistant))
+    make_env = known.environments(EnvInputs(worlds, routes_of, rules=settings.rules, assistant=settings.assistant))
     return Playground(
-        worlds, known.tasks_under(tasks, worlds, asked.rules), make_env, _oracle(worlds, catalogue, asked)
+        worlds, known.tasks_under(tasks, worlds, settings.rules), make_env, _oracle(worlds, catalogue, settings)
     )
 
 
-def _oracle(worlds: Mapping[str, SeenPlace], catalogue: Catalogue, asked: Asked) -> Mapping[str, np.ndarray]:
-    if "oracle" not in asked.sees:
+def _oracle(
+    worlds: Mapping[str, SeenPlace], catalogue: Catalogue, settings: PlaygroundSettings
+) -> Mapping[str, np.ndarray]:
+    if "oracle" not in settings.sees:
         return {}
-    return {name: seen_features(w, catalogue, asked.cache) for name, w in worlds.items()}
+    return {name: seen_features(w, catalogue, settings.cache) for name, w in worlds.items()}
 
 
 def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> PictureSettings:
@@ -183,16 +185,16 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
     Raises:
       ValueError: none, not of all houses, or not in one way, though they are wanted.
     """
-    settings = {n: drawn for n in names if (drawn := data.drawn_pictures(n)) is not None}
+    held = {n: drawn for n in names if (drawn := data.drawn_pictures(n)) is not None}
     again = f"`embodied dataset {data.kind} --out {data.folder} ... --pictures fast`"
-    if wanted and len(settings) < len(names):
+    if wanted and len(held) < len(names):
         raise ValueError(
-            f"{data.folder} has pictures of {len(settings)} of its {len(names)} houses here; draw them with "
+            f"{data.folder} has pictures of {len(held)} of its {len(names)} houses here; draw them with "
             f"{again}, or choose sees='oracle'"
         )
-    if wanted and len(ways := {(p.word, p.size) for p in settings.values()}) > 1:
+    if wanted and len(ways := {(p.word, p.size) for p in held.values()}) > 1:
         raise ValueError(f"the pictures in {data.folder} are of several kinds ({sorted(ways)}); finish {again}")
-    return next(iter(settings.values()), Unlit())
+    return next(iter(held.values()), Unlit())
 
 
 def seen_features(world: SeenPlace, catalogue: Catalogue, cache: Path) -> np.ndarray:

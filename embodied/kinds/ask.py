@@ -10,13 +10,13 @@ import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.ask import QUESTIONS, AskAssistant
-from embodied.assistants.description_arrays import ROWS, description_rows
+from embodied.assistants.description_arrays import DESCRIPTION_ROWS, description_rows
 from embodied.assistants.descriptions import Describer
 from embodied.envs.ask import AskEnv, AskSettings
 from embodied.interface import Assistant, Episode, Observation, Place, Stop
 from embodied.metrics import asked, success
 from embodied.navigation.graph import NavGraph
-from embodied.policies.ask import RULES, Asker
+from embodied.policies.ask import ASKER_RULES, Asker
 from embodied.policies.baselines import Shortest
 from embodied.task_kind import (
     UNBOUNDED,
@@ -107,8 +107,8 @@ def specs(candidates: int, rules: AskSettings) -> dict[str, ArraySpec]:
     return {
         "detections": ArraySpec((DETECTIONS, 4), -1.0, UNBOUNDED),
         "advised": ArraySpec((), 0, candidates + 1, "int64"),
-        "state": ArraySpec((ROWS, 5), 0, UNBOUNDED),
-        "goals": ArraySpec((NO_GOALS, ROWS, 5), 0, UNBOUNDED),
+        "state": ArraySpec((DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
+        "goals": ArraySpec((NO_GOALS, DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
     }
 
 
@@ -133,7 +133,7 @@ ASK = register_kind(
         environment=environments,
         rules=AS_USUAL,
         help="words",
-        baselines={**{name: functools.partial(Asker, rule) for name, rule in RULES.items()}, "oracle": Shortest},
+        baselines={**{name: functools.partial(Asker, rule) for name, rule in ASKER_RULES.items()}, "oracle": Shortest},
         metrics={
             "weighted success": Metric(weighted_success, percent=True),
             "success progress": Metric(success_progress, percent=True),

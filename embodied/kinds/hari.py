@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.assistants.description_arrays import ROWS, description_rows
+from embodied.assistants.description_arrays import DESCRIPTION_ROWS, description_rows
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
@@ -151,7 +151,10 @@ FEWEST_GOALS = 3
 def specs(candidates: int, rules: HariRules) -> dict[str, ArraySpec]:
     """'state' and 'goals': feature sets as rows (assistants.description_arrays), the goals top last."""
     goals = max(FEWEST_GOALS, rules.stack)
-    return {"state": ArraySpec((ROWS, 5), 0, UNBOUNDED), "goals": ArraySpec((goals, ROWS, 5), 0, UNBOUNDED)}
+    return {
+        "state": ArraySpec((DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
+        "goals": ArraySpec((goals, DESCRIPTION_ROWS, 5), 0, UNBOUNDED),
+    }
 
 
 def encode(o: Observation, specs: Mapping[str, ArraySpec]) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 from embodied.assistants.advisor import Advisor
-from embodied.envs.vnla import RULES, check_rules, fitted
+from embodied.envs.vnla import RULES_OF_PLAY, check_rules, fitted
 from embodied.interface import Episode, FindObject, Place, Task
 from embodied.kinds.hanna import TABLE_4_2
 from embodied.language.plain_language import PlainLanguage
@@ -24,7 +24,7 @@ from embodied.task_kind import (
     parts_of_pool,
     register_kind,
 )
-from embodied.tasks.vnla import VnlaConfig, limit_key, time_limits, vnla_pool, vnla_task
+from embodied.tasks.vnla import MOST_ACTIONS, help_budget, limit_key, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
 
 AS_PUBLISHED = "indirect"
@@ -33,15 +33,15 @@ AS_PUBLISHED = "indirect"
 
 def tasks(inputs: TaskInputs, parts: Parts) -> PartTasks:
     world, seed = inputs.world, inputs.seed
-    plan, config = VnlaTeacher().plan(world), VnlaConfig(by_room=inputs.rooms)
-    pool = vnla_pool(world, plan, seed=seed, config=config)
-    task = lambda i: vnla_task(pool, i, world, plan, seed=seed, language=inputs.language, config=config)
+    plan = VnlaTeacher().plan(world)
+    pool = vnla_pool(world, plan, seed=seed, by_room=inputs.rooms)
+    task = lambda i: vnla_task(pool, i, world, plan, seed=seed, language=inputs.language)
     return parts_of_pool(len(pool), task, parts)
 
 
 def environments(inputs: EnvInputs) -> EnvMaker:
     check_rules(inputs.rules)
-    teacher, rule = VnlaTeacher(), RULES[inputs.rules]
+    teacher, rule = VnlaTeacher(), RULES_OF_PLAY[inputs.rules]
     advisor = inputs.assistant or Advisor(teacher, inputs.language or PlainLanguage())
     return lambda: rule(inputs.worlds, advisor, teacher.moves)
 
@@ -58,15 +58,15 @@ def learned_limits(training: Sequence[Task], place: Callable[[str], Place]) -> L
         for t in training
         if isinstance(t.goal, FindObject)  # as all of VNLA's are
     ]
-    return time_limits(lengths, VnlaConfig().most_actions)
+    return time_limits(lengths, MOST_ACTIONS)
 
 
 def limited(task: Task, world: Place, limits: Limits) -> Task:
     """A task with the time limit of its rooms, and the budget that goes with it."""
     assert isinstance(task.goal, FindObject), "VNLA tasks look for objects"
-    config, key = VnlaConfig(), limit_key(world, task.start.node, task.goal)
-    horizon = max(task.horizon, limits.get(key, config.most_actions))
-    return dataclasses.replace(task, horizon=horizon, budget=config.help_ratio * horizon / config.help_steps)
+    key = limit_key(world, task.start.node, task.goal)
+    horizon = max(task.horizon, limits.get(key, MOST_ACTIONS))
+    return dataclasses.replace(task, horizon=horizon, budget=help_budget(horizon))
 
 
 def room_success(episode: Episode, graph: NavGraph) -> float:

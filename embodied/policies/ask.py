@@ -14,7 +14,7 @@ import numpy as np
 
 from embodied.geometry import wrap
 from embodied.interface import Action, Ask, Detection, Intention, Move, Observation, Situation, Stop
-from embodied.policies.baselines import OneByOne
+from embodied.policies.baselines import PerEpisodePolicy
 
 REACH = 2.0
 """Metres within which a thing has been reached."""
@@ -23,7 +23,7 @@ LIKELY = 0.55
 
 
 @dataclass
-class Mind:
+class EpisodeMemory:
     """Memory of one episode."""
 
     visits: dict[int, int] = field(default_factory=dict)
@@ -47,28 +47,28 @@ class Mind:
         return Ask(question)
 
 
-AskRule = Callable[[Observation, Detection | None, Mind], Action | None]
+PricedAskRule = Callable[[Observation, Detection | None, EpisodeMemory], Action | None]
 """Decision about what is known: an Ask, a Stop, or None to go on. It is given the thing that was reached, if any, the
 one nearest."""
 
 
-class Asker(OneByOne):
+class Asker(PerEpisodePolicy):
     """Explores, and asks by a rule."""
 
-    def __init__(self, rule: AskRule) -> None:
+    def __init__(self, rule: PricedAskRule) -> None:
         self.rule = rule
 
-    def mind(self) -> Any:
-        return Mind()
+    def new_memory(self) -> Any:
+        return EpisodeMemory()
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
-        action = self.rule(o, reached(o), mind)
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
+        action = self.rule(o, reached(o), memory)
         if isinstance(action, Ask) and action.intention in o.can_ask:
-            return mind.ask(action.intention, reached(o))
+            return memory.ask(action.intention, reached(o))
         if isinstance(action, Stop):
             return action
-        mind.visits[s.pose.node] = mind.visits.get(s.pose.node, 0) + 1
-        return onward(o, s, mind, rng)
+        memory.visits[s.pose.node] = memory.visits.get(s.pose.node, 0) + 1
+        return onward(o, s, memory, rng)
 
 
 def reached(o: Observation) -> Detection | None:
@@ -77,7 +77,7 @@ def reached(o: Observation) -> Detection | None:
     return min(near, key=lambda d: d.distance) if near else None
 
 
-def onward(o: Observation, s: Situation, trail: Mind, rng: np.random.Generator) -> Action:
+def onward(o: Observation, s: Situation, trail: EpisodeMemory, rng: np.random.Generator) -> Action:
     """Along the route that is shown, else towards what looks like the thing, else where it has been least."""
     if o.extras.advised is not None:
         return o.extras.advised
@@ -95,15 +95,15 @@ def onward(o: Observation, s: Situation, trail: Mind, rng: np.random.Generator) 
 # Rules ------------------------------------------------------------------------------------------
 
 
-def never(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
+def never(o: Observation, thing: Detection | None, trail: EpisodeMemory) -> Action | None:
     """Stops at the first thing that looks like it."""
     return Stop() if thing and thing.score >= LIKELY else None
 
 
-def between(low: float, high: float) -> AskRule:
+def between(low: float, high: float) -> PricedAskRule:
     """Stops at a thing whose score is at least `high`, passes by below `low`, and asks between."""
 
-    def rule(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
+    def rule(o: Observation, thing: Detection | None, trail: EpisodeMemory) -> Action | None:
         if thing is None:
             return None
         if trail.asked_at.get(Intention.CONFIRM) == trail.moment:  # asked at this very place: a no lowered the score
@@ -117,10 +117,10 @@ def between(low: float, high: float) -> AskRule:
     return rule
 
 
-def first(question: Intention, rule: AskRule) -> AskRule:
+def first(question: Intention, rule: PricedAskRule) -> PricedAskRule:
     """Asks one question at the beginning, then follows another rule."""
 
-    def both(o: Observation, thing: Detection | None, trail: Mind) -> Action | None:
+    def both(o: Observation, thing: Detection | None, trail: EpisodeMemory) -> Action | None:
         return Ask(question) if question in o.can_ask and not trail.asked.get(question) else rule(o, thing, trail)
 
     return both
@@ -128,7 +128,7 @@ def first(question: Intention, rule: AskRule) -> AskRule:
 
 confirm_on_sight = between(LIKELY - 0.1, 2.0)
 """Asks at everything that looks like it whether this is it."""
-RULES: Mapping[str, AskRule] = {
+ASKER_RULES: Mapping[str, PricedAskRule] = {
     "never ask": never,
     "confirm on sight": confirm_on_sight,
     "threshold 0.45-0.85": between(0.45, 0.85),

@@ -53,36 +53,36 @@ class Forward10:
         return [None if o is None else ahead(o) for o in observations], ()
 
 
-class OneByOne:
-    """A PrivilegedPolicy that looks at each episode by itself. Who derives from it says `one` and, where it remembers
-    something of an episode, `mind`."""
+class PerEpisodePolicy:
+    """A PrivilegedPolicy that looks at each episode by itself: derive `act_one` and, where it remembers something of an
+    episode, `new_memory`."""
 
-    def mind(self) -> Any:
-        """Memory at the beginning of an episode; `one` may change it."""
+    def new_memory(self) -> Any:
+        """Memory at the beginning of an episode; `act_one` may change it."""
         return None
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
         """The action of one episode."""
         raise NotImplementedError
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
-        minds = memory or [self.mind() for _ in observations]
+        memories = memory or [self.new_memory() for _ in observations]
         return [
-            None if o is None or s is None else self.one(o, s, mind, rng)
-            for o, s, mind, rng in zip(observations, situations, minds, rngs, strict=True)
-        ], minds
+            None if o is None or s is None else self.act_one(o, s, own_memory, rng)
+            for o, s, own_memory, rng in zip(observations, situations, memories, rngs, strict=True)
+        ], memories
 
 
-class Shortest(OneByOne):
+class Shortest(PerEpisodePolicy):
     """The skyline: the navigation teacher acts; never asks."""
 
     def __init__(self, teacher: Teacher | None = None) -> None:
         """`teacher`: of the action space; the panoramic shortest-path teacher if None."""
         self._label = (teacher or ShortestTeacher()).label
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
         move = self._label(s).move
         assert move is not None, "where an agent is there is something to do"
         return move
@@ -145,7 +145,7 @@ class _Trail:
     """Nodes where it asked."""
 
 
-class PerfectInterpreter(OneByOne):
+class PerfectInterpreter(PerEpisodePolicy):
     """The skyline 'perfect assistance interpretation' for an agent without learning.
 
     On a route the teacher acts, so every instruction is understood (4.2.5). On the main task the
@@ -154,11 +154,11 @@ class PerfectInterpreter(OneByOne):
     the task demands (it recognises the object). The authors' row has a trained navigator there (docs/sources.md, S40).
     """
 
-    def mind(self) -> Any:
+    def new_memory(self) -> Any:
         return _Trail()
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
-        here, trail = s.pose.node, mind
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
+        here, trail = s.pose.node, memory
         trail.visited[here] += 1
         if o.mode is Mode.SUB:
             return shortest_of(s)
@@ -255,14 +255,14 @@ class VnlaAsking:
         return self._ask == "first" or (self._ask == "random" and s.time in times)
 
 
-class HalfwaySkyline(OneByOne):
+class HalfwaySkyline(PerEpisodePolicy):
     """HARI with perfect navigation on sub-goals (Table 4.7, last row): it asks for a sub-goal, goes
     there, says so, and asks again, until a sub-goal turns out to be the goal itself.
 
     Knowing that is privileged; the authors' skyline learns when to ask (docs/sources.md, S62).
     """
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
         if len(s.extras.goals) == 1 and s.pose.node != s.extras.goals[0] and Intention.SUB in o.can_ask:
             return Ask(Intention.SUB)
         return shortest_of(s)

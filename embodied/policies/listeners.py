@@ -14,11 +14,11 @@ import numpy as np
 
 from embodied.interface import Action, Mode, Move, Observation, SeenPlace, Situation, Stop
 from embodied.language import follow
-from embodied.policies.baselines import OneByOne, PerfectInterpreter
+from embodied.policies.baselines import PerEpisodePolicy, PerfectInterpreter
 
 
 @dataclass
-class Plan:
+class HeardRoute:
     """Owns what was understood of a text."""
 
     heard: str = ""
@@ -35,18 +35,18 @@ class Plan:
         return Move(s.candidate_nodes.index(self.nodes[0]))
 
 
-class ScriptedListener(OneByOne):
+class ScriptedListener(PerEpisodePolicy):
     """VLN: reads the instruction once, walks as it understood, stops."""
 
     def __init__(self, worlds: Mapping[str, SeenPlace]) -> None:
         """`worlds`: the places it may be in, by name."""
         self._worlds = worlds
 
-    def mind(self) -> Any:
-        return Plan()
+    def new_memory(self) -> Any:
+        return HeardRoute()
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
-        return mind.step(self._worlds[s.task.world], o, s)
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
+        return memory.step(self._worlds[s.task.world], o, s)
 
 
 class ListeningInterpreter(PerfectInterpreter):
@@ -57,12 +57,12 @@ class ListeningInterpreter(PerfectInterpreter):
         """`worlds`: the places it may be in, by name."""
         self._worlds = worlds
 
-    def mind(self) -> Any:
-        return super().mind(), Plan()
+    def new_memory(self) -> Any:
+        return super().new_memory(), HeardRoute()
 
-    def one(self, o: Observation, s: Situation, mind: Any, rng: np.random.Generator) -> Action:
-        trail, plan = mind
-        action = super().one(o, s, trail, rng)
+    def act_one(self, o: Observation, s: Situation, memory: Any, rng: np.random.Generator) -> Action:
+        trail, plan = memory
+        action = super().act_one(o, s, trail, rng)
         if o.mode is Mode.SUB and s.pose.node not in s.targets:
             return plan.step(self._worlds[s.task.world], o, s)
         plan.heard = ""

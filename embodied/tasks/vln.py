@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from embodied.interface import FollowRoute, Pose, Route, Task
 
-RADIUS = 3.0
+VLN_RADIUS = 3.0
 """Metres from the intended end, inclusive (3.2.4.2); Room-to-Room itself says strictly less."""
-HORIZON = 20
+VLN_HORIZON = 20
 
 
 def vln_task(world: str, route: Route) -> Task:
@@ -19,6 +19,6 @@ def vln_task(world: str, route: Route) -> Task:
         goal=FollowRoute(route.id, route.path),
         goal_nodes=(route.path[-1],),
         request=route.instruction,
-        radius=RADIUS,
-        horizon=HORIZON,
+        radius=VLN_RADIUS,
+        horizon=VLN_HORIZON,
     )

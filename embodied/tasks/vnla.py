@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,36 +13,34 @@ from embodied.tasks.find import Pool, build_pool, draw, task_of_pair
 from embodied.tasks.goals import GoalClass, find_instances, goal_classes
 from embodied.teachers.vnla import MonocularPlan
 
-
-@dataclass(frozen=True)
-class VnlaConfig:
-    """Limits of the VNLA program; the dissertation does not print them."""
-
-    fewest_nodes: int = 3
-    most_actions: int = 25
-    """Of the teacher, the final stop included, and of an episode (docs/sources.md, S45)."""
-    radius: float = 2.0
-    reach: float = 2.5
-    by_room: bool = True
-    """False gives the no-room variant: 'find a towel'."""
-    help_ratio: float = 0.4
-    help_steps: int = 4
-    """Budget 0.4 T / 4 for a time limit of T steps (docs/sources.md, S46)."""
+FEWEST_NODES = 3
+MOST_ACTIONS = 25
+"""Of the teacher, the final stop included, and of an episode (docs/sources.md, S45)."""
+VNLA_RADIUS, VNLA_REACH = 2.0, 2.5
+"""Metres from a goal node to succeed, and from a thing to its goal node. Limits of the VNLA program; the dissertation
+does not print them."""
 
 
-def vnla_pool(world: Place, plan: MonocularPlan, *, seed: int, config: VnlaConfig = VnlaConfig()) -> Pool:
-    """Pairs that the teacher finishes in time, whichever way the agent looks at first."""
-    classes = goal_classes(find_instances(world, config.reach), by_room=config.by_room, nearest_only=True)
-    pool = build_pool(world, classes, seed=seed, fewest=config.fewest_nodes, most=config.most_actions, kind="vnla")
-    return Pool(
-        pool.world, classes, np.array([p for p in pool.pairs if _in_time(p, classes, plan, config)]).reshape(-1, 2)
-    )
+def help_budget(horizon: int) -> float:
+    """Requests in an episode of `horizon` steps: 0.4 T / 4 (docs/sources.md, S46)."""
+    return 0.4 * horizon / 4
 
 
-def _in_time(pair: np.ndarray, classes: tuple[GoalClass, ...], plan: MonocularPlan, config: VnlaConfig) -> bool:
+def vnla_pool(world: Place, plan: MonocularPlan, *, seed: int, by_room: bool = True) -> Pool:
+    """Pairs that the teacher finishes in time, whichever way the agent looks at first.
+
+    Args:
+      by_room: False gives the no-room variant: 'find a towel'.
+    """
+    classes = goal_classes(find_instances(world, VNLA_REACH), by_room=by_room, nearest_only=True)
+    pool = build_pool(world, classes, seed=seed, fewest=FEWEST_NODES, most=MOST_ACTIONS, kind="vnla")
+    return Pool(pool.world, classes, np.array([p for p in pool.pairs if _in_time(p, classes, plan)]).reshape(-1, 2))
+
+
+def _in_time(pair: np.ndarray, classes: tuple[GoalClass, ...], plan: MonocularPlan) -> bool:
     level = int(pair[1]) * VIEWS + TURNS
     counts = plan.counts(classes[int(pair[0])].goal_nodes)[level : level + TURNS]
-    return counts.min() > 0 and counts.max() <= config.most_actions
+    return counts.min() > 0 and counts.max() <= MOST_ACTIONS
 
 
 def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple[str, str], int]:
@@ -62,16 +59,7 @@ def time_limits(lengths: Sequence[tuple[str, str, int]], cap: int) -> dict[tuple
     }
 
 
-def vnla_task(
-    pool: Pool,
-    index: int,
-    world: Place,
-    plan: MonocularPlan,
-    *,
-    seed: int,
-    language: Language,
-    config: VnlaConfig = VnlaConfig(),
-) -> Task:
+def vnla_task(pool: Pool, index: int, world: Place, plan: MonocularPlan, *, seed: int, language: Language) -> Task:
     """Task `index` of the pool: a pure function of its arguments.
 
     Its time limit is the teacher's own length, as in training; in evaluation, `Dataset` raises it to what `time_limits`
@@ -82,8 +70,7 @@ def vnla_task(
     """
     goal, start, _ = draw(pool, index, seed=seed, kind="vnla")
     horizon = plan.count(start, goal.goal_nodes)
-    budget = config.help_ratio * horizon / config.help_steps
-    how: dict[str, Any] = {"radius": config.radius, "horizon": horizon, "budget": budget}
+    how: dict[str, Any] = {"radius": VNLA_RADIUS, "horizon": horizon, "budget": help_budget(horizon)}
     return task_of_pair("vnla", pool, index, seed=seed, language=language, **how)
 
 
