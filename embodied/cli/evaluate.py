@@ -158,7 +158,8 @@ def agents_of(args: Options, kind: TaskKind) -> tuple[dict[str, str], tuple[Lear
     from embodied.agents.learner import learner_named, playing_learner
 
     known, learner = kind.agent_names, playing_learner(args.kind)
-    names, trained = list[str](), list[tuple[Learner, Path]]()
+    names: list[str] = []
+    trained: list[tuple[Learner, Path]] = []
     shipped = learner and learner.shipped
     for name in args.agent or (["shipped"] if shipped and args.data else known):
         path, (module, _, run) = Path(name), name.partition("=")

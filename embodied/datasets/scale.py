@@ -43,7 +43,7 @@ def scale(size: str | DatasetSize, kind: str, ood: int = 0) -> Scale:
     elif size != PAPER:
         raise ValueError(f"unknown scale {size!r}; use one of {DATASET_SCALES}, or a DatasetSize")
     elif known.paper is None:
-        raise ValueError(f"no paper says how large data sets of kind {kind!r} are; use another of {DATASET_SCALES}")
+        raise ValueError(f"no paper says how large data sets of kind {kind!r} are; use one of {[*SMALL_SCALES]}")
     else:
         houses, splits = known.paper
     if ood:
