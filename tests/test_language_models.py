@@ -29,10 +29,10 @@ from embodied.agents.language_models.agent import LanguageModelAgent, Messages
 from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.agents.language_models.completions import misfit, object_schema
+from embodied.agents.language_models.observations import OracleNames
 from embodied.agents.language_models.prompts import PromptBuilder, read_prompt
 from embodied.agents.language_models.routes import ModelJudge, followed_replies, listener_arrives, paraphrased
 from embodied.agents.language_models.transport import MOST_BYTES, completions_url, proxy_of
-from embodied.agents.language_models.words import SeenNames
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.ask import AskAssistant
 from embodied.envs.base import HelpEnv
@@ -509,7 +509,7 @@ def test_a_model_is_told_the_names_of_what_is_seen_and_where():
 
     world = Furnished(grid_world().house, grid_world().graph)
     o = find_env().reset(dataclasses.replace(find_tasks(1)[0], start=Pose(0, 0)))
-    text = PromptBuilder(SeenNames({"grid": world})).text(o)
+    text = PromptBuilder(OracleNames({"grid": world})).text(o)
     assert "sofa (30 degrees to the left, 2 m)" in text and "key" not in text
 
 

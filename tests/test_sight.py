@@ -27,7 +27,7 @@ from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is
 from embodied.render.panorama import Panorama, face_rays
 
 ROOT = Path(__file__).resolve().parent.parent
-SEEING = {"agents/language_models/words.py", "agents/vision/bank.py", "agents/vision/live.py"}
+SEEING = {"agents/language_models/observations.py", "agents/vision/bank.py", "agents/vision/live.py"}
 """Modules of agents/ that turn sights into features or names: they alone may ask where one is from."""
 
 

@@ -15,8 +15,8 @@ from gymnasium import spaces
 
 from embodied.agents.language_models.client import Client
 from embodied.agents.language_models.completions import Answer
+from embodied.agents.language_models.observations import actions_by_name
 from embodied.agents.language_models.prompts import PromptBuilder, action_in, action_in_words, schema_of
-from embodied.agents.language_models.words import actions_of
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.spaces import number
 from embodied.interface import Action, Actions, Move, Observation, Observations, Rngs, Stop, Thought
@@ -93,7 +93,7 @@ class Messages(gym.Wrapper[str, str, dict[str, Any], Any]):
 
     def step(self, action: str) -> tuple[str, Any, bool, bool, dict[str, Any]]:
         before, layout = self._inner.observed, self._inner.layout
-        chosen = actions_of(before).get(action)
+        chosen = actions_by_name(before).get(action)
         env: Any = self.env
         _, reward, ended, cut, info = env.step(layout.actions if chosen is None else number(chosen, layout))
         if chosen is not None:

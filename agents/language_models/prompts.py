@@ -14,9 +14,16 @@ from typing import Any
 
 from embodied.agents.language_models.client import Message
 from embodied.agents.language_models.completions import object_schema
-from embodied.agents.language_models.pictures import Panoramas, shown
-from embodied.agents.language_models.words import Namer, actions_of, sees, side, ways
+from embodied.agents.language_models.observations import (
+    ObjectNamer,
+    Panoramas,
+    actions_by_name,
+    candidates_in_words,
+    observation_in_words,
+    pictures_for,
+)
 from embodied.assets.json_file import read_text
+from embodied.assistants.words import side
 from embodied.interface import Action, Ask, Intention, Observation, Stop
 
 PROMPTS = Path(__file__).parent / "prompts"
@@ -72,12 +79,12 @@ def read_prompt(name: str, names: tuple[str, ...], folder: Path | None = None) -
 class PromptBuilder:
     """Builds the prompt of an agent's model from an observation."""
 
-    namer: Namer | None = None
+    namer: ObjectNamer | None = None
     """Names the things in sight; None for a model that is told only where it can go."""
     panoramas: Panoramas | None = None
     """Pictures for a model that sees; None for one that reads only."""
     pictures: str = "strip"
-    """One of embodied.agents.language_models.pictures.PICTURE_FORMS."""
+    """One of embodied.agents.language_models.observations.PICTURE_FORMS."""
     prompt: Prompt = dataclasses.field(default_factory=lambda: agent_prompt())
 
     def text(self, o: Observation, history: Sequence[str] = ()) -> str:
@@ -90,7 +97,7 @@ class PromptBuilder:
 
     def messages(self, o: Observation, history: Sequence[str] = ()) -> list[Message]:
         """The same as messages, with pictures where there are any."""
-        pictures = () if self.panoramas is None else shown(o, self.panoramas, self.pictures)
+        pictures = () if self.panoramas is None else pictures_for(o, self.panoramas, self.pictures)
         return self.prompt.messages(pictures, **self._facts(o, history))
 
     def _facts(self, o: Observation, history: Sequence[str]) -> dict[str, str]:
@@ -98,9 +105,9 @@ class PromptBuilder:
         return {
             "instruction": o.instruction,
             "history": " ".join(history[-REMEMBERED_STEPS:]) or "nothing yet",
-            "sees": sees(o, names),
-            "ways": ways(o, names),
-            "actions": ", ".join(actions_of(o)),
+            "sees": observation_in_words(o, names),
+            "ways": candidates_in_words(o, names),
+            "actions": ", ".join(actions_by_name(o)),
             "time": str(o.time),
         }
 
@@ -114,12 +121,12 @@ def schema_of(o: Observation) -> dict[str, Any]:
     """A schema of the possible answers."""
     text = lambda most: {"type": "string", "maxLength": most}
     free = {"question": text(300)} if Intention.FREE in o.can_ask else {}
-    return object_schema(reason=text(100), action={"type": "string", "enum": list(actions_of(o))}, **free)
+    return object_schema(reason=text(100), action={"type": "string", "enum": list(actions_by_name(o))}, **free)
 
 
 def action_in(o: Observation, value: Mapping[str, Any]) -> Action:
     """The action that a valid answer names."""
-    action = actions_of(o)[value["action"]]
+    action = actions_by_name(o)[value["action"]]
     if isinstance(action, Ask) and action.intention is Intention.FREE:
         return dataclasses.replace(action, question=value["question"])
     return action

@@ -16,8 +16,8 @@ import numpy as np
 
 from embodied.agents.language_models.client import Client
 from embodied.agents.language_models.completions import object_schema
+from embodied.agents.language_models.observations import SMALLEST_SIGHTING
 from embodied.agents.language_models.prompts import read_prompt
-from embodied.agents.language_models.words import SMALLEST_SIGHTING
 from embodied.interface import STEP, Episode, Route, SeenPlace, Usage
 from embodied.language import PlainLanguage, follow
 from embodied.language.people_language import ARRIVED

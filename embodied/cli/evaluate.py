@@ -292,14 +292,14 @@ def agent_of(
 def model_agent(args: Options, split: SplitData, client: Any) -> Agent:
     """A language model that is shown what --sees says."""
     from embodied.agents.language_models.agent import LanguageModelAgent
+    from embodied.agents.language_models.observations import OracleNames
     from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt
-    from embodied.agents.language_models.words import SeenNames
     from embodied.gym.eyes import PanoramaStore
     from embodied.world import World
 
     prompt = agent_prompt(args.prompts)
     if args.sees == "names":
-        return LanguageModelAgent(client, PromptBuilder(SeenNames(seen_places(split.worlds)), prompt=prompt))
+        return LanguageModelAgent(client, PromptBuilder(OracleNames(seen_places(split.worlds)), prompt=prompt))
     if args.sees == "nothing":
         return LanguageModelAgent(client, PromptBuilder(prompt=prompt))
     drawn = {n: w for n, w in split.worlds.items() if isinstance(w, World)}

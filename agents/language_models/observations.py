@@ -1,18 +1,30 @@
-"""Pictures for a model that sees: candidate views as one numbered strip, or the panorama with numbered markers."""
+"""An observation in words and in pictures: what is in sight, where one can go, what can be done.
+
+No word tells one place from another. A picture is one numbered strip of candidate views, or the panorama with numbered
+markers.
+"""
 
 from __future__ import annotations
 
 import base64
 import io
+import math
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 from PIL import Image, ImageDraw
 
+from embodied.assistants.words import side
+from embodied.geometry import wrap
 from embodied.house.floor_plan import font
-from embodied.interface import STEP, VIEW_PITCHES, Observation, Sight
+from embodied.interface import STEP, VIEW_PITCHES, Action, Ask, Move, Observation, SeenPlace, Sight, Stop, viewpoint
 from embodied.render.panorama import Panorama
 
+MOST_NAMES = 12
+"""Things that are named of one place."""
+SMALLEST_SIGHTING = 20
+"""Fewest pixels of a sighting (of 24576 around) of what is named."""
 VIEW_SIZE = 224
 """Height and width of a candidate's view, pixels."""
 VIEW_ANGLE = np.radians(75.0)
@@ -22,13 +34,64 @@ PANORAMA_HEIGHT = 384
 PICTURE_FORMS = ("strip", "panorama")
 
 
+class ObjectNamer(Protocol):
+    """Names what can be seen of a sight; a stand-in for eyes, and an oracle."""
+
+    def names(self, sight: Sight) -> Sequence[tuple[str, float, float]]:
+        """(object class, yaw in radians, metres), the largest in view first."""
+
+
+class OracleNames:
+    """The true names of what can be seen: an oracle in place of pictures."""
+
+    def __init__(self, worlds: Mapping[str, SeenPlace]) -> None:
+        self._worlds = worlds
+
+    def names(self, sight: Sight) -> list[tuple[str, float, float]]:
+        here = viewpoint(sight)
+        seen = self._worlds[here.world].sightings(here.node)
+        return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST_SIGHTING][:MOST_NAMES]
+
+
+def actions_by_name(o: Observation) -> dict[str, Action]:
+    """Every possible action by the name that a model calls it by."""
+    c = o.candidates
+    moves: dict[str, Action] = {
+        (c.words[i] if c.words else f"go {i}"): Move(i) for i in range(len(c)) if bool(c.allowed[i])
+    }
+    return {**moves, **{f"ask {i.value}": Ask(i) for i in o.can_ask}, "stop": Stop()}
+
+
+def candidates_in_words(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
+    """The candidates: 'go 0: straight ahead, towards the sofa; go 1: ...'."""
+    if o.candidates.words:
+        return ", ".join(w for w, ok in zip(o.candidates.words, o.candidates.allowed) if ok)
+    yaw, clauses = o.turn * STEP, []
+    for i, bearing in enumerate(o.candidates.bearing):
+        off = [(abs(float(wrap(y - yaw - bearing))), name) for name, y, _ in names]
+        towards = f", towards the {min(off)[1]}" if off and min(off)[0] < STEP / 2 else ""
+        slope = float(o.candidates.slope[i])
+        stairs = "" if abs(slope) < math.radians(15) else f", {'up' if slope > 0 else 'down'} the stairs"
+        clauses.append(f"go {i}: {side(float(bearing))}{towards}{stairs}")
+    return "; ".join(clauses) or "nowhere"
+
+
+def observation_in_words(o: Observation, names: Sequence[tuple[str, float, float]] = ()) -> str:
+    """The place in words: names of what is in sight, and what the kind of task adds."""
+    yaw = o.turn * STEP
+    parts = [f"{name} ({side(y - yaw)}, {d:.0f} m)" for name, y, d in names]
+    if o.extras is not None:
+        parts += o.extras.lines(o.turn)
+    return "; ".join(parts) or "nothing that has a name"
+
+
 class Panoramas(Protocol):
     """Gives the panorama of a sight; embodied.gym.eyes.PanoramaStore is one."""
 
     def at(self, sight: Sight) -> Panorama: ...
 
 
-def shown(o: Observation, panoramas: Panoramas, how: str) -> tuple[str, ...]:
+def pictures_for(o: Observation, panoramas: Panoramas, how: str) -> tuple[str, ...]:
     """The pictures of an observation as data URLs; the image that is looked for (HANNA) last.
 
     Args:
