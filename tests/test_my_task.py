@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env
 from hand_data import hand_house, paint
 from hand_worlds import generated, grid_world
 
-from embodied.agents.language_models.words import sees
+from embodied.agents.language_models.observations import observation_in_words
 from embodied.agents.studies.engine import run_study
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
@@ -100,7 +100,7 @@ def test_gymnasium_makes_it_by_its_title(tmp_path):
     check_env(env.unwrapped, skip_render_check=True)
     observation, info = env.reset(seed=0)
     assert observation["rooms_left"] == 3 and info["request"].startswith("visit the ")
-    assert sees(env.unwrapped.observed) == "rooms left to visit: 3", "as language models are told"
+    assert observation_in_words(env.unwrapped.observed) == "rooms left to visit: 3", "as language models are told"
     envs = gym.make_vec("my_task:embodied/Visit-v0", num_envs=2, worlds=worlds, sees="oracle", cache=tmp_path)
     assert envs.reset(seed=0)[0]["rooms_left"].tolist() == [3, 3]
 
