@@ -231,7 +231,7 @@ def test_where_the_agent_was_weighs_less():
     def repeated(again: float) -> int:
         """Steps to places where the episode had been under the same words."""
         policy = dataclasses.replace(agent.policy(split.bank), revisit_weight=again)
-        policy.network.eval()
+        policy.policy.network.eval()
         with torch.inference_mode():
             played = play(split.make_env, policy, tasks, seed=1, batch=len(tasks))
         moves = lambda e: [(s.instruction, s.next_pose.node) for s in e.steps if isinstance(s.action, Move)]
@@ -249,8 +249,8 @@ def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, use_goa
     split = setting(houses=2)
     judged = dataclasses.replace(JUDGED, revisit_weight=again, use_goal_image=use_goal_image)
     policy = agent_for(split, dataclasses.replace(TINY, model=model), judged).policy(split.bank)
-    policy.network.eval()
-    policy = dataclasses.replace(policy, choose=choose_sampled, ask_rule=for_training(policy).ask_rule)
+    policy.policy.network.eval()
+    policy = policy.changed(choose=choose_sampled, ask_rule=RULES["learned"][0])
     tasks = [dataclasses.replace(t, id=f"{t.id}/{k}", horizon=8) for k, t in enumerate((split.tasks * 2)[:33])]
     with torch.inference_mode():
         together = play(split.make_env, policy, tasks, seed=1, batch=32)
@@ -264,7 +264,7 @@ def test_an_episode_does_not_depend_on_the_batch_around_it(model, again, use_goa
 
 def test_actions_are_described_by_the_view_they_lie_in_and_stop_by_nothing():
     split = setting()
-    policy = agent_for(split).policy(split.bank)
+    policy = agent_for(split).policy(split.bank).policy
     task = split.tasks[0]
     seen = split.make_env().reset(task)
     percept = policy.percept([seen], policy.start((0,)))
@@ -282,7 +282,11 @@ def test_actions_are_described_by_the_view_they_lie_in_and_stop_by_nothing():
 def test_two_observations_that_differ_only_in_what_is_private_look_the_same():
     """An agent that turned together with its world cannot tell: bearings and views are its own."""
     split = setting()
-    policy = agent_for(split).policy(FeatureBank({"a": np.arange(36.0)[None, :, None] * np.ones((1, 36, 16))}, "tests"))
+    policy = (
+        agent_for(split)
+        .policy(FeatureBank({"a": np.arange(36.0)[None, :, None] * np.ones((1, 36, 16))}, "tests"))
+        .policy
+    )
     env = split.make_env()
     seen = env.reset(split.tasks[0])
 
@@ -304,7 +308,7 @@ def test_two_observations_that_differ_only_in_what_is_private_look_the_same():
 def test_an_episode_misses_the_same_channels_at_every_step_and_at_its_target():
     """So a panorama still equals its target image exactly, whatever is hidden."""
     split = setting()
-    learner = for_training(agent_for(split).policy(split.bank), environment_dropout=0.5)
+    learner = for_training(agent_for(split).policy(split.bank).policy, environment_dropout=0.5)
     sight = Sight("grid0", 0)
     first = dataclasses.replace(split.make_env().reset(split.tasks[0]), sight=sight, target=sight, turn=0)
     torch.manual_seed(0)
@@ -315,7 +319,7 @@ def test_an_episode_misses_the_same_channels_at_every_step_and_at_its_target():
     assert 0.2 < hidden.float().mean() < 0.8
     assert not torch.equal(hidden[0], hidden[1])
     assert torch.equal(hidden[1:], learner.percept([first], memory.keep((1,))).current.abs().sum(1) == 0)
-    assert agent_for(split).policy(split.bank).start((0,)).channels is None
+    assert agent_for(split).policy(split.bank).policy.start((0,)).channels is None
 
 
 @pytest.mark.slow
@@ -323,7 +327,7 @@ def test_in_guided_episodes_every5_asks_and_in_the_others_the_learner():
     split = setting()
     tasks = [dataclasses.replace(t, horizon=20) for t in (*split.tasks, *split.tasks, *split.tasks)]
     half = round(len(tasks) / 2)
-    learner = for_training(agent_for(split).policy(split.bank), RULES["never"][0], guided_asking=0.5)
+    learner = for_training(agent_for(split).policy(split.bank).policy, RULES["never"][0], guided_asking=0.5)
     episodes, _ = collected(split, learner, tasks)
     asked = [[t for t, s in enumerate(e.steps) if isinstance(s.action, Ask)] for e in episodes]
     assert sum(map(len, asked[:half])) > 0 and not any(asked[half:])
@@ -338,7 +342,7 @@ def test_labels_line_up_with_what_the_networks_said():
     agent = agent_for(split)
     tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:5]]
     teacher = HannaTeacher()
-    episodes, experience = collected(split, for_training(agent.policy(split.bank)), tasks)
+    episodes, experience = collected(split, for_training(agent.policy(split.bank).policy), tasks)
     labels = [teacher.relabel(e, split.worlds[e.task.world]) for e in episodes]
     rows = [(t, i) for t in range(8) for i, e in enumerate(episodes) if t < len(e.steps)]
     assert len(rows) == len(experience.right_moves)
@@ -363,7 +367,7 @@ def test_it_overfits_one_batch(model):
     split = setting()
     agent = agent_for(split, dataclasses.replace(TINY, model=model, dropout=0.0))
     optimizer = torch.optim.Adam(agent.network.parameters(), 5e-3)
-    learner = dataclasses.replace(for_training(agent.policy(split.bank)), choose=choose_greedily)
+    learner = dataclasses.replace(for_training(agent.policy(split.bank).policy), choose=choose_greedily)
     tasks = [dataclasses.replace(t, horizon=8) for t in split.tasks[:8]]
     losses, rights = [], []
     for _ in range(40):

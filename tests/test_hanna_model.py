@@ -18,9 +18,7 @@ from embodied.agents.hanna.attention import (
     sim_attend,
     sinusoid,
 )
-from embodied.agents.hanna.lstm import LstmNetwork
-from embodied.agents.hanna.network import HannaNetwork
-from embodied.agents.hanna.percept import (
+from embodied.agents.hanna.inputs import (
     DO_NOTHING,
     REQUEST,
     SLOTS,
@@ -31,6 +29,8 @@ from embodied.agents.hanna.percept import (
     slot_distribution,
     target_similarity,
 )
+from embodied.agents.hanna.lstm import LstmNetwork
+from embodied.agents.hanna.network import HannaNetwork
 from embodied.agents.hanna.training_config import TrainingConfig
 
 WORDS, FEATURES = 12, 6

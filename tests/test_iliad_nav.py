@@ -9,7 +9,7 @@ from hand_worlds import grid_world, line_world
 
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.hanna.percept import orientation
+from embodied.agents.hanna.inputs import orientation
 from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.network import WalkDescriber

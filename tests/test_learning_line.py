@@ -16,7 +16,7 @@ from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
 from embodied.agents.hanna.evaluation import counted, hanna_policies
-from embodied.agents.hanna.policy import PerfectInterpretation
+from embodied.agents.hanna.map_policy import PerfectInterpretation
 from embodied.agents.hanna.run import train_agent, vocabulary_of
 from embodied.agents.hanna.study import HannaStudy
 from embodied.agents.learners.hanna import HannaTraining
@@ -207,8 +207,8 @@ def test_the_papers_columns_take_the_likeliest_action_and_ours_stand_apart(study
     agent = learner.load(next(iter(times(out, "best.safetensors"))))
     plain, shipped = (learner.policies(agent, row.judge, s) for s in ("test_unseen", "test_unseen as shipped"))
     draws = [np.random.default_rng(k) for k in range(50)]
-    assert {plain.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {1} and not plain.use_goal_image
-    assert {shipped.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {0, 1} and shipped.use_goal_image
+    assert {plain.policy.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {1} and not plain.use_goal_image
+    assert {shipped.policy.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {0, 1} and shipped.use_goal_image
     assert plain.revisit_weight == 1 and shipped.revisit_weight < 1
     assert plain.ask_rule(0.6, None, -1, rng=draws[0]) and not plain.ask_rule(0.4, None, -1, rng=draws[0])
 

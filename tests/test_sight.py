@@ -15,7 +15,7 @@ from test_hanna_learner import agent_for, setting
 
 from embodied import metrics
 from embodied.agents.hanna.evaluation import sight_policies
-from embodied.agents.hanna.places import Query, auc, measured, precision_recall, threshold
+from embodied.agents.hanna.recognition_study import Query, auc, measured, precision_recall, threshold
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.capture import strip_around
 from embodied.agents.vision.features import VIEW_SIZE, strip_of

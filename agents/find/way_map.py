@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from embodied.agents.hanna.recognition import Likeness, matches
-from embodied.agents.hanna.trail import fewest_moves
+from embodied.agents.hanna.topological_map import fewest_moves
 from embodied.geometry import wrap
 from embodied.interface import Observation
 

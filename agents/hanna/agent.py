@@ -13,6 +13,7 @@ from embodied.agents.common.weights import check_features
 from embodied.agents.common.word_vectors import take_weights as take_into
 from embodied.agents.hanna.asking import RULES, ask_patiently
 from embodied.agents.hanna.lstm import LstmNetwork
+from embodied.agents.hanna.map_policy import MapPolicy
 from embodied.agents.hanna.network import AgentNetwork, HannaNetwork
 from embodied.agents.hanna.policy import HannaPolicy
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
@@ -42,7 +43,7 @@ class HannaAgent(SightedAgent):
     def network_of(about: HannaAbout) -> AgentNetwork:
         return NETWORKS[about.config.model](about.config, len(about.words), about.feature_size)
 
-    def policy(self, bank: FeatureBank) -> HannaPolicy:
+    def policy(self, bank: FeatureBank) -> MapPolicy:
         check_features(bank.digest, self.about.encoder)
         config, judged = self.about.config, self.about.evaluation
         learned = ask_patiently(
@@ -52,7 +53,7 @@ class HannaAgent(SightedAgent):
             patience=judged.min_moves_between_requests,
         )
         rule = learned if config.ask_rule == "learned" else RULES[config.ask_rule][1]
-        return HannaPolicy(
+        policy = HannaPolicy(
             self.network,
             self.vocabulary,
             bank,
@@ -61,10 +62,8 @@ class HannaAgent(SightedAgent):
             instruction_length=config.instruction_length,
             turn_to_agent=config.turn_to_agent,
             read_assistance=config.read_assistance,
-            revisit_weight=judged.revisit_weight,
-            use_goal_image=judged.use_goal_image,
-            frontier_discount=judged.frontier_discount,
         )
+        return MapPolicy(policy, judged.revisit_weight, judged.use_goal_image, judged.frontier_discount)
 
 
 def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:

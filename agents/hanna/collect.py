@@ -16,8 +16,8 @@ import torch.nn.functional as F
 from torch import Tensor
 
 from embodied.agents.common.losses import IGNORE
+from embodied.agents.hanna.inputs import action_index
 from embodied.agents.hanna.losses import help_loss, navigation_loss
-from embodied.agents.hanna.percept import action_index
 from embodied.agents.hanna.policy import Moment
 from embodied.interface import Episode, Place, Teacher
 

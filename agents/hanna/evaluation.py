@@ -5,7 +5,6 @@ The playing itself is embodied.evaluation, the same for everybody.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -15,9 +14,9 @@ from torch import nn
 from embodied.agents.common.choosing import choose_at
 from embodied.agents.hanna.agent import HannaAgent
 from embodied.agents.hanna.asking import RULES, ask_every
+from embodied.agents.hanna.inputs import Percept
+from embodied.agents.hanna.map_policy import MapPolicy, PerfectInterpretation
 from embodied.agents.hanna.network import Scores
-from embodied.agents.hanna.percept import Percept
-from embodied.agents.hanna.policy import HannaPolicy, PerfectInterpretation
 from embodied.agents.vision.bank import FeatureBank
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.evaluation.tables import Samples, measured
@@ -42,7 +41,7 @@ EVAL_ABLATIONS: Mapping[str, Mapping[str, Any]] = {
 asks (docs/sources.md, S36, S161; S162 stays)."""
 
 
-Judged = Callable[[HannaAgent, FeatureBank], HannaPolicy]
+Judged = Callable[[HannaAgent, FeatureBank], MapPolicy]
 """How an agent acts when it is judged."""
 
 
@@ -55,25 +54,25 @@ def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent
     learned = of(agent, bank)
     return {
         "learned": learned,
-        "learned, no ask": dataclasses.replace(learned, ask_rule=RULES["never"][1]),
-        "learned, random ask": dataclasses.replace(learned, ask_rule=RULES["random"][1]),
-        "learned, ask every 5": dataclasses.replace(learned, ask_rule=RULES["every5"][1]),
-        "learned, target image only": dataclasses.replace(learned, read_assistance=False),
+        "learned, no ask": learned.changed(ask_rule=RULES["never"][1]),
+        "learned, random ask": learned.changed(ask_rule=RULES["random"][1]),
+        "learned, ask every 5": learned.changed(ask_rule=RULES["every5"][1]),
+        "learned, target image only": learned.changed(read_assistance=False),
         "learned, perfect interpretation": PerfectInterpretation(learned),
     }
 
 
-def by_the_text(agent: HannaAgent, bank: FeatureBank) -> HannaPolicy:
+def by_the_text(agent: HannaAgent, bank: FeatureBank) -> MapPolicy:
     """The agent as the text judges it: the likeliest move and decision to ask, without rules of ours (docs/sources.md,
     S36, S161, S162)."""
     plain = EVAL_ABLATIONS["learned, likeliest move, without a trail"]
-    return dataclasses.replace(agent.policy(bank), **plain, ask_rule=RULES[agent.config.ask_rule][1])
+    return agent.policy(bank).changed(**plain, ask_rule=RULES[agent.config.ask_rule][1])
 
 
 def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent.policy) -> dict[str, Agent]:
     """Those of `hanna_policies` and `sight_policies`, and the agent in each way of EVAL_ABLATIONS."""
     learned = of(agent, bank)
-    plainer = {name: dataclasses.replace(learned, **changed) for name, changed in EVAL_ABLATIONS.items()}
+    plainer = {name: learned.changed(**changed) for name, changed in EVAL_ABLATIONS.items()}
     return {**hanna_policies(agent, bank, of), **plainer, **sight_policies(agent, bank)}
 
 
@@ -113,15 +112,15 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
     """
     learned, blind = agent.policy(bank), agent.policy(bank.blind())
     every5 = RULES["every5"][1]
-    nothing: Any = Uniform(learned.network.action_size)
-    rules = dataclasses.replace(learned, network=nothing, ask_rule=every5)
+    nothing: Any = Uniform(learned.policy.network.action_size)
+    rules = learned.changed(network=nothing, ask_rule=every5)
     return {
         "blind": blind,
-        "blind, not by image": dataclasses.replace(blind, use_goal_image=False),
-        "blind, ask every 5": dataclasses.replace(blind, ask_rule=every5),
+        "blind, not by image": blind.changed(use_goal_image=False),
+        "blind, ask every 5": blind.changed(ask_rule=every5),
         "rules only": rules,
-        "rules only, ask every 10": dataclasses.replace(rules, ask_rule=ask_every(10)),
-        "rules only, blind": dataclasses.replace(rules, bank=blind.bank),
+        "rules only, ask every 10": rules.changed(ask_rule=ask_every(10)),
+        "rules only, blind": rules.changed(bank=blind.policy.bank),
     }
 
 

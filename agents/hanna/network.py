@@ -31,7 +31,7 @@ from embodied.agents.hanna.attention import (
     TextEncoder,
     sim_attend,
 )
-from embodied.agents.hanna.percept import (
+from embodied.agents.hanna.inputs import (
     REQUEST,
     SLOTS,
     VIEWS,

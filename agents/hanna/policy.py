@@ -1,9 +1,9 @@
-"""HannaPolicy: the networks as a Policy of embodied.interface, batched over episodes."""
+"""HannaPolicy: the networks as a Policy of embodied.interface, batched over episodes; and as one that learns."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,7 @@ from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sam
 from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.hanna.asking import RULES, HannaAskRule, ask_greedily, ask_sampled
-from embodied.agents.hanna.network import AgentNetwork, Scores
-from embodied.agents.hanna.percept import (
+from embodied.agents.hanna.inputs import (
     COPIES,
     DO_NOTHING,
     HEADINGS,
@@ -25,14 +24,13 @@ from embodied.agents.hanna.percept import (
     START,
     VIEWS,
     Percept,
-    action_index,
     candidate_rows,
     orientation,
 )
-from embodied.agents.hanna.recognition import Likeness, PlaceMap
-from embodied.agents.hanna.trail import Trail, weigh, weigh_by_image
+from embodied.agents.hanna.network import AgentNetwork, Scores
 from embodied.agents.vision.bank import FeatureBank
 from embodied.interface import (
+    Action,
     Actions,
     Ask,
     Intention,
@@ -41,11 +39,9 @@ from embodied.interface import (
     Observation,
     Observations,
     Rngs,
-    Situations,
     Stop,
     Thought,
 )
-from embodied.teachers.shortest import shortest_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +64,32 @@ class HannaMemory(RunningRows):
     previous_ask: Tensor
     """(k,) int64."""
     last_ask: tuple[int, ...]
-    trails: tuple[Trail, ...] = ()
-    """The way of each episode so far; empty if the policy does not mind."""
+
+
+@dataclass(frozen=True, eq=False)
+class Steering:
+    """What somebody who knows more than the networks makes of their moves."""
+
+    weights: np.ndarray
+    """(n + 1,) of the actions, stop first."""
+    known: bool = False
+    """The agent knows where it has to go, so it need not ask."""
+    match: float | None = None
+    """How well the picture that it was shown matches what it sees."""
+
+
+Steer = Callable[[int, Observation, np.ndarray], Steering]
+"""(place in the batch, observation, (n + 1,) probabilities of the actions, stop first) -> what is made of them."""
+
+
+def unsteered(position: int, observation: Observation, moves: np.ndarray) -> Steering:
+    """The networks' moves as they are."""
+    return Steering(moves)
 
 
 @dataclass(frozen=True, eq=False)
 class HannaPolicy:
-    """A trained (or training) pair of networks that acts."""
+    """A pair of networks that acts."""
 
     network: AgentNetwork
     vocabulary: Vocabulary
@@ -87,22 +102,6 @@ class HannaPolicy:
     (docs/sources.md, S29), which tells the agent where east is; D.1 leaves the order open, a robot has no compass."""
     read_assistance: bool = True
     """False: on a route the text is empty, 'target image only' of Table 4.4."""
-    environment_dropout: float = 0.0
-    """Share of feature channels that an episode does not see at all (Tan et al. 2019): every episode
-    plays in a house that looks a little different, so houses cannot be learned by heart. For training."""
-    guided_asking: float = 0.0
-    """Share of the episodes of a batch, the first ones, in which 'every5' asks in place of `ask_rule`: a mixture
-    of policies as in DAgger (Ross et al. 2011). For training."""
-    revisit_weight: float = 1.0
-    """A move's weight for each time the agent was, under the same words, where it knows the move to lead."""
-    use_goal_image: bool = False
-    """Go by the image of where to go, if one is shown (hanna.trail.weigh_by_image)."""
-    frontier_discount: float = 0.0
-    """How it looks for what the image shows; see hanna.trail.weigh_by_image."""
-    least: Likeness = Likeness()
-    """From which match on pictures are of one place."""
-    keep_moments: bool = False
-    """Keep Scores, with their gradients, in memory: for training."""
 
     def act(
         self,
@@ -110,79 +109,60 @@ class HannaPolicy:
         memory: HannaMemory | None,
         *,
         rngs: Rngs,
+        steer: Steer = unsteered,
         imposed: Sequence[int | None] | None = None,
     ) -> tuple[Actions, HannaMemory]:
         """One step of every running episode; see embodied.interface.Policy.
 
         Args:
-          imposed: navigation actions (0 is stop, c + 1 candidate c) that replace the network's own
-            choice in some episodes; whether to ask stays its own decision.
+          steer: what is made of the networks' moves before one is chosen.
+          imposed: navigation actions (0 is stop, c + 1 candidate c) that replace the choice in some episodes; whether
+            to ask stays the networks' decision.
         """
-        running = [(i, o) for i, o in enumerate(observations) if o is not None]
-        positions, seen = tuple(i for i, _ in running), [o for _, o in running]
+        positions = tuple(i for i, o in enumerate(observations) if o is not None)
+        seen = [o for o in observations if o is not None]
         memory = self.start(positions) if memory is None else memory.keep(positions)
-        if not positions:
-            return [None] * len(observations), memory
-        with torch.set_grad_enabled(self.keep_moments and torch.is_grad_enabled()):
-            percept = self.percept(seen, memory)
-            scores, networks = self.network(memory.networks, percept)
-        moves = scores.navigation.detach().softmax(-1).cpu().numpy()  # (k, A), stop first
-        asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
-        said = None if scores.reasons is None else scores.reasons.detach().sigmoid().tolist()  # (k, 3)
-        reasons = [None] * len(seen) if said is None else [tuple(r) for r in said]
-        trails = self._trails(memory.trails, seen) if memory.trails else []
         actions: Actions = [None] * len(observations)
-        guided = round(self.guided_asking * len(observations))
-        chosen, last_ask = [], []
-        for row, (position, o) in enumerate(zip(positions, seen, strict=True)):
-            n, rng = len(o.candidates), rngs[position]
-            thought = thought_of(moves[row], asks[row], reasons[row], n, trails[row].match if trails else None)
-            weights, known = moves[row, : n + 1], False
-            if trails:
-                trails[row], weights, known = self._weighed(trails[row], o, weights)
-            index = self.choose(weights, rng)  # drawn before asking, so asking shifts no draw
+        if not positions:
+            return actions, memory
+        percept = self.percept(seen, memory)
+        scores, networks = self.scored(memory, percept)
+        chosen = []
+        for row, (position, o, thought) in enumerate(zip(positions, seen, thoughts_of(scores, seen), strict=True)):
+            assert thought.moves is not None
+            steering = steer(position, o, np.roll(thought.moves, 1))  # stop first
+            index = self.choose(steering.weights, rngs[position])  # drawn before asking, so asking shifts no draw
             given = None if imposed is None else imposed[position]
             index = index if given is None else given
-            rule = RULES["every5"][0] if position < guided else self.ask_rule
-            if Intention.HELP in o.can_ask and not known and rule(float(asks[row]), o, memory.last_ask[row], rng=rng):
-                actions[position] = Ask(Intention.HELP, thought)
-                chosen.append(0)  # its own move is discarded; the last action reads as stop
-                last_ask.append(o.time)
-            else:
-                actions[position] = Stop(thought) if index == 0 else Move(index - 1, thought)
-                chosen.append(index)
-                last_ask.append(memory.last_ask[row])
-
-        device = percept.actions.device
+            rule = self.rule_of(position, len(observations))
+            thought = dataclasses.replace(thought, match=steering.match)
+            actions[position] = asked_or(
+                index, thought, o, None if steering.known else rule, memory.last_ask[row], rngs[position]
+            )
+            chosen.append(0 if isinstance(actions[position], Ask) else index)  # its own move is discarded
+        device, asks = percept.actions.device, [isinstance(actions[p], Ask) for p in positions]
         taken = torch.arange(len(positions), device=device), torch.tensor(chosen, device=device)
-        asked = [REQUEST if isinstance(actions[p], Ask) else DO_NOTHING for p in positions]
         return actions, dataclasses.replace(
             memory,
             networks=networks,
             previous_action=percept.actions[taken],
-            previous_ask=torch.tensor(asked, device=device),
-            last_ask=tuple(last_ask),
-            moments=(*memory.moments, Moment(positions, scores)) if self.keep_moments else (),
-            trails=tuple(t.left(seen[row], actions[positions[row]]) for row, t in enumerate(trails)),
+            previous_ask=torch.tensor([REQUEST if ask else DO_NOTHING for ask in asks], device=device),
+            last_ask=tuple(o.time if ask else t for ask, o, t in zip(asks, seen, memory.last_ask, strict=True)),
+            moments=self.kept(memory.moments, Moment(positions, scores)),
         )
 
-    def _weighed(self, trail: Trail, o: Observation, moves: np.ndarray) -> tuple[Trail, np.ndarray, bool]:
-        """What of the probabilities of stop and moves the map and the goal image leave, and whether its place is known;
-        and the trail that has seen them."""
-        weights = weigh(trail, o, moves, self.revisit_weight)
-        if not self.use_goal_image:
-            return trail, weights, False
-        trail = trail.thinking(o, moves[1:])
-        return trail, *weigh_by_image(trail, o, weights, self.frontier_discount)
+    @torch.no_grad()
+    def scored(self, memory: HannaMemory, percept: Percept) -> tuple[Scores, tuple[Any, Any]]:
+        """What the networks say of a step, and their memories."""
+        return self.network(memory.networks, percept)
 
-    def _trails(self, trails: Sequence[Trail], observations: Sequence[Observation]) -> list[Trail]:
-        """The trails when a step begins, by what the agents see."""
-        current = self.bank.gather([o.sight for o in observations]).cpu().numpy()
-        target = self.bank.gather([o.target for o in observations]).cpu().numpy()
-        return [
-            t.here(o, panorama, None if o.target is None else picture)
-            for t, o, panorama, picture in zip(trails, observations, current, target, strict=True)
-        ]
+    def rule_of(self, position: int, episodes: int) -> HannaAskRule:
+        """Who decides when to ask in one of the episodes of a batch."""
+        return self.ask_rule
+
+    def kept(self, moments: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
+        """What is remembered of what the networks said."""
+        return ()
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
         """Memory before the first step of the episodes at `positions`."""
@@ -193,8 +173,6 @@ class HannaPolicy:
             previous_action=torch.zeros(k, self.network.action_size, device=device),
             previous_ask=torch.full((k,), START, device=device),
             last_ask=(-1,) * k,
-            channels=hidden_channels(k, self.bank.size, self.environment_dropout, device),
-            trails=(Trail(PlaceMap(self.least)),) * k if self.revisit_weight < 1 or self.use_goal_image else (),
         )
 
     def percept(self, observations: Sequence[Observation], memory: HannaMemory) -> Percept:
@@ -238,16 +216,55 @@ class HannaPolicy:
         return self.vocabulary.encode(text, self.instruction_length)
 
 
-def thought_of(
-    moves: np.ndarray, ask: np.float32, reasons: tuple[float, ...] | None, candidates: int, match: float | None = None
-) -> Thought:
-    """What the networks said, as it is written down: `moves` has stop first, a Thought has it last."""
-    return Thought(
-        moves=np.append(moves[1 : candidates + 1], moves[0]),
-        asks={"help": float(ask), "nothing": float(1 - ask)},
-        reasons=reasons,
-        match=match,
-    )
+def thoughts_of(scores: Scores, observations: Sequence[Observation]) -> list[Thought]:
+    """What the networks said of each observation, as it is written down: a Thought has stop last."""
+    moves = scores.navigation.detach().softmax(-1).cpu().numpy()  # (k, A), stop first
+    asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
+    reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().tolist()  # (k, 3)
+    return [
+        Thought(
+            moves=np.roll(moves[row, : len(o.candidates) + 1], -1),
+            asks={"help": float(asks[row]), "nothing": float(1 - asks[row])},
+            reasons=None if reasons is None else tuple(reasons[row]),
+        )
+        for row, o in enumerate(observations)
+    ]
+
+
+def asked_or(
+    index: int, thought: Thought, o: Observation, rule: HannaAskRule | None, last_ask: int, rng: np.random.Generator
+) -> Action:
+    """A request if the rule wants one where it can be made, else the action `index`: 0 is stop, c + 1 candidate c."""
+    assert thought.asks is not None
+    if Intention.HELP in o.can_ask and rule is not None and rule(thought.asks["help"], o, last_ask, rng=rng):
+        return Ask(Intention.HELP, thought)
+    return Stop(thought) if index == 0 else Move(index - 1, thought)
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingPolicy(HannaPolicy):
+    """The networks as they learn: they keep what they said, with its gradients."""
+
+    environment_dropout: float = 0.0
+    """Share of feature channels that an episode does not see at all (Tan et al. 2019): every episode
+    plays in a house that looks a little different, so houses cannot be learned by heart."""
+    guided_asking: float = 0.0
+    """Share of the episodes of a batch, the first ones, in which 'every5' asks in place of `ask_rule`: a mixture
+    of policies as in DAgger (Ross et al. 2011)."""
+
+    def scored(self, memory: HannaMemory, percept: Percept) -> tuple[Scores, tuple[Any, Any]]:
+        return self.network(memory.networks, percept)
+
+    def rule_of(self, position: int, episodes: int) -> HannaAskRule:
+        return RULES["every5"][0] if position < round(self.guided_asking * episodes) else self.ask_rule
+
+    def kept(self, moments: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
+        return (*moments, moment)
+
+    def start(self, positions: tuple[int, ...]) -> HannaMemory:
+        memory, device = super().start(positions), next(self.network.parameters()).device
+        channels = hidden_channels(len(positions), self.bank.size, self.environment_dropout, device)
+        return dataclasses.replace(memory, channels=channels)
 
 
 def for_training(
@@ -255,31 +272,11 @@ def for_training(
     ask_rule: HannaAskRule = ask_sampled,
     environment_dropout: float = 0.0,
     guided_asking: float = 0.0,
-) -> HannaPolicy:
-    """The same networks, sampling their actions and keeping what they said."""
-    return dataclasses.replace(
-        policy,
-        choose=choose_sampled,
-        ask_rule=ask_rule,
+) -> TrainingPolicy:
+    """The same networks, sampling their actions and learning."""
+    same = {f.name: getattr(policy, f.name) for f in dataclasses.fields(policy)}
+    return TrainingPolicy(
+        **{**same, "choose": choose_sampled, "ask_rule": ask_rule},
         environment_dropout=environment_dropout,
         guided_asking=guided_asking,
-        revisit_weight=1.0,
-        use_goal_image=False,
-        keep_moments=True,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class PerfectInterpretation:
-    """The skyline of Table 4.3: the teacher walks whenever an instruction is followed.
-
-    Asking, and walking on the main task, are still the agent's own.
-    """
-
-    policy: HannaPolicy
-
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: HannaMemory | None, *, rngs: Rngs
-    ) -> tuple[Actions, HannaMemory]:
-        imposed = [None if s is None or s.mode is Mode.MAIN else action_index(shortest_of(s)) for s in situations]
-        return self.policy.act(observations, memory, rngs=rngs, imposed=imposed)

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from embodied.agents.hanna.percept import HEADINGS, VIEWS
+from embodied.agents.hanna.inputs import HEADINGS, VIEWS
 
 
 @dataclass(frozen=True)
 class Likeness:
     """Least matches, cosines, at which pictures are of one place. The defaults suit the shipped encoder: `picture` and
-    `view` have nearly the best F1 in validation houses (agents.hanna.places), and `place` is above its best, 0.44, so
-    that places are not merged; `encoder_compact` wants 0.68, 0.58 and 0.42."""
+    `view` have nearly the best F1 in validation houses (agents.hanna.recognition_study), and `place` is above its best,
+    0.44, so that places are not merged; `encoder_compact` wants 0.68, 0.58 and 0.42."""
 
     place: float = 0.55
     """Of two panoramas of the agent's own, whose headings it knows."""

@@ -41,7 +41,7 @@ class HannaLearner(imitation.ImitationLearner):
         config, self._teacher = agent.about.config, teacher
         guided = config.guided_asking if config.ask_rule == "learned" else 0.0
         self._player = for_training(
-            agent.policy(training.bank), RULES[config.ask_rule][0], config.environment_dropout, guided
+            agent.policy(training.bank).policy, RULES[config.ask_rule][0], config.environment_dropout, guided
         )
 
     def training_task(self, task: Task) -> Task:

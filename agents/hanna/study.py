@@ -12,7 +12,7 @@ from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
 from embodied.agents.hanna.agent import HannaAgent
 from embodied.agents.hanna.evaluation import all_policies, by_the_text, counted
-from embodied.agents.hanna.places import AGAIN, COLUMNS, recognised
+from embodied.agents.hanna.recognition_study import AGAIN, COLUMNS, recognised
 from embodied.agents.hanna.run import train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.engine import Measured
@@ -167,7 +167,7 @@ class HannaStudy(SightedStudy):
 
     name, agent_kind = "hanna", HannaAgent
     makers = ("embodied.agents.hanna.run",)
-    judges = (*JUDGES, "embodied.agents.hanna.evaluation", "embodied.agents.hanna.places")
+    judges = (*JUDGES, "embodied.agents.hanna.evaluation", "embodied.agents.hanna.recognition_study")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""

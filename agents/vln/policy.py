@@ -14,7 +14,7 @@ from embodied.agents.common.choosing import Chooser, choose_greedily
 from embodied.agents.common.losses import IGNORE
 from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.hanna.percept import action_index, candidate_rows, orientation
+from embodied.agents.hanna.inputs import action_index, candidate_rows, orientation
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vln.network import COPIES, FollowerNetwork, FollowerOutputs, FollowerState, FollowerViews
 from embodied.assets.records import ROOM_KINDS

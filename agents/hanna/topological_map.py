@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from embodied.agents.hanna.percept import HEADINGS, VIEWS
+from embodied.agents.hanna.inputs import HEADINGS, VIEWS
 from embodied.agents.hanna.recognition import PlaceMap
 from embodied.interface import Action, Mode, Move, Observation
 
