@@ -582,7 +582,7 @@ def test_ctrl_c_saves_and_the_same_command_goes_on(tmp_path):
 def test_success_in_the_progress_line_is_the_judges():
     split = setting()
     policy = agent_for(split).policy(split.bank)
-    policy.network.eval()
+    policy.policy.network.eval()
     with torch.inference_mode():
         episodes = play(split.make_env, policy, split.tasks[:4], seed=0, batch=4)
     world = split.worlds[episodes[0].task.world]
