@@ -368,18 +368,8 @@ def test_a_study_trains_by_dagger_judges_and_draws(world, tasks, make_env, tmp_p
 @pytest.mark.slow
 def test_the_command_judges_in_houses_of_hidden_seeds_and_does_not_tell_the_seeds(tmp_path, shared_cache, capsys):
     (tmp_path / "seeds.txt").write_text("918273645\n")
-    words = [
-        "evaluate",
-        "ask",
-        "--seed-file",
-        str(tmp_path / "seeds.txt"),
-        "--agent",
-        "never ask",
-        "oracle",
-        "--tasks",
-        "4",
-    ]
-    assert start([*words, "--cache", str(shared_cache), "--out", str(tmp_path / "out"), "--sees", "nothing"]) == 0
+    words = f"evaluate ask --seed-file {tmp_path}/seeds.txt --tasks 4 --cache {shared_cache} --out {tmp_path}/out"
+    assert start([*words.split(), "--sees", "nothing", "--agent", "never ask", "oracle"]) == 0
     assert "weighted success" in capsys.readouterr().out
     written = "".join(p.read_text() for p in (tmp_path / "out").rglob("*") if p.is_file())
     assert "918273645" not in written and '"world":"ask_0"' in written

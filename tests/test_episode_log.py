@@ -65,19 +65,14 @@ def test_requests_that_are_counted_run_out():
 
 
 def test_the_goal_stack_grows_with_a_sub_goal_and_shrinks_when_it_is_dropped():
-    world, reply = (
-        line_world(),
-        Reply(
-            description=(Feature("room", "hall"),), intention=Intention.SUB, subtask=Subtask("subgoal", 1, path=(0, 1))
-        ),
-    )
+    world, subtask = line_world(), Subtask("subgoal", 1, path=(0, 1))
+    reply = Reply(description=(Feature("room", "hall"),), intention=Intention.SUB, subtask=subtask)
     story = told(EpisodeLog(task_of("hari")), step_of(Ask(Intention.SUB), reply=reply))
     assert story.goals == [3, 1]
     sub = step_of(Move(0), to=1, mode=Mode.SUB, targets=(1,), subtask="subgoal")
     story.before(sub)
-    assert story.stack(world, sub).startswith("**2. sub-goal from the assistant") and "1. the task" in story.stack(
-        world, sub
-    )
+    stack = story.stack(world, sub)
+    assert stack.startswith("**2. sub-goal from the assistant") and "1. the task" in stack
     story.after(sub)
     story.before(step_of(Move(0), at=1, to=2))
     assert story.goals == [3] and story.route == ()
@@ -100,9 +95,7 @@ def test_a_long_dialogue_keeps_the_request_and_its_end():
 
 
 def test_an_answer_too_long_for_the_pane_is_shown_all_the_same():
-    story = told(
-        EpisodeLog(task_of("hanna")), step_of(Ask(), reply=Reply("short.")), step_of(Ask(), reply=Reply("long " * 300))
-    )
+    story = told(EpisodeLog(task_of("hanna")), *(step_of(Ask(), reply=Reply(t)) for t in ("short.", "long " * 300)))
     assert story.dialogue_text(11).split("\n\n")[-1].startswith("**Assistant:** long")
 
 

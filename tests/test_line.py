@@ -212,25 +212,7 @@ def test_the_camera_in_the_recording_looks_where_the_agent_looks():
 
 def test_house_command_writes_what_it_says(shared_cache, tmp_path, capsys):
     out = tmp_path / "house"
-    assert (
-        main(
-            [
-                "house",
-                "--seed",
-                "2",
-                "--area",
-                "38",
-                "46",
-                "--no-mjcf",
-                "--json",
-                "--out",
-                str(out),
-                "--cache",
-                str(shared_cache),
-            ]
-        )
-        == 0
-    )
+    assert main(f"house --seed 2 --area 38 46 --no-mjcf --json --out {out} --cache {shared_cache}".split()) == 0
     facts = json.loads(capsys.readouterr().out)
     house = House.load(out / "house.json")
     assert house.digest == facts["digest"] and facts["objects"] == len(house.placements)

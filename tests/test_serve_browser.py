@@ -24,16 +24,7 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here; `make browser` installs Debian's"),
 ]
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+FLAGS = "no-sandbox disable-gpu enable-unsafe-swiftshader disable-quic no-first-run disable-background-networking"
 PARTS = """
 [[parts]]
 name = "together"
@@ -47,7 +38,7 @@ advice = "Work together."
 @pytest.fixture(scope="module")
 def browser():
     with playwright.sync_playwright() as p:
-        browser = p.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser = p.chromium.launch(executable_path=CHROMIUM, args=[f"--{flag}" for flag in FLAGS.split()])
         yield browser
         browser.close()
 
@@ -211,6 +202,7 @@ def test_a_judge_watches_to_the_end_then_gives_stars_and_words(browser, server):
     assert re.fullmatch("[0-9A-F]{8}", judge.page.locator(".code").inner_text())
     seen.goto(other.links["results"][0])
     playwright.expect(seen.get_by_text("stars, mean")).to_be_visible()
+    playwright.expect(seen.get_by_role("row", name="joined")).to_have_text("joined1")
     seen.close()
     judge.close()
     other.stop()
