@@ -128,3 +128,25 @@ def painted(house: House, catalogue) -> LitPages:
             )
         )
     return LitPages(tuple(meshes), (page,), "painted")
+
+
+def smooth_pages(house: House, catalogue) -> LitPages:
+    """`painted` in colours that change smoothly and differently along u and v, so that a turned texture is seen."""
+    u, v = np.meshgrid(np.linspace(0, 1, 128), np.linspace(0, 1, 64))
+    page = np.stack([60 + 180 * u, 220 - 160 * v, 90 + 60 * u + 60 * v], -1).astype(np.uint8)
+    along = lambda m: np.clip(m.vertices[:, [0, 2]] / (10, 3) + m.vertices[:, [1, 1]] / (50, 20), 0, 1)
+    uv = lambda m: m.uv if m.kind == "outdoor" else along(m).astype(np.float32)
+    pages = painted(house, catalogue)
+    meshes = tuple(dataclasses.replace(m, uv=uv(m)) for m in pages.meshes)
+    return dataclasses.replace(pages, pages=(page,), meshes=meshes)
+
+
+def of_panes(pages: LitPages, **changes) -> LitPages:
+    """The same with other panes of glass."""
+    glass = lambda m: dataclasses.replace(m, **changes) if m.owner.endswith("/glass") else m
+    return dataclasses.replace(pages, meshes=tuple(map(glass, pages.meshes)))
+
+
+def decibels(a: np.ndarray, b: np.ndarray) -> float:
+    """Peak signal-to-noise ratio of two uint8 pictures."""
+    return float(10 * np.log10(255**2 / max(np.mean((a.astype(float) - b) ** 2), 1e-9)))

@@ -27,7 +27,6 @@ from embodied.agents.common.session import Session
 from embodied.agents.common.tensor_file import save_tensors
 from embodied.assets.cache import DRAFTS
 from embodied.assets.closure import ROOT
-from embodied.bench.timing import Measure, Report
 from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import Dataset
@@ -248,33 +247,21 @@ def test_two_that_light_one_house_light_it_once(tmp_path, monkeypatch):
     assert len(made) == 1
 
 
-def test_whoever_lights_a_house_is_told_before_how_long_it_takes(monkeypatch, tmp_path, caplog):
-    house = grid_world(4).house
-
-    class Begun(Exception):
-        pass
-
-    def begin(*_, **__):
-        assert re.search(f"lighting {house.name}, which .*, takes about a minute$", caplog.text.strip())
-        raise Begun
-
-    for name, value in {
-        "house_parts": lambda *_: (), "looks_of": lambda _: "", "BakeContext": begin, "device": lambda: "llvm"
-    }.items():  # fmt: skip
+def test_whoever_lights_a_house_is_told_before_how_long_it_takes_or_what_is_missing(monkeypatch, tmp_path, caplog):
+    house, light = grid_world(4).house, lambda: baking.bake(grid_world(4).house, None, tmp_path, "fast")
+    for name, value in {"house_parts": lambda *_: (), "looks_of": lambda _: "", "BakeContext": None}.items():
         monkeypatch.setattr(baking, name, value)
-    with pytest.raises(Begun):
-        baking.bake(house, None, tmp_path, "fast")
-
-
-def test_without_llvm_light_and_the_doctor_say_what_is_missing_before_any_work(monkeypatch, tmp_path, caplog):
-    monkeypatch.setattr("embodied.light.backend.mitsuba", lambda: backend.variant_of(lambda name: False))
-    for name, value in {"house_parts": lambda *_: (), "looks_of": lambda _: ""}.items():
-        monkeypatch.setattr(baking, name, value)
-    with pytest.raises(LightError, match=r"needs LLVM .*`embodied doctor --fix`"):
-        baking.bake(grid_world(4).house, None, tmp_path, "fast")
+    with monkeypatch.context() as without_llvm:
+        without_llvm.setattr("embodied.light.backend.mitsuba", lambda: backend.variant_of(lambda name: False))
+        finding = doctor.path_tracer(None)
+        assert "doctor --fix" in finding.text and "unlit" in finding.remedy and not finding.ok and not finding.needed
+        with pytest.raises(LightError, match=r"needs LLVM .*`embodied doctor --fix`"):
+            light()
     assert not caplog.text
-    finding = doctor.path_tracer(None)
-    assert "doctor --fix" in finding.text and "unlit" in finding.remedy and not finding.ok and not finding.needed
+    monkeypatch.setattr(baking, "device", lambda: "llvm")
+    with pytest.raises(TypeError, match="NoneType"):  # it begins
+        light()
+    assert re.search(f"lighting {house.name}, which .*, takes about a minute$", caplog.text.strip())
 
 
 # What is read -------------------------------------------------------------------------------------
@@ -328,14 +315,6 @@ def test_a_checkpoint_that_no_training_can_go_on_from_is_refused(wrong, tmp_path
         CheckpointError, match="not finite" if wrong == "weights" else "holds .*'network'.*, this run has"
     ):
         restore(tmp_path / "checkpoint.pt", {"settings": {}}, parts)
-
-
-def test_a_benchmark_of_several_parts_runs_them_all(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr("embodied.bench.world.houses", lambda *_: [Measure("a house", 1.0, "s", 1.0, 1.0, 1)])
-    monkeypatch.setattr("embodied.bench.light.compare", lambda *_, **__: Report({"seen": True}, "ways of rendering"))
-    assert cli.main(["bench", "houses", "light", "--out", str(tmp_path)]) == 0
-    said = capsys.readouterr().out
-    assert "a house" in said and "ways of rendering" in said
 
 
 @pytest.mark.parametrize("angle", [90.0, -360.0, float("nan"), float("inf")])

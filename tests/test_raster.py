@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 from conftest import two_rooms
-from handmade import HandCatalogue, furnished, painted
+from handmade import HandCatalogue, decibels, furnished, of_panes, smooth_pages
 
 from embodied.render import atlas, coarser, raster
 from embodied.render.camera import camera_at
@@ -28,14 +27,7 @@ def house():
 @pytest.fixture(scope="module")
 def lit(house):
     """Pages whose colours change smoothly, with glass that one looks through."""
-    u, v = np.meshgrid(np.linspace(0, 1, 128), np.linspace(0, 1, 64))
-    page = np.stack([60 + 180 * u, 220 - 160 * v, 90 + 60 * u + 60 * v], -1).astype(np.uint8)
-    pages = painted(house, HandCatalogue())
-    uv = lambda m: np.clip(m.vertices[:, [0, 2]] / (10, 3) + m.vertices[:, [1, 1]] / (50, 20), 0, 1).astype(np.float32)
-    alpha = lambda m: 0.3 if m.owner.endswith("/glass") else 1.0
-    meshes = tuple(dataclasses.replace(m, uv=uv(m), alpha=alpha(m)) for m in pages.meshes)
-    assert any(m.alpha < 1 for m in meshes)
-    return dataclasses.replace(pages, pages=(page,) * len(pages.pages), meshes=meshes)
+    return of_panes(smooth_pages(house, HandCatalogue()), alpha=0.3)
 
 
 @pytest.fixture(scope="module")
@@ -63,10 +55,6 @@ def test_a_house_without_colours_shows_the_depth_and_ids_that_mujoco_draws(house
     same = ids == ids_there
     assert same.mean() > 0.999
     np.testing.assert_allclose(depths[same], depths_there[same], rtol=1e-4)
-
-
-def decibels(a: np.ndarray, b: np.ndarray) -> float:
-    return float(10 * np.log10(255**2 / max(np.mean((a.astype(float) - b) ** 2), 1e-9)))
 
 
 @gl_test

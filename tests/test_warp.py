@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from conftest import two_rooms
 from gymnasium.utils.seeding import np_random
-from handmade import HandCatalogue, furnished, painted
+from handmade import HandCatalogue, decibels, furnished, of_panes, smooth_pages
 
 from embodied.errors import UnableError
 from embodied.gym.driving import DriveSettings, Driving
@@ -48,15 +48,7 @@ def house():
 
 @pytest.fixture(scope="module")
 def lit(house):
-    """Pages whose colours change smoothly and differently along u and v, so that a turned texture is seen."""
-    u, v = np.meshgrid(np.linspace(0, 1, 128), np.linspace(0, 1, 64))
-    page = np.stack([60 + 180 * u, 220 - 160 * v, 90 + 60 * u + 60 * v], -1).astype(np.uint8)
-    pages = painted(house, HandCatalogue())
-    along = lambda m: np.clip(m.vertices[:, [0, 2]] / (10, 3) + m.vertices[:, [1, 1]] / (50, 20), 0, 1)
-    uv = lambda m: m.uv if m.kind == "outdoor" else along(m).astype(np.float32)
-    shine = lambda m: (0.0, 0.5) if m.owner.endswith("/glass") else None
-    meshes = tuple(dataclasses.replace(m, uv=uv(m), gloss=shine(m)) for m in pages.meshes)
-    return dataclasses.replace(pages, pages=(page,), meshes=meshes)
+    return of_panes(smooth_pages(house, HandCatalogue()), gloss=(0.0, 0.5))
 
 
 @pytest.fixture(scope="module")
@@ -71,11 +63,6 @@ def warped(house, lit, device):
 
     with WarpRenderer(house, HandCatalogue(), lit, size=(SIZE, SIZE), device=device) as renderer:
         yield renderer
-
-
-def decibels(a: np.ndarray, b: np.ndarray) -> float:
-    """Peak signal-to-noise ratio of two uint8 pictures."""
-    return float(10 * np.log10(255**2 / np.mean((a.astype(float) - b) ** 2)))
 
 
 @pytest.mark.gl

@@ -152,19 +152,13 @@ def test_light_is_kept_beside_the_house_and_shown_by_its_folder(two_room_house, 
         open_folder(folder, cache=tmp_path)
 
 
-def test_unknown_nodes_and_folders_are_refused(world, tmp_path):
+def test_unknown_nodes_folders_and_settings_are_refused_at_once(world, house, tmp_path):
     with pytest.raises(IndexError, match="0 to 2"):
         world.panorama(3)
     with pytest.raises(FileNotFoundError, match=r"house\.json"):
         open_folder(tmp_path, HandCatalogue(), tmp_path)
-
-
-def test_a_misspelt_setting_is_refused(house, tmp_path):
     with pytest.raises(TypeError, match="qualitty"):
         make(house, tmp_path, qualitty="unlit")
-
-
-def test_unknown_pictures_are_refused_at_once(house, tmp_path):
     with pytest.raises(ValueError, match="pretty"):
         make(house, tmp_path, pictures="pretty")
 
