@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from embodied.generate import HouseConfig, generate_house
     from embodied.generate.plan_file import house_of_plan, load_plan
     from embodied.gym.env import make as make_env
-    from embodied.gym.eyes import ViewSettings
+    from embodied.gym.sensors import ViewSettings
     from embodied.house.house import House
     from embodied.house.validation import load_house
     from embodied.interface import Ask, Episode, Intention, Move, Observation, Reply, Situation, Stop, Subtask, Task
@@ -76,7 +76,7 @@ _HOMES = {
     "embodied.evaluation.tables": ("markdown",),
     "embodied.generate": ("HouseConfig", "generate_house"),
     "embodied.generate.plan_file": ("house_of_plan", "load_plan"),
-    "embodied.gym.eyes": ("ViewSettings",),
+    "embodied.gym.sensors": ("ViewSettings",),
     "embodied.house.house": ("House",),
     "embodied.house.validation": ("load_house",),
     "embodied.interface": (

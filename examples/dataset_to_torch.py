@@ -20,7 +20,7 @@ from embodied.agents.vision.pictures import ViewpointPictures
 from embodied.assets.cache import default_cache
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
 from embodied.datasets.store import Dataset
-from embodied.gym.eyes import ViewSettings
+from embodied.gym.sensors import ViewSettings
 from embodied.render.pictures import parse_pictures
 
 VIEW = ViewSettings("view", 24, 32)

@@ -19,7 +19,7 @@ import torch
 
 import embodied  # noqa: F401 - registers the environments
 from embodied.agents.vision.encoder import load_encoder
-from embodied.gym.eyes import ViewSettings
+from embodied.gym.sensors import ViewSettings
 from embodied.render.pictures import parse_pictures
 
 MEAN, DEVIATION = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])

@@ -53,7 +53,7 @@ from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig
 from embodied.geometry import wrap
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import CameraSensor, FeatureSensor, PanoramaStore, ViewSettings
+from embodied.gym.sensors import CameraSensor, FeatureSensor, PanoramaStore, ViewSettings
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import TURNS, FeatureSource, FollowRoute, Pose, Sight, Task, Viewpoint, viewpoint
 from embodied.language.plain_language import PlainLanguage

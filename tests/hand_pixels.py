@@ -11,7 +11,7 @@ from handmade import HandCatalogue, furnished
 from embodied.agents.vision.labels import HouseStrips
 from embodied.envs.base import HelpEnv
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import CameraSensor, PanoramaStore, ViewSettings
+from embodied.gym.sensors import CameraSensor, PanoramaStore, ViewSettings
 from embodied.interface import FindObject, Pose, Task
 from embodied.navigation.graph import graph_of
 from embodied.world import World, open_world

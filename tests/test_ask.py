@@ -28,7 +28,7 @@ from embodied.evaluation import tables
 from embodied.evaluation.ask import acted, observed, read_seeds, submitted
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import SensorSuite
+from embodied.gym.sensors import SensorSuite
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Ask, Intention, Move, Pose, Stop
 from embodied.kinds.ask import ASK, ask_environments, price, success_progress, weighted_success

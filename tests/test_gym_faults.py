@@ -24,9 +24,9 @@ import embodied.gym.env
 from embodied.datasets.store import Dataset
 from embodied.envs.base import ActionError
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import SensorSuite
-from embodied.gym.in_step import SharedSyncVectorEnv
+from embodied.gym.sensors import SensorSuite
 from embodied.gym.spaces import SpaceLayout, number
+from embodied.gym.vector_env import SharedSyncVectorEnv
 from embodied.teachers.shortest import shortest_action
 
 STOP = SpaceLayout().candidates
@@ -38,7 +38,9 @@ def tmp(tmp_path_factory) -> str:
 
 
 def batch(tmp, n=3, **options) -> SharedSyncVectorEnv:
-    return embodied.gym.in_step.make_vec("find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
+    return embodied.gym.vector_env.make_vec(
+        "find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options
+    )
 
 
 def times(envs) -> list[int]:
@@ -112,7 +114,7 @@ def test_seeds_are_integers_of_any_kind_and_nothing_else(tmp):
 
 @pytest.mark.parametrize("wrong", [{"patience": -1}, {"patience": 0}, {"patience": 2.5}, {"render_mode": "human"}])
 def test_options_are_refused_before_anything_is_opened(wrong, tmp_path):
-    for maker in (embodied.gym.env.make, embodied.gym.in_step.make_vec):
+    for maker in (embodied.gym.env.make, embodied.gym.vector_env.make_vec):
         with pytest.raises(ValueError, match=f"{next(iter(wrong))} should be"):
             maker("find", data="no/such/folder", cache=str(tmp_path), **wrong)
 

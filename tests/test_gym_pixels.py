@@ -17,11 +17,19 @@ from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.features import encode_panoramas
 from embodied.agents.vision.live import LiveFeatures
 from embodied.envs.base import HelpEnv
-from embodied.gym import eyes as module
+from embodied.gym import sensors as module
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import FAR, CameraSensor, FeatureSensor, PanoramaStore, SensorSuite, ViewSettings, checked_sees
-from embodied.gym.in_step import SharedSyncVectorEnv, free_memory, refuse_too_many
+from embodied.gym.sensors import (
+    FAR,
+    CameraSensor,
+    FeatureSensor,
+    PanoramaStore,
+    SensorSuite,
+    ViewSettings,
+    checked_sees,
+)
 from embodied.gym.spaces import SpaceLayout, number
+from embodied.gym.vector_env import SharedSyncVectorEnv, free_memory, refuse_too_many
 from embodied.interface import Move, Sight, Stop
 
 pytestmark = pytest.mark.gl
@@ -158,7 +166,7 @@ def test_pixels_of_a_place_that_nobody_can_draw_are_refused(tmp_path):
 def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monkeypatch):
     space = gym.spaces.Dict({"rgb": gym.spaces.Box(0, 255, (1024, 1024, 3), np.uint8)})
     assert 0 < free_memory() < psutil.virtual_memory().total
-    monkeypatch.setattr("embodied.gym.in_step.free_memory", lambda: 2**30)
+    monkeypatch.setattr("embodied.gym.vector_env.free_memory", lambda: 2**30)
     refuse_too_many(8, space)
     with pytest.raises(ValueError, match=r"1000 environments hold about 5\.9 GiB .* 1\.0 GiB are free"):
         refuse_too_many(1000, space)

@@ -40,7 +40,7 @@ from embodied.errors import UnableError
 from embodied.evaluation import tables
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import SensorSuite
+from embodied.gym.sensors import SensorSuite
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Sighting, Step, Subtask, Usage
 from embodied.kinds.ask import ask_environments
 from embodied.kinds.find import FIND

@@ -15,8 +15,8 @@ from embodied.agents.vision.pictures import ViewpointPictures
 from embodied.assets.records import ROOM_KINDS
 from embodied.datasets import build as building
 from embodied.datasets.build import Unit
-from embodied.gym.eyes import ViewSettings
 from embodied.gym.playground import pictures_of
+from embodied.gym.sensors import ViewSettings
 from embodied.render.panorama_file import PanoramaFileError
 from embodied.render.pictures import Baked, Unlit
 from embodied.scene.house_meshes import owners

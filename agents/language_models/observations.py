@@ -86,7 +86,7 @@ def observation_in_words(o: Observation, names: Sequence[tuple[str, float, float
 
 
 class Panoramas(Protocol):
-    """Gives the panorama of a sight; embodied.gym.eyes.PanoramaStore is one."""
+    """Gives the panorama of a sight; embodied.gym.sensors.PanoramaStore is one."""
 
     def at(self, sight: Sight) -> Panorama: ...
 

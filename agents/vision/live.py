@@ -7,7 +7,7 @@ import numpy as np
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.vision.encoder import Encoder, load_encoder
 from embodied.agents.vision.features import encode_panoramas
-from embodied.gym.eyes import PanoramaStore
+from embodied.gym.sensors import PanoramaStore
 from embodied.interface import VIEWS, Sight, Viewpoint, viewpoint
 
 

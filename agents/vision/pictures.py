@@ -22,8 +22,8 @@ import torch
 from embodied.agents.vision.labels import VISIBLE, ids_to_labels
 from embodied.assets.records import ROOM_KINDS
 from embodied.datasets.store import Dataset
-from embodied.gym.eyes import FAR, PIXELS, ViewSettings, framed
 from embodied.gym.playground import pictures_of
+from embodied.gym.sensors import FAR, PIXELS, ViewSettings, framed
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
 from embodied.render.panorama_file import PanoramaFile
 from embodied.render.photograph import check_camera

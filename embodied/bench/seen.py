@@ -13,7 +13,7 @@ from embodied.bench.timing import Measure, measure, one_core, share
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig, generate_house
 from embodied.gym.env import HelpGymEnv
-from embodied.gym.eyes import CameraSensor, PanoramaStore, Sensor, ViewSettings
+from embodied.gym.sensors import CameraSensor, PanoramaStore, Sensor, ViewSettings
 from embodied.gym.spaces import SpaceLayout
 from embodied.interface import Task
 from embodied.language.plain_language import PlainLanguage

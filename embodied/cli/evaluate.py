@@ -294,7 +294,7 @@ def model_agent(args: Options, split: SplitData, client: Any) -> Agent:
     from embodied.agents.language_models.agent import LanguageModelAgent
     from embodied.agents.language_models.observations import OracleNames
     from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt
-    from embodied.gym.eyes import PanoramaStore
+    from embodied.gym.sensors import PanoramaStore
     from embodied.world import World
 
     prompt = agent_prompt(args.prompts)

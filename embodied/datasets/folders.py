@@ -150,12 +150,7 @@ def largest_batch(data: Dataset) -> int:
     They fill the last batch of a split up with its first tasks, once: with fewer training tasks than a batch, or fewer
     than half as many to judge by, some of the batch is left without a task and the simulator refuses it.
     """
-    return min(_instructions(data, s) if s == "train" else 2 * _instructions(data, s) for s in data.splits)
-
-
-def _instructions(data: Dataset, split: str) -> int:
-    tasks = data.tasks(split)
-    return 3 * len({(t.world, route_of(t).path) for t in tasks}) if data.task_kind.from_routes else len(tasks)
+    return min((1 if s == "train" else 2) * len(data.tasks(s)) for s in data.splits)
 
 
 def sought(task: Task) -> FindObject:
@@ -364,8 +359,7 @@ def _duet(data: Dataset, root: Path) -> list[Path]:
 
 
 def _paths(data: Dataset, split: str, numbers: Iterator[int]) -> Iterator[Item]:
-    """One item per path with three instructions: the programs count on three, and where fewer people spoke (in seen
-    splits, those whose wording was held out) theirs are repeated."""
+    """One item per path with all its wordings: three, or fewer where one was held out, or more."""
     by_path: dict[tuple[str, tuple[int, ...]], list[Task]] = {}
     for t in data.tasks(split):
         by_path.setdefault((t.world, route_of(t).path), []).append(t)
@@ -377,7 +371,7 @@ def _paths(data: Dataset, split: str, numbers: Iterator[int]) -> Iterator[Item]:
             "path_id": next(numbers),
             "path": [graph.ids[v] for v in path],
             "heading": heading(tasks[0].start),
-            "instructions": [texts[k % len(texts)] for k in range(3)],
+            "instructions": texts,
         }
 
 
@@ -386,7 +380,7 @@ NAV_SPLITS = {"train": "train", "val": "val_unseen", "test": "test_unseen"}
 
 
 def _iliad_nav(data: Dataset, root: Path) -> list[Path]:
-    """Paths of at most MOST_NODES nodes: training items with three instructions, the others with one."""
+    """Paths of at most MOST_NODES nodes: training items with all their instructions, the others with one."""
     home, files, words, numbers = root / "data" / "nav", [], Words(), itertools.count(1)
     for theirs, ours in NAV_SPLITS.items():
         items = []

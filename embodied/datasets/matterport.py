@@ -5,7 +5,7 @@ Only here, in embodied.mattersim and in exported files they apply: heading clock
 and split ids at underscores. embodied.datasets.folders writes the files; their fields:
 
   connectivity/<scan>_connectivity.json, scans.txt   see navigation.connectivity.to_matterport
-  R2R_<split>.json      path_id, scan, heading, path, distance, instructions (three)
+  R2R_<split>.json      path_id, scan, heading, path, distance, instructions (all wordings)
   hanna_<split>.json    path_id, scan, heading, paths (one shortest path per goal), instructions
   routes.json           scan -> [path_id (text), path, instruction, view_id, split]
   panoramic_action_space.json   '<scan>_<viewpoint>_<bin>' -> actions, see `action_list`

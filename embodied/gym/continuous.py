@@ -38,10 +38,10 @@ from embodied.envs.continuous import (
 from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
-from embodied.gym.eyes import LARGE, check_live, live_pixels, pixel_spaces
-from embodied.gym.in_step import checked_limit
 from embodied.gym.playground import PlaygroundSettings, flat_playground
+from embodied.gym.sensors import LARGE, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of
+from embodied.gym.vector_env import checked_limit
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import checked_seed
@@ -231,7 +231,7 @@ def make_vec(
     disable_env_checker: bool | None = None,
     **options: Any,
 ) -> gym.vector.SyncVectorEnv:
-    """So many environments in this process that share houses and floors; arguments as of embodied.gym.in_step.make_vec.
+    """Environments in this process that share houses and floors; arguments as of embodied.gym.vector_env.make_vec.
 
     Raises:
       ValueError: no such limit, and what `open_episodes` raises.

@@ -22,8 +22,8 @@ from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
 from embodied.gym.driving import TEXT, DriveSettings, Driving
-from embodied.gym.eyes import LARGE, pixel_spaces
 from embodied.gym.playground import FLAT_AREA, pictures_of
+from embodied.gym.sensors import LARGE, pixel_spaces
 from embodied.render.pictures import PictureSettings, matte
 from embodied.seeds import checked_seed
 from embodied.world import World, open_world

@@ -23,7 +23,7 @@ from gymnasium.vector.utils import batch_space
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.gym.drive import seen_space
 from embodied.gym.driving import DriveSettings, Driving
-from embodied.gym.eyes import FAR
+from embodied.gym.sensors import FAR
 from embodied.navigation.floor_ways import FloorWays
 from embodied.render.warp import SEEN, WarpRenderer, device_of, mjw, wp
 from embodied.seeds import checked_seed

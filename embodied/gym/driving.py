@@ -16,7 +16,7 @@ import numpy as np
 from embodied.assistants.description_arrays import word_number
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
-from embodied.gym.eyes import PIXELS, check_live, live_pixels
+from embodied.gym.sensors import PIXELS, check_live, live_pixels
 from embodied.gym.spaces import codes_of
 from embodied.language.plain_language import with_article
 from embodied.metrics import weighted_by_path, within
@@ -51,7 +51,7 @@ class DriveSettings:
     task: str = "reach"
     """One of TASKS."""
     sees: tuple[str, ...] = ("rgb", "depth")
-    """Some of embodied.gym.eyes.PIXELS; nothing for a blind body."""
+    """Some of embodied.gym.sensors.PIXELS; nothing for a blind body."""
     height: int = 128
     width: int = 128
     """Pixels."""

@@ -5,11 +5,11 @@
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=8, data="DIR", vectorization_mode="async",
                               vector_kwargs={"context": "spawn"})
 
-The first batch takes its steps in one process and shares what it holds (embodied.gym.in_step); the second is
+The first batch takes its steps in one process and shares what it holds (embodied.gym.vector_env); the second is
 Gymnasium's AsyncVectorEnv, a process for each environment.
 
 Without `data` a small furnished flat is generated and lit, which takes a minute or two once. What an
-agent sees is chosen by `sees` (embodied.gym.eyes): by default a perspective view and the features
+agent sees is chosen by `sees` (embodied.gym.sensors): by default a perspective view and the features
 that the shipped encoder finds in the same pictures. An oracle is called an oracle.
 """
 
@@ -28,7 +28,9 @@ from PIL import Image, ImageDraw, ImageOps
 
 from embodied.assets.cache import default_cache
 from embodied.envs.base import STEP_COST, ActionError, HelpEnv
-from embodied.gym.eyes import (
+from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, split_playground
+from embodied.gym.semantic_features import FeatureTable
+from embodied.gym.sensors import (
     PIXELS,
     CameraSensor,
     FeatureSensor,
@@ -39,8 +41,6 @@ from embodied.gym.eyes import (
     checked_sees,
     encoder_entry,
 )
-from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, split_playground
-from embodied.gym.semantic_features import FeatureTable
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
@@ -371,7 +371,7 @@ class EnvironmentSettings:
     seed: int = 0
     cache: str | Path | None = None
     sees: str | Sequence[str] = ("rgb", "features")
-    """Some of embodied.gym.eyes.SEES: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
+    """Some of embodied.gym.sensors.SEES: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
     view: ViewSettings = ViewSettings()
     """How pixels are framed."""
     pictures: PictureSettings | str | None = None

@@ -54,7 +54,7 @@ class PlaygroundSettings:
     pictures: PictureSettings | str | None = None
     """How the houses are drawn; by default as a data set's pictures are, and 'fast' for a flat."""
     sees: Sequence[str] = ("oracle",)
-    """Some of embodied.gym.eyes.SEES; oracle's features are made for 'oracle' only."""
+    """Some of embodied.gym.sensors.SEES; oracle's features are made for 'oracle' only."""
     rules: Any = None
     """Rules of play, of the type of TaskKind.rules; the usual ones if None."""
     rooms: bool = True

@@ -33,7 +33,7 @@ def register(gymnasium: ModuleType) -> None:
 
 
 def register_environment(
-    gymnasium: ModuleType, title: str, kind: str, one: str = "embodied.gym.env", many: str = "embodied.gym.in_step"
+    gymnasium: ModuleType, title: str, kind: str, one: str = "embodied.gym.env", many: str = "embodied.gym.vector_env"
 ) -> None:
     """Register embodied/TITLE-v0, unless there is one: `one` has its `make`, `many` its `make_vec`."""
     if f"embodied/{title}-v0" not in gymnasium.registry:

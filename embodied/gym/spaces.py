@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.envs.base import ActionError
-from embodied.gym.eyes import LARGE, Sensor
+from embodied.gym.sensors import LARGE, Sensor
 from embodied.interface import TURNS, VIEWS, Action, Ask, Intention, Mode, Move, Observation, Stop
 from embodied.task_kind import INTENTIONS, ArraySpec, TaskKind
 

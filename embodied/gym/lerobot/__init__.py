@@ -24,7 +24,7 @@ from embodied.assets.cache import write_bytes
 from embodied.envs.continuous import POSITION
 from embodied.gym import continuous, drive
 from embodied.gym.driving import DriveSettings
-from embodied.gym.eyes import LARGE
+from embodied.gym.sensors import LARGE
 
 ENVS = ("VLNCE", "ObjectNav", "Drive")
 DRIVEN = ("motion", "touched", "goal")

@@ -20,7 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from embodied.gym.env import OWN, HelpGymEnv, check_options, open_resources
-from embodied.gym.eyes import Arrays, Sensor, SensorSuite
+from embodied.gym.sensors import Arrays, Sensor, SensorSuite
 from embodied.gym.spaces import observation_space
 from embodied.seeds import checked_seed
 from embodied.threads import processors
