@@ -244,7 +244,7 @@ def test_a_correction_of_a_material_that_is_not_there_is_told(tmp_path, caplog):
     )
     (own / "a.obj").write_text(PAINTED)
     load_catalogue(tmp_path, own=[own]).mesh("mine/box")
-    assert "its row names the materials ['wood'], which it has not; it has ['paint']" in caplog.text
+    assert "its row names the materials ['wood'], which it lacks; it has ['paint']" in caplog.text
 
 
 @pytest.mark.slow

@@ -291,7 +291,7 @@ def finish_parts(
     names = {p.name for p in raw}
     corrected_names = {*dict(recipe.looks), *recipe.dropped, *recipe.flipped, *recipe.glow, *recipe.two_sided} - {"*"}
     if unknown := sorted(corrected_names - names):
-        tell(f"its row names the materials {unknown}, which it has not; it has {sorted(names)}")
+        tell(f"its row names the materials {unknown}, which it lacks; it has {sorted(names)}")
     left_out: list[str] = []
     raw = tuple(_drawn(raw, recipe, HOLES * budget, tell, left_out))
     if not raw:
