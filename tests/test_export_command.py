@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
-from hand_data import build, built, read_features, small_house
+from hand_data import build, built, read_features
 from handmade import HandCatalogue, furnished
 
 from embodied import cli
@@ -20,6 +20,7 @@ from embodied.cli import export, exports
 from embodied.cli.common import Printed
 from embodied.cli.exports import Export, register_export, registered_exports
 from embodied.datasets.folders import names_of
+from embodied.navigation.graph import build_graph
 from embodied.options import OutputFolder
 from embodied.render.pictures import Unlit
 from embodied.world import open_world
@@ -77,7 +78,11 @@ def test_parquet_is_written(data, tmp_path):
 def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
     from embodied.gym import drive
 
-    data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=small_house)
+    def house(seed, name, config, catalogue):
+        rooms = dataclasses.replace(furnished(two_rooms()), name=name)
+        return rooms, build_graph(rooms)
+
+    data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=house)
     unlit = Unlit(size=64)
     found = drive.data_worlds
     monkeypatch.setattr(drive, "load_catalogue", lambda _: HandCatalogue())
