@@ -236,6 +236,6 @@ def test_the_shipped_agent_takes_part_with_what_embodied_features_left(folder):
         blank, pictures = np.zeros((len(place.graph.ids), 36, encoder.size)), Unlit(size=64)
         path = feature_path(data.folder / "features", encoder.digest, name, pictures)
         save_features(path, blank, encoder, place.house.digest, pictures)
-    agent = agents_of(data.folder, lambda: None)["shipped"](places)
+    agent = agents_of(data.folder, lambda: None)["shipped"](data.split("val_seen"))
     (episode,) = play(data.split("val_seen").make_env, agent, data.tasks("val_seen")[:1], seed=0)
     assert episode.steps[0].action.thought is not None

@@ -29,8 +29,8 @@ from embodied.serve.address import page_address
 
 if TYPE_CHECKING:
     from embodied.agents.language_models.client import Client
-    from embodied.datasets.store import Dataset
-    from embodied.interface import Agent, Place
+    from embodied.datasets.store import Dataset, SplitData
+    from embodied.interface import Agent
     from embodied.serve.game import AgentMaker
     from embodied.serve.study import Study
     from embodied.world import World
@@ -161,21 +161,16 @@ def agents_of(folder: Path, client: Callable[[], Client]) -> Mapping[str, AgentM
 
     data = Dataset(folder)
 
-    def shipped(places: Mapping[str, Place]) -> Agent:
-        from embodied.agents.common.shipped import SHIPPED_AGENT, SHIPPED_ENCODER, SHIPPED_VNLA
-        from embodied.agents.hanna.agent import HannaAgent
-        from embodied.agents.vision.drawn import pictures_of
-        from embodied.agents.vision.encoder import load_encoder
-        from embodied.agents.vision.features import feature_path, load_bank
-        from embodied.agents.vnla.agent import VnlaAgent
+    def shipped(split: SplitData) -> Agent:
+        from embodied.agents.learner import PlaySettings, playing_learner
 
-        agent = VnlaAgent.load(SHIPPED_VNLA) if data.kind == "vnla" else HannaAgent.load(SHIPPED_AGENT)
-        pictures = {n: pictures_of(data, n, None) for n in places}
-        encoder = load_encoder(SHIPPED_ENCODER).digest
-        paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in places}
-        return agent.policy(load_bank(paths, encoder, places, pictures))
+        learner = playing_learner(data.kind)
+        if learner is None or learner.players is None or learner.shipped is None:
+            raise ValueError(f"no trained agent comes with the program for tasks of kind {data.kind!r}")
+        _, agent = learner.players(learner.shipped, data, PlaySettings())(split.name).agents["learned"]
+        return agent
 
-    def model(places: Mapping[str, Place]) -> Agent:
+    def model(split: SplitData) -> Agent:
         from embodied.agents.language_models.agent import LanguageModelAgent
 
         return LanguageModelAgent(client())

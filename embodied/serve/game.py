@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, SplitData
 from embodied.envs.base import ActionError, HelpEnv
 from embodied.envs.continuous import NavMeshCache
 from embodied.interface import (
@@ -40,11 +40,11 @@ from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, PERSON, StudyPart
 from embodied.serve.talk import Overheard, PathSpeaker, PracticeAgent, Relay, TalkEnv
 
-AgentMaker = Callable[[Mapping[str, Place]], Agent]
+AgentMaker = Callable[[SplitData], Agent]
 AssistantMaker = Callable[[Assistant], Assistant]
 """Puts an assistant in the place of the simulated one, which it is given."""
 POLICIES: Mapping[str, AgentMaker] = {
-    name: functools.partial(lambda make, places: make(), make) for name, make in WITHOUT_LEARNING.items()
+    name: functools.partial(lambda make, split: make(), make) for name, make in WITHOUT_LEARNING.items()
 }
 
 
@@ -88,7 +88,7 @@ def set_table(
         raise ValueError(f"part {part.name!r}: the split {part.split!r} has no tasks")
     agent: Agent | None = None
     if part.agent != PERSON:
-        agent = agents[part.agent](split.worlds) if part.agent in agents else made_by_name(part.agent)
+        agent = agents[part.agent](split) if part.agent in agents else made_by_name(part.agent)
     moves, prices = PanoramicMoves(), {q.text: q.price for q in part.questions}
     assistant: Any = None
     if part.assistant == "simulated" or part.assistant in assistants:
