@@ -30,7 +30,7 @@ from embodied.navigation.graph import build_graph
 from embodied.render.pictures import Baked
 from embodied.serve.game import Game, set_table
 from embodied.serve.store import Event
-from embodied.serve.study import Part
+from embodied.serve.study import StudyPart
 from embodied.task_kind import TaskKind, kind_named, register_kind
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -125,7 +125,7 @@ def test_the_study_engine_judges_it(data, tmp_path):
 
 
 def test_a_person_plays_it_in_a_study(data):
-    table = set_table(Part("alone", split="test_unseen", assistant="none", tasks=1), data)
+    table = set_table(StudyPart("alone", split="test_unseen", assistant="none", tasks=1), data)
     (task,) = table.tasks.values()
     game, expert, rng = Game("g", table, {"agent": "ann"}, False, 0.0, task, 0), data.task_kind.agent("shortest"), None
     for time in range(1, 60):
