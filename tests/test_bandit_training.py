@@ -17,7 +17,7 @@ from embodied.agents.bandit.corpus import CorpusError, Pair, Sizes
 from embodied.agents.bandit.network import REMEDY, BanditAbout, Critic, EncoderDecoder, Translator, begin, load_network
 from embodied.agents.bandit.ratings import Rater
 from embodied.agents.bandit.study import BanditStudy
-from embodied.agents.bandit.training import bandit, material, pretrain, teach_critic
+from embodied.agents.bandit.training import bandit, load_corpus, pretrain, train_critic
 from embodied.agents.bandit.translate import batches, decode, greedy, padded, perplexity
 from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint
 from embodied.agents.common.choosing import sampled_choice
@@ -71,10 +71,10 @@ def data(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def trained(data, tmp_path_factory) -> Path:
     """A weakly trained toy translator with its critic."""
-    m, home = material(data, TOY), tmp_path_factory.mktemp("trained")
+    m, home = load_corpus(data, TOY), tmp_path_factory.mktemp("trained")
     pretrain(m, home / "pretrain", note=silent)
     for reference in ("weak", "full"):
-        teach_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference, note=silent)
+        train_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference, note=silent)
     return home
 
 
@@ -303,7 +303,7 @@ def test_every_sentence_is_in_one_batch():
 
 
 def test_pretraining_learns_to_translate(data, trained):
-    m = material(data, TOY)
+    m = load_corpus(data, TOY)
     translator, weak = m.translator(), m.translator()
     for network, name in ((translator, "full"), (weak, "weak")):
         load_network(network, trained / "pretrain" / f"{name}.safetensors")
@@ -315,7 +315,7 @@ def test_pretraining_learns_to_translate(data, trained):
 
 
 def test_ratings_alone_improve_translations(data, trained, tmp_path):
-    m = material(data, TOY)
+    m = load_corpus(data, TOY)
     files = trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"
     none = bandit(m, *files, tmp_path / "none", "reference", passes=6, note=silent)
     clean = bandit(m, *files, tmp_path / "clean", "a2c", passes=6, note=silent)
@@ -335,7 +335,7 @@ def weights(folder: Path) -> dict[str, torch.Tensor]:
 def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
     config = dataclasses.replace(TOY, checkpoint_minutes=1e-9)
     m, files = (
-        material(data, config),
+        load_corpus(data, config),
         (trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"),
     )
     rater = Rater(granularity=5, variance=0.5)
@@ -361,17 +361,17 @@ def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
 
 def test_a_checkpoint_of_other_settings_or_cut_short_is_refused(data, trained, tmp_path):
     files = trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"
-    bandit(material(data, TOY), *files, tmp_path, "reference", note=silent)
+    bandit(load_corpus(data, TOY), *files, tmp_path, "reference", note=silent)
     with pytest.raises(CheckpointError, match="learner 'reference' -> 'a2c'"):
-        bandit(material(data, TOY), *files, tmp_path, "a2c", note=silent)
+        bandit(load_corpus(data, TOY), *files, tmp_path, "a2c", note=silent)
     path = tmp_path / "checkpoint.pt"
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(CheckpointError, match="cut short.*delete it"):
-        bandit(material(data, TOY), *files, tmp_path, "reference", note=silent)
+        bandit(load_corpus(data, TOY), *files, tmp_path, "reference", note=silent)
 
 
 def test_diverging_says_so_and_keeps_the_checkpoint(data, trained, tmp_path):
-    m = material(data, dataclasses.replace(TOY, pretraining_rate=1e39))
+    m = load_corpus(data, dataclasses.replace(TOY, pretraining_rate=1e39))
     with pytest.raises(UnableError, match="not finite.*learning rate"):
         pretrain(m, tmp_path, note=silent)
 

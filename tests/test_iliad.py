@@ -96,7 +96,7 @@ class Presser:
     def greedy(self, tasks, requests) -> list[int]:
         return self.logits(requests).argmax(-1).tolist()
 
-    def practise(self, tasks, requests, *, rng) -> list[int]:
+    def rollout_for_dagger(self, tasks, requests, *, rng) -> list[int]:
         return self.greedy(tasks, requests)
 
     def scores(self, tasks, requests, executions, actions=None) -> ExecutionScores:

@@ -122,7 +122,7 @@ def test_who_is_guided_all_the_way_arrives_and_who_is_not_is_on_its_own():
     trips = [Trip("grid", Pose(n), GRID.graph.path(n, 15), ("go",)) for n in (0, 5, 10)]
     asked, walks = ["go"] * 3, {}
     for share in (0.0, 1.0):
-        walks[share] = student(look, guided=share).practise(trips, asked, rng=stream(0, "p"))
+        walks[share] = student(look, guided=share).rollout_for_dagger(trips, asked, rng=stream(0, "p"))
     assert walks[1.0] == [walk_along(t.path) for t in trips]
     assert walks[0.0] == student(look).sample(trips, asked, rng=stream(0, "p"))
 

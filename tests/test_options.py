@@ -113,7 +113,7 @@ def test_types_of_arguments_take_what_they_name_and_nothing_else(kind, good, bad
 def test_a_terminal_that_knows_no_unicode_gets_question_marks_not_an_error():
     code = (
         "from embodied import cli\nfrom embodied.cli import doctor\n"
-        "def run(args: doctor.Options):\n    print('50.0', chr(177), '3.1')\n"
+        "def run(args: doctor.DoctorOptions):\n    print('50.0', chr(177), '3.1')\n"
         "doctor.run = run\n"
         "raise SystemExit(cli.main(['doctor']))"
     )

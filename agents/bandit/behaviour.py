@@ -11,7 +11,7 @@ import torch
 
 from embodied.agents.bandit.bleu import corpus_parts, sentence_bleu
 from embodied.agents.bandit.network import Translator
-from embodied.agents.bandit.training import NumberedCorpus, sampled
+from embodied.agents.bandit.training import TokenizedCorpora, sampled
 from embodied.agents.bandit.translate import greedy, in_order, padded, perplexity
 from embodied.agents.common.checkpoint import read_checkpoint
 
@@ -34,7 +34,7 @@ BLEU of sampled translations whose last third of words is cut off: where that is
 
 
 @torch.no_grad()
-def behaviour(translator: Translator, m: NumberedCorpus, split: str) -> Mapping[str, float]:
+def behaviour(translator: Translator, m: TokenizedCorpora, split: str) -> Mapping[str, float]:
     """All COLUMNS on a split; learners draw alike."""
     data = m.splits[split]
     translations = greedy(translator, data, m.lexicons[1], m.config.longest)
@@ -66,7 +66,7 @@ def behaviour(translator: Translator, m: NumberedCorpus, split: str) -> Mapping[
     }
 
 
-def translator_of_run(m: NumberedCorpus, folder: Path) -> Translator:
+def translator_of_run(m: TokenizedCorpora, folder: Path) -> Translator:
     """The translator as a run in `folder` left it.
 
     Raises:

@@ -17,7 +17,7 @@ from embodied.agents.bandit.behaviour import COLUMNS, behaviour, translator_of_r
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest
 from embodied.agents.bandit.ratings import CLEAN, Rater, rater_of
-from embodied.agents.bandit.training import RATED, NumberedCorpus, bandit, material, pretrain, teach_critic
+from embodied.agents.bandit.training import RATED, TokenizedCorpora, bandit, load_corpus, pretrain, train_critic
 from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.session import Note
 from embodied.agents.studies.engine import Measured, StudyLearner
@@ -132,20 +132,20 @@ class BanditStudy(StudyLearner):
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """A corpus that cannot be read is refused."""
-        self._material(self.repeats[0])
+        self._corpus_of(self.repeats[0])
 
     def prepare_seed(self, rows: Sequence[StudyRow], seed: int, folder: Path, note: Note) -> None:
-        m, home = self._material(seed), self._begun(seed, folder)
+        m, home = self._corpus_of(seed), self._begun(seed, folder)
         pretrain(m, home / "pretrain", note=note)
         for reference in dict.fromkeys(row.train["reference"] for row in rows if row.train):
-            teach_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference, note=note)
+            train_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference, note=note)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
         config, run = self._settings(train, seed), {k: v for k, v in train.items() if k != RATE}
         return identity_of("embodied.agents.bandit.training", settings=config, corpus=self._corpus(), run=run)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        begun, m = self._begun(seed, folder), _material(self.data, self._settings(train, seed))
+        begun, m = self._begun(seed, folder), _corpus_of(self.data, self._settings(train, seed))
         reference = begun / "pretrain" / f"{train['reference']}.safetensors"
         critic = begun / train["reference"] / "critic.safetensors"
         (off,) = [k for k in train if k in SWEEPS] or [""]
@@ -161,7 +161,7 @@ class BanditStudy(StudyLearner):
         assert weights is not None and row.train is not None, "every row is a run"
         home = weights.parent
         if row.judge.get("behaviour"):
-            m = self._material(seed)
+            m = self._corpus_of(seed)
             return {k: Samples((v,)) for k, v in behaviour(translator_of_run(m, home), m, "test").items()}
         history = read_checkpoint(home / "checkpoint.pt")["history"]
         if row.judge.get("curve"):
@@ -183,15 +183,15 @@ class BanditStudy(StudyLearner):
     def _corpus(self) -> str:
         return _corpus(self.data)
 
-    def _material(self, seed: int) -> NumberedCorpus:
-        return _material(self.data, dataclasses.replace(self.config, seed=seed))
+    def _corpus_of(self, seed: int) -> TokenizedCorpora:
+        return _corpus_of(self.data, dataclasses.replace(self.config, seed=seed))
 
     def _begun(self, seed: int, folder: Path) -> Path:
         """The folder of the references and critics of a seed."""
         return folder / f"pretrain_{key_of(identity_of(settings=self.config, corpus=self._corpus()))}" / f"seed_{seed}"
 
 
-_material = functools.lru_cache(maxsize=8)(material)
+_corpus_of = functools.lru_cache(maxsize=8)(load_corpus)
 """Corpora in numbers of the seeds at hand: reading one takes as long as many updates."""
 
 

@@ -1,7 +1,7 @@
 """The three stages of BANDITNMT (3.1.5.1): pre-training the translator, then its critic, then learning from ratings.
 
     pretrain      supervised, Eq A.7 -> weak.safetensors (one pass), full.safetensors (lowest dev perplexity)
-    teach_critic  the critic, on translations sampled from the frozen translator
+    train_critic  the critic, on translations sampled from the frozen translator
     bandit        NED-A2C (Algorithm 2), or its two controls: learning nothing, learning from references
 
 Every draw is named by seed, pass and sentence, so a stage that was stopped goes on exactly as if it
@@ -25,7 +25,7 @@ from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest, load
 from embodied.agents.bandit.network import Critic, Translator, begin, load_network, save_network
 from embodied.agents.bandit.ratings import CLEAN, Rater
-from embodied.agents.bandit.translate import Numbered, batches, decode, greedy, numbered, padded, perplexity
+from embodied.agents.bandit.translate import TokenizedCorpus, batches, decode, greedy, padded, perplexity, tokenized
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.choosing import sampled_choice
 from embodied.agents.common.losses import Decisions, actor_loss, critic_loss
@@ -61,11 +61,11 @@ _PRETRAINING = (
 
 
 @dataclass(frozen=True, eq=False)
-class NumberedCorpus:
+class TokenizedCorpora:
     """A corpus in numbers, ready to be learned from."""
 
     config: BanditConfig
-    splits: Mapping[str, Numbered]
+    splits: Mapping[str, TokenizedCorpus]
     lexicons: tuple[Vocabulary, Vocabulary]
     digest: str
     """Of the sets for pre-training and judging."""
@@ -93,7 +93,7 @@ class NumberedCorpus:
         return torch.Generator().manual_seed(int(stream(self.config.seed, "begin", name).integers(2**31)))
 
 
-def material(folder: Path, config: BanditConfig) -> NumberedCorpus:
+def load_corpus(folder: Path, config: BanditConfig) -> TokenizedCorpora:
     """Read a corpus folder; words are those of its supervised set.
 
     Raises:
@@ -103,13 +103,13 @@ def material(folder: Path, config: BanditConfig) -> NumberedCorpus:
     corpus = load(folder, (*names, RATED), longest=config.longest)
     source = most_frequent((w for a, _ in corpus["supervised"] for w in a), most=config.source_words)
     target = most_frequent((w for _, b in corpus["supervised"] for w in b), most=config.target_words)
-    splits = {name: numbered(pairs, source, target) for name, pairs in corpus.items()}
-    return NumberedCorpus(
+    splits = {name: tokenized(pairs, source, target) for name, pairs in corpus.items()}
+    return TokenizedCorpora(
         config, splits, (source, target), corpus_digest(folder, names), corpus_digest(folder, (RATED,))
     )
 
 
-def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
+def pretrain(m: TokenizedCorpora, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
     """Supervised pre-training (3.1.5.2); writes weak.safetensors and full.safetensors into `folder`.
 
     Differs from the text in what 'full' is: not the tenth pass but the one of lowest dev perplexity,
@@ -148,7 +148,7 @@ def pretrain(m: NumberedCorpus, folder: Path, *, note: Note = print) -> list[dic
     return _run("pretrain", passes, step, finish, folder, identity, parts, config, data, note)
 
 
-def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
+def train_critic(m: TokenizedCorpora, reference: Path, folder: Path, *, note: Note = print) -> list[dict[str, float]]:
     """Teach a critic what ratings the translator in `reference` gets (Eq 3.7); writes critic.safetensors.
 
     Ratings are unperturbed here, as in the text (3.1.5.1).
@@ -178,7 +178,7 @@ def teach_critic(m: NumberedCorpus, reference: Path, folder: Path, *, note: Note
 
 
 def bandit(
-    m: NumberedCorpus,
+    m: TokenizedCorpora,
     reference: Path,
     critic_file: Path,
     folder: Path,
@@ -245,7 +245,7 @@ def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> T
 
 
 def sampled(
-    translator: Translator, m: NumberedCorpus, data: Numbered, chosen: np.ndarray, purpose: str, turn: int
+    translator: Translator, m: TokenizedCorpora, data: TokenizedCorpus, chosen: np.ndarray, purpose: str, turn: int
 ) -> list[list[int]]:
     """One sampled translation of each chosen sentence (line 3 of Algorithm 2); learners draw alike."""
     longest = m.config.longest
@@ -254,7 +254,7 @@ def sampled(
 
 
 def rated_samples(
-    translator: Translator, m: NumberedCorpus, data: Numbered, chosen: np.ndarray, purpose: str, turn: int
+    translator: Translator, m: TokenizedCorpora, data: TokenizedCorpus, chosen: np.ndarray, purpose: str, turn: int
 ) -> tuple[list[list[int]], list[float]]:
     """Sampled translations, and what a perfect rater would say: smoothed sentence BLEU of the words."""
     samples = sampled(translator, m, data, chosen, purpose, turn)
@@ -262,7 +262,7 @@ def rated_samples(
     return samples, [sentence_bleu(w, data.references[i]) for w, i in zip(words, chosen, strict=True)]
 
 
-def judged(translator: Translator, m: NumberedCorpus, split: str) -> float:
+def judged(translator: Translator, m: TokenizedCorpora, split: str) -> float:
     """Corpus BLEU of greedy translations (A.6), 0 to 100."""
     data = m.splits[split]
     return corpus_bleu(greedy(translator, data, m.lexicons[1], m.config.longest), data.references)
@@ -285,7 +285,7 @@ def _run(
     identity: Identity,
     parts: Mapping[str, Stateful],
     config: BanditConfig,
-    data: Numbered,
+    data: TokenizedCorpus,
     note: Note,
 ) -> list[dict[str, float]]:
     """Go on with a run until it has had its passes over `data`, whose random orders are named by `purpose`; returns

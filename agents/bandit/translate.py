@@ -18,7 +18,7 @@ POOL = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Numbered:
+class TokenizedCorpus:
     """Sentence pairs as numbers."""
 
     source: Sequence[Sequence[int]]
@@ -31,9 +31,11 @@ class Numbered:
         return len(self.source)
 
 
-def numbered(pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Vocabulary, target: Vocabulary) -> Numbered:
+def tokenized(
+    pairs: Sequence[tuple[Sequence[str], Sequence[str]]], source: Vocabulary, target: Vocabulary
+) -> TokenizedCorpus:
     """`pairs` in the numbers of two lexicons."""
-    return Numbered(
+    return TokenizedCorpus(
         [source.sentence(a) for a, _ in pairs], [target.sentence(b) for _, b in pairs], [tuple(b) for _, b in pairs]
     )
 
@@ -84,7 +86,7 @@ def decode(translator: Translator, source: Tensor, choose: Choice, longest: int)
 
 
 def greedy(
-    translator: Translator, data: Numbered, lexicon: Vocabulary, longest: int, batch: int = 128
+    translator: Translator, data: TokenizedCorpus, lexicon: Vocabulary, longest: int, batch: int = 128
 ) -> list[tuple[str, ...]]:
     """The words of all sentences' likeliest translations (A.6), in their order."""
     translations: list[tuple[str, ...]] = [()] * len(data)
@@ -97,7 +99,7 @@ def greedy(
 
 
 @torch.no_grad()
-def perplexity(translator: Translator, data: Numbered, batch: int = 128) -> float:
+def perplexity(translator: Translator, data: TokenizedCorpus, batch: int = 128) -> float:
     """exp of the mean negative log-likelihood of the reference words, END included."""
     total, words = 0.0, 0
     for chosen in in_order([len(s) for s in data.source], batch):

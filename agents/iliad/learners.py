@@ -119,7 +119,7 @@ def mixture(
 
 def dagger(asked: RequestBatch, world: RequestWorld, student: Student) -> IliadLesson:
     """Imitation: the student acts and is shown the best action in every state that it came to."""
-    done = student.practise(asked.tasks, asked.requests, rng=asked.rng)
+    done = student.rollout_for_dagger(asked.tasks, asked.requests, rng=asked.rng)
     shown = [world.demonstrate(q, e) for q, e in zip(asked.tasks, done, strict=True)]
     scores = student.scores(asked.tasks, asked.requests, done, shown)
     return IliadLesson(-scores.objective.sum() / len(asked.tasks), done)

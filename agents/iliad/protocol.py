@@ -36,13 +36,13 @@ class ExecutionScores:
     """(B, T) of pi(. | s_t, d), nats; carries the gradient."""
     mask: Tensor
     """(B, T) bool, False behind the end."""
-    besides: Tensor | None = None
+    auxiliary_loss: Tensor | None = None
     """(B, T) losses of what is learned besides, weighted; carries the gradient."""
 
     @property
     def objective(self) -> Tensor:
         """(B, T), what imitation makes larger."""
-        return self.log_probabilities if self.besides is None else self.log_probabilities - self.besides
+        return self.log_probabilities if self.auxiliary_loss is None else self.log_probabilities - self.auxiliary_loss
 
 
 class RequestWorld(Protocol):
@@ -84,7 +84,7 @@ class Student(Protocol):
     def greedy(self, tasks: Tasks, requests: Sequence[str]) -> list[Any]:
         """The likeliest action in every state."""
 
-    def practise(self, tasks: Tasks, requests: Sequence[str], *, rng: np.random.Generator) -> list[Any]:
+    def rollout_for_dagger(self, tasks: Tasks, requests: Sequence[str], *, rng: np.random.Generator) -> list[Any]:
         """Executions that visit the states in which it will be shown better actions."""
 
     def scores(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Furnished, Printed):
+class AssetsOptions(Furnished, Printed):
     action: Annotated[str, Option(words=("build", "list", "attribution"), name="action")]
     """Action."""
     object_class: Annotated[str | None, Option(metavar="NAME", name="--class")] = None
@@ -30,7 +30,7 @@ class Options(Furnished, Printed):
     """File for the attribution."""
 
 
-def run(args: Options) -> None:
+def run(args: AssetsOptions) -> None:
     catalogue = catalogue_of(args)
     chosen = [a for a in catalogue.assets.values() if args.object_class in (None, a.object_class)]
     if not chosen:
@@ -41,13 +41,13 @@ def run(args: Options) -> None:
     actions[args.action](args, catalogue, chosen)
 
 
-def build(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
+def build(args: AssetsOptions, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Import the meshes into the cache."""
     catalogue.build([a.key for a in chosen])
     show(args, {"models": len(chosen), "cache": str(args.cache)}, f"{len(chosen)} models are ready in {args.cache}")
 
 
-def list_assets(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
+def list_assets(args: AssetsOptions, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Print the catalogue by class."""
     by_class = collections.defaultdict(list)
     for a in chosen:
@@ -57,7 +57,7 @@ def list_assets(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) ->
     show(args, {name: [a.key for a in by_class[name]] for name in sorted(by_class)}, "\n".join(lines))
 
 
-def attribution(args: Options, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
+def attribution(args: AssetsOptions, catalogue: Catalogue, chosen: Sequence[Asset]) -> None:
     """Write who made which model, under which licence."""
     from embodied.assets.attribution import write_attribution
 

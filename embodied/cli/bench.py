@@ -31,7 +31,7 @@ PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Furnished, Printed):
+class BenchOptions(Furnished, Printed):
     part: Annotated[tuple[str, ...], Option(metavar="PART", name="part")] = ()
     """Benchmarks to run (default: houses, pictures, plays)."""
     seed: int = 7
@@ -46,7 +46,7 @@ class Options(Furnished, Printed):
     """serve: the study runs for N seconds."""
 
 
-def run(args: Options) -> None:
+def run(args: BenchOptions) -> None:
     from embodied import gl
     from embodied.bench import bakes, drive, episodes, light, seen, timing, views, world
 

@@ -32,14 +32,14 @@ CACHE_FOLDERS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Cached, Printed):
+class CacheOptions(Cached, Printed):
     prune: Annotated[int | None, Option(whole(), "DAYS")] = None
     """Remove files that nobody has read for DAYS days."""
     clear: tuple[Annotated[str, Option(words=CACHE_FOLDERS)], ...] = ()
     """Remove all files of these kinds."""
 
 
-def run(args: Options) -> None:
+def run(args: CacheOptions) -> None:
     for kind in args.clear:
         if (args.cache / kind).is_dir() and not (args.cache / kind).is_symlink():
             shutil.rmtree(args.cache / kind)

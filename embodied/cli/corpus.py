@@ -21,7 +21,7 @@ from embodied.options import Cached, Count, InputPath, Option, OutputFolder, Set
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Cached):
+class CorpusOptions(Cached):
     out: OutputFolder
     """Folder of the corpus."""
     folder: Annotated[Path | None, Option(any_path, "DIR", name="--from")] = None
@@ -35,7 +35,7 @@ class Options(Cached):
     sizes: Annotated[Sizes, Settings("sizes of the splits", Sizes())]
 
 
-def run(args: Options) -> None:
+def run(args: CorpusOptions) -> None:
     from embodied.agents.bandit import corpus, libreoffice
 
     if args.folder and args.moses:

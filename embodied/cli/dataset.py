@@ -26,7 +26,7 @@ SCALE_HELP = {name: described(name) for name in DATASET_SCALES}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Furnished, Printed):
+class DatasetOptions(Furnished, Printed):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
     """The kind of task: find, vln, vnla, hanna, hari, MODULE:NAME of your own, or from-people."""
     out: OutputFolder
@@ -75,7 +75,7 @@ class Options(Furnished, Printed):
     """Use a Ray cluster instead: its address, or 'local'."""
 
 
-def from_people(args: Options) -> None:
+def from_people(args: DatasetOptions) -> None:
     """A data set with what people said."""
     from embodied.agents.bandit.ratings import fitted
     from embodied.assets.cache import write_json
@@ -98,7 +98,7 @@ def from_people(args: Options) -> None:
     show(args, facts, text)
 
 
-def run(args: Options) -> None:
+def run(args: DatasetOptions) -> None:
     if args.kind == FROM_PEOPLE:
         from_people(args)
         return
@@ -162,7 +162,7 @@ def chosen_pictures(
     return None if word == "none" else parse_pictures(word, size)
 
 
-def chosen_scale(args: Options) -> str | DatasetSize:
+def chosen_scale(args: DatasetOptions) -> str | DatasetSize:
     """The scale that --scale, or --houses and --tasks, name.
 
     Raises:

@@ -34,7 +34,7 @@ SEED = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Filmed, Viewers, Furnished, Printed):
+class DemoOptions(Filmed, Viewers, Furnished, Printed):
     seed: int = SEED
     """Seed of the house."""
     task: Annotated[int, Option(whole(0), "N")] = 0
@@ -51,7 +51,7 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Write the Rerun recording here (default: DIR/episode.rrd)."""
 
 
-def run(args: Options) -> None:
+def run(args: DemoOptions) -> None:
     check_machine("fast" if args.small else args.pictures)
     if args.small:
         show_a_room(args)
@@ -60,7 +60,7 @@ def run(args: Options) -> None:
             demonstrate(args, viewers)
 
 
-def demonstrate(args: Options, viewers: tuple[str, ...]) -> None:
+def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
     """The whole line; both episodes also go to `viewers`."""
     from embodied.generate import generate_house
     from embodied.house.floor_plan import save_plan
@@ -101,7 +101,7 @@ SMALL_FLAT = (32.0, 36.0)
 """Area of the flat of --small, square metres."""
 
 
-def show_a_room(args: Options) -> None:
+def show_a_room(args: DemoOptions) -> None:
     """A small flat from the seed, lit, and the view of it that shows most objects; needs neither torch nor Rerun."""
     import cv2
     import numpy as np
@@ -131,7 +131,7 @@ def show_a_room(args: Options) -> None:
     show(args, facts, f"a room of it: {facts['room']}")
 
 
-def inhabited(house: House, catalogue: Catalogue, args: Options) -> tuple[House, NavGraph, tuple[Route, ...]]:
+def inhabited(house: House, catalogue: Catalogue, args: DemoOptions) -> tuple[House, NavGraph, tuple[Route, ...]]:
     """The house with people at the starts of the routes they know, its graph, and the routes in their words."""
     from embodied.assistants.route_system import WORDINGS, route_paths, worded
     from embodied.generate.people import add_people, place_people
@@ -147,7 +147,7 @@ def inhabited(house: House, catalogue: Catalogue, args: Options) -> tuple[House,
         return house, graph, worded(world, paths, WORDINGS["test"], seed=args.seed, language=People())
 
 
-def find_something(args: Options, world: World, viewers: tuple[str, ...]) -> dict:
+def find_something(args: DemoOptions, world: World, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.evaluation.rollout import play
     from embodied.kinds.find import FIND
@@ -162,7 +162,7 @@ def find_something(args: Options, world: World, viewers: tuple[str, ...]) -> dic
     return recorded(world, episode, args.rrd or args.out / "episode.rrd", viewers)
 
 
-def ask_for_help(args: Options, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
+def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewers: tuple[str, ...]) -> dict:
     """The trained agent, seeing the world's own pictures, does a HANNA task in a house it has never seen; recorded to
     help.rrd."""
     from embodied.agents.common.shipped import SHIPPED_AGENT

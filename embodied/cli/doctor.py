@@ -52,14 +52,14 @@ class Finding:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Furnished, Printed):
+class DoctorOptions(Furnished, Printed):
     fix: bool = False
     """Install without root what is missing: furniture models, software OpenGL and LLVM by pip, libatomic by apt-get."""
     pack: Annotated[tuple[Path, ...], Option(any_path, "FILE", repeated=True)] = ()
     """With --fix: install this .sh3f furniture library for all commands; may be repeated."""
 
 
-def run(args: Options) -> int:
+def run(args: DoctorOptions) -> int:
     if args.pack and not args.fix:
         raise ValueError("--pack goes together with --fix, which installs the furniture library for all commands")
     findings = []
@@ -122,7 +122,7 @@ def _pip(name: str) -> bool:
     return subprocess.run(order, capture_output=True, check=False).returncode == 0
 
 
-def versions(_: Options) -> Finding:
+def versions(_: DoctorOptions) -> Finding:
     """Python and library versions; every one listed is needed."""
     installed, missing = _installed(LIBRARIES)
     text = ", ".join([f"Python {platform.python_version()}", *installed])
@@ -130,7 +130,7 @@ def versions(_: Options) -> Finding:
     return Finding("versions", not missing, text, f"pip install {DISTRIBUTION}")
 
 
-def extras(_: Options) -> Finding:
+def extras(_: DoctorOptions) -> Finding:
     """Libraries that only some commands need."""
     parts, lacking = [], []
     for extra, names in EXTRAS.items():
@@ -155,7 +155,7 @@ def _installed(names: Sequence[str]) -> tuple[list[str], list[str]]:
     return installed, missing
 
 
-def renderer(_: Options) -> Finding:
+def renderer(_: DoctorOptions) -> Finding:
     """The off-screen renderer that MuJoCo gets."""
     from embodied import gl
 
@@ -166,7 +166,7 @@ def renderer(_: Options) -> Finding:
     return Finding("renderer", True, str(device))
 
 
-def packs(args: Options) -> Finding:
+def packs(args: DoctorOptions) -> Finding:
     """The furniture libraries, and whether they hold every model of the catalogue."""
     from embodied.assets.importing.packs import find_packs
 
@@ -187,7 +187,7 @@ def packs(args: Options) -> Finding:
     return Finding("furniture", not missing, text, remedy, False)
 
 
-def path_tracer(_: Options) -> Finding:
+def path_tracer(_: DoctorOptions) -> Finding:
     """Mitsuba with CUDA or LLVM, which computes light; houses are drawn unlit without."""
     from embodied.light.backend import VARIANTS, LightError, device
 
@@ -199,14 +199,14 @@ def path_tracer(_: Options) -> Finding:
     return Finding("path tracer", True, f"Mitsuba on {backend} (variant {variant})", needed=False)
 
 
-def body(_: Options) -> Finding:
+def body(_: DoctorOptions) -> Finding:
     """dm-control, which the driven body needs; its dependency labmaze has no wheel for Python 3.13."""
     installed, missing = _installed(("dm-control",))
     remedy = "only embodied/Drive-v0 needs it: pip install --no-deps dm-control"
     return Finding("driven body", not missing, (*installed, "no dm-control")[0], remedy, False)
 
 
-def disk(args: Options) -> Finding:
+def disk(args: DoctorOptions) -> Finding:
     """Free space where the cache lives, and whether it can be written."""
     place = args.cache.absolute()
     while not place.exists():

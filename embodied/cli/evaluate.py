@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from embodied.agents.language_models.options import client_of
 from embodied.cli.common import bar, catalogue_of, note, show
-from embodied.cli.evaluate_options import TEMPLATE, Options
+from embodied.cli.evaluate_options import TEMPLATE, EvaluateOptions
 
 if TYPE_CHECKING:
     from embodied.agents.learner import Learner
@@ -93,7 +93,7 @@ class EvaluationResults:
     """Split and agent to how many of the routes that it was told a scripted listener arrives with, and how many."""
 
 
-def run(args: Options) -> None:
+def run(args: EvaluateOptions) -> None:
     from embodied.locks import locked
     from embodied.records import episodes_file, save_lines
 
@@ -110,7 +110,7 @@ def run(args: Options) -> None:
 # What is evaluated -------------------------------------------------------------------------------
 
 
-def parsed(args: Options) -> Evaluation:
+def parsed(args: EvaluateOptions) -> Evaluation:
     """
     Raises:
       ValueError: an unknown kind, split, agent, rule or assistant, or options that do not go together.
@@ -149,7 +149,7 @@ def parsed(args: Options) -> Evaluation:
     )
 
 
-def agents_of(args: Options, kind: TaskKind) -> tuple[dict[str, str], tuple[Learner, Path] | None]:
+def agents_of(args: EvaluateOptions, kind: TaskKind) -> tuple[dict[str, str], tuple[Learner, Path] | None]:
     """The agents without training that --agent lists, by row, and the trained one with its learner.
 
     Raises:
@@ -198,7 +198,7 @@ def rows_of(names: Iterable[str]) -> dict[str, str]:
 # Playing -----------------------------------------------------------------------------------------
 
 
-def play_all(args: Options, evaluation: Evaluation, keep: Keep) -> EvaluationResults:
+def play_all(args: EvaluateOptions, evaluation: Evaluation, keep: Keep) -> EvaluationResults:
     """Play everything; a trained agent last, with the agents of its paper's tables beside it."""
     results, data = EvaluationResults(), evaluation.data
     if evaluation.agents:
@@ -216,7 +216,7 @@ def play_all(args: Options, evaluation: Evaluation, keep: Keep) -> EvaluationRes
 
 
 def play_split(
-    args: Options, evaluation: Evaluation, split: SplitData, keep: Keep, listener: dict[str, tuple[int, int]]
+    args: EvaluateOptions, evaluation: Evaluation, split: SplitData, keep: Keep, listener: dict[str, tuple[int, int]]
 ) -> list[Row]:
     """The rows of agents without training; `listener` gets what a scripted one makes of the routes that each heard."""
     from embodied.agents.language_models.routes import followed_replies
@@ -235,13 +235,13 @@ def play_split(
     return evaluate(evaluation.changed(split), agents, keep=kept, watch=watch, **how)
 
 
-def looks(args: Options, evaluation: Evaluation) -> bool:
+def looks(args: EvaluateOptions, evaluation: Evaluation) -> bool:
     """True where somebody looks around, so that houses are opened as worlds; generated ones are anyway."""
     looking = {LLM, *evaluation.kind.looking} & {*evaluation.agents.values()}
     return evaluation.data is None or bool(looking) or args.assistant != TEMPLATE
 
 
-def opened_splits(args: Options, evaluation: Evaluation) -> Iterable[SplitData]:
+def opened_splits(args: EvaluateOptions, evaluation: Evaluation) -> Iterable[SplitData]:
     """The splits of a data set, the houses of a list of seeds, or a generated flat."""
     data, assistant = evaluation.data, evaluation.assistant
     if data is None:
@@ -255,7 +255,7 @@ def opened_splits(args: Options, evaluation: Evaluation) -> Iterable[SplitData]:
         yield data.split(split, worlds=worlds, rules=evaluation.rules, assistant=assistant)
 
 
-def generated(args: Options, evaluation: Evaluation) -> SplitData:
+def generated(args: EvaluateOptions, evaluation: Evaluation) -> SplitData:
     """A flat, or the houses of a list of seeds, which what is written down names by their place in the list alone."""
     from embodied.datasets.store import SplitData
     from embodied.evaluation.ask import read_seeds
@@ -278,7 +278,7 @@ def generated(args: Options, evaluation: Evaluation) -> SplitData:
 
 
 def agent_of(
-    args: Options, evaluation: Evaluation, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None
+    args: EvaluateOptions, evaluation: Evaluation, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None
 ) -> Agent:
     """An agent without training."""
     from embodied.evaluation.ask import submitted
@@ -289,7 +289,7 @@ def agent_of(
     return kind.agent(name, worlds) if name in kind.agent_names else submitted(name)
 
 
-def model_agent(args: Options, split: SplitData, client: Any) -> Agent:
+def model_agent(args: EvaluateOptions, split: SplitData, client: Any) -> Agent:
     """A language model that is shown what --sees says."""
     from embodied.agents.language_models.agent import LanguageModelAgent
     from embodied.agents.language_models.observations import OracleNames
@@ -313,7 +313,7 @@ def seen_places(worlds: Mapping[str, Place]) -> Mapping[str, SeenPlace]:
 # Results -----------------------------------------------------------------------------------------
 
 
-def write(args: Options, evaluation: Evaluation, results: EvaluationResults) -> None:
+def write(args: EvaluateOptions, evaluation: Evaluation, results: EvaluationResults) -> None:
     """Print the table, and write what goes into --out."""
     from embodied.assets.cache import write_json
     from embodied.evaluation import tables

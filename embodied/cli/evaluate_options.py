@@ -66,7 +66,7 @@ class OfTrained:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
+class EvaluateOptions(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
     kind: Annotated[str, Option(metavar="KIND", name="kind")]
     """The kind of task: find, vln, vnla, hanna, hari, ask, or MODULE:NAME of your own."""
     agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()

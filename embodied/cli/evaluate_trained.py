@@ -15,13 +15,13 @@ from embodied.evaluation.tables import Row
 from embodied.render.pictures import in_words
 
 if TYPE_CHECKING:
-    from embodied.cli.evaluate_options import Options
+    from embodied.cli.evaluate_options import EvaluateOptions
     from embodied.datasets.store import Dataset, SplitData
     from embodied.interface import Episode
 
 
 def evaluate_trained(
-    args: Options,
+    args: EvaluateOptions,
     data: Dataset,
     learner: Learner,
     file: Path,
@@ -74,7 +74,7 @@ def evaluate_trained(
     return rows, facts | {"identity": identity_of(*JUDGES)}
 
 
-def record_trained(args: Options, data: Dataset, run: Path, first: int) -> None:
+def record_trained(args: EvaluateOptions, data: Dataset, run: Path, first: int) -> None:
     """Record the `first` episodes of the trained agent on each split, in their houses as the data set holds them."""
     from embodied.assets.catalogue import load_catalogue
     from embodied.cli.view import record_again

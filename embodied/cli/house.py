@@ -24,7 +24,7 @@ HOUSE_WORDS["novelty"] = NOVELTIES
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Furnished, Printed):
+class GenerateOptions(Furnished, Printed):
     out: OutputFolder
     """Folder to write, made if missing."""
     seed: int = 0
@@ -38,7 +38,7 @@ class Options(Furnished, Printed):
     config: Annotated[HouseConfig, Settings(KIND, HouseConfig(), words=HOUSE_WORDS)]
 
 
-def run(args: Options) -> None:
+def run(args: GenerateOptions) -> None:
     from embodied.house.floor_plan import save_plan
     from embodied.navigation.connectivity import to_matterport
     from embodied.navigation.graph import build_graph

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Nav, Printed):
+class IliadOptions(Nav, Printed):
     student: Annotated[Path | None, Option(any_path, "FILE", name="student")] = None
     """A trained student, best.safetensors (default: the shipped one of its world)."""
     world: Annotated[str, Option(words=("regex", "nav"))] = "regex"
@@ -55,7 +55,7 @@ class Options(Nav, Printed):
     """NAV: record the first episode, for Rerun."""
 
 
-def run(args: Options) -> None:
+def run(args: IliadOptions) -> None:
     if args.world == "nav":
         walks(args, args.student or SHIPPED_WALKER)
         return
@@ -69,7 +69,7 @@ def run(args: Options) -> None:
         episodes(args, student)
 
 
-def own_request(args: Options, file: Path, request: str) -> None:
+def own_request(args: IliadOptions, file: Path, request: str) -> None:
     """What the student makes of the user's words."""
     from embodied.agents.iliad.regex.data import WordTask
     from embodied.agents.iliad.regex.rules import LETTERS
@@ -84,7 +84,7 @@ def own_request(args: Options, file: Path, request: str) -> None:
     show(args, body, f"{args.word} -> {output or '(no rule)'}   by {done.rule}\n")
 
 
-def episodes(args: Options, file: Path) -> None:
+def episodes(args: IliadOptions, file: Path) -> None:
     """Episodes with the student's own teacher."""
     from embodied.agents.iliad.regex.run import load_student, prepare
     from embodied.agents.iliad.regex.showing import lines_of, tell
@@ -101,7 +101,7 @@ def episodes(args: Options, file: Path) -> None:
     show(args, {"episodes": [dataclasses.asdict(t) for t in told]}, text + "\n")
 
 
-def walks(args: Options, file: Path) -> None:
+def walks(args: IliadOptions, file: Path) -> None:
     """Episodes of NAV with the student's own teacher, or another one."""
     from embodied.agents.iliad.nav.config import NavConfig
     from embodied.agents.iliad.nav.run import NavSource, prepare
@@ -134,7 +134,7 @@ def walks(args: Options, file: Path) -> None:
     show(args, {"episodes": [dataclasses.asdict(told) for told, _ in shown]}, text + "\n")
 
 
-def _record(args: Options, data: Dataset, student: NavStudent, trip: Trip, shown: tuple[NavTold, NavWalk]) -> None:
+def _record(args: IliadOptions, data: Dataset, student: NavStudent, trip: Trip, shown: tuple[NavTold, NavWalk]) -> None:
     """The first episode as a Rerun recording, with what the student saw."""
     from embodied.agents.iliad.nav.showing import episode_of
     from embodied.agents.vision.drawn import drawn_world, pictures_of

@@ -41,7 +41,7 @@ def hour(text: str) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Furnished, Printed):
+class LightOptions(Furnished, Printed):
     folder: Annotated[Path, Option(house_folder, "DIR", name="folder")]
     """Folder that `embodied house` wrote."""
     time: Annotated[float | None, Option(hour, "TIME")] = None
@@ -60,7 +60,7 @@ class Options(Furnished, Printed):
     """Light it K times: as it is, and with hour, weather and lamps drawn from its seed."""
 
 
-def run(args: Options) -> None:
+def run(args: LightOptions) -> None:
     from embodied.house.lighting import load_lit_house, save_lightings
     from embodied.light import bake_all, lightings_of, progress_bar
     from embodied.light.backend import device

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Furnished, Printed):
+class RenderOptions(Furnished, Printed):
     folder: Annotated[Path, Option(house_folder, "DIR", name="folder")]
     """Folder that `embodied house` wrote."""
     size: CubeFace = 512
@@ -43,7 +43,7 @@ class Options(Furnished, Printed):
     """Random seed of the camera's imperfections."""
 
 
-def run(args: Options) -> None:
+def run(args: RenderOptions) -> None:
     from embodied.world import open_folder
 
     if (args.node is None) != (args.equirect is None and args.view is None):
@@ -67,7 +67,7 @@ def run(args: Options) -> None:
     show(args, facts, f"{facts['nodes']} panoramas in {path} ({facts['mib']} MiB)")
 
 
-def one(args: Options, node: int, world: World) -> None:
+def one(args: RenderOptions, node: int, world: World) -> None:
     """Draw one viewpoint as an equirectangular PNG, or a view from it, or both."""
     import cv2
 

@@ -25,7 +25,7 @@ AGENTS = ("shortest", "random", "forward10")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Filmed, Viewers, Furnished, Printed):
+class RolloutOptions(Filmed, Viewers, Furnished, Printed):
     house: HouseFolder | None = None
     """Folder that `embodied house` wrote (default: a house generated from --seed)."""
     seed: int = 0
@@ -42,13 +42,13 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Camera of videos and recordings."""
 
 
-def run(args: Options) -> None:
+def run(args: RolloutOptions) -> None:
     check_machine("unlit" if args.house else args.pictures)  # a house may be lit already
     with viewers_of(args) as viewers:
         roll_out(args, viewers)
 
 
-def roll_out(args: Options, viewers: tuple[str, ...]) -> None:
+def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
     """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.rollout import play
@@ -90,7 +90,7 @@ def roll_out(args: Options, viewers: tuple[str, ...]) -> None:
     show(args, facts, "\n".join(lines))
 
 
-def world_of(args: Options) -> World:
+def world_of(args: RolloutOptions) -> World:
     """The world of --house, or of the generated house of --seed."""
     from embodied.generate import generate_house
     from embodied.world import open_folder, open_world

@@ -48,7 +48,7 @@ def any_address(text: str) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(WithModel, Furnished, Printed):
+class PeopleStudyOptions(WithModel, Furnished, Printed):
     study: Annotated[Path, Option(any_path, "STUDY.toml", name="study")]
     """The study."""
     out: OutputFolder | None = None
@@ -70,7 +70,7 @@ class Options(WithModel, Furnished, Printed):
 NEEDED = ("starlette", "uvicorn", "websockets")
 
 
-def run(args: Options) -> None:
+def run(args: PeopleStudyOptions) -> None:
     if missing := [n for n in NEEDED if importlib.util.find_spec(n) is None]:
         raise UnableError(f"the server needs {', '.join(missing)}; run: pip install '{DISTRIBUTION}[serve]'")
     from embodied.agents.language_models.assistant import assistant_maker
@@ -106,7 +106,7 @@ def run(args: Options) -> None:
     serve(opened, args.host, args.port)
 
 
-def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
+def drawn(data: Dataset, name: str, study: Study, args: PeopleStudyOptions) -> Path:
     """The panoramas of a house: the data set's where they are sharp enough for the study, else drawn into the cache."""
     stored = data.drawn_pictures(name)
     if stored is not None and stored.size >= study.size:
@@ -127,13 +127,13 @@ def drawn(data: Dataset, name: str, study: Study, args: Options) -> Path:
         return data.panoramas(name)
 
 
-def live_world(data: Dataset, name: str, study: Study, args: Options) -> World:
+def live_world(data: Dataset, name: str, study: Study, args: PeopleStudyOptions) -> World:
     """A house to be drawn for people who drive: as its panoramas are, as far as that is quick."""
     pictures = data.drawn_pictures(name) or parse_pictures(study.pictures, study.size)
     return world_of(data, name, Baked("fast", gloss=False) if isinstance(pictures, Traced) else matte(pictures), args)
 
 
-def world_of(data: Dataset, name: str, pictures: PictureSettings, args: Options) -> World:
+def world_of(data: Dataset, name: str, pictures: PictureSettings, args: PeopleStudyOptions) -> World:
     """A house of the data set, to be drawn so."""
     from embodied.world import open_world
 
@@ -146,7 +146,7 @@ def listening_at(host: str, port: int) -> str:
     return page_address(f"http://{f'[{host}]' if ':' in host else host}:{port}")
 
 
-def addresses_of(args: Options) -> tuple[str, ...] | None:
+def addresses_of(args: PeopleStudyOptions) -> tuple[str, ...] | None:
     """Addresses of the page; None where the server listens to all and nobody said its address."""
     own = tuple(listening_at(name, args.port) for name in LOOPBACKS)
     if args.address:

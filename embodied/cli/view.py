@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(Filmed, Viewers, Furnished, Printed):
+class ViewOptions(Filmed, Viewers, Furnished, Printed):
     folder: Annotated[Path, Option(any_path, "RUN", name="folder")]
     """A .rrd file, or a folder with episodes*.jsonl."""
     episode: Annotated[int | None, Option(whole(0), "N")] = None
@@ -43,7 +43,7 @@ class Options(Filmed, Viewers, Furnished, Printed):
     """Write the Rerun recording here (default: RUN/recordings/N.rrd)."""
 
 
-def run(args: Options) -> None:
+def run(args: ViewOptions) -> None:
     if args.folder.suffix == ".rrd":
         show_file(args)
         return
@@ -60,7 +60,7 @@ def run(args: Options) -> None:
         show(args, {"episodes": facts}, "\n".join(summary_line(i, e) for i, e in enumerate(episodes)))
 
 
-def show_file(args: Options) -> None:
+def show_file(args: ViewOptions) -> None:
     """Open a .rrd file in a new viewer, in the browser or in a viewer that runs."""
     if not args.folder.exists():
         raise FileNotFoundError(
@@ -75,7 +75,7 @@ def show_file(args: Options) -> None:
             send_file(args.folder, viewers)
 
 
-def record_one(args: Options, episodes: Sequence[Listed], number: int) -> None:
+def record_one(args: ViewOptions, episodes: Sequence[Listed], number: int) -> None:
     """Draw one episode of a run again, into a recording."""
     from embodied.datasets.store import Dataset
     from embodied.viz.sinks import Sinks

@@ -67,7 +67,7 @@ def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note
 
     def loss_of(rng: np.random.Generator) -> Tensor:
         chosen, requests = _batch(trips, config.teacher_batch, rng)
-        done = executor.practise(chosen, requests, rng=rng)
+        done = executor.rollout_for_dagger(chosen, requests, rng=rng)
         shown = [world.demonstrate(q, e) for q, e in zip(chosen, done, strict=True)]
         return -executor.scores(chosen, requests, done, shown).objective.sum() / len(chosen)
 

@@ -123,7 +123,9 @@ class NavStudent:
     def greedy(self, tasks: Sequence[Trip], requests: Sequence[str]) -> list[NavWalk]:
         return self._walk(tasks, requests, greedy_choice)
 
-    def practise(self, tasks: Sequence[Trip], requests: Sequence[str], *, rng: np.random.Generator) -> list[NavWalk]:
+    def rollout_for_dagger(
+        self, tasks: Sequence[Trip], requests: Sequence[str], *, rng: np.random.Generator
+    ) -> list[NavWalk]:
         """Sampled, but `guided` of the steps lead along shortest paths."""
         choose = sampled_choice(rng.random((len(tasks), MOVES)))
         return self._walk(tasks, requests, choose, rng.random((len(tasks), MOVES)) < self.config.guided)
@@ -155,8 +157,8 @@ class NavStudent:
             log = outputs.moves.log_softmax(-1).masked_fill(~seen.mask, 0.0)
             right = torch.tensor([k.number(wanted[i].steps[t]) for k, i in zip(now, rows)])
             entropy = -(log.exp() * log * seen.mask).sum(-1)
-            besides = self._besides(outputs, now, [ends[i] for i in rows])
-            scores_of_steps.append((log.gather(1, right[:, None])[:, 0], entropy, besides))
+            auxiliary_loss = self._auxiliary_loss(outputs, now, [ends[i] for i in rows])
+            scores_of_steps.append((log.gather(1, right[:, None])[:, 0], entropy, auxiliary_loss))
             where += [(i, t) for i in rows]
             taken = [k.number(executions[i].steps[t]) for k, i in zip(now, rows)]
             heard = dataclasses.replace(heard, taken=outputs.tokens[torch.arange(len(rows)), torch.tensor(taken)])
@@ -164,11 +166,11 @@ class NavStudent:
                 track.go(number)
         at, steps = tuple(torch.tensor(where).T), max(t for _, t in where) + 1
         spread = lambda parts: torch.zeros(len(tasks), steps).index_put(at, torch.cat(parts))
-        log_probabilities, entropies, besides = map(spread, zip(*scores_of_steps))
+        log_probabilities, entropies, auxiliary_loss = map(spread, zip(*scores_of_steps))
         mask = torch.zeros(len(tasks), steps, dtype=torch.bool).index_put(at, torch.tensor(True))
-        return ExecutionScores(log_probabilities, entropies, mask, besides)
+        return ExecutionScores(log_probabilities, entropies, mask, auxiliary_loss)
 
-    def _besides(self, outputs: FollowerOutputs, tracks: Sequence[Track], ends: Sequence[int]) -> Tensor:
+    def _auxiliary_loss(self, outputs: FollowerOutputs, tracks: Sequence[Track], ends: Sequence[int]) -> Tensor:
         """(k,) losses of the guesses which share of the way to `ends` is left, and what kinds of rooms are near."""
         c = self.config
         left = [share_left(self.eyes.places[k.world].graph, k.nodes, end) for k, end in zip(tracks, ends)]

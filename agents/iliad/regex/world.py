@@ -81,7 +81,7 @@ class RegexStudent:
     def greedy(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> list[Written]:
         return self._write(tasks, requests, greedy_choice)
 
-    def practise(
+    def rollout_for_dagger(
         self, tasks: Sequence[WordTask], requests: Sequence[str], *, rng: np.random.Generator
     ) -> list[Written]:
         return self.greedy(tasks, requests)
