@@ -12,14 +12,14 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 from PIL import Image
 
-MOST = 4 * 2**30
+MOST_UNPACKED = 4 * 2**30
 """Most bytes that the arrays of one file unpack to; those of a large house's light are a third of it."""
 MOST_PIXELS = 2**27
 """Of a picture; the largest here has an eighth of them."""
 
 
 @contextlib.contextmanager
-def open_arrays(file: Path | BinaryIO, most: int = MOST) -> Iterator[NpzFile]:
+def open_arrays(file: Path | BinaryIO, most: int = MOST_UNPACKED) -> Iterator[NpzFile]:
     """An open .npz archive; its arrays are unpacked when they are asked for.
 
     Raises:

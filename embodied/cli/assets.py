@@ -1,4 +1,4 @@
-"""Build, list or show the catalogue of furniture.
+"""Build or list the catalogue of furniture, or write who made which model.
 
 `build` imports every model of the furniture packs into the cache (otherwise each is imported when first needed), `list`
 prints the catalogue, `attribution` writes who made which model, under which licence.

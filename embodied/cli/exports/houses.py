@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from embodied.house.house import House
     from embodied.scene.lit_pages import LitPages
 
-QUALITIES = ("fast", "normal", "high")
+LIT_QUALITIES = ("fast", "normal", "high")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +24,7 @@ class HouseOptions(Furnished, Printed):
 
     house: HouseFolder
     """Folder that `embodied house` wrote."""
-    light: Annotated[str, Option(words=("none", *QUALITIES))] = "normal"
+    light: Annotated[str, Option(words=("none", *LIT_QUALITIES))] = "normal"
     """Quality of the baked light; none: export the unlit house."""
 
 
@@ -54,7 +54,7 @@ class UsdOptions(HouseOptions):
 
     out: Annotated[Path, Option(file_ending_in(".usdz"), "FILE")]
     """File to write."""
-    light: Annotated[str, Option(words=QUALITIES)] = "normal"
+    light: Annotated[str, Option(words=LIT_QUALITIES)] = "normal"
     """Quality of the baked light."""
 
 
