@@ -72,7 +72,7 @@ def main() -> None:
     env = gymnasium.make(
         "embodied/Find-v0",
         seed=args.seed,
-        sees="rgb",
+        observations="rgb",
         view=ViewSettings("view", 128, 128),
         pictures=parse_pictures(args.pictures, 128),
     )

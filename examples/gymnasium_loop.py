@@ -21,10 +21,10 @@ def main() -> None:
     parser.add_argument("--kind", default="HANNA", choices=("Find", "VLN", "VNLA", "HANNA", "HARI"))
     parser.add_argument("--episodes", type=int, default=3)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--sees", nargs="+", default=["oracle"], help="rgb, depth, ids, features or oracle")
+    parser.add_argument("--observations", nargs="+", default=["oracle"], help="rgb, depth, ids, features or oracle")
     args = parser.parse_args()
 
-    env = gymnasium.make(f"embodied/{args.kind}-v0", seed=args.seed, sees=args.sees)
+    env = gymnasium.make(f"embodied/{args.kind}-v0", seed=args.seed, observations=args.observations)
     rng = np.random.default_rng(args.seed)
     for episode in range(args.episodes):
         observation, info = env.reset(seed=args.seed + episode)

@@ -3,7 +3,7 @@
     cd examples
     embodied dataset my_task:VISIT --out DATA --houses 2 --pictures none
     embodied evaluate my_task:VISIT --data DATA
-    python -c "import gymnasium; gymnasium.make('my_task:embodied/Visit-v0', data='DATA', sees='oracle')"
+    python -c "import gymnasium; gymnasium.make('my_task:embodied/Visit-v0', data='DATA', observations='oracle')"
 
 docs/tutorials/your_task.md explains it line by line.
 """

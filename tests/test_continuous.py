@@ -148,7 +148,7 @@ def test_vector_environments_play_as_one_alone_does(world, dataset):
 
 
 def test_running_out_of_actions_truncates_and_stop_terminates(dataset):
-    env = ContinuousGymEnv(replace(dataset, body=Body(steps=3), sees=()))
+    env = ContinuousGymEnv(replace(dataset, body=Body(steps=3), observations=()))
     env.reset(seed=0)
     ends = [env.step(HabitatAction.LEFT)[2:4] for _ in range(3)]
     assert ends == [(False, False), (False, False), (False, True)]
@@ -289,7 +289,7 @@ def test_vlnce_episodes_come_back_from_their_files(world, dataset, tmp_path):
     experts = json.loads(gzip.decompress(gt.read_bytes()))
     assert experts["1"]["actions"][-1] == 0
     again = open_episodes("vlnce", worlds={world.name: world}, episodes=whole, **SMALL)
-    env = ContinuousGymEnv(replace(again, sees=()))
+    env = ContinuousGymEnv(replace(again, observations=()))
     env.reset(options={"episode": 0})
     for action in experts["1"]["actions"]:
         info = env.step(action)[-1]

@@ -28,7 +28,7 @@ KINDS = ("find", "vln", "vnla", "hanna", "hari")
 
 
 def make(kind: str, tmp: str, **options):
-    return embodied.gym.env.make(kind, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options)
+    return embodied.gym.env.make(kind, cache=tmp, worlds={"grid": grid_world()}, observations="oracle", **options)
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_the_environment_checker_has_nothing_to_say(kind, tmp):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         name, worlds = f"embodied/{shipped_kinds()[kind]}-v0", {"grid": grid_world()}
-        env = gym.make(name, cache=tmp, worlds=worlds, sees="oracle", render_mode="rgb_array")
+        env = gym.make(name, cache=tmp, worlds=worlds, observations="oracle", render_mode="rgb_array")
         check_env(env.unwrapped, skip_render_check=False)
 
 
@@ -175,7 +175,12 @@ def test_an_assistant_need_not_name_where_a_subtask_starts(tmp):
 
 def test_an_assistant_is_named_by_module_and_class_and_refused_where_nobody_is_asked(tmp):
     envs = gym.make_vec(
-        "embodied/HANNA-v0", 2, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", assistant="test_gym:Guide"
+        "embodied/HANNA-v0",
+        2,
+        cache=tmp,
+        worlds={"grid": grid_world()},
+        observations="oracle",
+        assistant="test_gym:Guide",
     )
     _, info = envs.reset(seed=0)
     *_, info = envs.step(np.full(2, number(Ask(), SpaceLayout())))

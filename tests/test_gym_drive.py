@@ -45,11 +45,11 @@ def test_ways_over_free_floor_are_straight_lines_and_others_are_longer(world):
 
 @pytest.mark.parametrize("task", ["reach", "find"])
 def test_gymnasium_accepts_the_environment(world, task):
-    check_env(env_of(world, task=task, sees=("rgb", "depth", "ids")), skip_render_check=True)
+    check_env(env_of(world, task=task, observations=("rgb", "depth", "ids")), skip_render_check=True)
 
 
 def test_depth_straight_ahead_is_how_far_the_wall_is(world):
-    env = env_of(world, sees=("rgb", "depth"))
+    env = env_of(world, observations=("rgb", "depth"))
     env.reset(seed=0)
     driving = env.driving
     for x in (3.0, 4.0):
@@ -65,7 +65,7 @@ def test_depth_straight_ahead_is_how_far_the_wall_is(world):
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["reach", "find"])
 def test_whoever_knows_the_way_arrives_without_a_collision(world, task):
-    env = env_of(world, task=task, sees=())
+    env = env_of(world, task=task, observations=())
     for seed in range(6):
         env.reset(seed=seed)
         ended = False
@@ -76,7 +76,7 @@ def test_whoever_knows_the_way_arrives_without_a_collision(world, task):
 
 
 def test_a_wall_stops_the_body_and_is_counted_once(world):
-    env = env_of(world, sees=())
+    env = env_of(world, observations=())
     env.reset(seed=1)
     env.driving.driver.place(np.array([4.0, 3.0, 1.5]), 0.0)
     steps = [env.step(np.array([1.0, 0.0])) for _ in range(30)]
@@ -85,7 +85,7 @@ def test_a_wall_stops_the_body_and_is_counted_once(world):
 
 
 def test_time_is_up_or_the_wrong_thing_is_said(world):
-    env = env_of(world, task="find", sees=(), seconds=1.0)
+    env = env_of(world, task="find", observations=(), seconds=1.0)
     env.reset(seed=3)
     ends = [env.step(np.zeros(3)) for _ in range(10)]
     assert [e[3] for e in ends] == [False] * 9 + [True] and ends[-1][4]["success"] == 0.0
@@ -108,7 +108,7 @@ def test_live_pictures_are_without_reflections_unless_they_are_named(named, tmp_
 def test_wishes_that_cannot_be_had_are_refused(world):
     wrong = [
         {"task": "fly"},
-        {"sees": ("smell",)},
+        {"observations": ("smell",)},
         {"height": 0},
         {"vfov": math.pi},
         {"control": 0.0},
@@ -122,7 +122,7 @@ def test_wishes_that_cannot_be_had_are_refused(world):
     env = env_of(world, nearest=40.0, farthest=50.0)
     with pytest.raises(ValueError, match="no goal for 'reach'"):
         env.reset(seed=0)
-    env = env_of(world, sees=())
+    env = env_of(world, observations=())
     env.reset(seed=0)
     with pytest.raises(ValueError, match="2 finite numbers"):
         env.step(np.array([1.0, 0.0, 1.0]))

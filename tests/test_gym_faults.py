@@ -39,7 +39,7 @@ def tmp(tmp_path_factory) -> str:
 
 def batch(tmp, n=3, **options) -> SharedSyncVectorEnv:
     return embodied.gym.vector_env.make_vec(
-        "find", n, cache=tmp, worlds={"grid": grid_world()}, sees="oracle", **options
+        "find", n, cache=tmp, worlds={"grid": grid_world()}, observations="oracle", **options
     )
 
 
@@ -142,7 +142,7 @@ def test_every_last_info_has_success_is_success_and_spl(kind, tmp):
 @pytest.mark.parametrize("mode", ["one", "vector_entry_point", "sync"])
 def test_gymnasiums_limit_keeps_success_and_spl_in_the_last_info(tmp, mode, needs_stop):
     """It cuts an episode short without a word to the environment: here at the goal, or two steps before."""
-    options = {"cache": tmp, "worlds": {"grid": grid_world()}, "sees": "oracle", "needs_stop": needs_stop}
+    options = {"cache": tmp, "worlds": {"grid": grid_world()}, "observations": "oracle", "needs_stop": needs_stop}
     env = make("find", tmp)
     _, info = env.reset(seed=2)
     options, way = options | {"disable_env_checker": True}, []
@@ -166,7 +166,7 @@ def test_gymnasiums_limit_keeps_success_and_spl_in_the_last_info(tmp, mode, need
 
 def test_an_environment_that_is_registered_again_has_its_limit_in_batches_too(tmp):
     known = gym.spec("embodied/Find-v0")
-    kwargs = {**known.kwargs, "cache": tmp, "worlds": {"grid": grid_world()}, "sees": "oracle"}
+    kwargs = {**known.kwargs, "cache": tmp, "worlds": {"grid": grid_world()}, "observations": "oracle"}
     makers = {"entry_point": known.entry_point, "vector_entry_point": known.vector_entry_point}
     gym.register("mine/Find-v0", **makers, kwargs=kwargs, max_episode_steps=1)
     for env in (gym.make("mine/Find-v0"), gym.make_vec("mine/Find-v0", num_envs=2)):
@@ -204,7 +204,9 @@ def test_pictures_of_all_houses_have_one_even_size(tmp):
     sizes = set()
     for shape in ((4, 1.5), (6, 2.5)):
         world = grid_world(*shape)
-        env = embodied.gym.env.make("find", cache=tmp, worlds={"grid": world}, sees="oracle", render_mode="rgb_array")
+        env = embodied.gym.env.make(
+            "find", cache=tmp, worlds={"grid": world}, observations="oracle", render_mode="rgb_array"
+        )
         env.reset(seed=0)
         sizes.add(env.render().shape)
     assert sizes == {(544, 1120, 3)}

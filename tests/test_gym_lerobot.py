@@ -75,7 +75,7 @@ def test_the_hubs_file_makes_the_environment(world, tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ENVS)
 def test_the_blind_see_black_and_feel_the_same(world, name):
     (seeing, _), (blind, _) = (
-        make_one(name, worlds={world.name: world}, **SMALL, **sees).reset(seed=2) for sees in ({}, {"sees": ()})
+        make_one(name, worlds={world.name: world}, **SMALL, **sees).reset(seed=2) for sees in ({}, {"observations": ()})
     )
     assert seeing["pixels"].any() and not blind["pixels"].any() and seeing["pixels"].shape == blind["pixels"].shape
     assert (seeing["agent_pos"] == blind["agent_pos"]).all()
@@ -98,7 +98,7 @@ def drives(world, tmp_path_factory):
 
 
 def test_whoever_takes_the_written_commands_sees_the_written_states_and_arrives(world, drives):
-    table, env = drives[0.0], make_one("Drive", worlds={world.name: world}, farthest=4.0, sees=(), **SMALL)
+    table, env = drives[0.0], make_one("Drive", worlds={world.name: world}, farthest=4.0, observations=(), **SMALL)
     assert tuple(DRIVES[key][0].list_size for key in ("action", "observation.state")) == sizes("Drive")
     for k in range(3):
         mine = [i for i, number in enumerate(table["episode_index"]) if number == k]

@@ -26,7 +26,7 @@ from embodied.gym.sensors import (
     PanoramaStore,
     SensorSuite,
     ViewSettings,
-    checked_sees,
+    checked_observations,
 )
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.gym.vector_env import SharedSyncVectorEnv, free_memory, refuse_too_many
@@ -145,11 +145,11 @@ def test_the_store_keeps_to_its_budget_and_gives_the_same_pictures(world):
     assert (store.at(Sight(world.name, 0)).rgb == first).all()
 
 
-@pytest.mark.parametrize("sees", ["touch", ("rgb", "rgb"), (), ("rgb", "smell"), None, 3, ("rgb", ["depth"])])
-def test_what_cannot_be_seen_is_refused_with_what_can(sees, tmp_path):
-    with pytest.raises(ValueError, match="sees should be one or several of .*oracle"):
-        embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, sees=sees)
-    assert checked_sees("rgb") == ("rgb",)
+@pytest.mark.parametrize("observations", ["touch", ("rgb", "rgb"), (), ("rgb", "smell"), None, 3, ("rgb", ["depth"])])
+def test_what_cannot_be_seen_is_refused_with_what_can(observations, tmp_path):
+    with pytest.raises(ValueError, match="observations should be one or several of .*oracle"):
+        embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, observations=observations)
+    assert checked_observations("rgb") == ("rgb",)
 
 
 def test_views_without_pixels_and_unknown_frames_are_refused():
@@ -159,8 +159,8 @@ def test_views_without_pixels_and_unknown_frames_are_refused():
 
 
 def test_pixels_of_a_place_that_nobody_can_draw_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="no pictures of .*grid.*sees='oracle'"):
-        embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, sees=("rgb",))
+    with pytest.raises(ValueError, match="no pictures of .*grid.*observations='oracle'"):
+        embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, observations=("rgb",))
 
 
 def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monkeypatch):
@@ -176,7 +176,7 @@ def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monk
 def test_a_data_set_without_pictures_says_the_command_that_draws_them(tmp_path):
     data = built(tmp_path / "data")
     with pytest.raises(ValueError, match=r"pictures of 0 of its \d+ houses.*--pictures fast"):
-        embodied.gym.env.make(data.kind, data=data.folder, split="train", cache=tmp_path / "cache", sees="rgb")
+        embodied.gym.env.make(data.kind, data=data.folder, split="train", cache=tmp_path / "cache", observations="rgb")
 
 
 def test_without_an_installed_encoder_the_error_names_the_remedies():

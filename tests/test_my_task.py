@@ -96,12 +96,12 @@ def test_the_expert_visits_all_rooms_and_none_goes_a_shorter_way(data):
 
 def test_gymnasium_makes_it_by_its_title(tmp_path):
     worlds = {"grid": grid_world()}
-    env = gym.make("my_task:embodied/Visit-v0", worlds=worlds, sees="oracle", cache=tmp_path)
+    env = gym.make("my_task:embodied/Visit-v0", worlds=worlds, observations="oracle", cache=tmp_path)
     check_env(env.unwrapped, skip_render_check=True)
     observation, info = env.reset(seed=0)
     assert observation["rooms_left"] == 3 and info["request"].startswith("visit the ")
     assert observation_in_words(env.unwrapped.observed) == "rooms left to visit: 3", "as language models are told"
-    envs = gym.make_vec("my_task:embodied/Visit-v0", num_envs=2, worlds=worlds, sees="oracle", cache=tmp_path)
+    envs = gym.make_vec("my_task:embodied/Visit-v0", num_envs=2, worlds=worlds, observations="oracle", cache=tmp_path)
     assert envs.reset(seed=0)[0]["rooms_left"].tolist() == [3, 3]
 
 

@@ -144,7 +144,7 @@ def test_bodies_of_a_batch_drive_and_see_as_each_alone_does(house, lit, classic,
     envs = DriveVectorEnv(world, settings, 2, device=device, out=torch.from_dlpack)
     seen, _ = envs.reset(seed=3)
     assert {name: x.cpu().numpy() for name, x in seen.items()} in envs.observation_space
-    alone = [Driving({"house": world}, dataclasses.replace(settings, sees=())) for _ in range(2)]
+    alone = [Driving({"house": world}, dataclasses.replace(settings, observations=())) for _ in range(2)]
     for i, driving in enumerate(alone):
         driving.reset(np_random(3 + i)[0])
     actions = torch.tensor([[1.0, 0.2], [-0.6, 1.0]])

@@ -35,7 +35,7 @@ LINES = (("physics alone", ()), ("rgb, 128 x 128", ("rgb",)), ("rgb and depth, 1
 def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterator[Measure]:
     """Guided drives through one flat; whoever draws with the CPU has all of that counted."""
     with one_core(), open_world(generate_house(seed, FLAT, catalogue), catalogue, cache, pictures=pictures) as world:
-        driving = Driving({world.name: world}, DriveSettings(sees=()))
+        driving = Driving({world.name: world}, DriveSettings(observations=()))
         commands, cameras = recorded(driving, seed)
         rate = functools.partial(measure, unit="1/s", per=STEPS, clock=time.process_time)
         for size, aim in LIVE_SIZES:
@@ -43,8 +43,8 @@ def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterat
             colours = rate(f"{name}, rgb", functools.partial(_film, world.renderer, cameras, size, False), aim=aim)
             whole = rate(f"{name}, rgb, depth and ids", functools.partial(_film, world.renderer, cameras, size, True))
             yield from (colours, whole, share(f"{name}, with depth and ids of rgb alone", colours, whole, aim=TOGETHER))
-        for name, sees in LINES:
-            driving = Driving({world.name: world}, DriveSettings(sees=sees))
+        for name, observations in LINES:
+            driving = Driving({world.name: world}, DriveSettings(observations=observations))
             yield rate(f"drive, {name}", functools.partial(replay, driving, commands, seed))
 
 

@@ -104,7 +104,9 @@ def _drive(world: World, count: int, name: str) -> Measure:
     from embodied.gym.driving import DriveSettings
 
     rng = stream(0, "bench", "gpu", "drive")
-    envs = DriveVectorEnv(world, DriveSettings(sees=("rgb",), height=LIVE, width=LIVE), count, out=lambda array: array)
+    envs = DriveVectorEnv(
+        world, DriveSettings(observations=("rgb",), height=LIVE, width=LIVE), count, out=lambda array: array
+    )
     try:
         envs.reset(seed=0)
         step = lambda: envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))

@@ -263,7 +263,7 @@ def generated(args: EvaluateOptions, evaluation: Evaluation) -> SplitData:
 
     kind = evaluation.kind
     seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
-    how = PlaygroundSettings(args.cache, sees=seen, rules=evaluation.rules, assistant=evaluation.assistant)
+    how = PlaygroundSettings(args.cache, observations=seen, rules=evaluation.rules, assistant=evaluation.assistant)
     if args.seed_file is None:
         flat = flat_playground(args.kind, args.seed, how)
         return SplitData(f"flat_{args.seed}", flat.worlds, flat.tasks, flat.make_env)

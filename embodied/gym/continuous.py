@@ -56,7 +56,7 @@ KEPT = 4
 """Houses whose renderers are held open, the last used."""
 OBJECTS = 100
 """Episodes of ObjectNav in each house where no file says otherwise."""
-SEES = ("rgb", "depth")
+LIVE_CHANNELS = ("rgb", "depth")
 PRESETS: dict[str, tuple[Body, CameraConfig]] = {
     "vlnce": (Body(), CameraConfig()),
     "streamvln": (Body(), CameraConfig(480, 640, 79.0)),
@@ -75,7 +75,7 @@ class EpisodeDataset:
     episodes: tuple[ContinuousEpisode, ...]
     body: Body = Body()
     camera: CameraConfig = CameraConfig()
-    sees: tuple[str, ...] = SEES
+    observations: tuple[str, ...] = LIVE_CHANNELS
     navmeshes: NavMeshCache = dataclasses.field(default_factory=NavMeshCache)
     opened: OrderedDict[str, World] = dataclasses.field(default_factory=OrderedDict)
 
@@ -84,7 +84,7 @@ class EpisodeDataset:
             raise ValueError(f"kind is {self.kind!r}; use one of {KINDS}")
         if not self.episodes:
             raise ValueError("there are no episodes to play; choose another split or file")
-        check_live(self.sees, SEES, self.camera.height, self.camera.width)
+        check_live(self.observations, LIVE_CHANNELS, self.camera.height, self.camera.width)
         if lost := sorted({e.world for e in self.episodes} - set(self.worlds)):
             raise ValueError(
                 f"episodes play in houses that are not here: {lost[:4]}; there are {sorted(self.worlds)[:4]}"
@@ -168,7 +168,7 @@ class ContinuousGymEnv(LiveEnv):
         """rgb (h, w, 3) uint8 and depth (h, w) float32, metres along the optical axis."""
         camera, world = self.dataset.camera, self.dataset.world(self.play.episode.world)
         pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
-        return live_pixels(world, pose, (camera.height, camera.width), self.dataset.sees)
+        return live_pixels(world, pose, (camera.height, camera.width), self.dataset.observations)
 
     def gps(self) -> np.ndarray:
         """(2,) float32 metres ahead and to the left of the start, in the start's frame."""
@@ -209,7 +209,9 @@ class ContinuousGymEnv(LiveEnv):
 
 
 def observation_space(dataset: EpisodeDataset) -> spaces.Dict:
-    whole: dict[str, spaces.Space[Any]] = {**pixel_spaces((dataset.camera.height, dataset.camera.width), dataset.sees)}
+    whole: dict[str, spaces.Space[Any]] = {
+        **pixel_spaces((dataset.camera.height, dataset.camera.width), dataset.observations)
+    }
     whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
     if dataset.kind == "objectnav":
         whole["gps"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
@@ -256,7 +258,7 @@ def open_episodes(
     pictures: PictureSettings | str | None = None,
     worlds: Mapping[str, World] | None = None,
     preset: str | None = None,
-    sees: str | Sequence[str] = SEES,
+    observations: str | Sequence[str] = LIVE_CHANNELS,
     **changes: Any,
 ) -> EpisodeDataset:
     """Houses and episodes: of a data set, of given worlds, or of one flat that is generated from `seed` and lit.
@@ -266,7 +268,7 @@ def open_episodes(
       episodes: a .json.gz file in Habitat's format that plays in these houses, instead of their own episodes.
       pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere, matte unless they name a look.
       preset: one of PRESETS: body and camera; that of the kind where not given.
-      sees: some of SEES.
+      observations: some of LIVE_CHANNELS.
       changes: fields of Body and Lens that differ from the preset's.
 
     Raises:
@@ -295,7 +297,7 @@ def open_episodes(
                 check_on_floor(e, house, navmeshes.of(house), body.forward)
             except ValueError as error:
                 raise ValueError(f"{episodes}: {error}") from error
-    seen = (sees,) if isinstance(sees, str) else tuple(sees)
+    seen = (observations,) if isinstance(observations, str) else tuple(observations)
     return EpisodeDataset(kind, dict(worlds), tuple(found), body, camera, seen, navmeshes)
 
 

@@ -1,6 +1,6 @@
 """embodied/Drive-v0: a body on wheels, driven by velocities through lit houses, that sees every moment of its way.
 
-    env = gymnasium.make("embodied/Drive-v0", task="find", sees=("rgb", "depth"), data="DIR", split="train")
+    env = gymnasium.make("embodied/Drive-v0", task="find", observations=("rgb", "depth"), data="DIR", split="train")
 
 An action says how fast ahead and how fast to the left, each from -1 to 1, and is held for a tenth of a second while
 physics goes on; to find something, a third number above 0.5 says that it is here.
@@ -99,7 +99,7 @@ class DriveEnv(LiveEnv):
 
 def seen_space(s: DriveSettings) -> dict[str, spaces.Box]:
     """The spaces of what `Driving.look` returns."""
-    whole = pixel_spaces((s.height, s.width), s.sees)
+    whole = pixel_spaces((s.height, s.width), s.observations)
     whole["motion"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
     whole["touched"] = spaces.Box(0.0, 1.0, (1,), np.float32)
     if s.task == "reach":
@@ -134,8 +134,8 @@ def make_driving(
         command is a picture of its own, and reflections take more than twice the time.
       settings: fields of DriveSettings.
     """
-    if isinstance(sees := settings.get("sees"), str):
-        settings["sees"] = (sees,)
+    if isinstance(observations := settings.get("observations"), str):
+        settings["observations"] = (observations,)
     wanted, where = DriveSettings(**settings), Path(cache) if cache else default_cache()
     if worlds is None:
         worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)

@@ -131,7 +131,7 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
         self._all = [Driving({world.name: world}, settings, functools.partial(_given, stage)) for stage in stages]
         self._rngs: list[np.random.Generator] = []
         self._renderer = None
-        if settings.sees:
+        if settings.observations:
             if world.lit is None:
                 raise ValueError(f"house {world.name!r} has no light; MuJoCo Warp draws lit houses (pictures='fast')")
             self._renderer = WarpRenderer(
@@ -225,8 +225,8 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
             at = np.array([c.position for c in eyes])
             ahead = np.array([c.forward for c in eyes])
             yaws, pitches = np.arctan2(ahead[:, 1], ahead[:, 0]), np.arcsin(np.clip(ahead[:, 2], -1.0, 1.0))
-            batch = self._renderer.views(at, yaws, pitches, sees=self.settings.sees)
-            found |= {name: wp.clone(getattr(batch, name)) for name in SEEN if name in self.settings.sees}
+            batch = self._renderer.views(at, yaws, pitches, sees=self.settings.observations)
+            found |= {name: wp.clone(getattr(batch, name)) for name in SEEN if name in self.settings.observations}
             if "depth" in found:
                 wp.map(wp.min, found["depth"], float(FAR), out=found["depth"])
         return {name: self._out(found[name]) for name in seen_space(self.settings)}

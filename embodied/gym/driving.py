@@ -50,7 +50,7 @@ class DriveSettings:
 
     task: str = "reach"
     """One of TASKS."""
-    sees: tuple[str, ...] = ("rgb", "depth")
+    observations: tuple[str, ...] = ("rgb", "depth")
     """Some of embodied.gym.sensors.PIXELS; nothing for a blind body."""
     height: int = 128
     width: int = 128
@@ -72,7 +72,7 @@ class DriveSettings:
     def __post_init__(self) -> None:
         if self.task not in TASKS:
             raise ValueError(f"task is {self.task!r}; use one of {TASKS}")
-        check_live(self.sees, PIXELS, self.height, self.width)
+        check_live(self.observations, PIXELS, self.height, self.width)
         if not 0 < self.vfov < math.pi:
             raise ValueError(f"vfov is {self.vfov} radians; a picture needs more than 0 and less than pi")
         if not (self.control >= CONTROL and self.seconds >= self.control and 0 <= self.nearest < self.farthest):
@@ -226,7 +226,7 @@ class Driving:
     def look(self) -> dict[str, np.ndarray]:
         """What the body knows: pixels, its motion, whether it touches something, and its goal."""
         s = self.settings
-        return {**live_pixels(self.world, self.camera(), (s.height, s.width), s.sees), **self.proprioception()}
+        return {**live_pixels(self.world, self.camera(), (s.height, s.width), s.observations), **self.proprioception()}
 
     def proprioception(self) -> dict[str, np.ndarray]:
         """`look` with closed eyes."""

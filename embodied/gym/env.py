@@ -1,6 +1,6 @@
 """Gymnasium environments embodied/Find-v0, VLN-v0, VNLA-v0, HANNA-v0, HARI-v0, Ask-v0, registered by `import embodied`.
 
-    env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train", sees=("rgb", "depth"))
+    env = gymnasium.make("embodied/HANNA-v0", data="DIR", split="train", observations=("rgb", "depth"))
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=64, data="DIR")
     envs = gymnasium.make_vec("embodied/HANNA-v0", num_envs=8, data="DIR", vectorization_mode="async",
                               vector_kwargs={"context": "spawn"})
@@ -9,7 +9,7 @@ The first batch takes its steps in one process and shares what it holds (embodie
 Gymnasium's AsyncVectorEnv, a process for each environment.
 
 Without `data` a small furnished flat is generated and lit, which takes a minute or two once. What an
-agent sees is chosen by `sees` (embodied.gym.sensors): by default a perspective view and the features
+agent sees is chosen by `observations` (embodied.gym.sensors): by default a perspective view and the features
 that the shipped encoder finds in the same pictures. An oracle is called an oracle.
 """
 
@@ -38,7 +38,7 @@ from embodied.gym.sensors import (
     Sensor,
     SensorSuite,
     ViewSettings,
-    checked_sees,
+    checked_observations,
     encoder_entry,
 )
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
@@ -345,11 +345,11 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
     """The environment of a kind of task over a data set, or over one generated and lit flat without `data`.
 
     Args:
-      options: fields of EnvironmentSettings (data, split, seed, sees, view, pictures, ...) and of HelpGymEnv
+      options: fields of EnvironmentSettings (data, split, seed, observations, view, pictures, ...) and of HelpGymEnv
         (shaping, strict, patience, needs_stop).
 
     Examples:
-      >>> env = embodied.make_env('hanna', data='data/hanna', sees='oracle')
+      >>> env = embodied.make_env('hanna', data='data/hanna', observations='oracle')
       >>> _, info = env.reset(seed=0)
       >>> action = info['candidates'][0]['action']
       >>> _, reward, terminated, truncated, info = env.step(action)
@@ -370,8 +370,8 @@ class EnvironmentSettings:
     split: str = "train"
     seed: int = 0
     cache: str | Path | None = None
-    sees: str | Sequence[str] = ("rgb", "features")
-    """Some of embodied.gym.sensors.SEES: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
+    observations: str | Sequence[str] = ("rgb", "features")
+    """Some of embodied.gym.sensors.OBSERVATIONS: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
     view: ViewSettings = ViewSettings()
     """How pixels are framed."""
     pictures: PictureSettings | str | None = None
@@ -396,16 +396,16 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     """Everything that environments of a kind of task share; `settings` are fields of EnvironmentSettings.
 
     Raises:
-      ValueError: unknown `sees`, or pixels where there are none.
+      ValueError: unknown `observations`, or pixels where there are none.
     """
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
-    seen, where = checked_sees(wanted.sees), Path(wanted.cache) if wanted.cache else default_cache()
+    seen, where = checked_observations(wanted.observations), Path(wanted.cache) if wanted.cache else default_cache()
     playground = PlaygroundSettings(
         cache=where,
         worlds=wanted.worlds,
         pictures=wanted.pictures,
-        sees=seen,
+        observations=seen,
         rules=wanted.rules,
         rooms=wanted.rooms,
         assistant=assistant_of(wanted.assistant),
@@ -441,5 +441,5 @@ def require_rendered(worlds: Mapping[str, SeenPlace], drawn: Mapping[str, World]
     """Raises ValueError where pixels are asked of places that nobody can draw."""
     if blind := sorted(set(worlds) - set(drawn)):
         raise ValueError(
-            f"there are no pictures of {blind[:3]}: only an embodied.World can be seen; choose sees='oracle'"
+            f"there are no pictures of {blind[:3]}: only an embodied.World can be seen; choose observations='oracle'"
         )

@@ -53,8 +53,8 @@ class PlaygroundSettings:
     """Worlds to play in; otherwise opened."""
     pictures: PictureSettings | str | None = None
     """How the houses are drawn; by default as a data set's pictures are, and 'fast' for a flat."""
-    sees: Sequence[str] = ("oracle",)
-    """Some of embodied.gym.sensors.SEES; oracle's features are made for 'oracle' only."""
+    observations: Sequence[str] = ("oracle",)
+    """Some of embodied.gym.sensors.OBSERVATIONS; oracle's features are made for 'oracle' only."""
     rules: Any = None
     """Rules of play, of the type of TaskKind.rules; the usual ones if None."""
     rooms: bool = True
@@ -79,7 +79,7 @@ def split_playground(kind: str, data: Path, split: str, settings: PlaygroundSett
     worlds = settings.worlds
     if worlds is None:
         names = whole.names(split)
-        drawn = settings.pictures or pictures_of(whole, names, wanted=bool(set(settings.sees) - {"oracle"}))
+        drawn = settings.pictures or pictures_of(whole, names, wanted=bool(set(settings.observations) - {"oracle"}))
         worlds = {n: whole.open_world(n, catalogue, settings.cache, drawn) for n in names}
     chosen = whole.split(split, worlds=worlds, rules=settings.rules, assistant=settings.assistant)
     return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, settings))
@@ -117,7 +117,7 @@ def houses_playground(
       part: of the pool of tasks; that of unseen houses if None.
     """
     known, language = kind_named(kind), People(tries=1)
-    drawn = parse_pictures(settings.pictures or ("fast" if set(settings.sees) - {"oracle"} else "unlit"))
+    drawn = parse_pictures(settings.pictures or ("fast" if set(settings.observations) - {"oracle"} else "unlit"))
     worlds, tasks, routes = dict[str, SeenPlace](), list[Task](), dict[str, Sequence[Route]]()
     for name, house_seed in houses:
         house, graph = make_dataset_house(house_seed, name, HouseConfig(area=area), catalogue)
@@ -171,7 +171,7 @@ def _playground(
 def _oracle(
     worlds: Mapping[str, SeenPlace], catalogue: Catalogue, settings: PlaygroundSettings
 ) -> Mapping[str, np.ndarray]:
-    if "oracle" not in settings.sees:
+    if "oracle" not in settings.observations:
         return {}
     return {name: seen_features(w, catalogue, settings.cache) for name, w in worlds.items()}
 
@@ -190,7 +190,7 @@ def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> Picture
     if wanted and len(held) < len(names):
         raise ValueError(
             f"{data.folder} has pictures of {len(held)} of its {len(names)} houses here; draw them with "
-            f"{again}, or choose sees='oracle'"
+            f"{again}, or choose observations='oracle'"
         )
     if wanted and len(ways := {(p.word, p.size) for p in held.values()}) > 1:
         raise ValueError(f"the pictures in {data.folder} are of several kinds ({sorted(ways)}); finish {again}")

@@ -25,9 +25,9 @@ from embodied.render.panorama import VFOV36, Panorama, equirect_grid, grid36, pe
 from embodied.render.photograph import PhotoCamera, check_camera
 from embodied.world import World
 
-SEES = ("rgb", "depth", "ids", "features", "oracle")
+OBSERVATIONS = ("rgb", "depth", "ids", "features", "oracle")
 """What can be seen: three kinds of pixels, an encoder's features, an oracle's list of visible objects."""
-PIXELS = SEES[:3]
+PIXELS = OBSERVATIONS[:3]
 FRAMES = ("view", "views36", "equirect")
 """A perspective view straight ahead, the 36 views of the VLN literature, or all directions in one picture."""
 LARGE = 1e6
@@ -54,41 +54,41 @@ class Sensor(Protocol):
         returned makes the arrays, one for each space, and may be called in any thread."""
 
 
-def pixel_spaces(shape: tuple[int, ...], sees: Sequence[str]) -> dict[str, spaces.Box]:
+def pixel_spaces(shape: tuple[int, ...], observations: Sequence[str]) -> dict[str, spaces.Box]:
     """Of pictures: rgb uint8 (*shape, 3); depth float32 metres, FAR where nothing is; ids int32, 0 where nothing is."""
     kinds: dict[str, spaces.Box] = {
         "rgb": spaces.Box(0, 255, (*shape, 3), np.uint8),
         "depth": spaces.Box(0.0, FAR, shape, np.float32),
         "ids": spaces.Box(0, 2**31 - 1, shape, np.int32),
     }
-    return {name: kinds[name] for name in sees}
+    return {name: kinds[name] for name in observations}
 
 
-def live_pixels(world: World, camera: Camera, size: tuple[int, int], sees: Sequence[str]) -> Arrays:
+def live_pixels(world: World, camera: Camera, size: tuple[int, int], observations: Sequence[str]) -> Arrays:
     """What a camera sees now, drawn for it: depth in metres along the optical axis.
 
     Args:
       size: height and width, pixels.
-      sees: some of PIXELS; of nothing, nothing is drawn.
+      observations: some of PIXELS; of nothing, nothing is drawn.
     """
-    if not sees:
+    if not observations:
         return {}
-    if tuple(sees) == ("rgb",):
+    if tuple(observations) == ("rgb",):
         return {"rgb": np.ascontiguousarray(world.renderer.rgb(camera, size))}
     whole: Arrays = {}
-    if "rgb" in sees:
+    if "rgb" in observations:
         view = world.renderer.through(camera, size)
         whole["rgb"], depth, whole["ids"] = view.rgb, view.depth, view.ids
     else:
         depth, whole["ids"] = world.renderer.depth_and_ids(camera, size)
     whole["depth"] = np.minimum(depth, np.float32(FAR))
-    return {name: np.ascontiguousarray(whole[name]) for name in sees}
+    return {name: np.ascontiguousarray(whole[name]) for name in observations}
 
 
-def check_live(sees: Sequence[str], known: Sequence[str], height: int, width: int) -> None:
+def check_live(observations: Sequence[str], known: Sequence[str], height: int, width: int) -> None:
     """Raises ValueError for pixels that live pictures do not have, and for sides that they cannot have."""
-    if any(name not in known for name in sees) or len(set(sees)) < len(sees):
-        raise ValueError(f"sees should be some of {known}, each once, got {sees!r}")
+    if any(name not in known for name in observations) or len(set(observations)) < len(observations):
+        raise ValueError(f"observations should be some of {known}, each once, got {observations!r}")
     if not (8 <= height <= 2048 and 8 <= width <= 2048):
         raise ValueError(f"a view of {height} x {width} pixels; each side needs 8 to 2048")
 
@@ -297,18 +297,19 @@ def encoder_entry(name: str = "default") -> importlib.metadata.EntryPoint:
     if name not in found:
         raise UnableError(
             f"no encoder {name!r} is installed, only {sorted(found)}: install this package with its `agents`, "
-            "hand over features with source=..., or choose sees=('rgb',)"
+            "hand over features with source=..., or choose observations=('rgb',)"
         )
     return found[name]
 
 
-def checked_sees(sees: str | Sequence[str]) -> tuple[str, ...]:
-    """`sees` as a tuple.
+def checked_observations(observations: str | Sequence[str]) -> tuple[str, ...]:
+    """`observations` as a tuple.
 
     Raises:
       ValueError: something that cannot be seen, nothing, or the same twice.
     """
-    chosen = (sees,) if isinstance(sees, str) or not isinstance(sees, Sequence) else tuple(sees)
-    if not chosen or any(name not in SEES for name in chosen) or len(set(chosen)) < len(chosen):
-        raise ValueError(f"sees should be one or several of {SEES}, each once, got {sees!r}")
+    several = isinstance(observations, Sequence) and not isinstance(observations, str)
+    chosen = tuple(observations) if several else (observations,)
+    if not chosen or any(name not in OBSERVATIONS for name in chosen) or len(set(chosen)) < len(chosen):
+        raise ValueError(f"observations should be one or several of {OBSERVATIONS}, each once, got {observations!r}")
     return chosen

@@ -34,7 +34,12 @@ def run_drives(args: DriveOptions) -> None:
     from embodied.gym.lerobot import DriveForLeRobot
     from embodied.gym.lerobot.drives import export_drives
 
-    seen: dict[str, Any] = {"height": args.size, "width": args.size, "sees": ("rgb",), "pictures": args.pictures}
+    seen: dict[str, Any] = {
+        "height": args.size,
+        "width": args.size,
+        "observations": ("rgb",),
+        "pictures": args.pictures,
+    }
     env = DriveForLeRobot(make(data=args.data, split=args.split, cache=args.cache, **seen))
     watch = functools.partial(bar, name="drives", unit="drive")
     seed = Dataset(args.data).config.seed

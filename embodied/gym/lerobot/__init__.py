@@ -4,8 +4,9 @@
     envs = make_env(n_envs=4, env="VLNCE", data="DIR", split="val_unseen")     # {"embodied/VLNCE-v0": {0: VectorEnv}}
 
 Observations are `pixels` (pictures) and `agent_pos` (a vector), actions are vectors of float32: in VLNCE-v0 and
-ObjectNav-v0 a score for each action, of which the largest is taken; in Drive-v0 the velocities. With `sees=()` pixels
-are black. Every info has `is_success`; `task_description`, `task` and `_max_episode_steps` are attributes.
+ObjectNav-v0 a score for each action, of which the largest is taken; in Drive-v0 the velocities. With
+`observations=()` pixels are black. Every info has `is_success`; `task_description`, `task` and
+`_max_episode_steps` are attributes.
 
 EnvHub reads a file `env.py` of a repository; `hub_file` writes one that makes these environments.
 """
@@ -162,7 +163,7 @@ def make_env(
     elif env == "Drive":
         envs = gym.vector.SyncVectorEnv([functools.partial(make_one, env, **options)] * n_envs)
     else:
-        dataset = continuous.open_episodes(env.lower(), **{"sees": ("rgb",)} | options)
+        dataset = continuous.open_episodes(env.lower(), **{"observations": ("rgb",)} | options)
         envs = gym.vector.SyncVectorEnv(
             [lambda: ContinuousForLeRobot(continuous.ContinuousGymEnv(dataset, render_mode="rgb_array"))] * n_envs
         )
@@ -171,7 +172,7 @@ def make_env(
 
 def make_one(env: str, **options: Any) -> gym.Env[Any, Any]:
     """One environment for LeRobot's policies."""
-    options = {"sees": ("rgb",), "render_mode": "rgb_array"} | options
+    options = {"observations": ("rgb",), "render_mode": "rgb_array"} | options
     if env == "Drive":
         return DriveForLeRobot(drive.make(**options))
     return ContinuousForLeRobot(continuous.make(env.lower(), **options))

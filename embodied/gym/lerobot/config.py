@@ -57,7 +57,7 @@ class EmbodiedEnvConfig(EnvConfig):
         longest = {} if self.task == "Drive" else {"steps": self.steps}
         sees = () if self.blind else ("rgb",)
         sides = {"height": self.height, "width": self.width}
-        return {**sides, "sees": sees, "pictures": self.pictures, **longest, **house}
+        return {**sides, "observations": sees, "pictures": self.pictures, **longest, **house}
 
     def create_envs(self, n_envs: int, use_async_envs: bool = False) -> dict[str, dict[int, gym.vector.VectorEnv]]:
         return make_env(n_envs, use_async_envs, env=self.task or "VLNCE", **self.gym_kwargs)
