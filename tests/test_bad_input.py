@@ -72,6 +72,10 @@ def test_wrong_words_get_one_line_with_the_remedy(words, message, capsys, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
+STAIR = {"id": "s", "rooms": ["a", "b"], "path": [], "width": 1.0, "risers": 3}
+LAMP = {"id": "l", "room": "bedroom_1", "placement": "ghost", "position": [7, 2, 2], "color": [1, 1, 1], "power": 100}
+
+
 def edited(change) -> str:
     body = copy.deepcopy(json.loads(two_rooms().to_json()))
     change(body)
@@ -95,25 +99,8 @@ def edited(change) -> str:
         (lambda h: h["placements"][0].update(yaw="north"), "should be a number"),
         (lambda h: h["storeys"][0].update(height=1e9), "1.8 to 20 m"),
         (lambda h: h.update(disorder=7.0), "disorder"),
-        (
-            lambda h: h.update(stairs=[{"id": "s", "rooms": ["a", "b"], "path": [], "width": 1.0, "risers": 3}]),
-            "stair 's'",
-        ),
-        (
-            lambda h: h.update(
-                lights=[
-                    {
-                        "id": "l",
-                        "room": "bedroom_1",
-                        "placement": "ghost",
-                        "position": [7, 2, 2],
-                        "color": [1, 1, 1],
-                        "power": 100,
-                    }
-                ]
-            ),
-            "unknown object 'ghost'",
-        ),
+        (lambda h: h.update(stairs=[STAIR]), "stair 's'"),
+        (lambda h: h.update(lights=[LAMP]), "unknown object 'ghost'"),
     ],
 )
 def test_a_house_edited_into_nonsense_is_refused(change, message):

@@ -31,11 +31,9 @@ from embodied.cli import doctor
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
-from embodied.house.house import HouseError
 from embodied.interface import Episode
 from embodied.light import LightError, backend
 from embodied.light.baking import house as baking
-from embodied.mattersim.graphs import load_graphs
 from embodied.policies.baselines import Shortest
 from embodied.records import RecordError, from_json, save_lines
 from embodied.render.panorama import Panorama
@@ -265,24 +263,6 @@ def test_whoever_lights_a_house_is_told_before_how_long_it_takes_or_what_is_miss
 
 
 # What is read -------------------------------------------------------------------------------------
-
-VIEWPOINT = {"image_id": "a", "pose": [1.0] * 16, "included": True, "unobstructed": [False]}
-
-
-@pytest.mark.parametrize(
-    ("body", "message"),
-    [
-        ("[3]", "viewpoint 0 .*should have"),
-        (json.dumps([VIEWPOINT | {"pose": [float("nan")] * 16}]), "NaN is no JSON"),
-        (json.dumps([VIEWPOINT | {"pose": [1e300] * 16}]), "viewpoint 0 .*should have"),
-        (json.dumps([VIEWPOINT])[:-2] + ', "included": false}]', "'included' stands there twice"),
-    ],
-)
-def test_graphs_of_the_simulator_are_read_as_strictly_as_all_others(body, message, tmp_path):
-    (tmp_path / "s_connectivity.json").write_text(body)
-    load_graphs.cache_clear()
-    with pytest.raises(HouseError, match=f"s_connectivity.json.*{message}"):
-        load_graphs(str(tmp_path), ("s",))
 
 
 def test_a_radius_that_no_house_has_is_refused(played):
