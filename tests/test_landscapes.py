@@ -118,7 +118,7 @@ def test_neighbours_do_not_overlap_the_plot_and_only_three_landscapes_have_them(
 
 
 def test_what_is_left_of_contrast_falls_with_distance_to_a_fiftieth_at_the_visibility():
-    left = far_canvas.clearness(np.array([0.0, 10.0, 400.0, 3e3, 12e3]), 12e3)
+    left = far_canvas.transmittance(np.array([0.0, 10.0, 400.0, 3e3, 12e3]), 12e3)
     assert np.allclose(left[0], 1) and left[-1, 1] == pytest.approx(0.02, rel=0.01)
     assert all((a > b).all() for a, b in itertools.pairwise(left)) and (left[-1, 2] < left[-1, 0]), "hills turn blue"
 
