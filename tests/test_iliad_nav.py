@@ -105,12 +105,14 @@ def test_what_is_learned_besides_is_by_hand_the_way_that_is_left_and_the_rooms()
     other.network.load_state_dict(plain.network.state_dict())
     with torch.no_grad():
         a, b = (s.scores([trip], ["go"], [path]) for s in (plain, other))
-        assert torch.equal(a.log_probabilities, b.log_probabilities) and not a.besides.any()
+        assert torch.equal(a.log_probabilities, b.log_probabilities) and not a.auxiliary_loss.any()
         track = Track(look, trip)
         said, _ = other.network(other.network.begin(look.words(["go"])), look.see([track]))
     rooms = [kind_of(GRID, n) for n in (5, *(p.node for p in track.ways.poses))]
     named = -said.rooms[0].log_softmax(-1)[torch.arange(len(rooms)), rooms].mean()
-    assert float(b.besides[0, 0]) == pytest.approx(0.5 * float((said.left - 1) ** 2) + 0.25 * float(named), abs=1e-5)
+    assert float(b.auxiliary_loss[0, 0]) == pytest.approx(
+        0.5 * float((said.left - 1) ** 2) + 0.25 * float(named), abs=1e-5
+    )
 
 
 def kind_of(place, node: int) -> int:
