@@ -21,6 +21,10 @@ QUESTIONS = {
 }
 
 
+DIALOGUE_ROWS, DIALOGUE_COLUMNS = 11, 95
+"""Lines of text that there is room for, a gap between two speakers being one, and their letters."""
+
+
 def question_of(ask: Ask) -> str:
     """A question in words: the agent's own, or those of its intention."""
     return ask.question or QUESTIONS[ask.intention]
@@ -90,15 +94,11 @@ class EpisodeLog:
             if reply.intention is Intention.SUB:
                 self.goals.append(reply.subtask.target)
 
-    def dialogue_text(self, rows: int = 11, width: int = 95) -> str:
-        """The dialogue as Markdown; only its end when it is long, because the viewer does not scroll by itself.
-
-        Args:
-          rows: lines of text, of `width` letters each, that there is room for; a gap between two speakers is one.
-        """
-        height = lambda line: 2 + len(line) // width
+    def dialogue_text(self) -> str:
+        """The dialogue as Markdown; only its end when it is long, because the viewer does not scroll by itself."""
+        height = lambda line: 2 + len(line) // DIALOGUE_COLUMNS
         kept: list[str] = []
-        left = rows + 1 - height(self.dialogue[0])
+        left = DIALOGUE_ROWS + 1 - height(self.dialogue[0])
         for line in reversed(self.dialogue[1:]):
             more = 0 if len(kept) + 2 == len(self.dialogue) else height("…")
             if kept and left < height(line) + more:

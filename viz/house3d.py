@@ -46,9 +46,7 @@ class LightMesh:
     """(h, w, 3) uint8 sRGB."""
 
 
-def light_meshes(
-    parts: Sequence[Part], hidden: frozenset[str] = frozenset(), budget: int = BUDGET
-) -> tuple[LightMesh, ...]:
+def light_meshes(parts: Sequence[Part], hidden: frozenset[str] = frozenset()) -> tuple[LightMesh, ...]:
     """One mesh per owner that can be seen from above: ceilings, the outdoors and the `hidden` owners are left out."""
     by_owner: dict[tuple[str, str], list[Part]] = {}
     for part in parts:
@@ -61,7 +59,7 @@ def light_meshes(
         for part in group:
             key = (part.mesh_key, id(part.mesh))
             if key not in reduced:
-                reduced[key] = _reduce(part.mesh, _share(owner, budget, len(group)) if part.kind == "object" else None)
+                reduced[key] = _reduce(part.mesh, _share(owner, BUDGET, len(group)) if part.kind == "object" else None)
             positions, normals, colors, faces = reduced[key]
             pieces.append((*_placed(positions, normals, part), colors, faces))
         meshes.append(_joined(f"house/{room or 'shared'}/{owner.split('/')[-1]}", pieces))
@@ -82,7 +80,7 @@ def log_house(recording: rr.RecordingStream, meshes: Sequence[LightMesh]) -> Non
         recording.log(mesh.path, drawn, static=True)
 
 
-def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int = 2 * BUDGET) -> tuple[LightMesh, ...]:
+def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset()) -> tuple[LightMesh, ...]:
     """The same from baked pages: objects with colours in their vertices, walls and floors with light as a picture."""
     by_owner: dict[tuple[str, str, bool], list[LitMesh]] = {}
     for mesh in lit.meshes:
@@ -94,7 +92,7 @@ def lit_meshes(lit: LitPages, hidden: frozenset[str] = frozenset(), budget: int 
         if flat:
             meshes += [_surface(f"{path}/{i}" if i else path, m, lit.pages[m.page]) for i, m in enumerate(group)]
         else:
-            pieces = [_lit_piece(m, lit.pages[m.page], _share(owner, budget, len(group))) for m in group]
+            pieces = [_lit_piece(m, lit.pages[m.page], _share(owner, 2 * BUDGET, len(group))) for m in group]
             meshes.append(_joined(path, pieces, shaded=False))
     return tuple(meshes)
 

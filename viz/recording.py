@@ -50,6 +50,8 @@ VIEW_VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)
 """How high the picture along the gaze reaches: for people, and for an agent that sees this one view only (VNLA)."""
 Recognise = Callable[[Panorama], Sequence[Recognised]]
 """Names what is in a panorama (embodied.agents.vision.recognise.Recogniser)."""
+RECORDED_QUALITY = 85
+"""Of JPEG pictures, 1 to 100."""
 SHORT = 60
 """Letters of a request that is shown as a heading."""
 
@@ -62,8 +64,6 @@ class PictureSizes:
     """Height and width of the first-person view, pixels."""
     panorama: int = 256
     """Height of the equirectangular panorama; twice as wide."""
-    jpeg: int = 85
-    """JPEG quality, 1 to 100."""
     camera: PhotoCamera = PhotoCamera()
     """The camera of the first-person views; panoramas and targets stay as they are drawn."""
 
@@ -289,7 +289,7 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
         recording.log("view/lit", ahead(views.shown.panorama(pose.node), pose, sizes, views.vfov))
     equirect = panorama.equirect(sizes.panorama)
     shift = round(pose.yaw / (2 * np.pi) * equirect.shape[1])
-    recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1), sizes.jpeg))
+    recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1)))
     if views.recognise is not None:
         log_recognised(recording, views.recognise(panorama), pose, sizes.panorama)
     recording.log(
@@ -303,7 +303,7 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
 def ahead(panorama: Panorama, pose: Pose, sizes: PictureSizes, vfov: float = VIEW_VFOV) -> rr.EncodedImage:
     """The first-person view from a panorama along the gaze, `vfov` radians high."""
     rgb = panorama.view_rgb(pose.yaw, pose.pitch, vfov, sizes.view)
-    return encoded(sizes.camera.photographed(rgb, vfov, pose.node, round(np.degrees(pose.yaw))), sizes.jpeg)
+    return encoded(sizes.camera.photographed(rgb, vfov, pose.node, round(np.degrees(pose.yaw))))
 
 
 def on_floor(eyes: np.ndarray, height: float) -> np.ndarray:
@@ -321,7 +321,7 @@ def log_aim(recording: rr.RecordingStream, world: World, state: EpisodeLog, view
     """The route that the agent was told and the picture of what it looks for, while they hold."""
     if state.image is not None:
         picture = views.seen.panorama(state.image.node).equirect(views.sizes.panorama)
-        recording.log("view/target", encoded(picture, views.sizes.jpeg))
+        recording.log("view/target", encoded(picture))
     if state.route:
         nodes = list(state.route if len(state.route) > 1 else 2 * state.route)
         points = on_floor(world.graph.positions[nodes], HEIGHTS["route"])
@@ -381,6 +381,6 @@ def camera_axes(yaw: float, pitch: float) -> np.ndarray:
     return np.stack([camera.right, -np.array(camera.up), camera.forward], axis=1)
 
 
-def encoded(rgb: np.ndarray, quality: int) -> rr.EncodedImage:
+def encoded(rgb: np.ndarray) -> rr.EncodedImage:
     """An RGB picture as JPEG."""
-    return rr.EncodedImage(contents=jpeg(rgb, quality), media_type="image/jpeg")
+    return rr.EncodedImage(contents=jpeg(rgb, RECORDED_QUALITY), media_type="image/jpeg")

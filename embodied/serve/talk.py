@@ -28,6 +28,8 @@ from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import nearest
 from embodied.policies.baselines import Shortest
 
+ASK_EVERY = 3
+"""Steps after which somebody to practise with asks."""
 PERSON_SUBTASK = "said "
 """How the ids of sub-tasks begin that people put into words."""
 
@@ -130,15 +132,15 @@ class PathSpeaker:
 class PracticeAgent:
     """Takes the shortest way and asks every few steps: somebody to practise answering with."""
 
-    def __init__(self, every: int = 3) -> None:
-        self._shortest, self._every = Shortest(), every
+    def __init__(self) -> None:
+        self._shortest = Shortest()
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
         actions, _ = self._shortest.act_privileged(observations, situations, None, rngs=rngs)
-        asked = memory or [-self._every] * len(observations)
+        asked = memory or [-ASK_EVERY] * len(observations)
         for i, o in enumerate(observations):
-            if o is not None and o.can_ask and o.time - asked[i] >= self._every:
+            if o is not None and o.can_ask and o.time - asked[i] >= ASK_EVERY:
                 asked[i], actions[i] = o.time, Ask(question="Where do I go from here?")
         return actions, asked
