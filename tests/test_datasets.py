@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_data import build, built, content, hand_house, small_house
+from hand_data import DATA_KINDS, build, built, content, hand_house, small_house
 
 from embodied import metrics
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
@@ -28,7 +28,6 @@ from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import Baked, Unlit
 from embodied.splits import DatasetSize
 from embodied.task_kind import kind_named
-from embodied.teachers.vnla import VnlaTeacher
 from embodied.world import differing
 
 pytestmark = pytest.mark.slow
@@ -43,7 +42,7 @@ def test_paper_sizes_are_those_of_tables_4_2_and_e_1_and_of_room_to_room():
 
 
 def test_shares_add_up_to_the_split():
-    for kind in ("find", "vln", "vnla", "hanna", "hari"):
+    for kind in DATA_KINDS:
         config = DatasetConfig(kind, "paper")
         wanted = scale("paper", kind)
         sums = dict.fromkeys((s.name for s in wanted.splits), 0)
@@ -54,10 +53,10 @@ def test_shares_add_up_to_the_split():
     assert [quota(10, 4, i) for i in range(4)] == [3, 3, 2, 2]
 
 
-@pytest.mark.parametrize("kind", ["find", "vln", "vnla", "hanna", "hari"])
+@pytest.mark.parametrize("kind", DATA_KINDS)
 def test_every_kind_is_built_read_and_solved_by_the_expert(kind, tmp_path):
     data = built(tmp_path / "data", kind)
-    expert = Shortest(VnlaTeacher() if kind == "vnla" else None)
+    expert = data.task_kind.agent("shortest")
     for split in data.splits:
         tasks = data.tasks(split)
         assert tasks, f"{split} is empty"

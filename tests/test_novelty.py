@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_data import build
+from hand_data import DATA_KINDS, build
 
 from embodied.assets.catalogue import CatalogueError, load_catalogue
 from embodied.datasets.build import DatasetConfig
@@ -150,7 +150,7 @@ def test_every_clause_can_be_said_by_everybody():
     assert sum(s.share for s in SPEAKERS if s.habit == "formal") > 0
 
 
-@pytest.mark.parametrize("kind", ["find", "vln", "vnla", "hanna", "hari"])
+@pytest.mark.parametrize("kind", DATA_KINDS)
 def test_a_data_set_keeps_novel_houses_for_their_own_split(tmp_path, kind):
     data = build(tmp_path / "data", tmp_path / "cache", kind, ood=2)
     assert data.splits[-1] == "test_ood"
