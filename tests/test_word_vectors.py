@@ -12,7 +12,13 @@ from torch import nn
 from embodied.agents.common import word_vectors
 from embodied.agents.common.paraphrases import UNHEARD, in_synonyms, reworded
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.common.word_vectors import Lexicon, WordEmbedding, take_weights, use_vectors, vocabulary_with
+from embodied.agents.common.word_vectors import (
+    PretrainedVocabulary,
+    WordEmbedding,
+    take_weights,
+    use_vectors,
+    vocabulary_with,
+)
 from embodied.agents.hanna.attention import TextEncoder
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
@@ -31,12 +37,12 @@ def hand_vectors(words):
 
 @pytest.fixture(autouse=True)
 def by_hand(monkeypatch):
-    monkeypatch.setattr(Lexicon, "vectors", staticmethod(hand_vectors))
+    monkeypatch.setattr(PretrainedVocabulary, "vectors", staticmethod(hand_vectors))
 
 
-def embedding(words=WORDS) -> tuple[WordEmbedding, Lexicon]:
+def embedding(words=WORDS) -> tuple[WordEmbedding, PretrainedVocabulary]:
     torch.manual_seed(0)
-    part, lexicon = WordEmbedding(len(words), 6), Lexicon(words)
+    part, lexicon = WordEmbedding(len(words), 6), PretrainedVocabulary(words)
     use_vectors(nn.Sequential(part), lexicon)
     return part.eval(), lexicon
 
@@ -59,7 +65,7 @@ def test_the_order_in_which_new_words_are_heard_changes_nothing():
 
 
 def test_marks_that_are_no_words_stay_unknown():
-    assert Lexicon(WORDS).number("%") == 1 and Lexicon(WORDS).number("42") == 1
+    assert PretrainedVocabulary(WORDS).number("%") == 1 and PretrainedVocabulary(WORDS).number("42") == 1
 
 
 @pytest.mark.parametrize("vectors", ["learned", "minilm"])
@@ -98,7 +104,7 @@ def test_without_vectors_an_embedding_is_torchs():
     torchs = nn.Embedding(9, 4, padding_idx=0)
     numbers = torch.tensor([[1, 8, 0]])
     assert torch.equal(ours(numbers), torchs(numbers)) and set(ours.state_dict()) == {"weight"}
-    assert not isinstance(vocabulary_with(WORDS, "learned"), Lexicon)
+    assert not isinstance(vocabulary_with(WORDS, "learned"), PretrainedVocabulary)
 
 
 def test_in_training_a_word_is_at_times_known_by_its_vector_alone():
@@ -123,7 +129,7 @@ def test_a_trained_agent_is_stored_with_its_vectors_and_hears_new_words_again(tm
 
 
 def test_hannas_and_navs_text_encoder_reads_new_words():
-    reader, lexicon = TextEncoder(len(WORDS), 8, 2, 0.0), Lexicon(WORDS)
+    reader, lexicon = TextEncoder(len(WORDS), 8, 2, 0.0), PretrainedVocabulary(WORDS)
     use_vectors(reader, lexicon)
     tread, nothing = (torch.from_numpy(lexicon.encode(t, 3))[None] for t in ("tread", "%"))
     assert torch.isfinite(reader(tread)).all() and not torch.allclose(reader(tread)[0, 0], reader(nothing)[0, 0])
@@ -176,13 +182,13 @@ def test_an_agent_that_is_shown_the_situation_hears_other_words_too():
 def test_an_agent_that_learned_words_alone_begins_with_vectors_and_acts_as_before():
     torch.manual_seed(1)
     before, after = (nn.Sequential(WordEmbedding(len(WORDS), 6)) for _ in range(2))
-    use_vectors(after, Lexicon(WORDS))
+    use_vectors(after, PretrainedVocabulary(WORDS))
     take_weights(after, before.state_dict())
     said = torch.arange(3, len(WORDS))
     assert torch.allclose(before.eval()(said), after.eval()(said), atol=1e-6)
     assert after[0].meaning.weight.any(), "words never heard mean something at once"
     again = nn.Sequential(WordEmbedding(len(WORDS), 6))
-    use_vectors(again, Lexicon(WORDS))
+    use_vectors(again, PretrainedVocabulary(WORDS))
     take_weights(again, after.state_dict())
     assert torch.equal(again[0].meaning.weight, after[0].meaning.weight), "vectors that were learned stay"
 

@@ -47,7 +47,7 @@ def minilm() -> Vectors:
     return lambda words: np.stack([table[pieces.encode(w, add_special_tokens=False).ids].mean(0) for w in words])
 
 
-class Lexicon(Vocabulary):
+class PretrainedVocabulary(Vocabulary):
     """A vocabulary in which every word has a vector. Words that are not in it get numbers from V on when they are first
     heard; numbers differ between processes then, vectors do not."""
 
@@ -84,7 +84,7 @@ class Lexicon(Vocabulary):
 
 def vocabulary_with(words: tuple[str, ...], vectors: str, reword: Callable[[str], str] | None = None) -> Vocabulary:
     """The vocabulary of an agent whose setting `word_vectors` is `vectors`; `reword` as Vocabulary has it."""
-    return Vocabulary(words, reword) if vectors == LEARNED_WORDS else Lexicon(words, reword)
+    return Vocabulary(words, reword) if vectors == LEARNED_WORDS else PretrainedVocabulary(words, reword)
 
 
 class WordEmbedding(nn.Embedding):
@@ -93,9 +93,9 @@ class WordEmbedding(nn.Embedding):
 
     def __init__(self, words: int, width: int) -> None:
         super().__init__(words, width, padding_idx=0)
-        self.lexicon: Lexicon | None = None
+        self.lexicon: PretrainedVocabulary | None = None
 
-    def use_vectors(self, lexicon: Lexicon) -> None:
+    def use_vectors(self, lexicon: PretrainedVocabulary) -> None:
         """Use the vectors of `lexicon`; before training, and before weights are loaded."""
         self.lexicon, self.meaning = lexicon, nn.Linear(len(lexicon.mean), self.embedding_dim, bias=False)
         nn.init.normal_(self.meaning.weight, std=float(self.weight.detach().std()))
@@ -124,7 +124,7 @@ class WordEmbedding(nn.Embedding):
 
 def use_vectors(network: nn.Module, vocabulary: Vocabulary) -> None:
     """Let all word embeddings of a network use the pre-trained vectors of its vocabulary, if that has any."""
-    if isinstance(vocabulary, Lexicon):
+    if isinstance(vocabulary, PretrainedVocabulary):
         for part in network.modules():
             if isinstance(part, WordEmbedding):
                 part.use_vectors(vocabulary)
