@@ -72,7 +72,7 @@ LEARN = ("--data", "d", "--out", "o")
         (("house", "--out", "/dev/null"), "--out: /dev/null is a file, a folder is wanted"),
         (("house", "--out", "/dev/null/x"), "is a file"),
         (("export", "glb", "--house", "x", "--out", "/dev/null/a.glb"), "--out: /dev/null is a file"),
-        (("export", "usd", "--house", "x", "--out", "a.glb"), "a.glb should end in .usdz"),
+        (("export", "usd", "--house", "x", "--out", "a.glb"), "--out: should end in .usdz"),
         (("export", "mjcf", "--house", "x", "--out", "/dev/null"), "--out: /dev/null is a file, a folder is wanted"),
         (("render", "x", "--node", "1", "--equirect", "."), "--equirect: . is a folder, a file is wanted"),
         (("house", "--out", "x", "--cache", "loop"), "--cache: 'loop' cannot be used"),
