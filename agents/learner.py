@@ -58,7 +58,7 @@ class Players:
     blind: Collection[str] = ()
     """Rows whose agents need no pictures."""
     about: str = ""
-    """What is said of the trained agent."""
+    """A line about the trained agent."""
 
 
 PlayersOfSplit = Callable[[str], Players]
@@ -83,19 +83,30 @@ class Learner:
     """Weights that come with the program."""
 
 
+_LEARNERS: dict[str, Learner] = {}
+
+
+def register_learner(learner: Learner) -> Learner:
+    """Make a learner known by its name; returns it. Call it where the learner is defined."""
+    _LEARNERS[learner.name] = learner
+    return learner
+
+
 def shipped_learners() -> list[str]:
     """Names of the learners that come with the program, without importing them: the files of agents/learners."""
     return sorted(m.name for m in pkgutil.iter_modules([str(Path(__file__).parent / "learners")]))
 
 
 def learner_named(name: str) -> Learner:
-    """The learner of a name: a shipped one, or 'module:NAME', whose module is imported.
+    """The learner of a name: a registered or a shipped one, or 'module:NAME', whose module is imported.
 
     Raises:
       ValueError: unknown, or what 'module:NAME' names is no learner.
     """
-    if name in shipped_learners():
-        return importlib.import_module(f"embodied.agents.learners.{name}").LEARNER
+    if name not in _LEARNERS and name in shipped_learners():
+        importlib.import_module(f"embodied.agents.learners.{name}")
+    if name in _LEARNERS:
+        return _LEARNERS[name]
     if ":" not in name:
         raise ValueError(f"unknown learner {name!r}; use one of {shipped_learners()}, or 'module:NAME' of your own")
     learner = named_object(name)

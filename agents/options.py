@@ -117,7 +117,7 @@ class Recorded:
 
 
 def training_data(args: Any, kind: str, device: str = "cpu", goal_image: str = "same") -> TrainingData:
-    """What an agent learns from by options of WithData and Encoded; under torchrun, PyTorch has its device.
+    """Training data by options of WithData and Encoded; under torchrun, PyTorch has its device.
 
     Raises:
       DatasetError: a data set of another kind.

@@ -14,7 +14,15 @@ import torch
 from embodied.agents.bandit import corpus, libreoffice
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import CorpusError, Pair, Sizes
-from embodied.agents.bandit.network import REMEDY, BanditAbout, Critic, EncoderDecoder, Translator, begin, load_network
+from embodied.agents.bandit.network import (
+    TRANSLATOR_REMEDY,
+    BanditAbout,
+    Critic,
+    EncoderDecoder,
+    Translator,
+    begin,
+    load_network,
+)
 from embodied.agents.bandit.ratings import Rater
 from embodied.agents.bandit.study import BanditStudy
 from embodied.agents.bandit.training import bandit, load_corpus, pretrain, train_critic
@@ -307,7 +315,7 @@ def test_pretraining_learns_to_translate(data, trained):
     translator, weak = m.translator(), m.translator()
     for network, name in ((translator, "full"), (weak, "weak")):
         load_network(network, trained / "pretrain" / f"{name}.safetensors")
-    about = load_weights(trained / "pretrain" / "full.safetensors", "bandit", BanditAbout, REMEDY)[1]
+    about = load_weights(trained / "pretrain" / "full.safetensors", "bandit", BanditAbout, TRANSLATOR_REMEDY)[1]
     assert about.config == TOY and about.target == m.lexicons[1].words
     assert perplexity(translator, m.splits["dev"]) < 0.7 * perplexity(weak, m.splits["dev"])
     said = greedy(translator, m.splits["dev"], m.lexicons[1], 8)

@@ -38,14 +38,14 @@ from hand_data import built
 from handmade_models import CUBE, write_own, write_pack
 from PIL import Image
 
-from embodied.agents.bandit.network import REMEDY, BanditAbout
+from embodied.agents.bandit.network import TRANSLATOR_REMEDY, BanditAbout
 from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint, restore
 from embodied.agents.common.session import Session
 from embodied.agents.common.tensor_file import save_tensors
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.common.weights import FORMAT, load_weights
+from embodied.agents.common.weights import WEIGHTS_FORMAT, load_weights
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
-from embodied.agents.hanna.training_config import SCALES
+from embodied.agents.hanna.training_config import HANNA_SCALES
 from embodied.agents.hari import agent as hari
 from embodied.agents.iliad.nav.stages import config_of
 from embodied.agents.iliad.regex.run import load_student
@@ -294,7 +294,7 @@ def _weights(network: torch.nn.Module) -> list[float]:
 def _agent() -> HannaAgent:
     small = {"hidden_size": 8, "navigation_embedding": 8, "ask_embedding": 4, "self_heads": 2, "text_heads": 2}
     words = build_vocabulary(["go to the red door"]).words
-    config = dataclasses.replace(SCALES["mini"], **small)
+    config = dataclasses.replace(HANNA_SCALES["mini"], **small)
     return HannaAgent.new(HannaAbout(config=config, encoder="e" * 64, feature_size=4, words=words))
 
 
@@ -445,7 +445,7 @@ def test_an_index_of_pictures_that_is_whole_and_wrong_is_refused_or_its_pictures
 
 
 def _bandit(path: Path) -> object:
-    return load_weights(path, "bandit", BanditAbout, REMEDY)[1]
+    return load_weights(path, "bandit", BanditAbout, TRANSLATOR_REMEDY)[1]
 
 
 @pytest.mark.parametrize(
@@ -462,7 +462,9 @@ def _bandit(path: Path) -> object:
     ],
 )
 def test_weights_beside_settings_that_cannot_be_are_refused(read, kind, about, match, tmp_path):
-    save_tensors(tmp_path / "a.safetensors", {"x": torch.zeros(1)}, {"format": FORMAT, "kind": kind, "about": about})
+    save_tensors(
+        tmp_path / "a.safetensors", {"x": torch.zeros(1)}, {"format": WEIGHTS_FORMAT, "kind": kind, "about": about}
+    )
     with pytest.raises(ValueError, match=match):
         read(tmp_path / "a.safetensors")
 

@@ -37,7 +37,8 @@ def run(tmp_path, monkeypatch, capsys):
 
 
 def test_every_example_is_run_here_and_shown_in_the_readme_of_examples():
-    here, listed = Path(__file__).read_text(), (EXAMPLES / "README.md").read_text()
+    here = "".join(p.read_text(encoding="utf-8") for p in sorted(Path(__file__).parent.glob("test_*.py")))
+    listed = (EXAMPLES / "README.md").read_text(encoding="utf-8")
     for script in sorted(EXAMPLES.glob("*.py")):
         assert f'"{script.name}"' in here and script.name in listed, script.name
 

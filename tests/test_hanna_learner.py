@@ -47,7 +47,7 @@ from embodied.agents.hanna.losses import (
 )
 from embodied.agents.hanna.policy import for_training
 from embodied.agents.hanna.run import HannaLearner
-from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, TrainingConfig
+from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.assistants.anna import Anna
@@ -64,7 +64,7 @@ from embodied.teachers.hanna import HannaTeacher
 torch.set_num_threads(1)
 
 TINY = dataclasses.replace(
-    SCALES["mini"],
+    HANNA_SCALES["mini"],
     hidden_size=32,
     navigation_embedding=32,
     ask_embedding=8,
@@ -551,7 +551,7 @@ def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
 
 
 def test_table_d1_is_the_default():
-    d1 = SCALES["paper"]
+    d1 = HANNA_SCALES["paper"]
     assert (d1.hidden_size, d1.navigation_embedding, d1.ask_embedding, d1.batch) == (256, 256, 128, 32)
     assert (d1.learning_rate, d1.dropout, d1.alpha, d1.iterations) == (1e-4, 0.3, 1.0, 30_000)
     steps = EVALUATIONS["paper"].evaluation_steps

@@ -29,7 +29,7 @@ from embodied.agents.iliad.regex.networks import ChangeDescriber, Speller
 from embodied.agents.iliad.regex.rules import (
     ALPHABET,
     LETTERS,
-    LONGEST,
+    LONGEST_BLOCK,
     LONGEST_OUTPUT,
     SHAPES,
     apply,
@@ -102,7 +102,7 @@ def test_what_is_no_rule_is_none(rule):
 
 
 @pytest.mark.slow
-@given(st.text(alphabet=ALPHABET, max_size=LONGEST), st.text(alphabet=LETTERS, max_size=14))
+@given(st.text(alphabet=ALPHABET, max_size=LONGEST_BLOCK), st.text(alphabet=LETTERS, max_size=14))
 @settings(max_examples=300, deadline=None)
 def test_whatever_a_network_writes_is_carried_out_quickly_or_refused(rule, word):
     out = apply(rule, word)  # matching never goes back: no repetition, no choice
@@ -117,7 +117,7 @@ def test_the_worst_rules_of_the_alphabet_stay_quick():
         "()()@" + "\\2" * 17,
     ]
     for rule in worst:  # hours, if matching went back
-        assert len(rule) <= LONGEST
+        assert len(rule) <= LONGEST_BLOCK
         for word in ("a" * 14, "ab" * 7, ""):
             apply(rule, word)
 
@@ -289,7 +289,7 @@ def test_scores_are_those_of_the_characters_written(data):
     asked = [q.requests[0] for q in items]
     done = student.greedy(items, asked)
     found = student.scores(items, asked, done)
-    assert found.mask.sum(1).tolist() == [min(LONGEST, len(e.rule) + 1) for e in done]
+    assert found.mask.sum(1).tolist() == [min(LONGEST_BLOCK, len(e.rule) + 1) for e in done]
     logits = speller(characters([q.words[0] for q in items]), requests(asked), characters([e.rule for e in done]))
     by_hand = logits.log_softmax(-1)[0, 0].max()
     assert float(found.log_probabilities[0, 0].detach()) == pytest.approx(float(by_hand.detach()), abs=1e-5)

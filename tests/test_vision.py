@@ -27,7 +27,7 @@ from embodied.agents.vision.encoder import (
     strip_map,
     whitening,
 )
-from embodied.agents.vision.features import FORMAT, feature_path, load_bank, load_features, save_features
+from embodied.agents.vision.features import FEATURES_FORMAT, feature_path, load_bank, load_features, save_features
 from embodied.agents.vision.lite import Lite, folded, load_imagenet
 from embodied.agents.vision.probe import LabelledFeatures, ProbeScores, as_numbers, average_precision, place_auc, read
 from embodied.agents.vision.resnet import ARCHITECTURES, ResNet, load_torchvision
@@ -383,7 +383,7 @@ def test_features_name_their_encoder_and_their_house(tmp_path):
     (tmp_path / "flipped.safetensors").write_bytes(body)
     with pytest.raises(ValueError, match="do not fit its checksum.*embodied features"):
         load_features(tmp_path / "flipped.safetensors")
-    save_tensors(tmp_path / "whose.safetensors", {"features": torch.zeros(1, 36, 4)}, {"format": FORMAT})
+    save_tensors(tmp_path / "whose.safetensors", {"features": torch.zeros(1, 36, 4)}, {"format": FEATURES_FORMAT})
     with pytest.raises(ValueError, match="whose.safetensors: not a feature file"):
         load_features(tmp_path / "whose.safetensors")
     bank = load_bank({"house": path})

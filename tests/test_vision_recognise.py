@@ -10,7 +10,7 @@ from embodied.agents.vision.config import StripTraining
 from embodied.agents.vision.detector import Detector, train_detector
 from embodied.agents.vision.encoder import load_encoder, random_encoder
 from embodied.agents.vision.recognise import Recogniser
-from embodied.agents.vision.strip import CELL, COLUMNS, ROWS, cell_direction, directions
+from embodied.agents.vision.strip import CELL, STRIP_COLUMNS, STRIP_ROWS, cell_direction, directions
 from embodied.render.panorama import Panorama
 
 FACES = (6, 32, 32)
@@ -31,7 +31,7 @@ def trained() -> Detector:
 
 
 def test_cells_lie_where_the_strip_shows_them():
-    rays = directions().reshape(ROWS, CELL, COLUMNS, CELL, 3)
+    rays = directions().reshape(STRIP_ROWS, CELL, STRIP_COLUMNS, CELL, 3)
     for row, column in [(0, 0), (6, 18), (11, 35), (3, 9)]:
         x, y, z = rays[row, :, column].mean((0, 1))
         yaw, pitch = cell_direction(row, column)
@@ -58,7 +58,7 @@ def test_a_detector_is_saved_with_what_it_was_trained_with_and_belongs_to_its_en
 
 
 def test_a_thing_is_named_where_it_is_seen_best(panorama, monkeypatch):
-    cells = np.zeros((1, 3, ROWS, COLUMNS), np.float32)
+    cells = np.zeros((1, 3, STRIP_ROWS, STRIP_COLUMNS), np.float32)
     cells[0, 0, 4, 7], cells[0, 1, 2, 2], cells[0, 2, 5, 5] = 0.8, 0.9, 0.2
     detector = Detector(random_encoder(seed=0), None, ("mug", "wall", "sofa"))
     monkeypatch.setattr(Detector, "__call__", lambda self, strips: (cells, None))

@@ -17,7 +17,7 @@ from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.playing import play_with_memory
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
-from embodied.agents.vnla.config import ASKERS, SCALES, TRAINED_UNDER
+from embodied.agents.vnla.config import ASKERS, TRAINED_UNDER, VNLA_SCALES
 from embodied.agents.vnla.network import (
     ASK,
     DONT,
@@ -128,7 +128,7 @@ def test_actions_that_are_not_possible_are_never_likely():
 @pytest.mark.slow
 def test_the_paper_sizes_have_about_as_many_parameters_as_the_reference_says():
     agent = VnlaAgent.new(
-        VnlaAbout(config=SCALES["paper"], encoder="x", feature_size=192, words=lesson()[0].about.words)
+        VnlaAbout(config=VNLA_SCALES["paper"], encoder="x", feature_size=192, words=lesson()[0].about.words)
     )
     assert 4.3e6 < sum(p.numel() for p in agent.network.parameters()) < 4.9e6
 

@@ -27,14 +27,14 @@ from embodied.policies.baselines import PerEpisodePolicy
 QUESTIONS = tuple(c for c in CHOICES if isinstance(c, Intention))
 SEEN = 3
 """Detections that are told one by one, the best first."""
-BATCH = 512
+ASKER_BATCH = 512
 ENTROPY = 0.003
 """Weight of the entropy, which keeps choices of equal worth alike."""
 LEAST = 1e-9
 """Probabilities below it count as it in the entropy."""
 Decisions = tuple[np.ndarray, np.ndarray]
 """(n, d) float32 what was known; (n, 7) float64 what each of CHOICES was worth, NaN where it could not be."""
-REMEDY = "train it again: embodied study ask"
+ASKER_REMEDY = "train it again: embodied study ask"
 
 
 def facts(o: Observation, trail: EpisodeMemory) -> np.ndarray:
@@ -76,7 +76,7 @@ def fit(decisions: Decisions, config: AskerConfig) -> nn.Sequential:
         net(x[:1])
         optimizer = torch.optim.AdamW(net.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         for _ in range(config.passes):
-            for chosen in torch.randperm(len(x)).split(BATCH):
+            for chosen in torch.randperm(len(x)).split(ASKER_BATCH):
                 p = torch.softmax(torch.where(can[chosen], net(x[chosen]), -1e9), 1)
                 entropy = -(p * p.clamp_min(LEAST).log()).sum(1).mean()
                 loss = (p * lost[chosen]).sum(1).mean() - ENTROPY * entropy
@@ -147,7 +147,7 @@ def load_asker(path: Path) -> nn.Sequential:
     Raises:
       FileNotFoundError, ValueError: missing, damaged, or something else.
     """
-    tensors, config = load_weights(path, "asker", AskerConfig, REMEDY)
+    tensors, config = load_weights(path, "asker", AskerConfig, ASKER_REMEDY)
     net = network(config.hidden_size)
     net.load_state_dict(tensors)
     return net.eval()

@@ -40,7 +40,7 @@ FIRST = 100
 TEST = 1000
 """Seed of the first test house. Thresholds and network were chosen while looking at those from 0 on, which nothing is
 evaluated in any more."""
-SPLITS = ("unseen houses", "unseen houses and classes")
+ASK_SPLITS = ("unseen houses", "unseen houses and classes")
 MODEL, FORESIGHT = "language model", "oracle of asking"
 Places = Mapping[str, StoredPlace]
 ModelMaker = Callable[[Places], Agent]
@@ -110,10 +110,14 @@ class AskStudy(StudyLearner):
             ("success_",), "mean price of an episode's questions", "success (%)", against="price_unseen_houses"
         )
         return {
-            "houses": StudyTable("Ask-v0 in unseen houses", rows, columns, SPLITS[:1]),
-            "classes": StudyTable("Ask-v0 in unseen houses with unseen classes", rows, columns, SPLITS[1:]),
+            "houses": StudyTable("Ask-v0 in unseen houses", rows, columns, ASK_SPLITS[:1]),
+            "classes": StudyTable("Ask-v0 in unseen houses with unseen classes", rows, columns, ASK_SPLITS[1:]),
             "curves": StudyTable(
-                "Ask-v0: success against price", (*_curves(), *model), ("success", "price"), SPLITS[:1], figure=figure
+                "Ask-v0: success against price",
+                (*_curves(), *model),
+                ("success", "price"),
+                ASK_SPLITS[:1],
+                figure=figure,
             ),
         }
 
@@ -137,7 +141,7 @@ class AskStudy(StudyLearner):
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         e, rule = self.evaluation, row.judge.get("rule")
         places, make_env, look = houses("ask_test", TEST, e.test_houses, self.cache)
-        tasks: Sequence[Task] = ask_split(places, look, e.test_tasks, seed=TEST, unseen=split == SPLITS[1])
+        tasks: Sequence[Task] = ask_split(places, look, e.test_tasks, seed=TEST, unseen=split == ASK_SPLITS[1])
         tasks = spread(tasks, {MODEL: e.model_tasks, FORESIGHT: e.oracle_tasks}.get(str(rule)))
         player = self._player(weights, row.judge, places, make_env)
         episodes = play(make_env, player, tasks, seed=TEST, batch=8, agent=row.label)

@@ -15,7 +15,7 @@ from embodied.agents.bandit.training import TokenizedCorpora, sampled
 from embodied.agents.bandit.translate import greedy, in_order, padded, perplexity
 from embodied.agents.common.checkpoint import read_checkpoint
 
-COLUMNS = (
+BEHAVIOUR_MEASURES = (
     "BLEU",
     "brevity penalty",
     "1-gram precision",
@@ -35,7 +35,7 @@ BLEU of sampled translations whose last third of words is cut off: where that is
 
 @torch.no_grad()
 def behaviour(translator: Translator, m: TokenizedCorpora, split: str) -> Mapping[str, float]:
-    """All COLUMNS on a split; learners draw alike."""
+    """All BEHAVIOUR_MEASURES on a split; learners draw alike."""
     data = m.splits[split]
     translations = greedy(translator, data, m.lexicons[1], m.config.longest)
     parts = corpus_parts(translations, data.references)

@@ -9,7 +9,7 @@ from embodied.agents.common.settings import AT_LEAST_ONE, POSITIVE, Limit, RunSe
 
 @dataclass(frozen=True, kw_only=True)
 class BanditConfig(RunSettings):
-    """The defaults are the dissertation's; SCALES holds the smaller settings."""
+    """The defaults are the dissertation's; BANDIT_SCALES holds the smaller settings."""
 
     hidden_size: int = 500
     """Width of word embeddings and LSTMs of translator and critic."""
@@ -64,7 +64,7 @@ class Sizes:
             raise ValueError(f"overlap must be in [0, 1], got {self.overlap}")
 
 
-SCALES: dict[str, BanditConfig] = {
+BANDIT_SCALES: dict[str, BanditConfig] = {
     "mini": BanditConfig(
         hidden_size=64,
         source_words=5000,

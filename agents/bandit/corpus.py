@@ -19,8 +19,8 @@ from embodied.records import RecordError, from_plain, read_json
 from embodied.seeds import stream
 
 SOURCE, TARGET = "de", "en"
-SPLITS = ("supervised", "bandit_overlap", "bandit_disjoint", "dev", "test")
-FORMAT, MADE = "embodied-corpus-2", "corpus.json"
+CORPUS_SPLITS = ("supervised", "bandit_overlap", "bandit_disjoint", "dev", "test")
+CORPUS_FORMAT, MADE = "embodied-corpus-2", "corpus.json"
 _TOKEN = re.compile(r"\w+(?:[-'’]\w+)*|[^\w\s]")
 
 
@@ -99,7 +99,7 @@ def split(pairs: Sequence[Pair], sizes: Sizes, *, seed: int) -> dict[str, list[P
     rng = stream(seed, "corpus", "overlap")
     chosen = [pairs_by_document["supervised"][i] for i in sorted(rng.permutation(sizes.supervised)[:known])]
     pairs_by_document["bandit_overlap"] = chosen + pairs_by_document["bandit_disjoint"][: sizes.bandit - known]
-    return {name: pairs_by_document[name] for name in SPLITS}
+    return {name: pairs_by_document[name] for name in CORPUS_SPLITS}
 
 
 def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) -> None:
@@ -123,7 +123,7 @@ def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) ->
                 "target words per sentence": round(sum(words) / len(words), 2),
             }
         digests = {name: corpus_digest(folder, (name,)) for name in splits}
-        write_json(folder / MADE, {"format": FORMAT, **facts, "splits": counts, "digests": digests}, indent=1)
+        write_json(folder / MADE, {"format": CORPUS_FORMAT, **facts, "splits": counts, "digests": digests}, indent=1)
 
 
 def refuse_mixed(folder: Path, names: Sequence[str]) -> None:

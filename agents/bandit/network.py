@@ -151,7 +151,7 @@ def begin(network: Network, generator: torch.Generator) -> Network:
     return network
 
 
-REMEDY = "delete it and train it again with `embodied study bandit`"
+TRANSLATOR_REMEDY = "delete it and train it again with `embodied study bandit`"
 
 
 @dataclass(frozen=True)
@@ -178,4 +178,4 @@ def load_network(network: nn.Module, path: Path) -> None:
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    load_into(network, load_weights(path, "bandit", BanditAbout, REMEDY)[0], path)
+    load_into(network, load_weights(path, "bandit", BanditAbout, TRANSLATOR_REMEDY)[0], path)

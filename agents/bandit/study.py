@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from embodied.agents.bandit.behaviour import COLUMNS, behaviour, translator_of_run
+from embodied.agents.bandit.behaviour import BEHAVIOUR_MEASURES, behaviour, translator_of_run
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest
 from embodied.agents.bandit.ratings import CLEAN, Rater, rater_of
@@ -36,7 +36,7 @@ SWEEPS: Mapping[str, Sequence[float]] = {
 }
 """Figure 3.5's settings; a skew of 1 is the clean rater."""
 RATES = (1e-4, 3e-4, 1e-3)
-LEARNERS = {"Δ supervised": "supervised", "Δ NED-A2C": "a2c"}
+LEARNER_ROWS = {"Δ supervised": "supervised", "Δ NED-A2C": "a2c"}
 REFERENCES = {"full": "fully", "weak": "weakly"}
 
 
@@ -59,7 +59,7 @@ def _sweep() -> tuple[StudyRow, ...]:
     return tuple(rows)
 
 
-TABLES: Mapping[str, StudyTable] = {
+BANDIT_TABLES: Mapping[str, StudyTable] = {
     "3.2": StudyTable(
         "Translation scores and their improvement by one round of ratings",
         tuple(
@@ -89,7 +89,7 @@ TABLES: Mapping[str, StudyTable] = {
     ),
     "rates": StudyTable(
         "One round of ratings at other learning rates; 0.0001 is the text's (3.1.5.2)",
-        tuple(_gain(f"{rate:g}, {x}", k, bandit_rate=rate) for rate in RATES for x, k in LEARNERS.items()),
+        tuple(_gain(f"{rate:g}, {x}", k, bandit_rate=rate) for rate in RATES for x, k in LEARNER_ROWS.items()),
         (SENTENCE, HELD_OUT),
     ),
     "held-out": StudyTable(
@@ -102,7 +102,7 @@ TABLES: Mapping[str, StudyTable] = {
             )
             for row in (_row("reference", "reference"), _gain("Δ supervised", "supervised"), _gain("Δ NED-A2C", "a2c"))
         ),
-        COLUMNS,
+        BEHAVIOUR_MEASURES,
     ),
 }
 
@@ -125,10 +125,10 @@ class BanditStudy(StudyLearner):
 
     def tables(self) -> Mapping[str, StudyTable]:
         if self.rater is None:
-            return TABLES
+            return BANDIT_TABLES
         people = _gain("as people rate", "a2c", rater=dataclasses.asdict(self.rater))
         title = f"Gain by NED-A2C from ratings like people's: {self.rater}"
-        return {**TABLES, "people": StudyTable(title, (_gain("clean", "a2c"), people), (SENTENCE, HELD_OUT))}
+        return {**BANDIT_TABLES, "people": StudyTable(title, (_gain("clean", "a2c"), people), (SENTENCE, HELD_OUT))}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """A corpus that cannot be read is refused."""

@@ -40,7 +40,7 @@ Step = Callable[[np.ndarray, int, int], Mapping[str, float]]
 History = Sequence[Mapping[str, float]]
 Finish = Callable[[int, Mapping[str, float], History], Mapping[str, float]]
 """Is given a pass, the sums of its numbers and what the passes before gave; returns what is kept of it."""
-LEARNERS = ("reference", "supervised", "a2c")
+BANDIT_LEARNERS = ("reference", "supervised", "a2c")
 """'reference' learns nothing; 'supervised' is shown the references of the same sentences; 'a2c' their ratings."""
 RATED = "bandit_overlap"
 """The split that is rated, the dissertation's case."""
@@ -195,10 +195,10 @@ def bandit(
 
     Args:
       reference: the pre-trained translator to begin with.
-      learner: one of LEARNERS.
+      learner: one of BANDIT_LEARNERS.
     """
-    if learner not in LEARNERS:
-        raise ValueError(f"learner must be one of {LEARNERS}, got {learner!r}")
+    if learner not in BANDIT_LEARNERS:
+        raise ValueError(f"learner must be one of {BANDIT_LEARNERS}, got {learner!r}")
     config, data = m.config, m.splits[RATED]
     translator, critic = m.translator(), m.critic()
     load_network(translator, reference)

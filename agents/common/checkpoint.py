@@ -19,7 +19,7 @@ from torch import Tensor
 from embodied.assets.cache import write_bytes
 from embodied.identity import CODE, MAKERS, Identity, differences
 
-FORMAT = "embodied-checkpoint-2"
+CHECKPOINT_FORMAT = "embodied-checkpoint-2"
 FIELDS = ("identity", "progress", "sums", "history", "parts")
 
 
@@ -37,12 +37,12 @@ class Stateful(Protocol):
 def write_checkpoint(path: Path, body: Mapping[str, object]) -> None:
     """Write the FIELDS of a run atomically; an interruption leaves the checkpoint before it."""
     whole = io.BytesIO()
-    torch.save({"format": FORMAT, "digest": _digest(body), **body}, whole)
+    torch.save({"format": CHECKPOINT_FORMAT, "digest": _digest(body), **body}, whole)
     write_bytes(Path(path), whole.getvalue())
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """What `write_checkpoint` wrote.
+    """The contents that `write_checkpoint` wrote.
 
     Raises:
       CheckpointError: truncated, changed, of another format, or with numbers that are none.
@@ -64,8 +64,8 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         raise CheckpointError(
             f"{path}: cannot be read ({wrong}); it was changed or cut short, delete it to begin again"
         )
-    if not isinstance(body, dict) or body.pop("format", None) != FORMAT:
-        raise CheckpointError(f"{path}: not a checkpoint of format {FORMAT!r}; begin a new run")
+    if not isinstance(body, dict) or body.pop("format", None) != CHECKPOINT_FORMAT:
+        raise CheckpointError(f"{path}: not a checkpoint of format {CHECKPOINT_FORMAT!r}; begin a new run")
     found = body.pop("digest", None)
     if set(body) != set(FIELDS) or found != _digest(body):
         raise CheckpointError(f"{path}: its contents do not fit its digest; it was changed, delete it to begin again")

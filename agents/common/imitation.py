@@ -46,9 +46,9 @@ class BatchLoss:
     losses: tuple[Tensor, Tensor]
     """Of navigation and of asking, summed over steps and averaged over episodes."""
     loss: Tensor
-    """What the gradient is taken of: their sum, or navigation's alone where asking is not learned."""
+    """The number whose gradient is taken: their sum, or navigation's alone where asking is not learned."""
     numbers: Mapping[str, float]
-    """What is reported besides the losses and the gradient."""
+    """Numbers reported besides the losses and the gradient."""
 
 
 class ImitationLearner:
@@ -73,7 +73,7 @@ class ImitationLearner:
         raise NotImplementedError
 
     def experience(self, episodes: Sequence[Episode], memory: Any) -> Any:
-        """What is learned from, of finished episodes and the player's last memory: its moments, where it had labels."""
+        """Training data, of finished episodes and the player's last memory: its moments, where it had labels."""
         return memory.moments
 
     def loss_of(self, episodes: Sequence[Episode], experience: Any) -> BatchLoss:
@@ -150,19 +150,19 @@ REPORTED = (
     "should ask",
     "right asks",
 )
-"""What is reported of an update; the last two only where help could be asked for."""
+"""Numbers reported of an update; the last two only where help could be asked for."""
 SUMMED: Collection[str] = ("loss navigation", "loss asking", "steps")
 """Those that are sums over the batch, of which every process has a share."""
 
 
 def played(episodes: Sequence[Episode], worlds: Mapping[str, Place]) -> dict[str, float]:
-    """What is reported of the episodes of a batch."""
+    """Numbers reported of the episodes of a batch."""
     success = sum(metrics.success(e, worlds[e.task.world].graph) for e in episodes) / len(episodes)
     return {"steps": float(sum(len(e.steps) for e in episodes)), "success": success}
 
 
 def asked(episodes: Sequence[Episode], logits: Tensor, labels: Tensor) -> dict[str, float]:
-    """What is reported of asking: requests of an episode and, of the decisions with a label, how many should be to ask
+    """Numbers reported of asking: requests of an episode and, of the decisions with a label, how many should be to ask
     and how many are as they should be.
 
     Args:

@@ -50,7 +50,7 @@ def advantages(rated: Decisions) -> Tensor:
 
 
 def actor_loss(rated: Decisions) -> Tensor:
-    """Whose descent is the ascent of Eq 3.5: summed over decisions, averaged over sequences."""
+    """The loss whose descent is the ascent of Eq 3.5: summed over decisions, averaged over sequences."""
     return -(advantages(rated) * rated.log_probabilities * rated.mask).sum() / len(rated.returns)
 
 

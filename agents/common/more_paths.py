@@ -96,7 +96,7 @@ def way_of(task: Task) -> Route:
 
 
 def _kept(cache: Path, about: Sequence[object], kind: type[T], make: Callable[[], Iterable[T]]) -> list[T]:
-    """What `make` makes, from the cache if it is there."""
+    """The product of `make`, from the cache if it is there."""
     path = cache / "paths" / f"{digest([*about, _code()])[:32]}.jsonl"
     if not path.exists():
         save_lines(path, make())

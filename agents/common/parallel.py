@@ -1,5 +1,5 @@
-"""Where PyTorch computes, with how many threads, and in how many processes: of several that make one run, each plays a
-share of every batch, and gradients are added up.
+"""Devices on which PyTorch computes, with how many threads, and in how many processes: of several that make one run,
+each plays a share of every batch, and gradients are added up.
 
 Started by PyTorch's own launcher, `torchrun --nproc-per-node 4 --no-python embodied train hanna ...`.
 The batch of the settings is the whole batch, so results do not depend on the number of processes
@@ -66,7 +66,7 @@ def join_launcher(device: str) -> str:
 
 
 def share(items: Sequence[T]) -> Sequence[T]:
-    """What this process works on: every n-th item."""
+    """The share of this process: every n-th item."""
     return items[rank() :: world_size()]
 
 
@@ -105,7 +105,7 @@ def rank_zero(note: Callable[[str], None]) -> Callable[[str], None]:
 
 
 def any_rank(flag: bool, device: torch.device) -> bool:
-    """Whether `flag` is true in any process, so that all stop together."""
+    """True if `flag` is true in any process, so that all stop together."""
     if world_size() == 1:
         return flag
     tensor = torch.tensor(float(flag), device=device)

@@ -36,7 +36,7 @@ FIND = "find "
 
 @dataclass(frozen=True)
 class Wordings:
-    """What is in unheard.toml and in varied.toml."""
+    """Contents of unheard.toml and in varied.toml."""
 
     joints: tuple[str, ...]
     backwards: str
@@ -51,12 +51,14 @@ VARIED = from_plain(Wordings, read_toml(Path(__file__).with_name("varied.toml"))
 
 
 def paraphraser(catalogue: Catalogue, wordings: Wordings) -> Callable[[str], str]:
-    """What rewords instructions, requests and sub-goals about things of a catalogue; the same text always alike."""
+    """A function that rewords instructions, requests and sub-goals about things of a catalogue; the same text always
+    alike."""
     return functools.cache(functools.partial(paraphrase, lexicon=lexicon_of(catalogue), wordings=wordings))
 
 
 def varied(catalogue: Catalogue) -> Callable[[str], str]:
-    """What rewords a share of the texts of training in the wordings of varied.toml; the same text always alike."""
+    """A function that rewords a share of the texts of training in the wordings of varied.toml; the same text always
+    alike."""
     return functools.partial(_varied, lexicon=lexicon_of(catalogue))
 
 
@@ -109,7 +111,7 @@ def _said(
 
 
 def _slots(clauses: Sequence[Clause], text: str, lexicon: Lexicon) -> dict[str, str]:
-    """What is told of, in the nouns of the text."""
+    """The things that are told of, in the nouns of the text."""
     slots: dict[str, str] = {}
     kinds = [kind for c in clauses if (kind := room_of(c)) is not None]
     for name, kind in zip(("room", "other"), kinds):
@@ -173,7 +175,7 @@ UNHEARD = from_plain(Wordings, read_toml(Path(__file__).with_name("unheard.toml"
 
 
 def in_synonyms(known: Collection[str]) -> Callable[[str], str]:
-    """What replaces each common word of a text by the first of its like that is not in `known`."""
+    """A function that replaces each common word of a text by the first of its like that is not in `known`."""
     new = {word: next((w for w in many if w not in known), word) for word, many in UNHEARD.synonyms.items()}
     return functools.cache(lambda text: re.sub("[a-z]+", lambda m: new.get(m[0], m[0]), text.lower()))
 

@@ -22,15 +22,15 @@ class Rows:
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
 class RunningRows:
-    """What a policy carries between steps. All but `moments` belongs to the k episodes that still run: a tensor or a
-    record of tensors has a row for each, a tuple an item, unless it is empty or of such records."""
+    """State that a policy carries between steps. All but `moments` belongs to the k episodes that still run: a tensor
+    or a record of tensors has a row for each, a tuple an item, unless it is empty or of such records."""
 
     positions: tuple[int, ...]
     """Place of each row in the batch."""
     channels: Tensor | None = None
     """(k, D) what each episode sees of every feature channel; None is everything."""
     moments: tuple[Any, ...] = ()
-    """What was said in all steps so far, if the policy keeps it."""
+    """Outputs of all steps so far, if the policy keeps it."""
 
     def keep(self, positions: tuple[int, ...]) -> Self:
         """The memory of the episodes at `positions` only."""

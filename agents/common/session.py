@@ -51,7 +51,7 @@ class DivergedError(UnableError):
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run is. Randomness needs no state: every draw is named by seed and update."""
+    """Position of a run. Randomness needs no state: every draw is named by seed and update."""
 
     update: int = 0
     """Updates done."""
@@ -107,7 +107,7 @@ class Session:
         self.sums: dict[str, float] = {}
         """Of what is being counted, such as a pass; the caller empties it."""
         self.history: list[dict[str, float]] = []
-        """What was found so far, such as one entry per validation."""
+        """Results so far, such as one entry per validation."""
         self._note = parallel.rank_zero(note)
         self._may_change, self._minutes, self._saved_every, self._every = may_change, minutes, checkpoint_minutes, every
         self._means: dict[str, list[float]] = {}
@@ -150,7 +150,7 @@ class Session:
         return self.progress.update + 1
 
     def due(self, every: int) -> bool:
-        """Whether the update at hand is an `every`-th one, or the last."""
+        """True if the update at hand is an `every`-th one, or the last."""
         return self.done % every == 0 or self.done == self.total
 
     def add(self, numbers: Mapping[str, float]) -> None:
@@ -167,7 +167,7 @@ class Session:
         self._note(f"after {self.done} updates: " + ", ".join(f"{k} {v:.4g}" for k, v in found.items()))
 
     def improved(self, score: float, *, episodes: int | None = None) -> bool:
-        """Whether the weights at hand are to be kept: they are the best so far or, of `episodes` tasks, as good as it.
+        """True if the weights at hand are to be kept: they are the best so far or, of `episodes` tasks, as good as it.
 
         Of agents that a few hundred tasks cannot tell apart, the one that learned longest is kept, not the luckiest.
         """
@@ -382,7 +382,7 @@ def seeded_dropout(seed: int, update: int) -> Iterator[None]:
 
 
 def within_standard_error(success: float, best: float, episodes: int) -> bool:
-    """Whether a success rate on `episodes` tasks is within one standard error of the best one (Breiman's rule)."""
+    """True if a success rate on `episodes` tasks is within one standard error of the best one (Breiman's rule)."""
     return success >= best - math.sqrt(best * (1 - best) / episodes)
 
 

@@ -1,4 +1,4 @@
-"""What the settings of all learners share, and how settings are checked. Free of torch, so that --help answers at once.
+"""Settings that all learners share, and checks of settings. Free of torch, so that --help answers at once.
 
 A learner's settings are a frozen record over one of these; a field that stands there again has a default of its own.
 """
@@ -14,7 +14,7 @@ from embodied.novelty import FAMILIAR
 
 @dataclass(frozen=True)
 class Limit:
-    """What holds of a number, and that in words: 'must be <words>'."""
+    """A condition on a number, and that in words: 'must be <words>'."""
 
     holds: Callable[[float], bool]
     """Of NaN nothing does."""
@@ -30,7 +30,8 @@ LEARNED_WORDS = "learned"
 WORD_VECTORS = (LEARNED_WORDS, "minilm")
 EVERYBODY = "everybody"
 SPEAKERS = (EVERYBODY, FAMILIAR)
-"""Whose descriptions of routes are learned from: everybody's, or those of people who are not kept from training."""
+"""People whose descriptions of routes are learned from: everybody's, or those of people who are not kept from
+training."""
 
 
 def require(settings: object, limit: Limit, *names: str) -> None:
@@ -106,7 +107,7 @@ class ImitationSettings(ValidatedRunSettings):
     instruction_length: int = 50
     """Longest instruction, words."""
     word_vectors: str = LEARNED_WORDS
-    """What is known of words: 'learned' alone, or 'minilm', pre-trained vectors besides (docs/sources.md, S181)."""
+    """Knowledge of words: 'learned' alone, or 'minilm', pre-trained vectors besides (docs/sources.md, S181)."""
     varied_words: bool = False
     """Most of what is said in training is said in words and sentences of other writers (docs/sources.md, S184)."""
     validation_tasks: int = 200

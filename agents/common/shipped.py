@@ -1,4 +1,4 @@
-"""Where the weights that ship with this repository are; agents/weights/README.md says how they were made."""
+"""Paths of the weights that ship with this repository; agents/weights/README.md says how they were made."""
 
 from __future__ import annotations
 

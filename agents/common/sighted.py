@@ -19,7 +19,7 @@ from embodied.identity import Identity
 
 @dataclass(frozen=True, kw_only=True)
 class About:
-    """What stands beside the weights in an agent's file; learners name the types of their settings."""
+    """Metadata beside the weights in an agent's file; learners name the types of their settings."""
 
     config: ImitationSettings
     evaluation: EvaluationSettings = EvaluationSettings()

@@ -41,7 +41,7 @@ def _sorted(file: bytes) -> bytes:
 
 
 def load_tensors(path: Path, formats: Sequence[str], remedy: str) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """What `save_tensors` wrote.
+    """The contents that `save_tensors` wrote.
 
     Args:
       formats: which about["format"] can be read, the newest first; only an older one may lack a checksum.

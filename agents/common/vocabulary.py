@@ -30,7 +30,7 @@ class Vocabulary:
     words: tuple[str, ...]
     """Word of each number; starts with PAD, UNKNOWN, END."""
     reword: Callable[[str], str] | None = field(default=None, compare=False, repr=False)
-    """What says texts in other words before they are encoded: in training, where wordings are varied."""
+    """A function that says texts in other words before they are encoded: in training, where wordings are varied."""
 
     def __post_init__(self) -> None:
         if self.words[:3] != (PAD, UNKNOWN, END):

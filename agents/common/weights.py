@@ -14,7 +14,7 @@ from embodied.agents.common.tensor_file import checksum_of, load_tensors, save_t
 from embodied.identity import Identity
 from embodied.records import from_json, parse, to_json
 
-FORMAT = "embodied-weights-1"
+WEIGHTS_FORMAT = "embodied-weights-1"
 T = TypeVar("T")
 
 
@@ -28,12 +28,12 @@ def save_weights(
       about: a record of what is needed to use them: settings, words, whose features they know.
       identity: what they were trained with.
     """
-    body = {"format": FORMAT, "kind": kind, "about": to_json(about)}
+    body = {"format": WEIGHTS_FORMAT, "kind": kind, "about": to_json(about)}
     save_tensors(path, tensors, body | ({"identity": to_json(identity)} if identity else {}))
 
 
 def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[dict[str, Tensor], T]:
-    """What `save_weights` wrote: the tensors, and the record of type `about`.
+    """The contents that `save_weights` wrote: the tensors, and the record of type `about`.
 
     Args:
       remedy: how such a file is made, for messages.
@@ -42,7 +42,7 @@ def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[di
       FileNotFoundError, OSError.
       ValueError: truncated, changed, of another format or kind.
     """
-    tensors, found = load_tensors(Path(path), (FORMAT,), remedy)
+    tensors, found = load_tensors(Path(path), (WEIGHTS_FORMAT,), remedy)
     if found.get("kind") != kind:
         raise ValueError(f"{path}: holds {found.get('kind')!r}, {kind!r} is wanted; {remedy}")
     try:
@@ -52,7 +52,7 @@ def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[di
 
 
 def kind_of(path: Path) -> str | None:
-    """What a file of weights holds, as `save_weights` was told."""
+    """The kind of a file of weights, as `save_weights` was told."""
     return _read(path)[1].get("kind")
 
 
@@ -71,7 +71,7 @@ def weights_digest(path: Path) -> str:
 
 def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     """The tensors of a file of weights, and what stands beside them."""
-    return load_tensors(Path(path), (FORMAT,), "train it again")
+    return load_tensors(Path(path), (WEIGHTS_FORMAT,), "train it again")
 
 
 @contextmanager

@@ -20,25 +20,25 @@ from embodied.datasets.store import Dataset, SplitData
 from embodied.kinds.find import FIND
 from embodied.task_kind import EnvInputs
 
-SEEING, MAP, BLIND = (
+SEEING, MAP, BLIND_FINDER = (
     StudyRow("Seeing"),
     StudyRow("Blind, map sees", {"sees": "map"}),
     StudyRow("Blind", {"sees": "nothing"}),
 )
 EXPLORER = StudyRow("Frontier and detector", {"agent": "detector"})
-TABLES: Mapping[str, StudyTable] = {
+FIND_TABLES: Mapping[str, StudyTable] = {
     "find": StudyTable(
         "Finding things without help",
         (
             SEEING,
             MAP,
-            BLIND,
+            BLIND_FINDER,
             EXPLORER,
             *(StudyRow(w.capitalize(), None, {"played": w}) for w in ("random walk", "forward 10")),
         ),
         ("success", "spl", "oracle success", "navigation error", "steps"),
         ("test_unseen",),
-        ((SEEING, BLIND), (SEEING, MAP), (SEEING, EXPLORER)),
+        ((SEEING, BLIND_FINDER), (SEEING, MAP), (SEEING, EXPLORER)),
     )
 }
 
@@ -56,11 +56,11 @@ class FindStudy(SightedStudy):
     judges = (*JUDGES, "embodied.agents.find.run")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        return TABLES
+        return FIND_TABLES
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         """Who is only compared with learns once."""
-        return self.repeats if dataclasses.replace(row, minus=None) in (SEEING, BLIND) else self.repeats[:1]
+        return self.repeats if dataclasses.replace(row, minus=None) in (SEEING, BLIND_FINDER) else self.repeats[:1]
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_finder(self.training_data(), self.settings(train, seed), home, self.cache, note=note)

@@ -82,6 +82,6 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
 
 
 def _kind(about: HannaAbout) -> dict[str, object]:
-    """What must be alike in agents that share weights."""
+    """Settings that must be alike in agents that share weights."""
     sizes = {name: getattr(about.config, name) for name in SIZES}
     return {"encoder": about.encoder[:12], "words": len(about.words), **sizes}

@@ -14,7 +14,7 @@ class HannaAskRule(Protocol):
     def __call__(
         self, probability: float, observation: Observation, last_asked: int, *, rng: np.random.Generator
     ) -> bool:
-        """Whether to ask now, at a place where it is possible.
+        """True to ask now, at a place where it is possible.
 
         Args:
           probability: of REQUEST according to the help-request network.

@@ -1,4 +1,4 @@
-"""What the teacher says of training episodes, as tensors.
+"""The teacher's labels of training episodes, as tensors.
 
 The retrospective mode of 4.2.3: the learner acts alone until its episodes end, sampling from its
 own policies; then the teacher, who can now see each step's future, labels all steps at once. What
@@ -24,8 +24,8 @@ from embodied.interface import Episode, Place, Teacher
 
 @dataclass(frozen=True, eq=False)
 class Experience:
-    """What the networks said in the N steps of a batch of finished episodes, in the order in which they were taken, and
-    what the teacher says of them."""
+    """Outputs of the networks in the N steps of a batch of finished episodes, in the order in which they were taken,
+    and what the teacher says of them."""
 
     moves: Tensor
     """(N, A) logits."""
@@ -46,7 +46,7 @@ class Experience:
 def labelled(
     episodes: Sequence[Episode], moments: Sequence[Moment], teacher: Teacher, worlds: Mapping[str, Place]
 ) -> Experience:
-    """What the networks said in some episodes, beside what the teacher says of them; A is the most actions of any
+    """Outputs of the networks in some episodes, beside the teacher's labels; A is the most actions of any
     step."""
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
     rows = [labels[position][t] for t, m in enumerate(moments) for position in m.positions]

@@ -37,8 +37,8 @@ EVAL_ABLATIONS: Mapping[str, Mapping[str, Any]] = {
         "revisit_weight": 1.0,
     },
 }
-"""What differs, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when it
-asks (docs/sources.md, S36, S161; S162 stays)."""
+"""Changed settings, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when
+it asks (docs/sources.md, S36, S161; S162 stays)."""
 
 
 Judged = Callable[[HannaAgent, FeatureBank], MapPolicy]
@@ -105,7 +105,8 @@ class Forgetting:
 
 
 def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
-    """What sight is worth, by name: the learned agent without it, and its rules with sight but without learning.
+    """Agents that show the worth of sight, by name: the learned agent without it, and its rules with sight but without
+    learning.
 
     'blind' sees black with network and matcher alike; 'rules only' draws moves evenly, stops by the picture alone and
     asks every 5 steps, or every 10.

@@ -1,4 +1,4 @@
-"""What the networks see in one step: a Percept of tensors, and the features of appendix D.1 that need no learning.
+"""Inputs of the networks in one step: a Percept of tensors, and the features of appendix D.1 that need no learning.
 
 Row k of a view set is the view of the Matterport convention: band k // 12 looks 30 degrees down,
 level, 30 degrees up; column k % 12 turns clockwise in steps of 30 degrees.

@@ -21,7 +21,7 @@ from embodied.agents.hanna.training_config import TrainingConfig
 
 @dataclass(frozen=True, eq=False)
 class LstmMemory(Rows):
-    """What one decoder carries from step to step, for B agents."""
+    """State that one decoder carries from step to step, for B agents."""
 
     text: Tensor
     """(B, L, h), with `text_mask` (B, L) bool."""

@@ -19,7 +19,7 @@ from embodied.teachers.shortest import shortest_of
 
 @dataclass(frozen=True, eq=False)
 class MapMemory:
-    """What the policy carries between steps."""
+    """State that the policy carries between steps."""
 
     networks: HannaMemory | None = None
     trails: Mapping[int, Trail] = field(default_factory=dict)

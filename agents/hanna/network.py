@@ -48,7 +48,7 @@ SHORT = 12
 
 @dataclass(frozen=True, eq=False)
 class NetworkMemory(Rows):
-    """What one network carries from step to step, for B agents. Keys and values are projected."""
+    """State that one network carries from step to step, for B agents. Keys and values are projected."""
 
     text_keys: Tensor
     text_values: Tensor
@@ -76,7 +76,7 @@ class NetworkMemory(Rows):
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """What both networks say about one step."""
+    """Outputs of both networks for one step."""
 
     navigation: Tensor
     """(B, A) logits, -inf where there is no action."""

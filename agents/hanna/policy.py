@@ -46,7 +46,7 @@ from embodied.interface import (
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """What the networks said in one step, for the episodes that were still running."""
+    """Outputs of the networks in one step, for the episodes that were still running."""
 
     positions: tuple[int, ...]
     """Place of each row in the batch."""
@@ -55,7 +55,7 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class HannaMemory(RunningRows):
-    """What the policy carries between steps; rows belong to the episodes that still run."""
+    """State that the policy carries between steps; rows belong to the episodes that still run."""
 
     networks: tuple[Any, Any]
     """Memories of the navigation and the help-request network."""
@@ -68,7 +68,7 @@ class HannaMemory(RunningRows):
 
 @dataclass(frozen=True, eq=False)
 class Steering:
-    """What somebody who knows more than the networks makes of their moves."""
+    """Weights of the moves by somebody who knows more than the networks."""
 
     weights: np.ndarray
     """(n + 1,) of the actions, stop first."""
@@ -153,7 +153,7 @@ class HannaPolicy:
 
     @torch.no_grad()
     def scored(self, memory: HannaMemory, percept: Percept) -> tuple[Scores, tuple[Any, Any]]:
-        """What the networks say of a step, and their memories."""
+        """Outputs of the networks for a step, and their memories."""
         return self.network(memory.networks, percept)
 
     def rule_of(self, position: int, episodes: int) -> HannaAskRule:
@@ -161,7 +161,7 @@ class HannaPolicy:
         return self.ask_rule
 
     def kept(self, moments: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
-        """What is remembered of what the networks said."""
+        """The outputs that are remembered."""
         return ()
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
@@ -217,7 +217,7 @@ class HannaPolicy:
 
 
 def thoughts_of(scores: Scores, observations: Sequence[Observation]) -> list[Thought]:
-    """What the networks said of each observation, as it is written down: a Thought has stop last."""
+    """Outputs of the networks for each observation, as it is written down: a Thought has stop last."""
     moves = scores.navigation.detach().softmax(-1).cpu().numpy()  # (k, A), stop first
     asks = scores.ask.detach().softmax(-1)[:, REQUEST].cpu().numpy()  # (k,)
     reasons = None if scores.reasons is None else scores.reasons.detach().sigmoid().tolist()  # (k, 3)

@@ -28,7 +28,7 @@ WALKS, MOVES = 12, 15
 """Walks through each house, and moves of each: what the agent has seen when it is shown a picture."""
 RINGS = ((0.0, 2.0), (2.0, 4.0), (4.0, np.inf))
 """From how far to how far the places are, in metres along the graph, that the right one is told from."""
-COLUMNS = (
+RECOGNITION_MEASURES = (
     "right place first",
     "precision",
     "recall",
@@ -50,7 +50,7 @@ class Query:
 
     @property
     def known(self) -> bool:
-        """Whether the place is on the map."""
+        """True if the place is on the map."""
         return bool((self.distance == 0).any())
 
     @property
@@ -152,4 +152,4 @@ def measured(asked: Sequence[Query], least: float) -> dict[str, Samples]:
 
     rings = [told(*ring) for ring in ((0.0, np.inf), *RINGS)]
     best = Samples(tuple(threshold(some) for some in by_house.values()), tuple(by_house))
-    return dict(zip(COLUMNS, (each(known), each(found), each(known, least), *rings, best), strict=True))
+    return dict(zip(RECOGNITION_MEASURES, (each(known), each(found), each(known, least), *rings, best), strict=True))

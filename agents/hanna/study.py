@@ -12,7 +12,7 @@ from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
 from embodied.agents.hanna.agent import HannaAgent
 from embodied.agents.hanna.evaluation import all_policies, by_the_text, counted
-from embodied.agents.hanna.recognition_study import AGAIN, COLUMNS, recognised
+from embodied.agents.hanna.recognition_study import AGAIN, RECOGNITION_MEASURES, recognised
 from embodied.agents.hanna.run import train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.engine import Measured
@@ -20,13 +20,13 @@ from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import speakers_table, words_table
 from embodied.agents.vision.config import CAPTURE_CONDITIONS
-from embodied.agents.vision.sighted_study import SPLITS as TEST
+from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy, spoken
 from embodied.agents.vision.training_data import TrainingData
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
 
-VALIDATION = ("val_seen", "val_unseen")
+VALIDATION_SPLITS = ("val_seen", "val_unseen")
 FULL = ("success", "spl", "navigation error", "requests")
 
 
@@ -58,7 +58,7 @@ SIGHT_ROWS = (
     ),
     without("Random walk", "random walk"),
 )
-"""What the seeing agent is compared with: without sight, without learning, without help, with other rules of asking."""
+"""Rows beside the seeing agent: without sight, without learning, without help, with other rules of asking."""
 PICTURE = "picture"
 """In a row's `judge`: no agent plays; places are recognised in pictures that were taken then."""
 LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
@@ -74,7 +74,7 @@ ABLATIONS: Mapping[str, Mapping[str, Any]] = {
 REASONS = tuple(
     f"{r} {what}" for r in ("lost", "uncertain wrong", "never asked") for what in ("accuracy", "precision", "recall")
 )
-TABLES: Mapping[str, StudyTable] = {
+HANNA_TABLES: Mapping[str, StudyTable] = {
     "4.3": StudyTable(
         "Results on the test splits",
         (
@@ -102,7 +102,7 @@ TABLES: Mapping[str, StudyTable] = {
     "places": StudyTable(
         "Recognising places in pictures from another time",
         tuple(StudyRow(name, None, {PICTURE: name}) for name in (AGAIN, *CAPTURE_CONDITIONS)),
-        COLUMNS,
+        RECOGNITION_MEASURES,
         ("test_unseen",),
     ),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
@@ -125,7 +125,7 @@ TABLES: Mapping[str, StudyTable] = {
         "Ablations",
         (learned("Final agent"), *(learned(name, **off) for name, off in ABLATIONS.items())),
         FULL,
-        VALIDATION,
+        VALIDATION_SPLITS,
         tuple((learned("Final agent"), learned(name, **off)) for name, off in ABLATIONS.items()),
     ),
 }
@@ -136,13 +136,13 @@ alpha of these rules (Table D.1, note)."""
 
 PRINTED = ("4.3", "4.4", "4.5", "4.6", "D.2")
 """Tables whose numbers the dissertation prints: judged as the text has it, and in columns of their own as we do."""
-TEXT, SHIPPED = "by the text", " as shipped"
+BY_TEXT, SHIPPED = "by the text", " as shipped"
 """In a row's `judge`, and at the end of a split's name."""
 
 
 def in_both_ways(table: StudyTable) -> StudyTable:
     """The table with columns of the text's way of judging, then of ours; comparisons are of both."""
-    text = lambda row: dataclasses.replace(row, judge={**row.judge, TEXT: True})
+    text = lambda row: dataclasses.replace(row, judge={**row.judge, BY_TEXT: True})
     return dataclasses.replace(
         table,
         rows=tuple(text(row) for row in table.rows),
@@ -173,7 +173,7 @@ class HannaStudy(SightedStudy):
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
         ood = Dataset(self.eval_data or self.data).ood
         found = {}
-        for name, table in TABLES.items():
+        for name, table in HANNA_TABLES.items():
             splits = [s for s in table.splits if self.eval_data is None or not s.endswith("_seen")]
             splits += ood if table.splits == TEST else ()
             found[name] = dataclasses.replace(table, splits=tuple(splits))
@@ -200,7 +200,7 @@ class HannaStudy(SightedStudy):
         if agent is None:
             return super().policies(agent, judge, split)
         bank = self.evaluation_data(judge).split(split.removesuffix(SHIPPED)).bank
-        by_text = judge.get(TEXT) and not split.endswith(SHIPPED)
+        by_text = judge.get(BY_TEXT) and not split.endswith(SHIPPED)
         policy = all_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
         return self.heard(agent, policy, judge)
 

@@ -26,21 +26,22 @@ UNLIKELY = 1e-6
 
 @dataclass(frozen=True)
 class Trail:
-    """What one episode knows of its way so far; directions are views, 0..35, which keep neighbours apart by 30 degrees
-    only: whatever lies in the same view as a place that was visited counts as leading there (docs/sources.md, S36)."""
+    """Knowledge of one episode of its way so far; directions are views, 0..35, which keep neighbours apart by 30
+    degrees only: whatever lies in the same view as a place that was visited counts as leading there (docs/sources.md,
+    S36)."""
 
     map: PlaceMap = field(default_factory=PlaceMap)
-    """What the places look like; their numbers are meant below."""
+    """Features of the places; their numbers are meant below."""
     place: int = 0
-    """Where the agent takes itself to be."""
+    """The place where the agent takes itself to be."""
     picture: int | None = None
     """Which of the pictures that it was shown it is looking for."""
     goal: int | None = None
-    """Where that picture was taken; None without one, or where it is not on the map."""
+    """The place where that picture was taken; None without one, or where it is not on the map."""
     match: float | None = None
     """How well the picture matches what is seen here."""
     leads: Mapping[tuple[int, int], int] = field(default_factory=dict)
-    """Where the last move in a view from a place led, in either direction."""
+    """The place to which the last move in a view from a place led, in either direction."""
     visits: Mapping[tuple[int, str], int] = field(default_factory=dict)
     """How many steps began at a place under these words."""
     thoughts: Mapping[tuple[str, int | None, int], Mapping[int, float]] = field(default_factory=dict)

@@ -28,7 +28,7 @@ MODELS = ("hanna", "lstm")
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingConfig(ImitationSettings):
-    """The defaults are Table D.1; SCALES holds the smaller settings."""
+    """The defaults are Table D.1; HANNA_SCALES holds the smaller settings."""
 
     model: str = "hanna"
     """'hanna' (appendix D.2) or 'lstm' (the encoder-decoder of Table 4.6)."""
@@ -62,7 +62,7 @@ class TrainingConfig(ImitationSettings):
     read_assistance: bool = True
     """Read the words of routes; False: show only the goal image (Table 4.4)."""
     speakers: str = EVERYBODY
-    """Whose routes are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
+    """People whose routes are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
     reset_inter_task: bool = True
     """Reset the inter-task module between sub-tasks; False: ablation of Table D.2."""
     predict_reasons: bool = True
@@ -114,7 +114,7 @@ class HannaEvaluation(EvaluationSettings):
         require(self, SHARE, "revisit_weight", "frontier_discount", "first_ask_threshold", "route_ask_threshold")
 
 
-SCALES: dict[str, TrainingConfig] = {
+HANNA_SCALES: dict[str, TrainingConfig] = {
     "mini": TrainingConfig(
         hidden_size=128,
         navigation_embedding=128,

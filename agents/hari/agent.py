@@ -16,7 +16,7 @@ from embodied.agents.hari.networks import INTENTIONS, ExecutionNetwork, Recurren
 from embodied.agents.hari.words import FeatureWords
 from embodied.identity import Identity
 
-REMEDY = "train it again with `embodied train hari`"
+HARI_REMEDY = "train it again with `embodied train hari`"
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def load_executor(path: Path) -> Executor:
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    tensors, about = load_weights(path, "hari", HariAbout, REMEDY)
+    tensors, about = load_weights(path, "hari", HariAbout, HARI_REMEDY)
     executor = new_executor(about.execution, FeatureWords(about.names))
     load_into(executor.network, _of("execution", tensors), path)
     executor.network.eval()
@@ -109,7 +109,7 @@ def load_agent(path: Path) -> HariAgent:
     Raises:
       FileNotFoundError, ValueError: missing, damaged, of another format, or an execution policy alone.
     """
-    tensors, about = load_weights(path, "hari", HariAbout, REMEDY)
+    tensors, about = load_weights(path, "hari", HariAbout, HARI_REMEDY)
     config = about.intention
     if config is None:
         raise ValueError(

@@ -23,7 +23,7 @@ from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 from embodied.interface import Agent, Ask, Episode, Move
 
-VALIDATION = tuple(f"val_{c}" for c in CONDITIONS)
+VALIDATION_CONDITIONS = tuple(f"val_{c}" for c in CONDITIONS)
 ACTIONS = ("CUR", "GOAL", "SUB", "DO")
 SUB_RULE = "SUB whenever possible"
 RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", SUB_RULE, RANDOM)
@@ -43,7 +43,7 @@ def _costs() -> tuple[StudyRow, ...]:
     )
 
 
-TABLES: Mapping[str, StudyTable] = {
+HARI_TABLES: Mapping[str, StudyTable] = {
     "4.7": StudyTable(
         "Asking by learning and by rules",
         (
@@ -66,10 +66,10 @@ TABLES: Mapping[str, StudyTable] = {
         "Goals on the stack",
         tuple(_learned(f"stack {n}", stack=n) for n in (1, 2, 3)),
         ("success",),
-        VALIDATION,
+        VALIDATION_CONDITIONS,
         pooled=ACTIONS,
     ),
-    "figure 4.5": StudyTable("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION),
+    "figure 4.5": StudyTable("Requests by condition", (_learned("learned"),), ACTIONS[:3], VALIDATION_CONDITIONS),
     "figure 4.5b": StudyTable(
         "Intentions by time step",
         (StudyRow("learned", {}, {"played": "learned", TIMES: True}),),
@@ -80,7 +80,7 @@ TABLES: Mapping[str, StudyTable] = {
         "What costs change",
         _costs(),
         ("success", *ACTIONS),
-        VALIDATION,
+        VALIDATION_CONDITIONS,
         figure=Figure(("success",), "cost of an action", "success (%)", log=True),
     ),
 }
@@ -107,7 +107,7 @@ class HariStudy(EpisodeStudy):
         """The splits out of distribution come beside those of the tests; elsewhere, houses may all be unknown."""
         known = self.judged_in({}).lessons == dataset_of(self.data, "hari").lessons
         ood, tables = self.judged_in({}).ood, {}
-        for name, table in TABLES.items():
+        for name, table in HARI_TABLES.items():
             splits = [s for s in table.splits if known or s.endswith("_env")]
             splits += ood if table.splits == TEST else ()
             tables[name] = dataclasses.replace(table, splits=tuple(splits))

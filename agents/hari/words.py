@@ -15,7 +15,7 @@ from embodied.interface import STEP, TURNS, Candidates, Description, Feature
 
 TYPES = ("object", "room", "action", "state", "goal")
 """Of feature sets; the last two mark what is described, as the first token of a description."""
-COLUMNS = 5
+WORD_COLUMNS = 5
 """Name, type, horizontal, vertical, distance."""
 NAMELESS, UNKNOWN = 0, 1
 SIZES = (1 + len(TYPES), 1 + TURNS, 1 + 3, 1 + 5)

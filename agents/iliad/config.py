@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, SHARE, require, require_word
 
-LEARNERS = ("adel", "mixture", "dagger", "binary", "continuous")
+STUDENT_LEARNERS = ("adel", "mixture", "dagger", "binary", "continuous")
 """ADEL (Algorithm 9), the mixture of Algorithm 5, DAgger, and REINFORCE with a reward of success or of nearness."""
 
 
@@ -45,7 +45,7 @@ class LearnerConfig:
     """Random seed of training."""
 
     def __post_init__(self) -> None:
-        require_word(self, "learner", LEARNERS)
+        require_word(self, "learner", STUDENT_LEARNERS)
         require(self, AT_LEAST_ONE, "iterations", "batch", "validate_every")
         require(self, POSITIVE, "learning_rate", "clip", "checkpoint_minutes")
         require(self, SHARE, "mixing", "least_mixing", "cooldown", "threshold")

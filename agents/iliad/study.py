@@ -31,13 +31,13 @@ from embodied.identity import identity_of, key_of
 from embodied.seeds import stream
 
 NEEDED = "thousand episodes to the threshold"
-LEARNERS = (
+LEARNING_ROWS = (
     StudyRow("DAgger", {"learner": "dagger"}),
     StudyRow("REINFORCE, binary", {"learner": "binary"}),
     StudyRow("REINFORCE, continuous", {"learner": "continuous"}),
     StudyRow("ADEL"),
 )
-DAGGER, BLIND = LEARNERS[0], StudyRow("DAgger, blind", {"learner": "dagger", "blind": True})
+DAGGER, BLIND_STUDENT = LEARNING_ROWS[0], StudyRow("DAgger, blind", {"learner": "dagger", "blind": True})
 OWN = ("blind", "word_vectors", "varied_words")
 """Settings of NAV's students in which rows differ."""
 CHANCE = StudyRow("chance: a random shortest path of 2 to 6 edges", None)
@@ -47,8 +47,8 @@ def _table(title: str, *rows: StudyRow) -> StudyTable:
     return StudyTable(title, rows, ("success",), ("test",), pooled=(NEEDED,))
 
 
-TABLES: Mapping[str, StudyTable] = {
-    "3.4": _table("Learning from descriptions, demonstrations and rewards", *LEARNERS),
+ILIAD_TABLES: Mapping[str, StudyTable] = {
+    "3.4": _table("Learning from descriptions, demonstrations and rewards", *LEARNING_ROWS),
     "3.5": _table(
         "The mixing weight", StudyRow("λ = 0", {"mixing": 0.0}), StudyRow("λ = 1", {"mixing": 1.0}), StudyRow("λ = 0.5")
     ),
@@ -70,7 +70,7 @@ TABLES: Mapping[str, StudyTable] = {
     ),
     "figure 3.7": StudyTable(
         "Success over the course of training",
-        tuple(dataclasses.replace(row, judge={"curve": True}) for row in LEARNERS),
+        tuple(dataclasses.replace(row, judge={"curve": True}) for row in LEARNING_ROWS),
         splits=("validation",),
         figure=Figure(("success_at",), "training episodes", "success (share)", share=True),
     ),
@@ -198,13 +198,13 @@ class IliadStudy(StudyLearner):
         """REGEX is judged on its validation split, too; NAV's is that of which the best of many students was kept. In
         NAV one can be blind, arrive by chance, and hear what one never heard."""
         if self.world.name == "nav":
-            rows = (*LEARNERS, BLIND, CHANCE)
-            seen = dataclasses.replace(TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND),))
+            rows = (*LEARNING_ROWS, BLIND_STUDENT, CHANCE)
+            seen = dataclasses.replace(ILIAD_TABLES["3.4"], rows=rows, compared=((DAGGER, BLIND_STUDENT),))
             heard = {"words": words_table, "speakers": speakers_table}
             made = {name: table(_reader, ("success",), ("test",)) for name, table in heard.items()}
-            return {**TABLES, "3.4": seen, **made}
+            return {**ILIAD_TABLES, "3.4": seen, **made}
         both = lambda t: dataclasses.replace(t, splits=("validation", "test")) if t.pooled else t
-        return {name: both(table) for name, table in TABLES.items()}
+        return {name: both(table) for name, table in ILIAD_TABLES.items()}
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Data and teachers."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.language_models.options import WithModel, client_of
-from embodied.agents.learner import Learner
+from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import EVALUATION, Repeated, StudyOptions, Tables, study_of
 from embodied.options import Cached, Settings
 
@@ -46,4 +46,4 @@ def model_agent(args: AskStudyOptions, places: object) -> Agent:
     return LanguageModelAgent(client_of(args), PromptBuilder(prompt=agent_prompt(args.prompts)))
 
 
-LEARNER = Learner(name="ask", study=(AskStudyOptions, study))
+register_learner(Learner(name="ask", study=(AskStudyOptions, study)))

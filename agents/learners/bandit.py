@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from embodied.agents.bandit.config import SCALES, BanditConfig
-from embodied.agents.learner import Learner
+from embodied.agents.bandit.config import BANDIT_SCALES, BanditConfig
+from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import SMALL_SCALE, TRAINING, Repeated, StudyOptions, Tables, study_of
 from embodied.options import InputFolder, InputPath, Settings
 
@@ -26,7 +26,7 @@ class BanditStudyOptions(StudyOptions, Repeated):
     """The settings to start from."""
     rater: InputPath | None = None
     """Learn from ratings like people's, too: rater.json of `embodied dataset from-people`."""
-    config: Annotated[BanditConfig, Settings(TRAINING, SCALES)]
+    config: Annotated[BanditConfig, Settings(TRAINING, BANDIT_SCALES)]
 
 
 def study(args: BanditStudyOptions) -> StudyLearner:
@@ -38,4 +38,4 @@ def study(args: BanditStudyOptions) -> StudyLearner:
     return study_of(BanditStudy, args, rater=rater)
 
 
-LEARNER = Learner(name="bandit", study=(BanditStudyOptions, study))
+register_learner(Learner(name="bandit", study=(BanditStudyOptions, study)))

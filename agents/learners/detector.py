@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from embodied.agents.learner import Learner
+from embodied.agents.learner import Learner, register_learner
 from embodied.agents.learners.vision import StripOptions
 from embodied.agents.options import TRAINING, EncoderFile
 from embodied.agents.vision.config import StripTraining
@@ -60,4 +60,4 @@ def train(args: DetectorTraining, *, note: Note) -> None:
     )
 
 
-LEARNER = Learner(name="detector", train=(DetectorTraining, train))
+register_learner(Learner(name="detector", train=(DetectorTraining, train)))

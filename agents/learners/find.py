@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents.find.config import FinderConfig
-from embodied.agents.learner import Learner
+from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import TRAINING, EncoderFile, Repeated, StudyOptions, WithData, study_of
 from embodied.options import Count, Settings
 
@@ -32,4 +32,4 @@ def study(args: FindStudyOptions) -> StudyLearner:
     return study_of(FindStudy, args)
 
 
-LEARNER = Learner(name="find", study=(FindStudyOptions, study))
+register_learner(Learner(name="find", study=(FindStudyOptions, study)))

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.agents.common.shipped import SHIPPED_AGENT
-from embodied.agents.hanna.training_config import EVALUATIONS, SCALES, HannaEvaluation, TrainingConfig
-from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings
+from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, HannaEvaluation, TrainingConfig
+from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
     SCALE,
@@ -45,7 +45,7 @@ class HannaTraining(Recorded, Run, Encoded, WithDevice, WithGoalImage):
     threads: Count = 2
     init_from: InputPath | None = None
     """Initialise with the weights of this agent."""
-    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES)]
+    config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES)]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
 
@@ -64,7 +64,7 @@ class HannaStudyOptions(StudyOptions, Repeated, Limited, WithData, EncoderFile, 
     """Evaluate in the unseen houses of another data set that has features (default: of --data)."""
     init_from: InputPath | None = None
     """Initialise with the weights of this agent."""
-    config: Annotated[TrainingConfig, Settings(TRAINING, SCALES, skip=("training_houses",))]
+    config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES, skip=("training_houses",))]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
 
@@ -97,14 +97,16 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     return of_split
 
 
-LEARNER = Learner(
-    name="hanna",
-    train=(HannaTraining, train),
-    study=(HannaStudyOptions, study),
-    players=players,
-    columns=(
-        *("success", "strict success", "spl", "navigation error", "requests"),
-        *("oracle success", "mistake repeat", "request repeat"),
-    ),
-    shipped=SHIPPED_AGENT,
+register_learner(
+    Learner(
+        name="hanna",
+        train=(HannaTraining, train),
+        study=(HannaStudyOptions, study),
+        players=players,
+        columns=(
+            *("success", "strict success", "spl", "navigation error", "requests"),
+            *("oracle success", "mistake repeat", "request repeat"),
+        ),
+        shipped=SHIPPED_AGENT,
+    )
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.agents.common.shipped import SHIPPED_HARI
 from embodied.agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
-from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings
+from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     SCALE,
     TRAINING,
@@ -108,14 +108,16 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     return of_split
 
 
-LEARNER = Learner(
-    name="hari",
-    train=(
-        "The agent that learns which question to ask, in two phases.",
-        {"execution": (ExecutionTraining, execution), "intention": (IntentionTraining, intention)},
-    ),
-    study=(HariStudyOptions, study),
-    players=players,
-    columns=("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error"),
-    shipped=SHIPPED_HARI,
+register_learner(
+    Learner(
+        name="hari",
+        train=(
+            "The agent that learns which question to ask, in two phases.",
+            {"execution": (ExecutionTraining, execution), "intention": (IntentionTraining, intention)},
+        ),
+        study=(HariStudyOptions, study),
+        players=players,
+        columns=("success", "CUR", "GOAL", "SUB", "DO", "requests", "navigation error"),
+        shipped=SHIPPED_HARI,
+    )
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from embodied.agents.iliad.config import LearnerConfig, folder_name
 from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig, students_of
-from embodied.agents.learner import Learner
+from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import SMALL_SCALE, Nav, Repeated, StudyOptions, Tables, Threaded, Timed, study_of
 from embodied.options import InputFolder, InputPath, OutputFolder, Settings
 
@@ -112,14 +112,16 @@ def nav_study(args: NavStudyOptions) -> StudyLearner:
     return study_of(IliadStudy, args, world=NavStudyWorld(args.world, source))
 
 
-LEARNER = Learner(
-    name="iliad",
-    train=(
-        "A student that learns to do what a request says from descriptions (ADEL), demonstrations or rewards.",
-        {"regex": (RegexTraining, regex), "nav": (NavTraining, nav)},
-    ),
-    study=(
-        "Students that learn from descriptions of what they did.",
-        {"regex": (RegexStudyOptions, regex_study), "nav": (NavStudyOptions, nav_study)},
-    ),
+register_learner(
+    Learner(
+        name="iliad",
+        train=(
+            "A student that learns to do what a request says from descriptions (ADEL), demonstrations or rewards.",
+            {"regex": (RegexTraining, regex), "nav": (NavTraining, nav)},
+        ),
+        study=(
+            "Students that learn from descriptions of what they did.",
+            {"regex": (RegexStudyOptions, regex_study), "nav": (NavStudyOptions, nav_study)},
+        ),
+    )
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.learner import Learner
+from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import (
     PRESETS,
     TRAINING,
@@ -93,4 +93,4 @@ def study(args: VisionStudyOptions) -> StudyLearner:
     return study_of(EncoderStudy, args, source=args.source(), **more)
 
 
-LEARNER = Learner(name="vision", train=(VisionTraining, train), study=(VisionStudyOptions, study))
+register_learner(Learner(name="vision", train=(VisionTraining, train), study=(VisionStudyOptions, study)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.shipped import SHIPPED_VLN
-from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings
+from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
     SCALE,
@@ -25,7 +25,7 @@ from embodied.agents.options import (
     study_of,
     training_data,
 )
-from embodied.agents.vln.config import FORCING, MEASURES, SCALES, SPEAKER_SCALES, FollowerSettings, SpeakerSettings
+from embodied.agents.vln.config import FORCING, MEASURES, SPEAKER_SCALES, VLN_SCALES, FollowerSettings, SpeakerSettings
 from embodied.options import Count, InputPath, OutputFolder, Settings
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class FollowerTraining(Recorded, Run, Encoded, WithDevice):
 
     speaker: InputPath | None = None
     """For --spoken-share: a file of `embodied train vln speaker`."""
-    config: Annotated[FollowerSettings, Settings(TRAINING, SCALES, words={"forcing": FORCING})]
+    config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, words={"forcing": FORCING})]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
 
 
@@ -66,7 +66,7 @@ class VlnStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
     others: Count = 1
     """Training seeds of all rows but the first."""
     config: Annotated[
-        FollowerSettings, Settings(TRAINING, SCALES, skip=("forcing", "blind", "wordless", "spoken_share"))
+        FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless", "spoken_share"))
     ]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
 
@@ -107,14 +107,16 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     return of_split
 
 
-LEARNER = Learner(
-    name="vln",
-    train=(
-        "Agents that follow route instructions, and a speaker that describes walks.",
-        {"follower": (FollowerTraining, follower), "speaker": (SpeakerTraining, speaker)},
-    ),
-    study=(VlnStudyOptions, study),
-    players=players,
-    columns=MEASURES,
-    shipped=SHIPPED_VLN,
+register_learner(
+    Learner(
+        name="vln",
+        train=(
+            "Agents that follow route instructions, and a speaker that describes walks.",
+            {"follower": (FollowerTraining, follower), "speaker": (SpeakerTraining, speaker)},
+        ),
+        study=(VlnStudyOptions, study),
+        players=players,
+        columns=MEASURES,
+        shipped=SHIPPED_VLN,
+    )
 )

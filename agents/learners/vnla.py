@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.shipped import SHIPPED_VNLA
-from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings
+from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
     SCALE,
@@ -26,7 +26,7 @@ from embodied.agents.options import (
     study_of,
     training_data,
 )
-from embodied.agents.vnla.config import ASK_RULES, ASKERS, SCALES, TRAINED_UNDER, VnlaSettings
+from embodied.agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VNLA_SCALES, VnlaSettings
 from embodied.options import Count, InputFolder, Settings
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class VnlaTraining(Recorded, Run, Encoded, WithDevice):
     config: Annotated[
         VnlaSettings,
         Settings(
-            TRAINING, SCALES, words={"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
+            TRAINING, VNLA_SCALES, words={"asker": ASKERS, "ask_rules": tuple(ASK_RULES), "rules": tuple(TRAINED_UNDER)}
         ),
     ]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
@@ -63,7 +63,7 @@ class VnlaStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
     """A data set of --no-rooms, for the table `rooms`."""
     others: Count | None = None
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
-    config: Annotated[VnlaSettings, Settings(TRAINING, SCALES, skip=("asker", "ask_rules", "rules"))]
+    config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "ask_rules", "rules"))]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings())]
 
 
@@ -99,11 +99,21 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     return of_split
 
 
-LEARNER = Learner(
-    name="vnla",
-    train=(VnlaTraining, train),
-    study=(VnlaStudyOptions, study),
-    players=players,
-    columns=("success", "strict success", "room success", "navigation error", "requests", "oracle success", "steps"),
-    shipped=SHIPPED_VNLA,
+register_learner(
+    Learner(
+        name="vnla",
+        train=(VnlaTraining, train),
+        study=(VnlaStudyOptions, study),
+        players=players,
+        columns=(
+            "success",
+            "strict success",
+            "room success",
+            "navigation error",
+            "requests",
+            "oracle success",
+            "steps",
+        ),
+        shipped=SHIPPED_VNLA,
+    )
 )

@@ -46,11 +46,11 @@ from embodied.records import RecordError, from_plain, read_json
 PRINTED = Path(__file__).parent / "data" / "printed.json"
 """Numbers of papers: table to row to column, in the table's own units."""
 Measured = Mapping[str, Samples]
-"""What was counted of one run, by name."""
+"""Counts of one run, by name."""
 
 
 class StudyLearner:
-    """What the engine needs of a learner, whose studies are frozen records of it; small, so that it can be sent to
+    """Interface of a learner to the engine, whose studies are frozen records of it; small, so that it can be sent to
     other processes. What has no body here every learner says."""
 
     repeats: tuple[int, ...]
@@ -91,11 +91,11 @@ class StudyLearner:
         raise NotImplementedError
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
-        """What is counted of a run; `seed` is that of its training, `keep` names files of its own, without a suffix."""
+        """Counts of a run; `seed` is that of its training, `keep` names files of its own, without a suffix."""
         raise NotImplementedError
 
     def about(self) -> str:
-        """What all rows have in common, in sentences."""
+        """Facts that all rows have in common, in sentences."""
         raise NotImplementedError
 
 
@@ -156,7 +156,7 @@ def refuse_unknown(names: Iterable[str], known: Iterable[str], what: str) -> Non
 
 
 def check(folder: Path) -> list[str]:
-    """What stored tables in a folder, and in folders of it, are worth: one line per table."""
+    """The worth of stored tables in a folder, and in folders of it: one line per table."""
     lines = []
     for path in sorted(Path(folder).rglob("*.json")):
         try:
@@ -248,7 +248,7 @@ def _weights(home: Path, identity: Identity) -> Path | None:
 def _judged(
     learner: StudyLearner, home: Path, weights: Path | None, row: StudyRow, split: str
 ) -> tuple[Path, dict[str, Any]]:
-    """Where a judgement is kept, and its identity."""
+    """The file of a judgement, and its identity."""
     about = {"weights": weights and _digest_of(weights, weights.stat().st_mtime_ns), "judge": row.judge, "split": split}
     mine = identity_of(*learner.judges, **about, **learner.judged(row, split))
     how = "_".join(map(str, row.judge.values()))
@@ -344,7 +344,7 @@ def result(
 
 
 def _found(learner: StudyLearner, table: StudyTable, row: StudyRow, out: Path) -> dict[tuple[str, str], list[Samples]]:
-    """What was counted of a row, by split and name, per training seed; nothing if some of it is missing."""
+    """Counts of a row, by split and name, per training seed; nothing if some of it is missing."""
     found: dict[tuple[str, str], list[Samples]] = {}
     for split in table.splits:
         runs = _samples(learner, row, split, out)
@@ -370,7 +370,7 @@ def _together(a: Samples, b: Samples) -> Samples:
 
 
 def _samples(learner: StudyLearner, row: StudyRow, split: str, out: Path) -> list[Measured] | None:
-    """What was counted of a row on a split, per training seed."""
+    """Counts of a row on a split, per training seed."""
     found: list[Measured] = []
     for seed in learner.seeds(row):
         home, weights = _home(learner, out, row, seed), None

@@ -73,7 +73,7 @@ class EpisodeStudy(StudyLearner):
         return self.judged_in(judge).split(split)
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
-        """What is counted of some episodes."""
+        """Counts of some episodes."""
         return measured(episodes, {name: place.graph for name, place in split.worlds.items()})
 
     # What the engine asks -----------------------------------------------------------------------

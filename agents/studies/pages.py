@@ -70,7 +70,7 @@ def _wanted(values: Mapping[str, Any], columns: Sequence[str]) -> list[tuple[str
 
 
 def _place(key: str, k: int) -> float:
-    """Where a column is drawn: at the number that its name holds, else one after the other."""
+    """The position at which a column is drawn: the number that its name holds, else one after the other."""
     found = re.search(r"_at_([0-9.]+)", key)
     return float(found[1]) if found else float(k)
 

@@ -13,13 +13,13 @@ class StudyRow:
 
     label: str
     train: Mapping[str, Any] | None = field(default_factory=dict)
-    """What differs from the settings of the study; None for a row that does not learn."""
+    """Differences from the settings of the study; None for a row that does not learn."""
     judge: Mapping[str, Any] = field(default_factory=dict)
     """Who plays, and how, in the learner's words."""
     minus: StudyRow | None = None
     """The row whose numbers are subtracted, task by task and seed by seed."""
     x: float | None = None
-    """Where a figure draws it."""
+    """Its position in a figure."""
     series: str = ""
     """The curve of the figure that it belongs to."""
 
@@ -34,9 +34,9 @@ class Figure:
     against: str = ""
     """Key of the column over whose mean rows are drawn, instead of their `x`."""
     log: bool = False
-    """Whether x grows by factors."""
+    """True if x grows by factors."""
     share: bool = False
-    """Whether what is drawn lies between 0 and 1."""
+    """True if what is drawn lies between 0 and 1."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class StudyTable:
     columns: tuple[str, ...] = ()
     """Names of what is counted; none for all that is."""
     splits: tuple[str, ...] = ("",)
-    """Where agents are judged; '' where there is nothing to choose."""
+    """Splits that agents are judged in; '' where there is nothing to choose."""
     compared: tuple[tuple[StudyRow, StudyRow], ...] = ()
     """Pairs that differ in one thing, whose difference is told task by task."""
     figure: Figure | None = None

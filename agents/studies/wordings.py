@@ -78,7 +78,7 @@ def code_of(judge: Mapping[str, Any]) -> dict[str, str]:
 
 
 def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
-    """What says a text as a row has it to an agent that knows the words `known`."""
+    """A function that says a text as a row has it to an agent that knows the words `known`."""
     return in_synonyms(known) if how == SYNONYMS else paraphraser(load_catalogue(cache), UNHEARD)
 
 

@@ -49,13 +49,13 @@ class CaptureCondition:
     day: int = 0
     """Day of embodied.generate.rearrange: people elsewhere, small things moved; 0 is the agent's own."""
     camera: str = "ideal"
-    """What took it, one of embodied.render.photograph.CAMERAS: exposure, balance, lens, noise, JPEG."""
+    """The camera that took it, one of embodied.render.photograph.CAMERAS: exposure, balance, lens, noise, JPEG."""
     view: bool = False
     """A single view of 60 degrees along a drawn direction instead of a panorama."""
 
     @property
     def name(self) -> str:
-        """What its features are filed under, after the house."""
+        """The name that its features are filed under, after the house."""
         parts = [f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day)]
         parts += [self.camera * (self.camera != "ideal"), "view" * self.view]
         return "".join(f"+{p}" for p in parts if p)
@@ -72,7 +72,7 @@ CAPTURE_CONDITIONS: Mapping[str, CaptureCondition] = {
     "later-camera": CaptureCondition(lighting=1, day=1, camera="robot"),
     "later-view": CaptureCondition(lighting=1, day=1, camera="robot", view=True),
 }
-"""What --goal-image may name, from what the agent sees itself to a single view at another hour of another day."""
+"""Values of --goal-image, from what the agent sees itself to a single view at another hour of another day."""
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ class _Block(nn.Module):
 
 @dataclass(frozen=True)
 class DetectorAbout:
-    """What stands beside the weights of a detector."""
+    """Metadata beside the weights of a detector."""
 
     encoder: str
     """Digest of its encoder."""

@@ -73,7 +73,7 @@ class StripSource:
         return [HouseStrips.load(self._path(data, n)) for n in names]
 
     def _path(self, data: Dataset, name: str) -> Path:
-        """Where the strips of a house are."""
+        """The file in which the strips of a house are."""
         part = "" if self.share == 1 else f"_{self.share:.4f}"
         folder = self.folder / f"{drawing(pictures_of(data, name, self.picture_kind))}{part}"
         return folder / f"{name}.npz"

@@ -19,11 +19,11 @@ from embodied.agents.common.tensor_file import load_into, read_weights
 from embodied.agents.common.weights import load_weights, save_weights, seeded
 from embodied.agents.vision.lite import LITE, Lite, folded
 from embodied.agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
-from embodied.agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, inside_windows, windows
+from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, inside_windows, windows
 from embodied.identity import Identity
 
 DIGESTED = "embodied-encoder-1"
-"""What digests of encoders begin with."""
+"""The beginning of what digests of encoders are made of."""
 Network = ResNet | Lite
 """Makes a map of `size` channels, of which the last `peaks` are pooled as maxima, in cells of `stride` pixels."""
 SHARINGS = ("strip", "views")
@@ -35,7 +35,7 @@ MARGIN = 3 * CELL
 
 @dataclass(frozen=True)
 class EncoderAbout:
-    """What stands beside the weights in an encoder's file."""
+    """Metadata beside the weights in an encoder's file."""
 
     name: str
     sharing: str
@@ -141,7 +141,7 @@ def strip_pyramid(network: Network, strips: Tensor) -> list[Tensor]:
 def pool_views(maps: Tensor, peaks: int = 0) -> Tensor:
     """(n, D, 12, 36) feature maps -> (n, 36, D): each view is the average of its window, but for the last `peaks`
     channels, of which it is the largest value."""
-    weights = torch.from_numpy(windows()).to(maps.device).view(36, ROWS * COLUMNS)
+    weights = torch.from_numpy(windows()).to(maps.device).view(36, STRIP_ROWS * STRIP_COLUMNS)
     cells, means = maps.flatten(2), maps.shape[1] - peaks
     mean = torch.einsum("vc,ndc->nvd", weights, cells[:, :means])
     if not peaks:

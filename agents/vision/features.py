@@ -22,9 +22,9 @@ from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings
 
-FORMAT = "embodied-features-2"
+FEATURES_FORMAT = "embodied-features-2"
 KEYS = ("encoder", "source", "drawing")
-"""What a feature file says that it was made from."""
+"""Entries of a feature file on what it was made from."""
 EQUIRECT = 288
 """Height of the equirect that the strip is cut from: 1.6 pixels per degree."""
 VIEW_SIZE = (240, 320)
@@ -70,7 +70,7 @@ def _groups(pictures: Iterator[np.ndarray], batch: int) -> Iterator[list[np.ndar
 
 
 def feature_path(folder: Path, digest: str, world: str, pictures: PictureSettings = PLAIN) -> Path:
-    """Where the features of a world by an encoder, from pictures drawn so, are kept."""
+    """The file in which the features of a world by an encoder, from pictures drawn so, are kept."""
     return Path(folder) / digest[:16] / drawing(pictures) / f"{world}.safetensors"
 
 
@@ -78,7 +78,7 @@ def save_features(
     path: Path, features: np.ndarray, encoder: Encoder, source: str, pictures: PictureSettings = PLAIN
 ) -> None:
     """Write (n, 36, D) features; `source` is the digest of what they were computed from (the house)."""
-    about = {"format": FORMAT, "encoder": encoder.digest, "source": source, "drawing": drawing(pictures)}
+    about = {"format": FEATURES_FORMAT, "encoder": encoder.digest, "source": source, "drawing": drawing(pictures)}
     tensor = torch.from_numpy(np.ascontiguousarray(features, dtype=np.float16))
     save_tensors(Path(path), {"features": tensor}, about)
 
@@ -99,10 +99,10 @@ def load_features(
     remedy = f"make it again with `{command}`"
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; make it with `{command}`")
-    tensors, about = load_tensors(path, (FORMAT,), remedy)
+    tensors, about = load_tensors(path, (FEATURES_FORMAT,), remedy)
     features = tensors.get("features")
     if features is None or features.dim() != 3 or features.shape[1] != VIEWS or not {*KEYS} <= set(about):
-        raise ValueError(f"{path}: not a feature file of format {FORMAT!r}; {remedy}")
+        raise ValueError(f"{path}: not a feature file of format {FEATURES_FORMAT!r}; {remedy}")
     drawn = None if pictures is None else drawing(pictures)
     for name, expected in zip(KEYS, (encoder, source, drawn), strict=True):
         if expected is not None and about[name] != expected:

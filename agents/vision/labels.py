@@ -1,4 +1,4 @@
-"""What a strip shows, as labels for training: objects, rooms and distances per cell of the feature map."""
+"""Contents of a strip as labels for training: objects, rooms and distances per cell of the feature map."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.agents.vision.features import EQUIRECT, margin, strip_of
-from embodied.agents.vision.strip import CELL, COLUMNS, HEIGHT, ROWS, WIDTH, windows
+from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, windows
 from embodied.assets.archives import open_arrays
 from embodied.assets.cache import DAMAGED, atomic_path
 from embodied.assets.records import ROOM_KINDS
@@ -77,7 +77,7 @@ class HouseStrips:
         except DAMAGED as e:
             raise ValueError(f"{path}: not a file of strips, or damaged ({e}); delete it and render again") from e
         n, shapes = len(arrays["room"]), {name: a.shape for name, a in arrays.items()}
-        cells = (n, ROWS, COLUMNS)
+        cells = (n, STRIP_ROWS, STRIP_COLUMNS)
         wanted = {"rgb": (n, HEIGHT, WIDTH, 3), "share": (*cells, len(classes)), "rooms": cells, "log_depth": cells}
         if shapes != {**wanted, "room": (n,)}:
             raise ValueError(f"{path}: its arrays do not fit each other ({shapes}); delete it and render again")
@@ -138,7 +138,7 @@ def ids_to_labels(house: House, classes: Sequence[str]) -> tuple[np.ndarray, np.
 def _cells() -> np.ndarray:
     """(192, 576) index of the cell each pixel is in."""
     rows, columns = np.indices((HEIGHT, WIDTH)) // CELL
-    return rows * COLUMNS + columns
+    return rows * STRIP_COLUMNS + columns
 
 
 def cell_labels(
@@ -155,15 +155,15 @@ def cell_labels(
     Returns:
       share (12, 36, C) uint8, rooms (12, 36) int8, log_depth (12, 36) float16; see HouseStrips.
     """
-    cells, n = _cells(), ROWS * COLUMNS
+    cells, n = _cells(), STRIP_ROWS * STRIP_COLUMNS
     seen = object_class[ids]
     share = _count(cells, seen, n, classes) / CELL**2  # (432, C)
     kinds = _count(cells, room[ids], n, len(ROOM_KINDS))  # (432, kinds)
     most = np.where(kinds.max(1) > 0, kinds.argmax(1), -1)
-    logs = np.log(np.maximum(depth, NEAREST)).reshape(ROWS, CELL, COLUMNS, CELL).mean((1, 3))
+    logs = np.log(np.maximum(depth, NEAREST)).reshape(STRIP_ROWS, CELL, STRIP_COLUMNS, CELL).mean((1, 3))
     return (
-        np.ceil(share * 255).astype(np.uint8).reshape(ROWS, COLUMNS, classes),
-        most.astype(np.int8).reshape(ROWS, COLUMNS),
+        np.ceil(share * 255).astype(np.uint8).reshape(STRIP_ROWS, STRIP_COLUMNS, classes),
+        most.astype(np.int8).reshape(STRIP_ROWS, STRIP_COLUMNS),
         logs.astype(np.float16),
     )
 
@@ -177,7 +177,7 @@ def _count(cells: np.ndarray, values: np.ndarray, n: int, size: int) -> np.ndarr
 def visible_in_views(share: np.ndarray) -> np.ndarray:
     """(n, 12, 36, C) uint8 shares of cells -> (n, 36, C) bool, classes that cover VISIBLE of a view."""
     n, classes = len(share), share.shape[-1]
-    flat = share.reshape(n, ROWS * COLUMNS, classes).astype(np.float32) / 255
+    flat = share.reshape(n, STRIP_ROWS * STRIP_COLUMNS, classes).astype(np.float32) / 255
     return np.einsum("vc,nck->nvk", windows().reshape(36, -1), flat, optimize=True) >= VISIBLE
 
 

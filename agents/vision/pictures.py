@@ -35,7 +35,7 @@ OPEN = 16
 
 @dataclass(frozen=True, eq=False)
 class _House:
-    """What is known of a house beside its pictures; n viewpoints."""
+    """Facts about a house beside its pictures; n viewpoints."""
 
     name: str
     positions: np.ndarray

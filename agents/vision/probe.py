@@ -42,12 +42,12 @@ class LabelledFeatures:
 
 @dataclass(frozen=True)
 class ProbeScores:
-    """What linear readers achieve on unseen houses."""
+    """Scores of linear readers on unseen houses."""
 
     mean_ap: float
     """Mean over classes of the average precision of 'is it visible in this view'."""
     chance_ap: float
-    """What a constant score would get: the mean share of positive views."""
+    """The score of a constant: the mean share of positive views."""
     classes: int
     ap: tuple[float, ...]
     """Per class; NaN where the unseen houses show none."""

@@ -1,4 +1,4 @@
-"""What a detector recognises in a panorama."""
+"""Things that a detector recognises in a panorama."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from embodied.agents.vision.detector import Detector
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.features import strip_of
 from embodied.agents.vision.labels import SHELL
-from embodied.agents.vision.strip import COLUMNS, cell_direction
+from embodied.agents.vision.strip import STRIP_COLUMNS, cell_direction
 from embodied.render.panorama import Panorama, Recognised
 
 
@@ -42,5 +42,5 @@ class Recogniser:
             if best[k] < self.least or len(found) == most:
                 break
             if (name := self.detector.classes[k]) not in SHELL:
-                found.append(Recognised(name, float(best[k]), *cell_direction(*divmod(int(cells[k]), COLUMNS))))
+                found.append(Recognised(name, float(best[k]), *cell_direction(*divmod(int(cells[k]), STRIP_COLUMNS))))
         return found

@@ -20,7 +20,7 @@ MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 
 @dataclass(frozen=True)
 class Architecture:
-    """What tells one residual network from another."""
+    """Sizes that tell one residual network from another."""
 
     block: str
     """'basic' (two 3x3 convolutions) or 'bottleneck' (1x1, 3x3, 1x1, four times as wide at the end)."""

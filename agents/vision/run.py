@@ -1,4 +1,4 @@
-"""What the commands of the encoder do: train it, train a detector on it, and make features with it.
+"""The work of the encoder's commands: train it, train a detector on it, and make features with it.
 
 What belongs to viz, such as recordings, is passed in from the console command as a function.
 """

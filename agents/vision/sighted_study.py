@@ -21,7 +21,7 @@ from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
 
-SPLITS = ("test_seen", "test_unseen")
+TEST_SPLITS = ("test_seen", "test_unseen")
 NOTHING: Mapping[str, Any] = {}
 
 
@@ -69,7 +69,7 @@ class FeatureStudy(EpisodeStudy):
         return {**super().judged(row, split), "pictures": self.evaluation_data(row.judge).pictures(split)}
 
     def training_data(self, how: Mapping[str, Any] = NOTHING) -> TrainingData:
-        """What the agents of a row learn from, by what differs in it.
+        """Training data of the agents of a row, by what differs in it.
 
         Raises:
           DatasetError: a data set of another kind.
@@ -77,7 +77,7 @@ class FeatureStudy(EpisodeStudy):
         return self.training_data_in(self.data)
 
     def evaluation_data(self, judge: Mapping[str, Any]) -> TrainingData:
-        """What they are judged in."""
+        """The data that they are judged in."""
         return spoken(self.training_data(judge), judge)
 
     def training_data_in(self, folder: Path) -> TrainingData:

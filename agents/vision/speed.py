@@ -1,4 +1,4 @@
-"""What learners do on a device, to be timed by `embodied bench gpu`: features of panoramas and steps of training."""
+"""Work of learners on a device, to be timed by `embodied bench gpu`: features of panoramas and steps of training."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import torch
 
 from embodied.agents.common.session import descend
 from embodied.agents.vision.encoder import Network, load_encoder
-from embodied.agents.vision.strip import COLUMNS
+from embodied.agents.vision.strip import STRIP_COLUMNS
 from embodied.agents.vision.training import Heads, StripBatch, vision_loss
 
 BATCH = {"cpu": 2, "cuda": 64}
@@ -28,10 +28,10 @@ def works(device: str) -> dict[str, tuple[Callable[[], object], int]]:
     optimiser = torch.optim.AdamW([*network.parameters(), *heads.parameters()])
     batch = StripBatch(
         torch.from_numpy(strips),
-        torch.zeros(n, 12, COLUMNS, CLASSES, dtype=torch.uint8),
+        torch.zeros(n, 12, STRIP_COLUMNS, CLASSES, dtype=torch.uint8),
         torch.zeros(n, 36, CLASSES, dtype=torch.bool),
-        torch.zeros(n, 12, COLUMNS, dtype=torch.int64),
-        torch.zeros(n, 12, COLUMNS),
+        torch.zeros(n, 12, STRIP_COLUMNS, dtype=torch.int64),
+        torch.zeros(n, 12, STRIP_COLUMNS),
         torch.zeros(n, dtype=torch.int64),
     ).to(device)
     return {

@@ -22,7 +22,7 @@ from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
 HEIGHT, WIDTH = 192, 576
 CELL = 16
 """Pixels of a cell of the feature map (the encoder's stride)."""
-ROWS, COLUMNS = HEIGHT // CELL, WIDTH // CELL
+STRIP_ROWS, STRIP_COLUMNS = HEIGHT // CELL, WIDTH // CELL
 HALF = math.radians(60)
 """The strip ends this far above and below the horizon."""
 VFOV = math.radians(60)
@@ -60,13 +60,15 @@ def view_coverage(view: int) -> np.ndarray:
 
 def cell_direction(row: int, column: int) -> tuple[float, float]:
     """Yaw and pitch, in radians, of the middle of a cell of the feature map."""
-    return math.pi - (column + 0.5) / COLUMNS * math.tau, HALF - (row + 0.5) / ROWS * 2 * HALF
+    return math.pi - (column + 0.5) / STRIP_COLUMNS * math.tau, HALF - (row + 0.5) / STRIP_ROWS * 2 * HALF
 
 
 @functools.cache
 def windows() -> np.ndarray:
     """(36, 12, 36) float32: weight of each cell of the feature map in each view; each view sums to 1."""
-    weights = np.stack([view_coverage(k).reshape(ROWS, CELL, COLUMNS, CELL).sum((1, 3)) for k in range(VIEWS)])
+    weights = np.stack(
+        [view_coverage(k).reshape(STRIP_ROWS, CELL, STRIP_COLUMNS, CELL).sum((1, 3)) for k in range(VIEWS)]
+    )
     return (weights / weights.sum((1, 2), keepdims=True)).astype(np.float32)
 
 

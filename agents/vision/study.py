@@ -35,7 +35,7 @@ from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.interface import FindObject
 
-COLUMNS = ("AP", "goal AP", "chance AP", "room accuracy", "depth R²", "place AUC")
+ENCODER_MEASURES = ("AP", "goal AP", "chance AP", "room accuracy", "depth R²", "place AUC")
 GOALS = 60
 """The goal AP is a mean over so many classes: those that tasks seek most often, or all if they seek none."""
 READY = "ready"
@@ -52,10 +52,10 @@ class EncoderStudy(StudyLearner):
 
     source: StripSource
     config: VisionConfig
-    """Where the encoders start from."""
+    """Settings that the encoders start from."""
     repeats: tuple[int, ...]
     split: str = "val_unseen"
-    """Whose houses they are judged on; choose on validation houses."""
+    """The split whose houses they are judged on; choose on validation houses."""
     pictures: tuple[str, ...] = ("unlit", "fast")
     """Kinds of pictures that encoders are judged on."""
     threads: int = 1
@@ -99,7 +99,7 @@ class EncoderStudy(StudyLearner):
             lit = {"training_houses": budget, "epochs": self.config.epochs, LIT: self.lit_houses}
             rows.append(StudyRow(f"{budget} houses, {self.lit_houses} of them lit", lit))
         rows += [StudyRow(name, {READY: name}) for name in self.ready]
-        return {"houses": StudyTable("Encoders by houses to learn in", tuple(rows), COLUMNS, self.pictures)}
+        return {"houses": StudyTable("Encoders by houses to learn in", tuple(rows), ENCODER_MEASURES, self.pictures)}
 
     def seeds(self, row: StudyRow) -> Sequence[int]:
         train = row.train or {}
@@ -146,7 +146,7 @@ class EncoderStudy(StudyLearner):
         return training_houses(data, self.config)[: self._budget or None]
 
     def _strips(self, train: Mapping[str, Any], seed: int, note: Note) -> list[HouseStrips]:
-        """What an encoder learns from."""
+        """Strips that an encoder learns from."""
         names, lit = training_houses(Dataset(self.source.data), self._settings(train, seed)), train.get(LIT, 0)
         unlit = dataclasses.replace(self.source, share=train.get(SHARE, 1.0))
         lit_ones = self._lit().strips(names[:lit], workers=self.workers, note=note)
@@ -172,12 +172,12 @@ class EncoderStudy(StudyLearner):
         if kind_of(weights) == "detector":
             found = Detector.load(load_encoder(), weights).precision(unseen)
             known = [c for c in classes if _shown(c, read_in) and _shown(c, unseen)]
-            return _measured(COLUMNS[:2], _mean_precision({c: found.get(c, 0.0) for c in known}, goals))
+            return _measured(ENCODER_MEASURES[:2], _mean_precision({c: found.get(c, 0.0) for c in known}, goals))
         first, other = (labelled(data, houses, load_encoder(weights), classes) for houses in (read_in, unseen))
         reading = read(first, other, seed=self.config.seed)
         ap, goal_ap = _mean_precision(dict(zip(classes, reading.ap, strict=True)), goals)
         rest = (reading.chance_ap, 100 * reading.room_accuracy, reading.depth_r2, reading.place_auc)
-        return _measured(COLUMNS, (ap, goal_ap, *rest))
+        return _measured(ENCODER_MEASURES, (ap, goal_ap, *rest))
 
     def about(self) -> str:
         data = Dataset(self.source.data)
@@ -198,7 +198,7 @@ class EncoderStudy(StudyLearner):
 
 
 def _shown(name: str, houses: Sequence[HouseStrips]) -> bool:
-    """Whether some view of `houses` shows a class."""
+    """True if some view of `houses` shows a class."""
     return any(visible_in_views(h.share[..., [h.classes.index(name)]]).any() for h in houses)
 
 

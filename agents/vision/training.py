@@ -28,7 +28,7 @@ from embodied.agents.vision.config import StripTraining, VisionConfig
 from embodied.agents.vision.encoder import Encoder, Network, build, pool_views, save_encoder, strip_map, whitening
 from embodied.agents.vision.labels import HouseStrips, visible_in_views
 from embodied.agents.vision.lite import Lite, load_imagenet
-from embodied.agents.vision.strip import CELL, COLUMNS
+from embodied.agents.vision.strip import CELL, STRIP_COLUMNS
 from embodied.assets.cache import digest, write_json
 from embodied.assets.records import ROOM_KINDS
 from embodied.identity import Identity, identity_of
@@ -119,7 +119,7 @@ def batches(
         for name, i in chosen:
             several = lightings[name]
             house = several[int(rng.integers(len(several)))] if len(several) > 1 else several[0]
-            turn, mirror = int(rng.integers(COLUMNS)), bool(rng.random() < 0.5)
+            turn, mirror = int(rng.integers(STRIP_COLUMNS)), bool(rng.random() < 0.5)
             seen = recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
             rgb.append(photograph_strip(seen, cameras, rng=rng) if set(cameras) != {"ideal"} else seen)
             share.append(turn_strip(house.share[i], turn, mirror)[..., columns])

@@ -1,4 +1,4 @@
-"""What learners by imitation learn from: a split of a data set, ready to be played with features."""
+"""Training data of learners by imitation: a split of a data set, ready to be played with features."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Split(TaskSet):
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """What an agent learns from, and where it does."""
+    """A data set with features, from which an agent learns, and the device."""
 
     data: Dataset
     encoder: Encoder
@@ -48,7 +48,7 @@ class TrainingData:
     goal_image: str = "same"
     """How the pictures that helpers show were taken, one of embodied.agents.vision.config.CAPTURE_CONDITIONS."""
     cache: Path = field(default_factory=default_cache)
-    """Where the furniture is, for other pictures than the agent sees."""
+    """Folder of the furniture, for other pictures than the agent sees."""
 
     def split(self, name: str, *, limit: int | None = None, houses: int | None = None, rules: Any = None) -> Split:
         """At most `limit` tasks of a split, from its first `houses` houses; `rules` as in Dataset.split.
@@ -74,16 +74,17 @@ class TrainingData:
         return dataclasses.replace(self, data=SaidBy(novelty, self.data, cache=self.cache))
 
     def rewording(self, config: ImitationSettings) -> Callable[[str], str] | None:
-        """What says the texts of training in other words, if the settings want it."""
+        """A function that says the texts of training in other words, if the settings want it."""
         return varied(load_catalogue(self.cache)) if config.varied_words else None
 
     def identity(self) -> dict[str, str]:
-        """What an agent depends on besides its settings: the data set, the encoder, how its houses were drawn."""
+        """Everything that an agent depends on besides its settings: the data set, the encoder, how its houses were
+        drawn."""
         shown = {} if self.goal_image == "same" else {"shown": self.goal_image}
         return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train"), **shown}
 
     def about(self, kind: type[A], config: ImitationSettings, evaluation: EvaluationSettings, words: Vocabulary) -> A:
-        """What stands beside the weights of an agent that learns here."""
+        """Metadata beside the weights of an agent that learns here."""
         encoder, pictures = self.encoder, self.pictures("train")
         return kind(
             config=config,

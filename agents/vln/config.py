@@ -86,7 +86,7 @@ class SpeakerSettings(RunSettings):
         require(self, AT_LEAST_ONE, "hidden_size", "heads", "iterations")
 
 
-SCALES: dict[str, FollowerSettings] = {
+VLN_SCALES: dict[str, FollowerSettings] = {
     "mini": FollowerSettings(
         hidden_size=128,
         batch=32,

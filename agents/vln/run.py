@@ -35,7 +35,7 @@ from embodied.interface import Agent, Episode, Task
 from embodied.novelty import FAMILIAR
 from embodied.tasks.vln import vln_task
 
-LONGEST = 12
+LONGEST_EPISODE = 12
 """Steps of an episode of training: described paths have at most six, and who is lost learns little more."""
 
 
@@ -45,7 +45,7 @@ class VlnLearner(imitation.ImitationLearner):
     optimizer_kind = torch.optim.AdamW
 
     def training_task(self, task: Task) -> Task:
-        return dataclasses.replace(task, horizon=min(task.horizon, LONGEST))
+        return dataclasses.replace(task, horizon=min(task.horizon, LONGEST_EPISODE))
 
     def player(self, update: int, bank: FeatureBank) -> Agent:
         dropout, share = self.config.environment_dropout, teacher_share(self.config, update)

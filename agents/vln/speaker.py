@@ -41,11 +41,11 @@ from embodied.metrics import without_repeats
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task
 
-LONGEST = 60
+LONGEST_INSTRUCTION = 60
 """Words of a description."""
 JUDGED = 200
 """Walks that the speaker is judged on between its updates."""
-BATCH = 64
+SPEAKER_BATCH = 64
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def _scored(
 ) -> tuple[Tensor, Tensor]:
     """(B, W) log L0 of each word of the tasks' requests, given walks along `paths`, and the words."""
     trips = [Trip(t.world, t.start, tuple(p), (t.request,)) for t, p in zip(tasks, paths, strict=True)]
-    words = eyes.words([t.request for t in tasks])[:, :LONGEST]
+    words = eyes.words([t.request for t in tasks])[:, :LONGEST_INSTRUCTION]
     logits = speaker.network(*encoded_walks(eyes, trips, [walk_along(p) for p in paths]), words)
     return log_likelihood(logits, words), words
 
@@ -160,18 +160,20 @@ def reranked(
     """
     policy = follower.policy(bank)
     sampling = dataclasses.replace(policy, choose=choose_sampled)
-    tries = [play(split.make_env, policy, tasks, seed=seed, batch=BATCH)]
+    tries = [play(split.make_env, policy, tasks, seed=seed, batch=SPEAKER_BATCH)]
     tries += [
-        play(split.make_env, sampling, tasks, seed=int(stream(seed, "candidate", k).integers(2**31)), batch=BATCH)
+        play(
+            split.make_env, sampling, tasks, seed=int(stream(seed, "candidate", k).integers(2**31)), batch=SPEAKER_BATCH
+        )
         for k in range(1, candidates)
     ]
     eyes, scores = speaker.eyes(dict(split.worlds), bank), []
     for episodes in tries:
         rows = []
-        for i in range(0, len(tasks), BATCH):
-            some = episodes[i : i + BATCH]
+        for i in range(0, len(tasks), SPEAKER_BATCH):
+            some = episodes[i : i + SPEAKER_BATCH]
             paths = [without_repeats(e.nodes) for e in some]
-            rows.append(_scored(speaker, eyes, tasks[i : i + BATCH], paths)[0].sum(1))
+            rows.append(_scored(speaker, eyes, tasks[i : i + SPEAKER_BATCH], paths)[0].sum(1))
         scores.append(torch.cat(rows))
     best = torch.stack(scores).argmax(0).tolist()
     return [tries[k][i] for i, k in enumerate(best)]
@@ -190,9 +192,9 @@ def spoken_tasks(speaker: InstructionSpeaker, training: Split, dropout: float, *
         unworded = [vln_task(name, r) for r in routes]
         trips = [Trip(name, t.start, _path(t), ("",)) for t in unworded]
         channels = torch.stack([channels_of(t.id, training.bank.size, dropout) for t in unworded])
-        choose = sampled_choice(rng.random((len(paths), LONGEST)))
+        choose = sampled_choice(rng.random((len(paths), LONGEST_INSTRUCTION)))
         seen = encoded_walks(eyes, trips, [walk_along(p) for p in paths], channels)
-        numbers = speaker.network.write(*seen, choose, LONGEST)
+        numbers = speaker.network.write(*seen, choose, LONGEST_INSTRUCTION)
         texts = texts_of(eyes.vocabulary, numbers)
         tasks += [dataclasses.replace(t, request=text) for t, text in zip(unworded, texts, strict=True)]
     return tasks

@@ -14,7 +14,7 @@ from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import speakers_table, words_table
-from embodied.agents.vision.sighted_study import SPLITS, SightedStudy
+from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
 from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import MEASURES, FollowerSettings, SpeakerSettings
 from embodied.agents.vln.run import train_follower
@@ -36,33 +36,33 @@ def _without(name: str) -> StudyRow:
     return StudyRow(name, None, {"played": name})
 
 
-FOLLOWER, BLIND = _row("DAgger"), _row("DAgger, blind", blind=True)
+FOLLOWER, BLIND_FOLLOWER = _row("DAgger"), _row("DAgger, blind", blind=True)
 CHOSEN, SPOKEN = _row("DAgger, reranked", RERANKED), _row("DAgger, back-translation", spoken_share=0.5)
-TABLES: Mapping[str, StudyTable] = {
+VLN_TABLES: Mapping[str, StudyTable] = {
     "followers": StudyTable(
         "Followers of route instructions",
         (
             FOLLOWER,
             _row("student forcing", forcing="student"),
             _row("teacher forcing", forcing="teacher"),
-            BLIND,
+            BLIND_FOLLOWER,
             _row("DAgger, no instruction", wordless=True),
             _without("random walk"),
             _without("shortest"),
         ),
         MEASURES,
-        SPLITS,
-        ((FOLLOWER, BLIND),),
+        TEST_SPLITS,
+        ((FOLLOWER, BLIND_FOLLOWER),),
     ),
     "speaker": StudyTable(
         "A speaker that chooses between walks (Eq 2.19) and words further paths",
         (FOLLOWER, CHOSEN, SPOKEN, _row("DAgger, back-translation, reranked", RERANKED, spoken_share=0.5)),
         MEASURES,
-        SPLITS,
+        TEST_SPLITS,
         ((CHOSEN, FOLLOWER), (SPOKEN, FOLLOWER)),
     ),
-    "words": words_table(_row, MEASURES, SPLITS[1:]),
-    "speakers": speakers_table(_row, MEASURES, SPLITS[1:]),
+    "words": words_table(_row, MEASURES, TEST_SPLITS[1:]),
+    "speakers": speakers_table(_row, MEASURES, TEST_SPLITS[1:]),
 }
 
 
@@ -73,7 +73,7 @@ class VlnStudy(SightedStudy):
     config: FollowerSettings
     speaker: SpeakerSettings
 
-    name, agent_kind, all_tables = "vln", VlnAgent, TABLES
+    name, agent_kind, all_tables = "vln", VlnAgent, VLN_TABLES
     makers = ("embodied.agents.vln.run",)
     judges = (*JUDGES, "embodied.agents.vln.speaker", "embodied.agents.common.more_paths")
 

@@ -27,7 +27,7 @@ ASK_RULES: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class VnlaSettings(ImitationSettings):
-    """The defaults are the program's; SCALES holds smaller ones."""
+    """The defaults are the program's; VNLA_SCALES holds smaller ones."""
 
     hidden_size: int = 512
     """Width of the LSTMs of encoder and decoder."""
@@ -68,7 +68,7 @@ class VnlaSettings(ImitationSettings):
         require(self, NOT_ALL, "dropout")
 
 
-SCALES: dict[str, VnlaSettings] = {
+VNLA_SCALES: dict[str, VnlaSettings] = {
     "mini": VnlaSettings(
         hidden_size=128,
         word_embedding=64,

@@ -15,7 +15,7 @@ from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import words_table
-from embodied.agents.vision.sighted_study import NOTHING, SPLITS, SightedStudy
+from embodied.agents.vision.sighted_study import NOTHING, TEST_SPLITS, SightedStudy
 from embodied.agents.vision.training_data import TrainingData
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
@@ -26,7 +26,7 @@ from embodied.interface import Agent
 
 EVALUATION_SEEDS = (123, 435, 6757, 867, 983)
 """The program's."""
-COLUMNS = ("success", "room success", "navigation error", "requests")
+VNLA_MEASURES = ("success", "room success", "navigation error", "requests")
 ROOMS = "rooms"
 """In a row: whether the requests name rooms that it learns from (train) or is judged by (judge)."""
 
@@ -36,13 +36,13 @@ def _row(label: str, played: str = LEARNED, rooms: bool = True, **train: Any) ->
 
 
 def _table(title: str, *rows: StudyRow, compared: Sequence[tuple[StudyRow, StudyRow]] = ()) -> StudyTable:
-    return StudyTable(title, rows, COLUMNS, SPLITS, tuple(compared))
+    return StudyTable(title, rows, VNLA_MEASURES, TEST_SPLITS, tuple(compared))
 
 
 RANDOM_ASKER, LEARNED_ASKER = _row("random", asker="random"), _row("learned")
-BLIND = _row("learned, blind", blind=True)
+BLIND_ASKER = _row("learned, blind", blind=True)
 PROGRAM, ALGORITHM_6 = _row("program's rules, learned"), _row("Algorithm 6, learned", rules="algorithm-6")
-TABLES: Mapping[str, StudyTable] = {
+VNLA_TABLES: Mapping[str, StudyTable] = {
     "askers": _table(
         "Who decides when to ask",
         _row("none", asker="none"),
@@ -50,10 +50,10 @@ TABLES: Mapping[str, StudyTable] = {
         RANDOM_ASKER,
         _row("teacher", TEACHER),
         LEARNED_ASKER,
-        BLIND,
+        BLIND_ASKER,
         StudyRow("scripted listener asking at random", None, {"played": "listener, random", ROOMS: True}),
         StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher", ROOMS: True}),
-        compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND)),
+        compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND_ASKER)),
     ),
     "interventions": _table(
         "Direct and indirect intervention",
@@ -70,8 +70,8 @@ TABLES: Mapping[str, StudyTable] = {
             StudyRow("learned, trained without rooms", {ROOMS: False}, {"played": LEARNED, ROOMS: False}),
             StudyRow("learned, trained with rooms", {}, {"played": LEARNED, ROOMS: False}),
         ),
-        COLUMNS,
-        SPLITS,
+        VNLA_MEASURES,
+        TEST_SPLITS,
     ),
     "algorithm-6": StudyTable(
         "Algorithm 6 as printed beside the program's rules of play (docs/sources.md, S43)",
@@ -81,8 +81,8 @@ TABLES: Mapping[str, StudyTable] = {
             _row("Algorithm 6, asks at random", asker="random", rules="algorithm-6"),
             ALGORITHM_6,
         ),
-        (*COLUMNS, "steps"),
-        SPLITS,
+        (*VNLA_MEASURES, "steps"),
+        TEST_SPLITS,
         ((ALGORITHM_6, PROGRAM),),
     ),
     "rules": _table(
@@ -91,7 +91,7 @@ TABLES: Mapping[str, StudyTable] = {
         _row("b to d", ask_rules="b to d"),
         _row("all"),
     ),
-    "words": words_table(_row, COLUMNS, SPLITS[1:]),
+    "words": words_table(_row, VNLA_MEASURES, TEST_SPLITS[1:]),
 }
 """The paper's Tables 2, 3, 4 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
 
@@ -105,7 +105,7 @@ class VnlaStudy(SightedStudy):
     """A data set whose requests name no room, for the table 'rooms'."""
     eval_seeds: tuple[int, ...] = EVALUATION_SEEDS
 
-    name, agent_kind, all_tables = "vnla", VnlaAgent, TABLES
+    name, agent_kind, all_tables = "vnla", VnlaAgent, VNLA_TABLES
     makers = ("embodied.agents.vnla.run",)
     judges = (*JUDGES, "embodied.agents.vnla.judging")
 

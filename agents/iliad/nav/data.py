@@ -20,7 +20,7 @@ from embodied.datasets.store import Dataset
 from embodied.novelty import FAMILIAR
 from embodied.tasks.vln import vln_task
 
-SPLITS = {"train": "train", "validation": "val_unseen", "test": "test_unseen"}
+NAV_SPLITS = {"train": "train", "validation": "val_unseen", "test": "test_unseen"}
 """NAV's splits and the data set's: other houses in each."""
 
 
@@ -60,7 +60,7 @@ def nav_data(
     if cache is None and (config.more_paths or novelty):
         raise ValueError("more_paths and speakers need the cache: people name what can be seen in the houses")
     spoken = SaidBy(novelty, source, cache=cache) if cache and novelty else source
-    houses = {part: source.names(name) for part, name in SPLITS.items()}
+    houses = {part: source.names(name) for part, name in NAV_SPLITS.items()}
     splits = {part: [trip for name in names for trip in house_trips(spoken, name)] for part, names in houses.items()}
     if cache is not None and config.more_paths:
         for name in houses["train"]:

@@ -14,7 +14,7 @@ from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.word_vectors import vocabulary_with
 from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NavConfig
-from embodied.agents.iliad.nav.data import SPLITS, NavData, each_wording, house_trips, nav_data
+from embodied.agents.iliad.nav.data import NAV_SPLITS, NavData, each_wording, house_trips, nav_data
 from embodied.agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from embodied.agents.iliad.nav.student import LoopFree, NavStudent
 from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, OtherWords, PeopleNavTeacher
@@ -27,7 +27,7 @@ from embodied.identity import identity_of
 from embodied.interface import SeenPlace
 from embodied.language.people_language import People, RouteDescriber
 
-VALIDATION = 300
+VALIDATION_TRIPS = 300
 """Trips of each validation, from all houses alike; judging takes all."""
 
 
@@ -90,7 +90,7 @@ def _teacher(config: NavConfig, data: NavData, cache: Path, folder: Path, note: 
 def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
     """The houses to learn from and to test in, with what can be seen from every node of them."""
     catalogue = load_catalogue(cache)
-    names = [name for split in SPLITS.values() for name in source.names(split)]
+    names = [name for split in NAV_SPLITS.values() for name in source.names(split)]
     return {name: source.open_world(name, catalogue, cache) for name in names}
 
 
@@ -105,7 +105,7 @@ def spoken(grounds: NavGrounds, novelty: str, cache: Path) -> NavGrounds:
     """With the test requests of somebody of a novelty."""
     data = grounds.data
     people = SaidBy(novelty, data.source, cache=cache)
-    trips = [trip for name in data.source.names(SPLITS["test"]) for trip in house_trips(people, name)]
+    trips = [trip for name in data.source.names(NAV_SPLITS["test"]) for trip in house_trips(people, name)]
     test = [one for trip in trips for one in each_wording(trip)]
     return dataclasses.replace(grounds, data=dataclasses.replace(data, splits={**data.splits, "test": test}))
 
@@ -121,7 +121,7 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
     explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
-    validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION)]
+    validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION_TRIPS)]
     identity = identity_of(
         "embodied.agents.iliad.nav.run", world="nav", data=data.digest, pictures=data.pictures, teacher=c
     )

@@ -19,7 +19,7 @@ from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.data import NavData
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent
-from embodied.agents.iliad.nav.teacher import LONGEST, arrival, encoded_walks, texts_of
+from embodied.agents.iliad.nav.teacher import LONGEST_DESCRIPTION, arrival, encoded_walks, texts_of
 from embodied.agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
 from embodied.agents.iliad.stages import TeachingStage
 from embodied.agents.iliad.training import success_rate
@@ -29,7 +29,7 @@ from embodied.agents.vln.network import FollowerNetwork
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
-REMEDY = "train it again with `embodied train iliad nav`"
+NAV_REMEDY = "train it again with `embodied train iliad nav`"
 JUDGED = 128
 """Trips that a stage is judged on between its updates."""
 
@@ -88,7 +88,7 @@ def teach_describer(
 
     def loss_of(rng: np.random.Generator) -> Tensor:
         chosen, requests = _batch(trips, config.teacher_batch, rng)
-        wanted = eyes.words(requests)[:, :LONGEST]
+        wanted = eyes.words(requests)[:, :LONGEST_DESCRIPTION]
         logits = describer(*encoded_walks(eyes, chosen, [walk_along(t.path) for t in chosen]), wanted)
         return -log_likelihood(logits, wanted).sum() / len(wanted)
 
@@ -100,7 +100,7 @@ def teach_describer(
 def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, trips: Sequence[Trip]) -> float:
     """Share of paths whose likeliest description leads the executor to their end."""
     walks = [walk_along(t.path) for t in trips]
-    numbers = describer.write(*encoded_walks(executor.eyes, trips, walks), greedy_choice, LONGEST)
+    numbers = describer.write(*encoded_walks(executor.eyes, trips, walks), greedy_choice, LONGEST_DESCRIPTION)
     done = executor.greedy(trips, texts_of(executor.eyes.vocabulary, numbers))
     return float(np.mean([arrival(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
 
@@ -119,7 +119,7 @@ def load_follower(path: Path, eyes: NavEyes) -> NavStudent:
     Raises:
       FileNotFoundError, ValueError: missing, damaged, of another format, or taught with features of another encoder.
     """
-    tensors, about = load_weights(path, "nav", NavAbout, REMEDY)
+    tensors, about = load_weights(path, "nav", NavAbout, NAV_REMEDY)
     if about.encoder != eyes.bank.digest:
         raise ValueError(
             f"{path} was taught with features of encoder {about.encoder[:12]}, these are of {eyes.bank.digest[:12]}; "
@@ -138,7 +138,7 @@ def config_of(path: Path) -> NavConfig:
     Raises:
       FileNotFoundError, ValueError: as load_follower.
     """
-    return load_weights(path, "nav", NavAbout, REMEDY)[1].config
+    return load_weights(path, "nav", NavAbout, NAV_REMEDY)[1].config
 
 
 def _about(config: NavConfig, eyes: NavEyes) -> NavAbout:

@@ -23,7 +23,7 @@ from embodied.metrics import sdtw
 
 THRESHOLD = 0.5
 """Tau of Eq 3.15 and 3.16, of SDTW (C.1.1)."""
-LONGEST = 50
+LONGEST_DESCRIPTION = 50
 """Words of a description."""
 
 
@@ -66,7 +66,7 @@ def texts_of(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
 class LearnedNavTeacher(DescribingNetworks):
     """Eq 3.15 and 3.16 with two networks."""
 
-    threshold, longest = THRESHOLD, LONGEST
+    threshold, longest = THRESHOLD, LONGEST_DESCRIPTION
 
     def __init__(
         self, world: NavWorld, describer: WalkDescriber, executor: NavStudent, candidates: int, pragmatics: str
@@ -84,8 +84,10 @@ class LearnedNavTeacher(DescribingNetworks):
         self, tasks: Sequence[Trip], executions: Sequence[NavWalk], uniforms: np.ndarray | None = None
     ) -> list[list[str]]:
         copies = 1 if uniforms is None else uniforms.shape[1]
-        choose = greedy_choice if uniforms is None else sampled_choice(uniforms.reshape(-1, LONGEST))
-        numbers = self.describer.write(*encoded_walks(self.eyes, tasks, executions), choose, LONGEST, copies)
+        choose = greedy_choice if uniforms is None else sampled_choice(uniforms.reshape(-1, LONGEST_DESCRIPTION))
+        numbers = self.describer.write(
+            *encoded_walks(self.eyes, tasks, executions), choose, LONGEST_DESCRIPTION, copies
+        )
         drawn = texts_of(self.eyes.vocabulary, numbers)
         return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(tasks))]
 

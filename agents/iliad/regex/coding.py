@@ -13,8 +13,8 @@ from torch import Tensor
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.iliad.regex.rules import ALPHABET, LETTERS, columns
 
-PAD, END = 0, 1
-"""Of characters; END also stands before the first one."""
+PAD, END_CODE = 0, 1
+"""Of characters; END_CODE also stands before the first one."""
 CHARACTERS = 2 + len(ALPHABET)
 GAP = CHARACTERS
 """In the columns of a change: no letter here."""
@@ -26,18 +26,18 @@ _TEXT = np.array(["", "", *ALPHABET])
 
 
 def characters(texts: Sequence[str]) -> Tensor:
-    """(B, longest + 1) int64 characters, each with its END, padded."""
+    """(B, longest + 1) int64 characters, each with its END_CODE, padded."""
     out = np.full((len(texts), max(map(len, texts), default=0) + 1), PAD, dtype=np.int64)
     for row, text in enumerate(texts):
         out[row, : len(text)] = _NUMBERS[np.frombuffer(text.encode(), np.uint8)]
-        out[row, len(text)] = END
+        out[row, len(text)] = END_CODE
     return torch.from_numpy(out)
 
 
 def texts(numbers: Tensor) -> list[str]:
-    """Rows of numbers as written (B, T), up to each END."""
+    """Rows of numbers as written (B, T), up to each END_CODE."""
     rows = numbers.numpy()
-    ends = np.where((rows == END).any(1), (rows == END).argmax(1), rows.shape[1])
+    ends = np.where((rows == END_CODE).any(1), (rows == END_CODE).argmax(1), rows.shape[1])
     return ["".join(_TEXT[row[:end]]) for row, end in zip(rows, ends)]
 
 
@@ -48,11 +48,11 @@ class Requests:
     vocabulary: Vocabulary
 
     def __call__(self, requests: Sequence[str]) -> Tensor:
-        """(B, longest) int64 words, each with its END if it fits, padded."""
+        """(B, longest) int64 words, each with its END_CODE if it fits, padded."""
         return torch.from_numpy(self.vocabulary.batch(requests, LONGEST_REQUEST))
 
     def say(self, numbers: Tensor) -> list[str]:
-        """Requests of (B, T) words, up to each END."""
+        """Requests of (B, T) words, up to each END_CODE."""
         return [" ".join(self.vocabulary.decode(row)) for row in numbers.tolist()]
 
 
@@ -62,7 +62,7 @@ def request_words(requests: Iterable[str]) -> Requests:
 
 
 def changes(pairs: Sequence[Sequence[tuple[str, str]]]) -> Tensor:
-    """(B, J, T, 2) int64: J words before and after, side by side, between two columns of END, padded.
+    """(B, J, T, 2) int64: J words before and after, side by side, between two columns of END_CODE, padded.
 
     Args:
       pairs: of each of B executions, J words (before, after).
@@ -79,4 +79,6 @@ def changes(pairs: Sequence[Sequence[tuple[str, str]]]) -> Tensor:
 @functools.lru_cache(maxsize=120_000)
 def _columns(before: str, after: str) -> np.ndarray:
     number = lambda c: int(_NUMBERS[ord(c)]) if c else GAP
-    return np.array([(END, END), *((number(a), number(b)) for a, b in columns(before, after)), (END, END)])
+    return np.array(
+        [(END_CODE, END_CODE), *((number(a), number(b)) for a, b in columns(before, after)), (END_CODE, END_CODE)]
+    )

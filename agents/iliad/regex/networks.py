@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from embodied.agents.common.choosing import Choice
 from embodied.agents.common.vocabulary import END_NUMBER
-from embodied.agents.iliad.regex.coding import CHARACTERS, END, GAP, PAD
+from embodied.agents.iliad.regex.coding import CHARACTERS, END_CODE, GAP, PAD
 from embodied.agents.iliad.writing import AttentiveWriter, Bridge, Remembered, before, last, write
 
 
@@ -19,7 +19,7 @@ class Speller(nn.Module):
     """p(characters | word, request): the word's last state begins the request's LSTM, whose last begins the writer
     (docs/sources.md, S98)."""
 
-    stop = END
+    stop = END_CODE
 
     def __init__(self, words: int, size: int, word_size: int, character_size: int) -> None:
         super().__init__()
@@ -40,12 +40,12 @@ class Speller(nn.Module):
 
     def forward(self, word: Tensor, request: Tensor, written: Tensor) -> Tensor:
         """Logits (B, T, V) before each of the given characters (B, T)."""
-        return self.writer(before(written, END), *self.read(word, request))[0]
+        return self.writer(before(written, END_CODE), *self.read(word, request))[0]
 
     @torch.no_grad()
     def write(self, word: Tensor, request: Tensor, choose: Choice, longest: int) -> Tensor:
-        """(B, at most `longest`) characters, END last unless cut, padded."""
-        return write(self.writer, *self.read(word, request), choose, longest, END)
+        """(B, at most `longest`) characters, END_CODE last unless cut, padded."""
+        return write(self.writer, *self.read(word, request), choose, longest, END_CODE)
 
 
 class ChangeDescriber(nn.Module):

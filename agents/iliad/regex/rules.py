@@ -20,13 +20,13 @@ VOWELS = "aeiou"
 SYMBOLS = "^$.()@\\2CV"
 ALPHABET = LETTERS + SYMBOLS
 """All characters that a rule may have. None of them repeats or chooses, so matching never goes back."""
-LONGEST = 40
+LONGEST_BLOCK = 40
 """H, the most characters of a rule (Table C.2)."""
 LONGEST_OUTPUT = 60
 """Letters of the longest word that counts as one."""
 _CLASSES = {"C": "[b-df-hj-np-tv-z]", "V": "[aeiou]"}
-START, END, ANYWHERE = "^", "$", ""
-ANCHORS = (ANYWHERE, START, END)
+START, END_MARK, ANYWHERE = "^", "$", ""
+ANCHORS = (ANYWHERE, START, END_MARK)
 LETTER, ANY, VOWEL, CONSONANT = "L", ".", "V", "C"
 BLOCKS = tuple("".join(p) for n in (1, 2) for p in itertools.product((LETTER, ANY, VOWEL, CONSONANT), repeat=n))
 """The pattern: one or two symbols."""
@@ -76,9 +76,9 @@ SHAPES = tuple(RuleShape(a, b, r) for a in ANCHORS for b in BLOCKS for r in REPL
 def apply(rule: str, word: str) -> str | None:
     """The word that `rule` makes of `word`; None if it is no rule.
 
-    Safe for whatever a network says: a rule has at most LONGEST characters, all of ALPHABET, which
-    has no repetition, choice or counter; so each of them is matched at most once per place of the
-    word, and the output is at most LONGEST times as long as the word. Matching cannot explode (docs/sources.md, S100).
+    Safe for whatever a network says: a rule has at most LONGEST_BLOCK characters, all of ALPHABET, which has no
+    repetition, choice or counter; so each of them is matched at most once per place of the word, and the output is at
+    most LONGEST_BLOCK times as long as the word. Matching cannot explode (docs/sources.md, S100).
     """
     made = compiled(rule)
     if made is None:
@@ -96,9 +96,9 @@ def compiled(rule: str) -> tuple[re.Pattern[str], str] | None:
     """Pattern and replacement of a rule; None if it is none.
 
     Valid is, as in the authors' program, what has exactly one '@', no C, V or parenthesis behind
-    it, and compiles; and, here, what has at most LONGEST characters, all of ALPHABET.
+    it, and compiles; and, here, what has at most LONGEST_BLOCK characters, all of ALPHABET.
     """
-    if len(rule) > LONGEST or rule.count("@") != 1 or not set(rule) <= set(ALPHABET):
+    if len(rule) > LONGEST_BLOCK or rule.count("@") != 1 or not set(rule) <= set(ALPHABET):
         return None
     pattern, replacement = rule.split("@")
     if set(replacement) & set("CV()"):
@@ -148,7 +148,7 @@ def _places(shape: RuleShape, word: str) -> list[int]:
         VOWEL: lambda c: c in VOWELS,
         CONSONANT: lambda c: c not in VOWELS,
     }
-    first = {START: [0], END: [len(word) - n]}.get(shape.anchor, range(len(word) - n + 1))
+    first = {START: [0], END_MARK: [len(word) - n]}.get(shape.anchor, range(len(word) - n + 1))
     return [p for p in first if p >= 0 and all(fits[s](word[p + k]) for k, s in enumerate(shape.block))]
 
 

@@ -33,7 +33,7 @@ from embodied.identity import differences, identity_of, read_finished, write_fin
 from embodied.records import from_plain, to_json
 from embodied.seeds import stream
 
-VALIDATION = 500
+VALIDATION_REQUESTS = 500
 """Data points of each validation; the last one of a run and tests have all."""
 
 
@@ -89,7 +89,7 @@ def problem_of(grounds: RegexGrounds, seed: int, folder: Path, *, note: Note = p
     identity = identity_of("embodied.agents.iliad.regex.run", world="regex", data=grounds.digest, teacher=c)
     return IliadProblem(
         RegexWorld(), grounds.teacher, RegexMarginal(rules), student(), student(),
-        splits["train"], splits["validation"][:VALIDATION], identity,
+        splits["train"], splits["validation"][:VALIDATION_REQUESTS], identity,
     )  # fmt: skip
 
 

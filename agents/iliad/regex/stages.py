@@ -29,7 +29,7 @@ from embodied.assets.cache import digest
 from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
-REMEDY = "delete it and train it again with `embodied train iliad regex`"
+REGEX_REMEDY = "delete it and train it again with `embodied train iliad regex`"
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Req
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    tensors, about = load_weights(path, "regex", RegexAbout, REMEDY)
+    tensors, about = load_weights(path, "regex", RegexAbout, REGEX_REMEDY)
     requests = Requests(Vocabulary(about.words))
     network = new_network(kind, about.config, requests, 0, "loaded")
     load_into(network, tensors, path)

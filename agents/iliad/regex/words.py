@@ -20,8 +20,8 @@ _PARTS = {
 }
 PARTS = {name: text.split() for name, text in _PARTS.items()}
 """Parts of made-up words; '-' is none."""
-SHORTEST, LONGEST, LONGEST_MADE_UP = 3, 14, 10
-_WORD = re.compile(f"[a-z]{{{SHORTEST},{LONGEST}}}")
+SHORTEST, LONGEST_WORD, LONGEST_MADE_UP = 3, 14, 10
+_WORD = re.compile(f"[a-z]{{{SHORTEST},{LONGEST_WORD}}}")
 
 
 def made_up(count: int, *, seed: int) -> tuple[str, ...]:
@@ -49,7 +49,7 @@ def read_words(path: Path) -> tuple[str, ...]:
     words = tuple(dict.fromkeys(line for line in lines if _WORD.fullmatch(line)))
     if len(words) < 1000:
         raise ValueError(
-            f"{path}: {len(words)} lower-case words of {SHORTEST} to {LONGEST} letters, at least 1000 are needed; "
+            f"{path}: {len(words)} lower-case words of {SHORTEST} to {LONGEST_WORD} letters, at least 1000 are needed; "
             "give one word a line, or leave the option out"
         )
     return words

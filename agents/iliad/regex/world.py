@@ -14,7 +14,7 @@ from embodied.agents.iliad.protocol import ExecutionScores, one_request
 from embodied.agents.iliad.regex.coding import PAD, Requests, characters, texts
 from embodied.agents.iliad.regex.data import WordTask
 from embodied.agents.iliad.regex.networks import Speller
-from embodied.agents.iliad.regex.rules import LONGEST, edit_distance, outputs
+from embodied.agents.iliad.regex.rules import LONGEST_BLOCK, edit_distance, outputs
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class RegexStudent:
         self.network, self.requests = speller, requests
 
     def sample(self, tasks: Sequence[WordTask], requests: Sequence[str], *, rng: np.random.Generator) -> list[Written]:
-        return self._write(tasks, requests, sampled_choice(rng.random((len(tasks), LONGEST))))
+        return self._write(tasks, requests, sampled_choice(rng.random((len(tasks), LONGEST_BLOCK))))
 
     def greedy(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> list[Written]:
         return self._write(tasks, requests, greedy_choice)
@@ -94,15 +94,15 @@ class RegexStudent:
         actions: Sequence[Written] | None = None,
     ) -> ExecutionScores:
         """Of the characters of rules, at most H, END included; of other rules' characters where `actions` are given."""
-        states = characters([e.rule for e in executions])[:, :LONGEST]
-        wanted = states if actions is None else characters([e.rule for e in actions])[:, :LONGEST]
+        states = characters([e.rule for e in executions])[:, :LONGEST_BLOCK]
+        wanted = states if actions is None else characters([e.rule for e in actions])[:, :LONGEST_BLOCK]
         length = min(states.shape[1], wanted.shape[1])
         states, wanted = states[:, :length], wanted[:, :length]
         logits = self.network(*self._inputs(tasks, requests), states)
         return scores_of(logits, wanted, (states != PAD) & (wanted != PAD))
 
     def _write(self, tasks: Sequence[WordTask], requests: Sequence[str], choose: Choice) -> list[Written]:
-        numbers = self.network.write(*self._inputs(tasks, requests), choose, LONGEST)
+        numbers = self.network.write(*self._inputs(tasks, requests), choose, LONGEST_BLOCK)
         return [carried_out(rule, task) for rule, task in zip(texts(numbers), tasks, strict=True)]
 
     def _inputs(self, tasks: Sequence[WordTask], requests: Sequence[str]) -> tuple[Tensor, Tensor]:
