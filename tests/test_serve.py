@@ -446,6 +446,13 @@ def test_panoramas_too_small_for_a_page_are_drawn_larger(data, monkeypatch, caps
     assert said in (text := capsys.readouterr().err) and bool(text) == bool(said)
 
 
+def test_a_summary_needs_no_pictures(data, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("embodied.cli.serve.world_of", None)
+    study = write_study(data.folder.parent, TOGETHER + 'moves = "drive"\n', HEAD.replace("64", "96"), "summed")
+    assert start(["serve", str(study), "--out", str(tmp_path / "out"), "--summary"]) == 0
+    assert "together: wanted 3, done 0" in capsys.readouterr().out
+
+
 def test_typed_questions_have_prices_that_are_written_down(data):
     part = StudyPart("p", questions=(Question("Which room?", 2.0),), free_question=False, tasks=1)
     env, relay = set_table(part, data).make_env()

@@ -84,7 +84,7 @@ def run(args: PeopleStudyOptions) -> None:
     opened = open_study(
         args.study,
         out,
-        lambda data, name: drawn(data, name, study, args),
+        None if args.summary else lambda data, name: drawn(data, name, study, args),
         agents_of(args.study.parent / study.data, client),
         {"llm": assistant_maker("llm", client, args.prompts)},
         addresses_of(args),

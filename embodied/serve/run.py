@@ -54,7 +54,7 @@ class Opened:
 def open_study(
     path: Path,
     folder: Path,
-    draw: PanoramaDrawer,
+    draw: PanoramaDrawer | None,
     agents: Mapping[str, AgentMaker] = POLICIES,
     assistants: Mapping[str, AssistantMaker] = MappingProxyType({}),
     addresses: Iterable[str] | None = None,
@@ -64,7 +64,7 @@ def open_study(
 
     Args:
       folder: where the log and the results are kept.
-      draw: see PanoramaDrawer.
+      draw: see PanoramaDrawer; None where nobody is served, and only the log is read.
       agents, assistants: by name, see `set_table`.
       addresses: see Server.
       open_world: gives a house that can be drawn, for people who drive.
@@ -82,7 +82,7 @@ def open_study(
     worlds = {w for t in tables.values() for w in t.places} | {e.task.world for v in viewed.values() for e in v}
     for world in sorted(worlds):
         data.place(world)  # refuses houses that the data set has not
-    files = {w: PanoramaFile(draw(data, w)) for w in sorted(worlds)}
+    files = {} if draw is None else {w: PanoramaFile(draw(data, w)) for w in sorted(worlds)}
     store = Store(folder / "people.db")
     secret = store.about("secret", secrets.token_hex(32))
     digest = hashlib.sha256((to_json(study) + data.digest).encode()).hexdigest()
@@ -92,7 +92,7 @@ def open_study(
             "changed; give another --out"
         )
     live = None
-    if driven := [t for t in tables.values() if t.part.moves == "drive"]:
+    if draw is not None and (driven := [t for t in tables.values() if t.part.moves == "drive"]):
         if open_world is None:
             raise StudyError(f"{path.name}: nobody can drive here, for nothing draws live pictures")
         live = Live(functools.partial(open_world, data))
