@@ -1,4 +1,4 @@
-"""What code makes a product: the modules that a module imports, the data beside them, and the libraries they use.
+"""The code that makes a product: the modules that a module imports, the data beside them, and the libraries they use.
 
 Products that are kept on disk carry `code_digest` of the module that made them in their key, so that none made by
 other code is believed. Comments, docstrings and formatting do not count.
@@ -48,7 +48,7 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
     Raises:
       ModuleNotFoundError: a maker is no module of ours.
     """
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     libraries: set[str] = set()
     known = {OURS, *sys.stdlib_module_names, *without, *INDIFFERENT}
     waiting = list(makers)
@@ -58,14 +58,14 @@ def closure(*makers: str, root: Path = ROOT, without: Collection[str] = ()) -> C
     while waiting:
         name = waiting.pop()
         path = _file_of(name, root)
-        if name in found or name in without or path is None:
+        if name in paths or name in without or path is None:
             continue
-        found[name] = path
+        paths[name] = path
         names = _read(path.read_bytes(), name, path.name == "__init__.py").imports
         ours = [n for n in names if n.split(".")[0] == OURS]
         waiting += ours + [n.rpartition(".")[0] for n in (name, *ours) if n.count(".") > 1]  # run before their modules
         libraries.update(n.split(".")[0] for n in names if n.split(".")[0] not in known)
-    return Closure(dict(sorted(found.items())), tuple(sorted(libraries)))
+    return Closure(dict(sorted(paths.items())), tuple(sorted(libraries)))
 
 
 def imported(tree: ast.Module, module: str, *, package: bool) -> Iterator[str]:
@@ -112,7 +112,7 @@ def code_digest(*makers: str, root: Path = ROOT, without: tuple[str, ...] = ()) 
 
 @dataclass(frozen=True)
 class _Read:
-    """What is in the source of a module."""
+    """Imports, tables and digest of the source of a module."""
 
     imports: tuple[str, ...]
     tables: frozenset[str]
@@ -174,7 +174,7 @@ def _described(value: object) -> object:
 
 
 def _is_docstring(node: object) -> bool:
-    """Whether a statement is text alone, behind a module's, class's, function's or field's head."""
+    """True if a statement is text alone, behind a module's, class's, function's or field's head."""
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 

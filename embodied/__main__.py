@@ -1,4 +1,4 @@
-"""Where the console command begins, also as `python -m embodied`: Ctrl-C works from the first line on.
+"""The console command's entry point, also as `python -m embodied`: Ctrl-C works from the first line on.
 
 Libraries may swallow a KeyboardInterrupt that reaches them while they are being imported, or turn
 it into an ImportError. Nothing is being written at that time, so Ctrl-C then ends the program at
@@ -25,7 +25,7 @@ def start() -> int:
 
 
 def stop(number: int, frame: FrameType | None) -> None:
-    """What Ctrl-C and a polite kill do: end the program if something is being imported, else raise
+    """Handle Ctrl-C and SIGTERM: end the program if something is being imported, else raise
     KeyboardInterrupt."""
     import os
 

@@ -25,7 +25,7 @@ FIELD = math.radians(40)
 halved, the linear rule of the Matterport3D simulator (docs/sources.md, S1)."""
 
 Reach = tuple[Candidates, tuple[Pose, ...]]
-"""What the agent knows about its moves, and the privileged pose that each leads to."""
+"""The agent's knowledge of its moves, and the privileged pose that each leads to."""
 
 
 class Moves(Protocol):

@@ -1,4 +1,4 @@
 """The name of our distribution."""
 
 DISTRIBUTION = "embodied-houses"
-"""What pip calls us; `embodied` on PyPI is another project's."""
+"""The distribution's name for pip; `embodied` on PyPI is another project's."""

@@ -32,13 +32,13 @@ def key_of(identity: Identity, without: Collection[str] = (CODE, MAKERS)) -> str
 
 
 def differences(before: Identity, now: Identity, may_change: Collection[str] = (CODE, MAKERS)) -> list[str]:
-    """What differs, as 'settings.batch 6 -> 5', sorted; parts and settings named in `may_change` do not count."""
+    """Differences, as 'settings.batch 6 -> 5', sorted; parts and settings named in `may_change` do not count."""
     old, new = _flat(before, may_change), _flat(now, may_change)
     return [f"{k} {old.get(k)!r} -> {new.get(k)!r}" for k in sorted({*old, *new}) if old.get(k) != new.get(k)]
 
 
 def made_by_this_code(identity: Identity) -> bool:
-    """Whether the code that made a thing is the code that runs."""
+    """True if the code that made a thing is the code that runs."""
     try:
         return bool(identity.get(MAKERS)) and code_digest(*identity[MAKERS]) == identity.get(CODE)
     except (ModuleNotFoundError, TypeError):  # a maker that was renamed, or is none
@@ -65,23 +65,23 @@ def read_finished(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def finished(path: Path, identity: Identity, may_change: Collection[str] = ()) -> dict[str, Any] | None:
-    """What `write_finished` wrote, if it belongs to `identity`; None where it is missing or belongs to another.
+    """The body that `write_finished` wrote, if it belongs to `identity`; None where it is missing or belongs to another.
 
     Raises:
       RecordError: damaged; names the file.
     """
     if not Path(path).exists():
         return None
-    found, body = read_finished(path)
-    return None if differences(found, identity, may_change) else body
+    stored, body = read_finished(path)
+    return None if differences(stored, identity, may_change) else body
 
 
 def _flat(value: object, without: Collection[str], name: str = "") -> dict[str, object]:
     """Leaves of nested objects by dotted name."""
     if not isinstance(value, Mapping):
         return {name: value}
-    found: dict[str, object] = {}
+    leaves: dict[str, object] = {}
     for key, inner in value.items():
         if key not in without:
-            found |= _flat(inner, without, f"{name}.{key}" if name else str(key))
-    return found
+            leaves |= _flat(inner, without, f"{name}.{key}" if name else str(key))
+    return leaves

@@ -1,4 +1,4 @@
-"""What is kept from learning, so that there is something new to be judged by: some models, looks, words and templates.
+"""Parts of the world that are kept from learning, for evaluation out of distribution: models, looks, words, templates.
 
 Data sets with houses out of distribution (`test_ood`) build all others of 'familiar' things, and those of 'novel'
 ones. Where nobody asks, novelty is None and all there is may be used.

@@ -25,7 +25,7 @@ from embodied.assets.cache import default_cache
 
 C = typing.TypeVar("C")
 METAVARS: Mapping[type, str] = {int: "N", float: "X", str: "WORD", Path: "FILE"}
-MOST = 10**7
+LARGEST_COUNT = 10**7
 """Largest count that any option takes."""
 HOUSES = 100_000
 """Most houses of a data set."""
@@ -36,7 +36,7 @@ REPEATS = 1000
 # Types of arguments -----------------------------------------------------------------------------
 
 
-def whole(least: int = 1, most: int = MOST, *, even: bool = False) -> Callable[[str], int]:
+def whole(least: int = 1, most: int = LARGEST_COUNT, *, even: bool = False) -> Callable[[str], int]:
     """Whole numbers from `least` to `most`, both included."""
     wanted = f"{'an even' if even else 'a whole'} number of at least {least}"
 
@@ -46,7 +46,7 @@ def whole(least: int = 1, most: int = MOST, *, even: bool = False) -> Callable[[
         except ValueError:
             value = least - 1
         if not least <= value <= most or (even and value % 2):
-            upto = f" and at most {most}" if most < MOST or value > most else ""
+            upto = f" and at most {most}" if most < LARGEST_COUNT or value > most else ""
             raise argparse.ArgumentTypeError(f"should be {wanted}{upto}, got {text[:40]!r}")
         return value
 
@@ -90,58 +90,58 @@ def any_path(text: str) -> Path:
             f"should be a path in UTF-8, which MuJoCo wants, got {os.fsencode(text)!r}; "
             "rename it, or set LC_ALL=C.UTF-8 if it is meant as UTF-8"
         ) from None
-    found = Path(text)
+    path = Path(text)
     try:
-        found.stat()
+        path.stat()
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         pass
     except OSError as e:  # a link that leads to itself, a name too long
         raise argparse.ArgumentTypeError(f"{text[:80]!r} cannot be used: {e.strerror}; choose another path") from None
-    return found
+    return path
 
 
 def any_folder(text: str) -> Path:
     """A folder, there or not."""
-    found = any_path(text)
-    if found.exists() and not found.is_dir():
+    path = any_path(text)
+    if path.exists() and not path.is_dir():
         raise argparse.ArgumentTypeError(f"{text} is a file, a folder is wanted; move it away or choose another name")
-    return found
+    return path
 
 
 def folder_to_write(text: str) -> Path:
     """A folder that is there and may be written, or that can be made."""
-    found = any_folder(text)
-    _refuse_unwritable(found)
-    return found
+    path = any_folder(text)
+    _refuse_unwritable(path)
+    return path
 
 
 def file_to_write(text: str) -> Path:
     """A file that can be written, new or over an old one."""
-    found = any_path(text)
-    if found.is_dir():
+    path = any_path(text)
+    if path.is_dir():
         raise argparse.ArgumentTypeError(f"{text} is a folder, a file is wanted; name a file in it")
-    _refuse_unwritable(found.parent)
-    return found
+    _refuse_unwritable(path.parent)
+    return path
 
 
 def file_ending_in(*endings: str) -> Callable[[str], Path]:
     """A file that can be written, of the kind that is written."""
 
     def read(text: str) -> Path:
-        found = file_to_write(text)
-        if found.suffix.lower() not in endings:
+        path = file_to_write(text)
+        if path.suffix.lower() not in endings:
             raise argparse.ArgumentTypeError(f"should end in {' or '.join(endings)}, which is written, got {text!r}")
-        return found
+        return path
 
     return read
 
 
 def house_folder(text: str) -> Path:
     """A folder that `embodied house` wrote."""
-    found = any_path(text)
-    if found.is_file():
-        raise argparse.ArgumentTypeError(f"{text} is a file; name the folder that it is in, {found.parent}")
-    return found
+    path = any_path(text)
+    if path.is_file():
+        raise argparse.ArgumentTypeError(f"{text} is a file; name the folder that it is in, {path.parent}")
+    return path
 
 
 def _refuse_unwritable(wanted: Path) -> None:
@@ -175,13 +175,13 @@ class Option:
     """Turns a word into a value; None: the annotated type does."""
     metavar: str | tuple[str, ...] | None = None
     words: Sequence[str] = ()
-    """What may be given."""
+    """The words that may be given."""
     helps: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """What these words mean."""
+    """The meaning of these words."""
     name: str = ""
     """The option's name where it is not the field's; without dashes for an argument by position."""
     repeated: bool = False
-    """Whether it is given once for each item, instead of once with all items."""
+    """True if it is given once for each item, instead of once with all items."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)  # annotations are hashed
@@ -195,7 +195,7 @@ class Settings:
     skip: Sequence[str] = ()
     """Fields without an option."""
     words: Mapping[str, Sequence[str]] = dataclasses.field(default_factory=dict)
-    """What may be given for a field, listed in its help; the settings check themselves."""
+    """The words that may be given for a field, listed in its help; the settings check themselves."""
 
     @property
     def of_scale(self) -> bool:
@@ -301,23 +301,23 @@ def _add(parser: argparse._ActionsContainer, field: dataclasses.Field, hint: Any
     text = "; ".join([text.rstrip("."), *(f"{w}: {how.helps[w]}" for w in how.words if w in how.helps)])
     if "(default" not in text:
         text = _with_default(text, {"": default})
-    told: dict[str, Any] = {"help": text.replace("%", "%%")}
+    arguments: dict[str, Any] = {"help": text.replace("%", "%%")}
     name = how.name or "--" + field.name.replace("_", "-")
     if kind is bool:
-        parser.add_argument(name, dest=field.name, action="store_true", **told)
+        parser.add_argument(name, dest=field.name, action="store_true", **arguments)
         return
-    told |= {"type": how.read or kind, "choices": tuple(how.words) or None}
-    told["default"] = str(default) if isinstance(default, Path) else default  # argparse reads strings as if given
-    told["metavar"] = how.metavar or (None if how.words else METAVARS.get(kind))
+    arguments |= {"type": how.read or kind, "choices": tuple(how.words) or None}
+    arguments["default"] = str(default) if isinstance(default, Path) else default  # argparse reads strings as if given
+    arguments["metavar"] = how.metavar or (None if how.words else METAVARS.get(kind))
     if how.repeated:
-        told |= {"action": "append", "default": []}
+        arguments |= {"action": "append", "default": []}
     elif many:
-        told["nargs"] = many
+        arguments["nargs"] = many
     if name.startswith("-"):
-        parser.add_argument(name, dest=field.name, required=required, **told)
+        parser.add_argument(name, dest=field.name, required=required, **arguments)
     else:
-        told |= {} if required else {"nargs": "*" if many else "?"}
-        parser.add_argument(field.name, **told)
+        arguments |= {} if required else {"nargs": "*" if many else "?"}
+        parser.add_argument(field.name, **arguments)
 
 
 def _add_settings(parser: argparse._ActionsContainer, kind: type, settings: Settings) -> None:
@@ -332,21 +332,21 @@ def _add_settings(parser: argparse._ActionsContainer, kind: type, settings: Sett
         )
         item, many, _ = _scalar(hints[f.name])
         listed = settings.words.get(f.name)
-        told: dict[str, Any] = {"default": None, "help": text.replace("%", "%%")}
+        arguments: dict[str, Any] = {"default": None, "help": text.replace("%", "%%")}
         if item is bool:
-            told["action"] = argparse.BooleanOptionalAction
+            arguments["action"] = argparse.BooleanOptionalAction
         else:
-            told |= {"type": item, "nargs": many}
-            told["metavar"] = "{" + ",".join(listed) + "}" if listed else METAVARS.get(item)
-        parser.add_argument("--" + f.name.replace("_", "-"), **told)
+            arguments |= {"type": item, "nargs": many}
+            arguments["metavar"] = "{" + ",".join(listed) + "}" if listed else METAVARS.get(item)
+        parser.add_argument("--" + f.name.replace("_", "-"), **arguments)
 
 
 def _with_default(text: str, defaults: Mapping[str, Any]) -> str:
     """A help text with the default, or with that of every scale where they differ."""
     shown = {k: " ".join(map(str, v)) if isinstance(v, tuple) else str(v) for k, v in defaults.items()}
     different = len(set(shown.values())) > 1
-    told = ", ".join(f"{name}: {value}" for name, value in shown.items()) if different else [*shown.values()][0]
-    return text if told in ("", "None", "False") else f"{text} (default: {told})"
+    default = ", ".join(f"{name}: {value}" for name, value in shown.items()) if different else [*shown.values()][0]
+    return text if default in ("", "None", "False") else f"{text} (default: {default})"
 
 
 def _settings(hint: Any) -> Settings | None:

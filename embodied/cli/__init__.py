@@ -60,7 +60,7 @@ REMEDIES = {
     errno.EISDIR: "a folder stands where a file is needed; move it away or choose another name",
     errno.ENOENT: "there is no such file or folder, and it cannot be made; check the path",
 }
-"""What to do about an error of the operating system."""
+"""The remedy of an error of the operating system."""
 
 EXTRAS = {
     **dict.fromkeys(("torch", "safetensors", "sacrebleu"), "agents"),
@@ -76,7 +76,7 @@ KILLED = (
     "a worker process was ended from outside, most often because memory ran out; run the same command again, "
     "perhaps with fewer --workers. Finished files are kept"
 )
-"""What a killed worker leaves to be said."""
+"""The message about a killed worker."""
 
 
 class PrintCompletion(argparse.Action):
@@ -198,7 +198,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def message_of(error: Exception) -> str:
-    """What is shown of an error: one line, with the remedy."""
+    """An error in one line, with the remedy."""
     if isinstance(error, OSError) and error.errno in REMEDIES and error.strerror:
         where = f"{error.filename}: " if error.filename else ""
         return f"{where}{error.strerror}: {REMEDIES[error.errno]}"

@@ -70,7 +70,7 @@ def run(args: IliadOptions) -> None:
 
 
 def own_request(args: IliadOptions, file: Path, request: str) -> None:
-    """What the student makes of the user's words."""
+    """Apply the student's rule to the user's words."""
     from embodied.agents.iliad.regex.data import WordTask
     from embodied.agents.iliad.regex.rules import LETTERS
     from embodied.agents.iliad.regex.run import load_student
@@ -96,9 +96,9 @@ def episodes(args: IliadOptions, file: Path) -> None:
     grounds = prepare(config, args.shared, note=note)
     items = grounds.data.splits[args.split]
     chosen = stream(args.seed, "iliad", "shown").permutation(len(items))[: args.episodes]
-    told = [tell(student, grounds.teacher, items[int(i)], seed=args.seed, sample=not args.greedy) for i in chosen]
-    text = "\n\n".join("\n".join(lines_of(t)) for t in told)
-    show(args, {"episodes": [dataclasses.asdict(t) for t in told]}, text + "\n")
+    episodes = [tell(student, grounds.teacher, items[int(i)], seed=args.seed, sample=not args.greedy) for i in chosen]
+    text = "\n\n".join("\n".join(lines_of(t)) for t in episodes)
+    show(args, {"episodes": [dataclasses.asdict(t) for t in episodes]}, text + "\n")
 
 
 def walks(args: IliadOptions, file: Path) -> None:
@@ -130,8 +130,8 @@ def walks(args: IliadOptions, file: Path) -> None:
     shown = [tell(student, grounds.teacher, t, seed=args.seed, sample=not args.greedy) for t in chosen]
     if args.rrd:
         _record(args, grounds.data.source, student, chosen[0], shown[0])
-    text = "\n\n".join("\n".join(lines_of(told)) for told, _ in shown)
-    show(args, {"episodes": [dataclasses.asdict(told) for told, _ in shown]}, text + "\n")
+    text = "\n\n".join("\n".join(lines_of(episode)) for episode, _ in shown)
+    show(args, {"episodes": [dataclasses.asdict(episode) for episode, _ in shown]}, text + "\n")
 
 
 def _record(args: IliadOptions, data: Dataset, student: NavStudent, trip: Trip, shown: tuple[NavTold, NavWalk]) -> None:
@@ -141,6 +141,6 @@ def _record(args: IliadOptions, data: Dataset, student: NavStudent, trip: Trip, 
     from embodied.viz.recording import record_episode
     from embodied.viz.sinks import Sinks
 
-    told, walk = shown
+    episode, walk = shown
     with drawn_world(data, trip.world, args.cache, pictures_of(data, trip.world, args.pictures)) as eyes:
-        record_episode(eyes, episode_of(student, trip, walk, told.description), Sinks(args.rrd), eyes=eyes)
+        record_episode(eyes, episode_of(student, trip, walk, episode.description), Sinks(args.rrd), eyes=eyes)

@@ -10,7 +10,7 @@ from embodied.agents.learner import learner_named, shipped_learners
 
 
 def learner_commands(verb: str, words: Sequence[str], run: Callable[[Callable[..., Any], Any], None]) -> dict[str, Any]:
-    """What `embodied VERB LEARNER` may be, for embodied.options.add_commands.
+    """Commands `embodied VERB LEARNER`, for embodied.options.add_commands.
 
     Args:
       verb: 'train' or 'study', a field of embodied.agents.learner.Learner.
