@@ -65,7 +65,7 @@ def read_finished(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def finished(path: Path, identity: Identity, may_change: Collection[str] = ()) -> dict[str, Any] | None:
-    """The body that `write_finished` wrote, if it belongs to `identity`; None where it is missing or belongs to another.
+    """The body of a finished thing, if it belongs to `identity`; None where it is missing or belongs to another.
 
     Raises:
       RecordError: damaged; names the file.
