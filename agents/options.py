@@ -36,7 +36,7 @@ GOAL_IMAGES = tuple(CAPTURE_CONDITIONS)
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
     pictures: Annotated[str | None, PRESET] = None
-    """How the encoded pictures are drawn; traced and reference of few rays (default: as the panoramas of
+    """How the encoded pictures are drawn; traced and reference with few rays (default: as the panoramas of
     the data set, else unlit)."""
 
 

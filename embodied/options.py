@@ -216,7 +216,7 @@ OutputRrd = Annotated[Path, Option(file_ending_in(".rrd"), "FILE")]
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Cached:
     cache: AnyFolder = dataclasses.field(default_factory=default_cache)
-    """Folder that keeps expensive products; it is safe to delete."""
+    """Cache folder; it is safe to delete."""
 
 
 def drawn_as(kinds: Sequence[str]) -> Option:
@@ -354,8 +354,8 @@ def _settings(hint: Any) -> Settings | None:
 
 
 def _lower(text: str) -> str:
-    """With a small first letter, unless it is an abbreviation."""
-    return text[0].lower() + text[1:] if text[1:2].islower() else text
+    """With a small first letter, unless the first word is an abbreviation."""
+    return text[0].lower() + text[1:] if text[1:2].islower() or text[1:2] == " " else text
 
 
 def _required(field: dataclasses.Field) -> bool:

@@ -3,7 +3,7 @@
     python examples/dataset_to_torch.py --data data/find_flats
 
 Every viewpoint of a flat is seen in 36 views; from the colours of each the network tells its mean distance, and is
-judged in a house it has never seen, beside whoever always says the same. Without --data a data set of small flats is
+evaluated in a house it has never seen, beside a constant prediction. Without --data a data set of small flats is
 built and drawn first, which takes about a minute; with `--pictures fast` they are lit, too. Object classes, instance
 ids, poses and rooms are in the same batches (agents/vision/pictures.py).
 """
@@ -80,7 +80,7 @@ def main() -> None:
     with torch.no_grad():
         told, true = zip(*((network(c), d) for c, d in map(colours_and_distance, DataLoader(test, batch_size=64))))
     error = (torch.cat(told) - torch.cat(true)).square().mean().sqrt().item()
-    print(f"unseen house: {100 * error:.0f} % off, {100 * torch.cat(true).std().item():.0f} % who always says the same")
+    print(f"unseen house: {100 * error:.0f} % off, {100 * torch.cat(true).std().item():.0f} % by a constant")
 
 
 if __name__ == "__main__":

@@ -3,8 +3,8 @@
     python examples/encode.py --network resnet18 --weights resnet18-f37072fd.pth
 
 The environment shows colours; a torchvision network (if that package is installed; without --weights it is untrained)
-or the encoder that ships with this package turns each look into numbers. At the end: how alike looks from one room are,
-and looks from different rooms. Without data a flat is generated and lit, once, which takes a minute or two.
+or the encoder that ships with this package turns each view into numbers. At the end it prints how similar views from
+one room are, and views from different rooms. Without data a flat is generated and lit once, in a minute or two.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Generate a flat from a seed, write its plan, and look round from one of its viewpoints.
+"""Generate a flat from a seed, write its plan, and look around from one of its viewpoints.
 
     python examples/generate_and_look.py --seed 7 --out out/look
 

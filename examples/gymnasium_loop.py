@@ -1,4 +1,4 @@
-"""The Gymnasium loop: somebody who understands nothing asks for help as often as it may.
+"""The Gymnasium loop: an agent that moves at random asks for help as often as it may.
 
     python examples/gymnasium_loop.py --kind HANNA --episodes 3
 

@@ -107,9 +107,9 @@ class ImitationSettings(ValidatedRunSettings):
     instruction_length: int = 50
     """Longest instruction, words."""
     word_vectors: str = LEARNED_WORDS
-    """Knowledge of words: 'learned' alone, or 'minilm', pre-trained vectors besides (docs/sources.md, S181)."""
+    """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition (docs/sources.md, S181)."""
     varied_words: bool = False
-    """Most of what is said in training is said in words and sentences of other writers (docs/sources.md, S184)."""
+    """Replace most training instructions by paraphrases of other writers (docs/sources.md, S184)."""
     validation_tasks: int = 200
     """Tasks of each validation."""
 

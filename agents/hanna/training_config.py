@@ -62,7 +62,7 @@ class TrainingConfig(ImitationSettings):
     read_assistance: bool = True
     """Read the words of routes; False: show only the goal image (Table 4.4)."""
     speakers: str = EVERYBODY
-    """People whose routes are learned from: 'everybody', or 'familiar' to hear some people only when evaluated."""
+    """Speakers of the training routes: 'everybody', or 'familiar', which holds some out for evaluation."""
     reset_inter_task: bool = True
     """Reset the inter-task module between sub-tasks; False: ablation of Table D.2."""
     predict_reasons: bool = True

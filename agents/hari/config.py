@@ -41,7 +41,7 @@ class ExecutionConfig(ValidatedRunSettings):
     """Share of training steps at which the agent stands still and gets the description of its place, as an agent that
     asks does (docs/sources.md, S172)."""
     keep_fraction: float = 0.1
-    """Share of object classes that these descriptions keep (docs/sources.md, S170)."""
+    """Share of object classes that sparse descriptions keep (docs/sources.md, S170)."""
     reset_on_goal_change: bool = False
     """Reset the belief when the goal on top of the stack changes (docs/sources.md, S145)."""
     clip: float = 1.0

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class AskStudyOptions(StudyOptions, Repeated, WithModel, Cached):
-    """Ask-v0: agents that decide when to ask, against the price of their questions."""
+    """Agents that decide when a question is worth its price (Ask-v0)."""
 
     tables: Tables
     """Make these tables: houses, classes or curves."""

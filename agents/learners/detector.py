@@ -19,7 +19,7 @@ DETECTOR = StripTraining(epochs=3, shade=0.3, weight_decay=0.02)
 
 @dataclass(frozen=True, kw_only=True)
 class DetectorTraining(StripOptions, EncoderFile):
-    """A detector of objects, on an encoder that stays as it is.
+    """A detector of objects on a frozen encoder.
 
     Renders the houses of a data set, trains a detector on the encoder's maps, and measures its average precision on
     validation houses.
@@ -29,11 +29,11 @@ class DetectorTraining(StripOptions, EncoderFile):
     workers: Count = 1
     """Render N houses in parallel."""
     lit_houses: Annotated[int, Option(whole(0), "N")] = 0
-    """N of the training houses are seen in light, too."""
+    """Also train on lit pictures of N of the training houses."""
     also: InputFolder | None = None
-    """Another data set: its training houses that are not in --data are seen, too."""
+    """Another data set: also train on its training houses that are not in --data."""
     share: Annotated[float, Option(part, "X")] = 1.0
-    """Share of the viewpoints of --also that is drawn, in regular steps."""
+    """Share of the viewpoints of --also to draw, at regular intervals."""
     config: Annotated[StripTraining, Settings(TRAINING, DETECTOR)]
 
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class HannaTraining(Recorded, Run, Encoded, WithDevice, WithGoalImage):
-    """The agent, on a HANNA data set with features.
+    """An agent that asks people for help (HANNA), by imitation, on a HANNA data set with features.
 
     Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
     """

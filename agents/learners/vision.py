@@ -44,7 +44,7 @@ class StripOptions(Drawn, WithDevice, WithData):
 
 @dataclass(frozen=True, kw_only=True)
 class VisionTraining(StripOptions):
-    """The encoder, on renders of a data set's training houses.
+    """An encoder of panoramas, on renders of a data set's training houses.
 
     Renders the houses of a data set, trains an encoder to name and locate the objects in them, and measures on unseen
     houses how well it does.
@@ -67,10 +67,10 @@ class VisionStudyOptions(StudyOptions, Repeated, StripOptions):
     """Train every encoder on as many pictures as N houses have in all epochs; of more houses than N times --epochs,
     only some viewpoints are drawn (default: the largest of --houses)."""
     lit_houses: Count = 12
-    """N houses are lit for one more encoder, and for linear readers."""
+    """Light N houses for one more encoder and for the linear probes."""
     encoders: NamedFiles = ()
-    """Evaluate these encoders, or detectors of the shipped encoder, too; those of one name are training seeds of one
-    kind."""
+    """Evaluate these encoders, or detectors of the shipped encoder, too; files with one name count as training seeds of
+    one encoder."""
     test_pictures: tuple[Annotated[str, PRESETS], ...] = ("unlit", "fast")
     """Kinds of pictures to evaluate on (default: unlit and fast)."""
     split: str = "val_unseen"

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class VnlaTraining(Recorded, Run, Encoded, WithDevice):
-    """The agent that asks an advisor, on a VNLA data set with features.
+    """An agent that asks an advisor within a budget (VNLA), by imitation, on a VNLA data set with features.
 
     Trains an agent by imitation to navigate by one view, to ask an advisor within a budget and to follow the advice.
     """

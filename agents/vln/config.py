@@ -47,7 +47,7 @@ class FollowerSettings(ImitationSettings):
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
     speakers: str = EVERYBODY
-    """Speakers of the training instructions: 'everybody', or 'familiar' to hear some people only when evaluated."""
+    """Speakers of the training instructions: 'everybody', or 'familiar', which holds some out for evaluation."""
     least_teacher: float = 0.0
     """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
     iterations: int = 20_000

@@ -1,4 +1,4 @@
-"""Show the size of the cache by kind of product, and make room in it.
+"""Show the size of the cache by kind of content, and remove old files.
 
 Everything in the cache can be made again. --prune DAYS removes what nobody has read for so many days, --clear KIND all
 products of a kind (assets, light, panoramas ...). EMBODIED_CACHE may name several folders, separated as in PATH: files

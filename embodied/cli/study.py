@@ -4,7 +4,7 @@
     embodied study my_learner:LEARNER --data DATA --out STUDY
     embodied study check STUDY
 
-`embodied study LEARNER --help` lists the tables of a learner; `check` says which stored tables no longer belong to this
+`embodied study LEARNER --help` lists the tables of a learner; `check` lists the stored tables that no longer match the
 code. Rows that tables share are trained once. Each table is written as JSON, Markdown and, for some, as a figure. Rerun
 an interrupted command to resume.
 """
@@ -24,7 +24,7 @@ from embodied.options import Option, any_folder
 
 @dataclass(frozen=True, kw_only=True)
 class CheckOptions:
-    """Say which stored tables no longer belong to this code."""
+    """List the stored tables that no longer match the code."""
 
     folder: Annotated[Path, Option(any_folder, "STUDY", name="folder")]
     """Folder of a study, or of stored tables such as docs/results/data."""

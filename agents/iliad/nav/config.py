@@ -62,11 +62,11 @@ class NavConfig:
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
     speakers: str = EVERYBODY
-    """Speakers of the training requests: 'everybody', or 'familiar' to hear some people only when evaluated."""
+    """Speakers of the training requests: 'everybody', or 'familiar', which holds some out for evaluation."""
     word_vectors: str = LEARNED_WORDS
-    """Knowledge of words: 'learned' alone, or 'minilm', pre-trained vectors besides."""
+    """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition."""
     varied_words: bool = False
-    """Students hear requests of training as they are and as other writers would say them (docs/sources.md, S184)."""
+    """Add paraphrases of other writers to the training requests (docs/sources.md, S184)."""
     data_seed: int = 0
     """Random seed of the further paths and of the teacher, which all students share."""
 

@@ -14,7 +14,7 @@ from embodied.render.pictures import PICTURES
 
 @dataclass(frozen=True, kw_only=True)
 class DriveOptions(OfData, Cached):
-    """Drives of an expert on wheels to points, as LeRobot data (v3.0), in houses of any kind of data."""
+    """Drives of an expert on wheels to points, as LeRobot data (v3.0), in the houses of any data set."""
 
     split: str = "train"
     """The split whose houses are driven in."""

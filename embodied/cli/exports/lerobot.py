@@ -15,7 +15,7 @@ class LeRobotOptions(OfData):
     """Episodes as a LeRobot data set (v3.0)."""
 
     episodes: tuple[InputPath, ...] = ()
-    """Episodes (.jsonl) of `embodied evaluate` (default: --agent plays --split); they say who played which tasks."""
+    """Episodes (.jsonl) of `embodied evaluate` (default: --agent plays the tasks of --split)."""
     agent: Annotated[str | None, Option(metavar="NAME")] = None
     """Who plays: an agent of `embodied evaluate` that needs no training and no pictures (default: an expert, which asks
     where the kind of task has help)."""

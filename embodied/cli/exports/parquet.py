@@ -11,7 +11,7 @@ from embodied.options import InputPath
 
 @dataclass(frozen=True, kw_only=True)
 class ParquetOptions(OfData):
-    """Parquet tables of houses, tasks, routes and episodes, with a data-set card."""
+    """Houses, tasks, routes and episodes as Parquet tables, with a data-set card."""
 
     episodes: tuple[InputPath, ...] = ()
     """Episodes (.jsonl) to write as tables, too."""
