@@ -18,7 +18,7 @@ from embodied.datasets.lerobot import (
     CAMERA,
     DEPTH,
     FPS,
-    MOST,
+    MOST_CANDIDATES,
     STATE,
     RecordedCamera,
     export_lerobot,
@@ -89,7 +89,7 @@ def test_every_step_is_a_row_with_its_pose_its_action_and_the_words_of_the_momen
     acts, asked = np.array(table["action"]), [ACTION.index("ask"), ACTION.index("stop")]
     kinds = [type(s.action).__name__ for s in steps]
     assert [("Ask", "Stop")[int(a[1])] if a.any() else "Move" for a in acts[:, asked]] == kinds
-    where = np.array(table["candidates"]).reshape(len(steps), MOST, 3)
+    where = np.array(table["candidates"]).reshape(len(steps), MOST_CANDIDATES, 3)
     for k, step in enumerate(steps):
         there = graph.positions[list(step.candidate_nodes)] - graph.positions[step.pose.node]
         n, chosen = len(there), table["candidate"][k]

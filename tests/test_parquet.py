@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 from hand_data import built
 
-from embodied.datasets.parquet import TABLES, export_parquet, size_category
+from embodied.datasets.parquet import PARQUET_TABLES, export_parquet, size_category
 from embodied.evaluation.evaluate import agent
 from embodied.evaluation.rollout import play
 from embodied.house.house import House
@@ -38,7 +38,7 @@ def test_tables_give_back_every_record_and_the_card_names_every_file(tmp_path):
     played = table("episodes/episodes_val").to_pylist()
     assert [from_json(Episode, e["record"]).nodes for e in played] == [e.nodes for e in episodes]
     assert any("ask help" in e["actions"] for e in played) and any(any(e["replies"]) for e in played)
-    for name in TABLES:
+    for name in PARQUET_TABLES:
         assert (tmp_path / "out" / name).is_dir()
 
     card = (tmp_path / "out/README.md").read_text()

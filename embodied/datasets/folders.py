@@ -58,14 +58,14 @@ FEATURES = "img_features/ResNet-152-imagenet.tsv"
 VIT = "features/pth_vit_base_patch16_224_imagenet.hdf5"
 """The name that HAMT and VLN-DUET look for."""
 THEIRS = {FEATURES: "a ResNet-152", VIT: "a ViT"}
-"""Whose features the files' names promise."""
+"""The network whose features a file's name promises."""
 ANGLES = ("ZMojNkEp431", "2f4d90acd4024c269fb0efe49a8ac540")
 """Scan and viewpoint of Matterport3D where later agents turn once around to compute their angle features."""
 LEAST_WORDS = 5
 """How often ILIAD counts a word of the training instructions before it is one of the vocabulary."""
 MOST_NODES = 10
 """ILIAD's NAV plays ten actions, of which the last node is never recorded: longer paths cannot be won."""
-LONGEST = 200
+LONGEST_TEACHING = 200
 """Actions after which a teacher's walk is given up; no house is that large."""
 
 Words = Counter[str]
@@ -90,7 +90,7 @@ class Program:
     needs: str = ""
     """The extra of this package that the export needs."""
     angles: bool = False
-    """Whether it computes angle features at the first viewpoint of ANGLES."""
+    """It computes angle features at the first viewpoint of ANGLES."""
 
 
 def export_folder(program: str, data: Dataset, folder: Path, features: FeatureRows | None = None) -> list[Path]:
@@ -122,7 +122,7 @@ def export_folder(program: str, data: Dataset, folder: Path, features: FeatureRo
 
 
 def readme(program: str, data: Dataset, with_features: bool) -> str:
-    """What the folder's README says."""
+    """The text of the folder's README."""
     file = PROGRAMS[program].features
     if with_features:
         theirs = THEIRS[file]
@@ -154,13 +154,13 @@ def largest_batch(data: Dataset) -> int:
 
 
 def sought(task: Task) -> FindObject:
-    """What a task of HANNA or VNLA looks for."""
+    """The object that a task of HANNA or VNLA looks for."""
     assert isinstance(task.goal, FindObject), "they look for objects"
     return task.goal
 
 
 def route_of(task: Task) -> FollowRoute:
-    """What a task of Room-to-Room follows."""
+    """The route that a task of Room-to-Room follows."""
     assert isinstance(task.goal, FollowRoute), "they follow routes"
     return task.goal
 
@@ -291,7 +291,7 @@ def _anywhere(place: StoredPlace) -> Mapping[str, tuple[int, ...]]:
 def _vnla_fields(task: Task, goals: Sequence[int], place: StoredPlace, plan: MonocularPlan) -> Item:
     room, rooms = place.house.room_by_id, place.graph.room_of_node
     return {
-        "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), LONGEST)[0]] for g in goals],
+        "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), LONGEST_TEACHING)[0]] for g in goals],
         "start_region_name": region_name(room[rooms[task.start.node]].kind),
         "end_region_name": region_name(room[rooms[nearest(place.graph, task.start.node, goals)]].kind),
         "object_name": sought(task).object_class,

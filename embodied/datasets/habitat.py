@@ -39,9 +39,9 @@ from embodied.envs.continuous import (
 from embodied.interface import FollowRoute, Place, Task
 from embodied.seeds import stream
 
-LONGEST = 200
+INSTRUCTION_TOKENS = 200
 """Tokens of an instruction in VLN-CE's files, filled up with zeros."""
-MOST = 2**30
+LARGEST_FILE = 2**30
 """Most bytes of a file, unpacked; VLN-CE's largest has a fifth."""
 SPECIAL = ("<pad>", "<unk>")
 """Words 0 and 1 of the vocabulary."""
@@ -95,17 +95,17 @@ def yaw_of(rotation: Sequence[float]) -> float:
 
 def route_episodes(tasks: Iterable[Task], places: Mapping[str, Place]) -> list[ContinuousEpisode]:
     """VLN tasks as continuous episodes: the same starts, paths and words."""
-    found = []
+    episodes = []
     for number, task in enumerate(tasks, 1):
         assert isinstance(task.goal, FollowRoute), "VLN tasks follow routes"
         place = places[task.world]
         floor = float(place.house.storeys[0].elevation)
         path = tuple((float(x), float(y), floor) for x, y, _ in place.graph.positions[list(task.goal.path)])
         start, goals, route = (path[0], task.start.yaw), (NavigationGoal(path[-1]),), task.goal.route
-        found.append(
+        episodes.append(
             ContinuousEpisode(str(number), task.world, *start, task.request, goals, task.radius, path, trajectory=route)
         )
-    return found
+    return episodes
 
 
 def object_episodes(
@@ -116,7 +116,7 @@ def object_episodes(
     Raises:
       ValueError: the house has no object far enough from any start.
     """
-    ground, found, far = (navmeshes or NavMeshCache()).of(place.house), [], {}
+    ground, episodes, far = (navmeshes or NavMeshCache()).of(place.house), [], {}
     floor, rng = float(place.house.storeys[0].elevation), stream(seed, "objectnav", place.name)
     for name in sorted({p.object_class for p in place.house.placements}):
         if goals := seen_from(place.house, ground, name, REACH):
@@ -134,15 +134,15 @@ def object_episodes(
         x, y = ground.xy[int(rng.choice(starts))]
         yaw = float(rng.uniform(-math.pi, math.pi))
         start = (float(x), float(y), floor)
-        found.append(ContinuousEpisode(str(number), place.name, start, yaw, name, goals, AT_VIEW, object_class=name))
-    return found
+        episodes.append(ContinuousEpisode(str(number), place.name, start, yaw, name, goals, AT_VIEW, object_class=name))
+    return episodes
 
 
 def with_experts(
     episodes: Iterable[ContinuousEpisode], places: Mapping[str, Place], env: ContinuousEnv
 ) -> list[tuple[ContinuousEpisode, Trajectory]]:
     """Each episode with the walk of an expert along its path, and its positions written into the episode."""
-    found = []
+    expert_episodes = []
     for e in episodes:
         env.reset(e, places[e.world])
         expert = ShortestPathFollower(env, along=bool(e.reference))
@@ -151,8 +151,8 @@ def with_experts(
         trajectory = env.trajectory()
         passed = itertools.groupby((x, y, z) for x, y, z in trajectory.positions.tolist())
         whole = replace(e, expert=tuple(place for place, _ in passed))
-        found.append((whole, replace(trajectory, episode=whole)))
-    return found
+        expert_episodes.append((whole, replace(trajectory, episode=whole)))
+    return expert_episodes
 
 
 # Files -------------------------------------------------------------------------------------------
@@ -169,7 +169,7 @@ def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[ContinuousEpiso
     number = {w: k for k, w in enumerate(word_list)}
     episodes, experts = [], {}
     for e, trajectory in walked:
-        tokens = [number[w] for w in tokenised(e.instruction).split()][:LONGEST]
+        tokens = [number[w] for w in tokenised(e.instruction).split()][:INSTRUCTION_TOKENS]
         episodes.append(
             {
                 "episode_id": int(e.id) if e.id.isdecimal() else e.id,
@@ -181,7 +181,7 @@ def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[ContinuousEpiso
                 "goals": [{"position": to_habitat(a.position), "radius": e.radius} for a in e.goals],
                 "instruction": {
                     "instruction_text": e.instruction,
-                    "instruction_tokens": tokens + [0] * (LONGEST - len(tokens)),
+                    "instruction_tokens": tokens + [0] * (INSTRUCTION_TOKENS - len(tokens)),
                 },
                 "reference_path": [to_habitat(p) for p in e.reference],
             }
@@ -295,13 +295,13 @@ def _write(path: Path, value: object) -> Path:
 def _read(path: Path) -> dict[str, Any]:
     try:
         with gzip.open(path) as f:
-            body = f.read(MOST + 1)
+            body = f.read(LARGEST_FILE + 1)
     except (OSError, EOFError, zlib.error) as e:
         if isinstance(e, FileNotFoundError):
             raise
         raise RecordError(f"{path} is not a whole gzip file ({e})") from e
-    if len(body) > MOST:
-        raise RecordError(f"{path} unpacks to over {MOST} bytes; split it")
+    if len(body) > LARGEST_FILE:
+        raise RecordError(f"{path} unpacks to over {LARGEST_FILE} bytes; split it")
     value = parse(body, f"{path}")
     if not isinstance(value, dict):
         raise RecordError(f"{path} should hold one JSON object, got {shown(value)}")

@@ -56,7 +56,7 @@ EVENT = pa.struct(
         pa.field("tool_calls", pa.list_(pa.json_() if hasattr(pa, "json_") else pa.string())),
     ]
 )
-"""What somebody says at a frame: an assistant's words are an 'interjection'."""
+"""Words at a frame: an assistant's are an 'interjection'."""
 NEAREST, FARTHEST, SHIFT, CODES = 0.01, 10.0, 3.5, 4095
 """Depth videos: metres of the least and the largest code, metres added before the logarithm, the largest code."""
 STATE = ("x", "y", "z", "yaw", "pitch")
@@ -71,7 +71,7 @@ PATHS = {
     "video": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
 }
 Columns = Mapping[str, tuple[pa.DataType, tuple[str, ...] | None]]
-COLUMNS: Columns = {
+STEP_COLUMNS: Columns = {
     "observation.state": (pa.list_(pa.float32(), len(STATE)), STATE),
     "action": (pa.list_(pa.float32(), len(ACTION)), ACTION),
     "next.done": (pa.bool_(), None),
@@ -83,13 +83,13 @@ COLUMNS: Columns = {
     "task_index": (pa.int64(), None),
 }
 """Of one step: type, and names where it is a vector."""
-MOST = 24
+MOST_CANDIDATES = 24
 """Candidates that a row has room for; graphs of houses have at most a dozen neighbours at a node."""
 GRAPH_COLUMNS: Columns = {
-    **COLUMNS,
+    **STEP_COLUMNS,
     "candidates": (
-        pa.list_(pa.float32(), 3 * MOST),
-        tuple(f"{axis}_{k}" for k in range(MOST) for axis in ("forward", "left", "up")),
+        pa.list_(pa.float32(), 3 * MOST_CANDIDATES),
+        tuple(f"{axis}_{k}" for k in range(MOST_CANDIDATES) for axis in ("forward", "left", "up")),
     ),
     "candidate": (pa.int64(), None),
 }
@@ -193,17 +193,17 @@ def offsets(pose: Pose, nodes: Sequence[int], place: Place) -> np.ndarray:
 
 
 def candidates(step: Step, place: Place) -> np.ndarray:
-    """(3 MOST,) float32, as GRAPH_COLUMNS.
+    """(3 MOST_CANDIDATES,) float32, as GRAPH_COLUMNS.
 
     Raises:
-      ValueError: more than MOST candidates.
+      ValueError: more than MOST_CANDIDATES candidates.
     """
-    found, nodes = np.zeros((MOST, 3), np.float32), step.candidate_nodes
-    if len(nodes) > MOST:
-        raise ValueError(f"a step has {len(nodes)} candidates; a LeRobot data set has room for {MOST}")
+    offsets_of_all, nodes = np.zeros((MOST_CANDIDATES, 3), np.float32), step.candidate_nodes
+    if len(nodes) > MOST_CANDIDATES:
+        raise ValueError(f"a step has {len(nodes)} candidates; a LeRobot data set has room for {MOST_CANDIDATES}")
     if nodes:
-        found[: len(nodes)] = offsets(step.pose, nodes, place)
-    return found.ravel()
+        offsets_of_all[: len(nodes)] = offsets(step.pose, nodes, place)
+    return offsets_of_all.ravel()
 
 
 def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeeded: Callable[[Episode], bool]) -> None:
@@ -219,22 +219,22 @@ def _add(writer: Writer, episode: Episode, place: Place, pictures: Path, succeed
     with PanoramaFile(pictures) as file:
         frames = [seen(file, s.pose, writer.camera) for s in episode.steps]
         depths = [seen_depth(file, s.pose, writer.camera) for s in episode.steps] if writer.depth else []
-    words, said = spoken(episode.steps)
+    words, replies = spoken(episode.steps)
     facts = {"embodied/task": episode.task.id, "embodied/house": episode.task.world, "embodied/agent": episode.agent}
-    writer.add(rows, frames, depths, words, said, succeeded(episode), facts)
+    writer.add(rows, frames, depths, words, replies, succeeded(episode), facts)
 
 
 def spoken(steps: Sequence[Step]) -> tuple[list[str], list[str]]:
-    """What the agent is to do at each step, and what an assistant says there, '' for nothing."""
-    words, said, nearer = [], [], ""
+    """Words that say what to do at each step, and an assistant's words there, '' for none."""
+    words, replies, nearer = [], [], ""
     for s in steps:
         nearer = nearer if s.mode is Mode.SUB else ""
         words.append(nearer or s.instruction)
-        said.append((s.reply and s.reply.text) or "")
+        replies.append((s.reply and s.reply.text) or "")
         if s.reply and s.reply.description:
-            said[-1] = described(s.reply.description, s.pose if s.reply.intention is Intention.CUR else None)
-            nearer = said[-1] if s.reply.intention is Intention.SUB else nearer
-    return words, said
+            replies[-1] = described(s.reply.description, s.pose if s.reply.intention is Intention.CUR else None)
+            nearer = replies[-1] if s.reply.intention is Intention.SUB else nearer
+    return words, replies
 
 
 class Writer:
@@ -244,7 +244,7 @@ class Writer:
         self,
         folder: Path,
         camera: RecordedCamera,
-        columns: Columns = COLUMNS,
+        columns: Columns = STEP_COLUMNS,
         *,
         key: str = CAMERA,
         fps: int = FPS,
@@ -268,7 +268,7 @@ class Writer:
         frames: Sequence[np.ndarray],
         depths: Sequence[np.ndarray],
         words: Sequence[str],
-        said: Sequence[str],
+        replies: Sequence[str],
         success: bool,
         facts: Mapping[str, Any],
     ) -> None:
@@ -316,7 +316,7 @@ class Writer:
             }
         )
         self._rows.append(whole)
-        self._said += said
+        self._said += replies
         self._steps += n
 
     def finish(self, robot: str, card: str) -> int:
@@ -369,14 +369,14 @@ class Writer:
         }
 
 
-def _events(said: Sequence[str]) -> pa.Array:
+def _events(replies: Sequence[str]) -> pa.Array:
     """A list of EVENT for each step: what an assistant says there, '' for nothing."""
-    texts = [text for text in said if text]
+    texts = [text for text in replies if text]
     n = len(texts)
     kinds = [EVENT.field(k) for k in range(EVENT.num_fields)]
     words = [pa.array(["assistant"] * n, pa.string()), pa.array(texts, pa.string())]
     words += [pa.array(["interjection"] * n, pa.string()), *(pa.nulls(n, k.type) for k in kinds[3:])]
-    ends = np.cumsum([0, *(bool(text) for text in said)])
+    ends = np.cumsum([0, *(bool(text) for text in replies)])
     return pa.ListArray.from_arrays(pa.array(ends, pa.int32()), pa.StructArray.from_arrays(words, fields=kinds))
 
 
@@ -418,7 +418,7 @@ class _Video:
             self._container = None
 
     def feature(self) -> dict[str, Any]:
-        """What info.json says of the pictures."""
+        """The description of the pictures in info.json."""
         c = self._camera
         codec, pixels, channels = ("hevc", "gray12le", 1) if self.depth else ("h264", "yuv420p", 3)
         facts: dict[str, Any] = {"height": c.height, "width": c.width, "codec": codec, "pix_fmt": pixels}
@@ -502,9 +502,9 @@ def _table_of_tasks(tasks: Sequence[str]) -> pa.Table:
 def _statistics(values: np.ndarray) -> dict[str, list]:
     """Of (n,) or (n, k) values: per number of a vector."""
     values = values.reshape(len(values), -1)
-    found = {"min": values.min(0), "max": values.max(0), "mean": values.mean(0), "std": values.std(0)}
-    found |= {name: np.quantile(values, q, axis=0) for name, q in QUANTILES.items()}
-    return {**{name: v.tolist() for name, v in found.items()}, "count": [len(values)]}
+    numbers = {"min": values.min(0), "max": values.max(0), "mean": values.mean(0), "std": values.std(0)}
+    numbers |= {name: np.quantile(values, q, axis=0) for name, q in QUANTILES.items()}
+    return {**{name: v.tolist() for name, v in numbers.items()}, "count": [len(values)]}
 
 
 def _colours(frames: Sequence[np.ndarray]) -> np.ndarray:
@@ -531,13 +531,13 @@ def _statistics_of_counts(counts: np.ndarray, depth: bool) -> dict[str, list]:
     share = np.cumsum(shown, axis=1) / total[:, None]
     at = lambda q: values[(share >= q).argmax(1)]
     last = shown.shape[1] - 1 - (shown[:, ::-1] > 0).argmax(1)
-    found = {"min": at(1e-12), "max": values[last], "mean": mean, "std": deviation}
-    found |= {name: at(q) for name, q in QUANTILES.items()}
-    return {**{name: v.reshape(-1, 1, 1).tolist() for name, v in found.items()}, "count": [frames]}
+    numbers = {"min": at(1e-12), "max": values[last], "mean": mean, "std": deviation}
+    numbers |= {name: at(q) for name, q in QUANTILES.items()}
+    return {**{name: v.reshape(-1, 1, 1).tolist() for name, v in numbers.items()}, "count": [frames]}
 
 
 def _flat(statistics: Mapping[str, Mapping[str, list]]) -> dict[str, list]:
-    return {f"stats/{name}/{what}": v for name, found in statistics.items() for what, v in found.items()}
+    return {f"stats/{name}/{what}": v for name, numbers in statistics.items() for what, v in numbers.items()}
 
 
 HEAD = """---

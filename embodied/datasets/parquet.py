@@ -94,8 +94,8 @@ EPISODES: Columns = {
     "record": (TEXT, lambda e: to_json(e)),
 }
 """Of an episode."""
-TABLES: Mapping[str, Columns] = {"houses": HOUSES, "tasks": TASKS, "routes": ROUTES, "episodes": EPISODES}
-BATCH = 1000
+PARQUET_TABLES: Mapping[str, Columns] = {"houses": HOUSES, "tasks": TASKS, "routes": ROUTES, "episodes": EPISODES}
+ROW_GROUP = 1000
 """Rows of a row group."""
 
 
@@ -148,19 +148,19 @@ def _said(action: object) -> str:
 
 def _write(folder: Path, table: str, name: str, items: Iterable[tuple[object, ...]]) -> Path:
     """A table of items, each given to the columns of its kind."""
-    path, columns = folder / table / f"{name}.parquet", TABLES[table]
+    path, columns = folder / table / f"{name}.parquet", PARQUET_TABLES[table]
     path.parent.mkdir(parents=True, exist_ok=True)
     schema = pa.schema([(column, kind) for column, (kind, _) in columns.items()])
     rows = ({column: read(*item) for column, (_, read) in columns.items()} for item in items)
     with atomic_path(path) as temporary, pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
-        while group := list(itertools.islice(rows, BATCH)):
+        while group := list(itertools.islice(rows, ROW_GROUP)):
             writer.write_table(pa.Table.from_pylist(group, schema=schema))
     return path
 
 
 def card(data: Dataset, files: Sequence[Path]) -> str:
     """The card of the data set, with the front matter that Hugging Face reads."""
-    tables = sorted({f.parts[0] for f in files}, key=list(TABLES).index)
+    tables = sorted({f.parts[0] for f in files}, key=list(PARQUET_TABLES).index)
     configs = "\n".join(
         f"- config_name: {t}\n"
         + ("  default: true\n" if t == "tasks" else "")
@@ -172,7 +172,7 @@ def card(data: Dataset, files: Sequence[Path]) -> str:
         "card",
         data,
         CONFIGS=configs,
-        FIELDS="\n".join(f"| `{t}` | {', '.join(f'`{n}`' for n in TABLES[t])} |" for t in tables),
+        FIELDS="\n".join(f"| `{t}` | {', '.join(f'`{n}`' for n in PARQUET_TABLES[t])} |" for t in tables),
         AREA="{:g} to {:g}".format(*data.config.area),
         LANGUAGE=data.config.language,
         SIZE=size_category(sum(row.tasks for row in data.index.splits.values())),

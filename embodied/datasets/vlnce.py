@@ -27,7 +27,7 @@ from PIL import Image
 from embodied.assets.cache import write_json
 from embodied.datasets.folders import write_lines
 from embodied.datasets.habitat import with_experts, write_vlnce
-from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
+from embodied.datasets.lerobot import STEP_COLUMNS, Columns, RecordedCamera, Writer, whole_folder
 from embodied.envs.continuous import (
     POSITION,
     Body,
@@ -234,7 +234,7 @@ def _uninavid(folder: Path, walks: Iterable[Taught], camera: CameraConfig) -> in
 SCORES = ("stop", "forward", "left", "right")
 """action: 1 for what the expert does, 0 for the others."""
 LEROBOT: Columns = {
-    **COLUMNS,
+    **STEP_COLUMNS,
     "observation.state": (pa.list_(pa.float32(), len(POSITION)), POSITION),
     "action": (pa.list_(pa.float32(), len(SCORES)), SCORES),
 }

@@ -47,9 +47,9 @@ class Body:
     tilt: int = 30
     """Degrees of a look up or down."""
     looks: bool = False
-    """Whether it can look up and down."""
+    """It can look up and down."""
     sliding: bool = True
-    """Whether it slides along what it touches."""
+    """It slides along walls and things; otherwise it stops at them."""
     steps: int = 500
     """Most actions of an episode, STOP included."""
     eye: float = 1.25
@@ -138,7 +138,7 @@ class ContinuousEpisode:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What an agent did in an episode."""
+    """An agent's way through an episode."""
 
     episode: ContinuousEpisode
     positions: np.ndarray
@@ -239,7 +239,7 @@ class ContinuousEnv:
 
     @property
     def eye(self) -> Point:
-        """Where the camera is, metres, world."""
+        """Position of the camera, metres, world."""
         return float(self.position[0]), float(self.position[1]), self.floor + self.body.eye
 
     @property
@@ -253,7 +253,7 @@ class ContinuousEnv:
         return len(self._actions)
 
     def trajectory(self) -> Trajectory:
-        """What was done since the last reset."""
+        """The way since the last reset."""
         poses = np.array(self._poses, float)
         positions = np.column_stack([poses[:, :2], np.full(len(poses), self.floor)])
         return Trajectory(
@@ -268,7 +268,7 @@ class ContinuousEnv:
 
 
 POSITION = ("ahead", "left", "sin", "cos", "tilt")
-"""What an agent can know of its own way: metres from the start in its frame, the turn since then, radians of the
+"""Odometry: metres from the start in its frame, the turn since then, radians of the
 camera's tilt."""
 
 
@@ -309,17 +309,17 @@ def goal_cells(episode: ContinuousEpisode, ground: FloorWays) -> np.ndarray:
 
 def seen_from(house: House, ground: FloorWays, object_class: str, reach: float) -> tuple[NavigationGoal, ...]:
     """The objects of a class that can be come near to, with the cells in their rooms within `reach` metres of them."""
-    floor, found = float(house.storeys[0].elevation), []
+    floor, goals = float(house.storeys[0].elevation), []
     for p in house.placements:
         if p.object_class != object_class or object_class in NOT_OBJECTS:
             continue
         near = (footprint_distance(p, ground.xy) <= reach) & (ground.room_of_cell == p.room)
         views = tuple((float(x), float(y), floor) for x, y in ground.xy[near])
         if views:
-            found.append(
+            goals.append(
                 NavigationGoal((float(p.position[0]), float(p.position[1]), float(p.position[2])), views, p.id)
             )
-    return tuple(found)
+    return tuple(goals)
 
 
 class ShortestPathFollower:
@@ -344,7 +344,7 @@ class ShortestPathFollower:
         self._legs: list[DrivingWays] = [env.ground.wide_ways(c) for c in (*cells, last)]
 
     def action(self) -> int:
-        """What the expert does here."""
+        """The expert's action here."""
         env = self._env
         while len(self._legs) > 1 and self._left() <= PASSED:
             self._legs.pop(0)

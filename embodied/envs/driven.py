@@ -90,14 +90,14 @@ class RollingBody(composer.Entity):
 
 @dataclass(frozen=True)
 class Roll:
-    """What came of a command."""
+    """Outcome of a command."""
 
     metres: float
     """Way of the body's centre."""
     collisions: tuple[str, ...]
-    """What it began to touch, besides floors, in order."""
+    """Things that it began to touch, besides floors, in order."""
     touched: bool
-    """Whether it touched anything meanwhile."""
+    """It touched something meanwhile."""
 
 
 class Driver:
@@ -242,6 +242,6 @@ def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dic
 
 
 def is_overhead(low: float, high: float, floors: Sequence[float]) -> bool:
-    """Whether what reaches from one height to another hangs above a body on any of the floors, and under the next."""
+    """True of a thing between two heights that hangs above a body on any of the floors, and under the next."""
     above = [*floors[1:], math.inf]
     return any(low > floor + HEIGHT + 0.1 and high < upper - 0.05 for floor, upper in zip(floors, above, strict=True))

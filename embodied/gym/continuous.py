@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,8 +47,7 @@ from embodied.render.pictures import PictureSettings
 from embodied.seeds import checked_seed
 from embodied.world import World
 
-KINDS = ("vlnce", "objectnav")
-TEXT = 1000
+LONGEST_INSTRUCTION = 1000
 """Most characters of an instruction; longer ones are cut."""
 STEP_COST, PER_METRE = 0.01, 0.1
 """Of every action, and what a metre nearer to the goal is worth."""
@@ -67,10 +66,66 @@ PRESETS: dict[str, tuple[Body, CameraConfig]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class EpisodeDataset:
-    """What environments of one batch share: houses, episodes, floors."""
+class EpisodeSource:
+    """Everything that episodes are made from where no file says them."""
 
-    kind: str
+    worlds: Mapping[str, World]
+    data: Dataset | None
+    """The data set that the worlds are of; None for given and generated ones."""
+    split: str
+    seed: int
+    cache: Path
+    navmeshes: NavMeshCache
+
+
+@dataclass(frozen=True)
+class ContinuousTask:
+    """One of Habitat's tasks."""
+
+    name: str
+    preset: str
+    """One of PRESETS."""
+    read: Callable[[Path], list[ContinuousEpisode]]
+    """The episodes of a file in Habitat's format."""
+    episodes: Callable[[EpisodeSource], list[ContinuousEpisode]]
+    gps: bool = False
+    """Observations have gps and compass."""
+
+
+def route_source(source: EpisodeSource) -> list[ContinuousEpisode]:
+    """The routes of a data set, or of the only house.
+
+    Raises:
+      ValueError: the tasks of the data set are no routes.
+    """
+    data = source.data
+    if data is None:
+        settings = PlaygroundSettings(source.cache, source.worlds)
+        return route_episodes(flat_playground("vln", source.seed, settings).tasks, source.worlds)
+    if not data.task_kind.from_routes:
+        raise ValueError(
+            f"{data.folder} is a data set of {data.kind!r}; VLNCE-v0 plays those of 'vln', or give episodes"
+        )
+    return route_episodes(data.tasks(source.split), source.worlds)
+
+
+def object_source(source: EpisodeSource) -> list[ContinuousEpisode]:
+    """OBJECTS episodes in each house."""
+    how = {"seed": source.seed, "navmeshes": source.navmeshes}
+    return [e for w in source.worlds.values() for e in object_episodes(w, OBJECTS, **how)]
+
+
+CONTINUOUS_TASKS = {
+    "vlnce": ContinuousTask("vlnce", "vlnce", read_vlnce, route_source),
+    "objectnav": ContinuousTask("objectnav", "objectnav", read_objectnav, object_source, gps=True),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class EpisodeDataset:
+    """Houses, episodes and floors that the environments of one batch share."""
+
+    task: ContinuousTask
     worlds: Mapping[str, World]
     episodes: tuple[ContinuousEpisode, ...]
     body: Body = Body()
@@ -80,8 +135,6 @@ class EpisodeDataset:
     opened: OrderedDict[str, World] = dataclasses.field(default_factory=OrderedDict)
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise ValueError(f"kind is {self.kind!r}; use one of {KINDS}")
         if not self.episodes:
             raise ValueError("there are no episodes to play; choose another split or file")
         check_live(self.observations, LIVE_CHANNELS, self.camera.height, self.camera.width)
@@ -126,7 +179,7 @@ class ContinuousGymEnv(LiveEnv):
 
     @property
     def task_description(self) -> str:
-        """What the agent is asked to do."""
+        """The instruction."""
         return self.play.episode.instruction
 
     def reset(
@@ -157,12 +210,12 @@ class ContinuousGymEnv(LiveEnv):
         return self.look(), reward, bool(stopped), self.play.ended and not stopped, info
 
     def look(self) -> dict[str, Any]:
-        """What the agent knows."""
-        found: dict[str, Any] = self.pixels()
-        found["instruction"] = codes_of(self.task_description, TEXT).copy()
-        if self.dataset.kind == "objectnav":
-            found["gps"], found["compass"] = self.gps(), np.array([self.turned()], np.float32)
-        return found
+        """The observation."""
+        observation: dict[str, Any] = self.pixels()
+        observation["instruction"] = codes_of(self.task_description, LONGEST_INSTRUCTION).copy()
+        if self.dataset.task.gps:
+            observation["gps"], observation["compass"] = self.gps(), np.array([self.turned()], np.float32)
+        return observation
 
     def pixels(self) -> dict[str, np.ndarray]:
         """rgb (h, w, 3) uint8 and depth (h, w) float32, metres along the optical axis."""
@@ -212,8 +265,8 @@ def observation_space(dataset: EpisodeDataset) -> spaces.Dict:
     whole: dict[str, spaces.Space[Any]] = {
         **pixel_spaces((dataset.camera.height, dataset.camera.width), dataset.observations)
     }
-    whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
-    if dataset.kind == "objectnav":
+    whole["instruction"] = spaces.Box(0, 255, (LONGEST_INSTRUCTION,), np.uint8)
+    if dataset.task.gps:
         whole["gps"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
         whole["compass"] = spaces.Box(-4.0, 4.0, (1,), np.float32)
     return spaces.Dict(whole)
@@ -274,31 +327,26 @@ def open_episodes(
     Raises:
       ValueError: an unknown preset or option, or episodes of other houses or in another frame.
     """
-    body, camera = chosen(preset or kind, changes)
+    if kind not in CONTINUOUS_TASKS:
+        raise ValueError(f"kind is {kind!r}; use one of {sorted(CONTINUOUS_TASKS)}")
+    task = CONTINUOUS_TASKS[kind]
+    body, camera = chosen(preset or task.preset, changes)
     where, navmeshes = Path(cache) if cache else default_cache(), NavMeshCache()
-    given = worlds is not None
+    whole = Dataset(Path(data)) if data is not None and worlds is None else None
     if worlds is None:
         worlds = data_worlds(Path(data), split, where, pictures) if data else flat_worlds(seed, where, pictures)
-    if episodes is not None:
-        found = (read_vlnce if kind == "vlnce" else read_objectnav)(Path(episodes))
-    elif kind == "objectnav":
-        found = [e for w in worlds.values() for e in object_episodes(w, OBJECTS, seed=seed, navmeshes=navmeshes)]
-    elif data is not None and not given:
-        whole = Dataset(Path(data))
-        if whole.kind != "vln":
-            raise ValueError(f"{data} is a data set of {whole.kind!r}; VLNCE-v0 plays those of 'vln', or give episodes")
-        found = route_episodes(whole.tasks(split), worlds)
+    if episodes is None:
+        played = task.episodes(EpisodeSource(worlds, whole, split, seed, where, navmeshes))
     else:
-        found = route_episodes(flat_playground("vln", seed, PlaygroundSettings(where, worlds)).tasks, worlds)
-    if episodes is not None:
-        for e in (e for e in found if e.world in worlds):
+        played = task.read(Path(episodes))
+        for e in (e for e in played if e.world in worlds):
             house = worlds[e.world].house
             try:
                 check_on_floor(e, house, navmeshes.of(house), body.forward)
             except ValueError as error:
                 raise ValueError(f"{episodes}: {error}") from error
     seen = (observations,) if isinstance(observations, str) else tuple(observations)
-    return EpisodeDataset(kind, dict(worlds), tuple(found), body, camera, seen, navmeshes)
+    return EpisodeDataset(task, dict(worlds), tuple(played), body, camera, seen, navmeshes)
 
 
 def chosen(preset: str, changes: Mapping[str, Any]) -> tuple[Body, CameraConfig]:
@@ -313,5 +361,5 @@ def chosen(preset: str, changes: Mapping[str, Any]) -> tuple[Body, CameraConfig]
     names = [{f.name for f in dataclasses.fields(x)} for x in (body, camera)]
     if unknown := sorted(set(changes) - names[0] - names[1]):
         raise ValueError(f"unknown options {unknown}; expected some of {sorted(names[0] | names[1])}")
-    mine = [{k: v for k, v in changes.items() if k in n} for n in names]
-    return dataclasses.replace(body, **mine[0]), dataclasses.replace(camera, **mine[1])
+    fields = [{k: v for k, v in changes.items() if k in n} for n in names]
+    return dataclasses.replace(body, **fields[0]), dataclasses.replace(camera, **fields[1])

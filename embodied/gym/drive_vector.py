@@ -218,18 +218,18 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
         return whole
 
     def _seen(self) -> dict[str, Any]:
-        felt = [d.proprioception() for d in self._all]
-        found = {name: wp.array(np.stack([f[name] for f in felt]), device=self._device) for name in felt[0]}
+        states = [d.proprioception() for d in self._all]
+        arrays = {name: wp.array(np.stack([f[name] for f in states]), device=self._device) for name in states[0]}
         if self._renderer is not None:
             eyes = [d.camera() for d in self._all]
             at = np.array([c.position for c in eyes])
             ahead = np.array([c.forward for c in eyes])
             yaws, pitches = np.arctan2(ahead[:, 1], ahead[:, 0]), np.arcsin(np.clip(ahead[:, 2], -1.0, 1.0))
             batch = self._renderer.views(at, yaws, pitches, sees=self.settings.observations)
-            found |= {name: wp.clone(getattr(batch, name)) for name in SEEN if name in self.settings.observations}
-            if "depth" in found:
-                wp.map(wp.min, found["depth"], float(FAR), out=found["depth"])
-        return {name: self._out(found[name]) for name in seen_space(self.settings)}
+            arrays |= {name: wp.clone(getattr(batch, name)) for name in SEEN if name in self.settings.observations}
+            if "depth" in arrays:
+                wp.map(wp.min, arrays["depth"], float(FAR), out=arrays["depth"])
+        return {name: self._out(arrays[name]) for name in seen_space(self.settings)}
 
 
 def _given(stage: tuple[Driver, FloorWays], _: World) -> tuple[Driver, FloorWays]:

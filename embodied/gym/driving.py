@@ -46,7 +46,7 @@ SAID = 0.5
 
 @dataclass(frozen=True)
 class DriveSettings:
-    """What is to be done, what is seen and how an episode ends."""
+    """Task, observations and end of an episode."""
 
     task: str = "reach"
     """One of TASKS."""
@@ -89,7 +89,7 @@ class DriveSettings:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one command."""
+    """Outcome of one command."""
 
     reward: float
     ended: str | None
@@ -180,7 +180,7 @@ class Driving:
         return np.clip(command, -1.0, 1.0)
 
     def judged(self, command: np.ndarray, rolled: Roll) -> Outcome:
-        """What came of a command that moved the body so."""
+        """Outcome of a command that moved the body so."""
         s = self.settings
         self.metres += rolled.metres
         self.seconds += self.periods * CONTROL
@@ -205,7 +205,7 @@ class Driving:
 
     @property
     def is_there(self) -> bool:
-        """Whether it is where it should be, said or not."""
+        """True where the body should be, said or not."""
         if self.settings.task == "reach":
             return within(float(np.linalg.norm(self._goal - self.driver.position)), self.settings.reached)
         return self._ways.metres[self._ground.cell_at(self.driver.position)] == 0.0
@@ -224,21 +224,21 @@ class Driving:
         return self._ground.xy[self._wide.cells(self._ground.cell_at(self.driver.position))]
 
     def look(self) -> dict[str, np.ndarray]:
-        """What the body knows: pixels, its motion, whether it touches something, and its goal."""
+        """The observation: pixels, motion, touch and goal."""
         s = self.settings
         return {**live_pixels(self.world, self.camera(), (s.height, s.width), s.observations), **self.proprioception()}
 
     def proprioception(self) -> dict[str, np.ndarray]:
-        """`look` with closed eyes."""
-        found = {}
-        found["motion"] = np.array(self.driver.motion, np.float32)
-        found["touched"] = np.array([self.touched], np.float32)
+        """The observation without pixels."""
+        observation = {}
+        observation["motion"] = np.array(self.driver.motion, np.float32)
+        observation["touched"] = np.array([self.touched], np.float32)
         if self.settings.task == "reach":
-            found["goal"] = self.direction
+            observation["goal"] = self.direction
         else:
-            found["object"] = np.array([word_number(self._wanted)], np.float32)
-            found["instruction"] = codes_of(self.request, TEXT).copy()
-        return found
+            observation["object"] = np.array([word_number(self._wanted)], np.float32)
+            observation["instruction"] = codes_of(self.request, TEXT).copy()
+        return observation
 
     def camera(self) -> Camera:
         """The body's eye as it is now, upright."""

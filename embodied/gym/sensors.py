@@ -26,7 +26,7 @@ from embodied.render.photograph import PhotoCamera, check_camera
 from embodied.world import World
 
 OBSERVATIONS = ("rgb", "depth", "ids", "features", "oracle")
-"""What can be seen: three kinds of pixels, an encoder's features, an oracle's list of visible objects."""
+"""Names of observations: three kinds of pixels, an encoder's features, an oracle's list of visible objects."""
 PIXELS = OBSERVATIONS[:3]
 FRAMES = ("view", "views36", "equirect")
 """A perspective view straight ahead, the 36 views of the VLN literature, or all directions in one picture."""
@@ -50,7 +50,7 @@ class Sensor(Protocol):
         """The space of each array."""
 
     def look(self, o: Observation) -> Callable[[], Arrays]:
-        """What is seen, in two halves: now, in this thread, places are drawn or read where nobody has them; what is
+        """The arrays, in two halves: now, in this thread, places are drawn or read where nobody has them; what is
         returned makes the arrays, one for each space, and may be called in any thread."""
 
 
@@ -65,7 +65,7 @@ def pixel_spaces(shape: tuple[int, ...], observations: Sequence[str]) -> dict[st
 
 
 def live_pixels(world: World, camera: Camera, size: tuple[int, int], observations: Sequence[str]) -> Arrays:
-    """What a camera sees now, drawn for it: depth in metres along the optical axis.
+    """Pictures of a camera, drawn now: depth in metres along the optical axis.
 
     Args:
       size: height and width, pixels.
@@ -111,7 +111,7 @@ class ViewSettings:
     vfov: float = math.radians(60.0)
     """Vertical field of 'view', radians; 60 degrees is the literature's (Anderson et al. 2018)."""
     camera: str = "ideal"
-    """What takes the pictures, one of embodied.render.photograph.CAMERAS; 'ideal' shows what the renderer draws."""
+    """The camera, one of embodied.render.photograph.CAMERAS; 'ideal' shows what the renderer draws."""
     device: int = 0
     """Seed: which device of that kind."""
 
@@ -222,10 +222,10 @@ class CameraSensor:
         self._store, self._channels, self._view = store, tuple(channels), view
 
     def spaces(self) -> dict[str, spaces.Space]:
-        found: dict[str, spaces.Space] = {**pixel_spaces(self._view.shape, self._channels)}
+        channels: dict[str, spaces.Space] = {**pixel_spaces(self._view.shape, self._channels)}
         if "rgb" in self._channels:
-            found["target_rgb"] = spaces.Box(0, 255, (self.TARGET, 2 * self.TARGET, 3), np.uint8)
-        return found
+            channels["target_rgb"] = spaces.Box(0, 255, (self.TARGET, 2 * self.TARGET, 3), np.uint8)
+        return channels
 
     def look(self, o: Observation) -> Callable[[], Arrays]:
         target = self._store.at(o.target) if o.target is not None and "rgb" in self._channels else None
@@ -233,12 +233,12 @@ class CameraSensor:
 
     def _arrays(self, o: Observation, panorama: Panorama, target: Panorama | None) -> Arrays:
         at, yaw, pitch = viewpoint(o.sight), o.turn * STEP, o.tilt * STEP
-        found = {
+        arrays = {
             name: framed(panorama, self._view, name, yaw, pitch, place=(at.world, at.node)) for name in self._channels
         }
         if "rgb" in self._channels:
-            found["target_rgb"] = self._target(o.target, target)
-        return found
+            arrays["target_rgb"] = self._target(o.target, target)
+        return arrays
 
     def _target(self, sight: Sight | None, panorama: Panorama | None) -> np.ndarray:
         if sight is None or panorama is None:
@@ -263,8 +263,8 @@ class FeatureSensor:
         return {self._name: box, f"target_{self._name}": box}
 
     def look(self, o: Observation) -> Callable[[], Arrays]:
-        found = {self._name: self._of(o.sight), f"target_{self._name}": self._of(o.target)}
-        return lambda: found
+        arrays = {self._name: self._of(o.sight), f"target_{self._name}": self._of(o.target)}
+        return lambda: arrays
 
     def _of(self, sight: Sight | None) -> np.ndarray:
         if sight is None:
@@ -293,13 +293,13 @@ def encoder_entry(name: str = "default") -> importlib.metadata.EntryPoint:
     Raises:
       UnableError: no package offers one by this name.
     """
-    found = {e.name: e for e in importlib.metadata.entry_points(group=ENCODERS)}
-    if name not in found:
+    entries = {e.name: e for e in importlib.metadata.entry_points(group=ENCODERS)}
+    if name not in entries:
         raise UnableError(
-            f"no encoder {name!r} is installed, only {sorted(found)}: install this package with its `agents`, "
+            f"no encoder {name!r} is installed, only {sorted(entries)}: install this package with its `agents`, "
             "hand over features with source=..., or choose observations=('rgb',)"
         )
-    return found[name]
+    return entries[name]
 
 
 def checked_observations(observations: str | Sequence[str]) -> tuple[str, ...]:

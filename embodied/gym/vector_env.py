@@ -104,11 +104,11 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         self.num_envs, self.render_mode = num_envs, first.render_mode
         self.metadata = {**first.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
         self.single_action_space, self.action_space = first.action_space, batch_space(first.action_space, num_envs)
-        self._sensor, self._seen, told = sensor, sensor.spaces(), first.observation_space
-        assert isinstance(told, gym.spaces.Dict), "an environment shows several things"
-        self.single_observation_space = gym.spaces.Dict({**self._seen, **told.spaces})
+        self._sensor, self._seen, own_spaces = sensor, sensor.spaces(), first.observation_space
+        assert isinstance(own_spaces, gym.spaces.Dict), "an environment shows several things"
+        self.single_observation_space = gym.spaces.Dict({**self._seen, **own_spaces.spaces})
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._told = _arrays_of(told.spaces, num_envs)
+        self._observations = _arrays_of(own_spaces.spaces, num_envs)
         self._over, self._steps, self._limit = np.zeros(num_envs, bool), np.zeros(num_envs, int), limit
         self._threads = min(threads or processors(), num_envs)
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
@@ -170,9 +170,9 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         return tuple(env.render() for env in self.envs)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """What a method of every slot returns, or an attribute of each."""
-        found = [getattr(env, name) for env in self.envs]
-        return tuple(f(*args, **kwargs) if callable(f) else f for f in found)
+        """Call a method of every slot, or read an attribute of each."""
+        attributes = [getattr(env, name) for env in self.envs]
+        return tuple(f(*args, **kwargs) if callable(f) else f for f in attributes)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """An attribute of every slot."""
@@ -186,17 +186,17 @@ class SharedSyncVectorEnv(VectorEnv[dict[str, Any], Any, np.ndarray]):
         for world in self._opened:
             world.close()
 
-    def _note(self, k: int, told: dict[str, Any]) -> None:
-        for name, value in told.items():
-            self._told[name][k] = value
+    def _note(self, k: int, observation: dict[str, Any]) -> None:
+        for name, value in observation.items():
+            self._observations[name][k] = value
 
     def _shown(self) -> Arrays:
-        found = _arrays_of(self._seen, self.num_envs)
-        self._look(found)
-        return {**found, **{name: array.copy() for name, array in self._told.items()}}
+        arrays = _arrays_of(self._seen, self.num_envs)
+        self._look(arrays)
+        return {**arrays, **{name: array.copy() for name, array in self._observations.items()}}
 
     def _look(self, into: Arrays) -> None:
-        """What all slots see: places by this thread, since only it may draw; pictures of them by all."""
+        """Fill in what all slots see: places by this thread, since only it may draw; pictures of them by all."""
         looks = [self._sensor.look(env.observed) for env in self.envs]
 
         def fill(first: int) -> None:

@@ -34,7 +34,7 @@ from embodied.mattersim import simulator, v01
 DIALECTS = {
     "upstream": (simulator.Simulator, simulator.SimState, simulator.ViewPoint),
     "hanna": (simulator.ForkSimulator, simulator.SimState, simulator.ViewPoint),
-    "v0.1": (v01.Simulator, v01.SimState, v01.ViewPoint),
+    "v0.1": (v01.FirstSimulator, v01.FirstSimState, v01.FirstViewPoint),
 }
 """Name of a dialect to its Simulator, SimState and ViewPoint."""
 

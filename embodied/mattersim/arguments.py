@@ -1,4 +1,4 @@
-"""What the C++ module takes as arguments (pybind11): the same values are accepted, the same ones raise TypeError.
+"""Arguments of the C++ module (pybind11): the same values are accepted, the same ones raise TypeError.
 
 Arguments go by position. A whole number is anything but a float that says what integer it is; a number anything that
 says what float it is; lists are lists, tuples, ranges and arrays.
@@ -69,11 +69,11 @@ def _each(values: Any, what: str, of: str, kinds: tuple[type, ...], convert: Cal
             f"MatterSim: {what} should be a list of {of}, one for each agent of the batch, got {values!r:.80}; this "
             "dialect takes lists, 'v0.1' takes single values"
         )
-    found = list(values)
-    usual = set(map(type, found)) <= set(kinds)
-    if usual and (convert is not index or not found or 0 <= min(found) <= max(found) < LARGEST):
-        return found
-    return [convert(v, what) for v in found]
+    items = list(values)
+    usual = set(map(type, items)) <= set(kinds)
+    if usual and (convert is not index or not items or 0 <= min(items) <= max(items) < LARGEST):
+        return items
+    return [convert(v, what) for v in items]
 
 
 def _wrong(what: str, wanted: str, value: object) -> TypeError:

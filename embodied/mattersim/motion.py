@@ -54,7 +54,7 @@ class DiscreteViews:
 
     @property
     def started(self) -> bool:
-        """Whether agents stand anywhere yet."""
+        """True once agents stand somewhere."""
         return bool(self._codes)
 
     def start(self, rows: Sequence[int], headings: Sequence[float], elevations: Sequence[float]) -> None:

@@ -35,7 +35,7 @@ TILES = ((3, 0), (5, 1), (2, 3), (4, 1), (0, 1), (1, 2))
 WHERE = {face: (tile, turns) for tile, (face, turns) in enumerate(TILES)}
 """Tile and quarter turns of each face."""
 TURNED_BACK = {1: cv2.ROTATE_90_CLOCKWISE, 2: cv2.ROTATE_180, 3: cv2.ROTATE_90_COUNTERCLOCKWISE}
-"""What undoes so many quarter turns."""
+"""The rotation that undoes so many quarter turns."""
 DEPTH_UNITS = 4000.0
 """Depth along the ray is kept in quarters of a millimetre; 0 where nothing is."""
 RGB, DEPTH = "{}_skybox_small.jpg", "{}_skybox_depth_small.png"

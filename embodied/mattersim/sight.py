@@ -125,11 +125,11 @@ class NavigableLocations:
         count, ids, points = counts[at], self.graphs.ids, self._points
         first = self.graphs.first[self.graphs.scans[row]]
         rows = rows[at][:count]
-        found = []
+        others = []
         for r, h, e, d in zip(rows, headings[at], elevations[at], distances[at], strict=False):  # these are padded
             x, y, z = points[r]
-            found.append(ViewPoint(ids[r], r - first, x, y, z, h, e, d))
-        return (row, *rows), (self.here(row), *found)
+            others.append(ViewPoint(ids[r], r - first, x, y, z, h, e, d))
+        return (row, *rows), (self.here(row), *others)
 
 
 @functools.lru_cache(maxsize=64)

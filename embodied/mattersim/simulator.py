@@ -26,7 +26,7 @@ Draw = Callable[[str, str, float, float, float, tuple[int, int]], np.ndarray]
 
 
 class SimState:
-    """What one agent of a batch sees. It is alive: after the next action it shows the new state."""
+    """State of one agent of a batch. It is alive: after the next action it shows the new state."""
 
     __slots__ = ("_agent", "_motion", "_simulator")
 
@@ -120,7 +120,7 @@ class Simulator:
         self._set("_restricted", take.flag(value, "setRestrictedNavigation"))
 
     def setPreloadingEnabled(self, value: bool, /) -> None:
-        """Whether `initialize` reads all skyboxes; no more than setCacheSize are kept."""
+        """Have `initialize` read all skyboxes, or not; no more than setCacheSize are kept."""
         self._set("_preload", take.flag(value, "setPreloadingEnabled"))
 
     def setDepthEnabled(self, value: bool, /) -> None:
@@ -149,7 +149,7 @@ class Simulator:
         self._watch()
 
     def setElevationLimits(self, low: float, high: float, /) -> bool:
-        """Whether the limits were taken: they should lie within a right angle on either side of the horizon."""
+        """True where the limits were taken: they should lie within a right angle on either side of the horizon."""
         low, high = (take.number(v, "setElevationLimits") for v in (low, high))
         if not -math.pi / 2 < low < 0.0 < high < math.pi / 2:
             return False

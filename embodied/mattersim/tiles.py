@@ -14,7 +14,7 @@ WHOLE = bytes([3, 1, 0x11, 0, 2, 0x11, 1, 3, 0x11, 1])
 BLOCK = 8
 """Side of a block of pixels."""
 RESTART = [bytes([0xFF, 0xD0 + k]) for k in range(8)]
-RESTARTS, END = re.compile(rb"\xff[\xd0-\xd7]"), b"\xff\xd9"
+RESTARTS, END_OF_IMAGE = re.compile(rb"\xff[\xd0-\xd7]"), b"\xff\xd9"
 
 
 def tiles_in(data: bytes, count: int) -> list[bytes] | None:
@@ -35,9 +35,9 @@ def tiles_in(data: bytes, count: int) -> list[bytes] | None:
     blocks, rest = divmod(side, BLOCK)
     if rest or width != count * side or data[interval] != struct.pack(">H", blocks):
         return None
-    parts = RESTARTS.split(data[at:].removesuffix(END))
-    if not data.endswith(END) or len(parts) != count * blocks:
+    parts = RESTARTS.split(data[at:].removesuffix(END_OF_IMAGE))
+    if not data.endswith(END_OF_IMAGE) or len(parts) != count * blocks:
         return None
     head = data[: frame.start + 3] + struct.pack(">H", side) + data[frame.start + 5 : at]
-    marks = [RESTART[k % 8] for k in range(blocks - 1)] + [END]
+    marks = [RESTART[k % 8] for k in range(blocks - 1)] + [END_OF_IMAGE]
     return [head + b"".join(p + m for p, m in zip(parts[t::count], marks, strict=True)) for t in range(count)]

@@ -11,13 +11,13 @@ from embodied.mattersim import simulator
 from embodied.mattersim.chance import Engine
 from embodied.mattersim.graphs import load_graphs
 from embodied.mattersim.pictures import Skyboxes
-from embodied.mattersim.sight import ViewPoint as BatchedViewPoint
+from embodied.mattersim.sight import ViewPoint
 
 KEPT = 200
 """Decoded skyboxes held in memory."""
 
 
-class ViewPoint(NamedTuple):
+class FirstViewPoint(NamedTuple):
     """A viewpoint as the agent sees it. Metres and radians, heading clockwise from +y."""
 
     viewpointId: str
@@ -29,18 +29,18 @@ class ViewPoint(NamedTuple):
     rel_distance: float
 
 
-class SimState(NamedTuple):
-    """What the agent sees, as it was when `getState` was called."""
+class FirstSimState(NamedTuple):
+    """State of the agent, as it was when `getState` was called."""
 
     scanId: str
     step: int
     rgb: np.ndarray | None
     """(H, W, 3) uint8, blue, green, red; None without rendering."""
-    location: ViewPoint
+    location: FirstViewPoint
     heading: float
     elevation: float
     viewIndex: int
-    navigableLocations: list[ViewPoint]
+    navigableLocations: list[FirstViewPoint]
 
 
 class _One(simulator.Simulator):
@@ -54,11 +54,11 @@ class _One(simulator.Simulator):
             self._graphs = load_graphs(self._graph_path, (scan,))
             self._motion = self._new_motion()
 
-    def snapshot(self) -> SimState:
+    def snapshot(self) -> FirstSimState:
         motion = self._motion
         if motion is None:
             raise ValueError("MatterSim: call newEpisode before getState")
-        return SimState(
+        return FirstSimState(
             self._scans[0],
             self._step,
             self._picture(0, depth=False) if self._rendering else None,
@@ -70,11 +70,11 @@ class _One(simulator.Simulator):
         )
 
 
-def _pointed(seen: BatchedViewPoint) -> ViewPoint:
-    return ViewPoint(seen[0], seen[1], [seen[2], seen[3], seen[4]], seen[5], seen[6], seen[7])
+def _pointed(seen: ViewPoint) -> FirstViewPoint:
+    return FirstViewPoint(seen[0], seen[1], [seen[2], seen[3], seen[4]], seen[5], seen[6], seen[7])
 
 
-class Simulator:
+class FirstSimulator:
     """One agent; with discretized angles the sign of a change turns or tilts by 30 degrees.
 
     Differs from the first release in: without `setSeed` random viewpoints follow from seed 1, not from the clock.
@@ -127,7 +127,7 @@ class Simulator:
         self._one.enter(scan)
         self._one.newEpisode([scan], [viewpoint or self._one._random_viewpoint(scan)], [turn], [tilt])
 
-    def getState(self) -> SimState:
+    def getState(self) -> FirstSimState:
         return self._one.snapshot()
 
     def makeAction(self, index: int, heading: float, elevation: float, /) -> None:

@@ -33,7 +33,7 @@ DRIVEN = ("motion", "touched", "goal")
 
 
 class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
-    """What both environments have in common: `pixels`, which are black for a blind agent, and `agent_pos`. Subclasses
+    """Base of both environments: `pixels`, which are black for a blind agent, and `agent_pos`. Subclasses
     define `_command`, what an action of the policy does, and `_state`, the numbers of agent_pos."""
 
     def __init__(self, env: Any, height: int, width: int, numbers: int) -> None:
@@ -90,7 +90,7 @@ class ContinuousForLeRobot(_ForLeRobot):
     @property
     def task(self) -> str:
         """The name of the task."""
-        return self.env.dataset.kind
+        return self.env.dataset.task.name
 
     def _command(self, action: np.ndarray) -> int:
         return int(np.argmax(action))
@@ -144,7 +144,7 @@ def sizes(env: str) -> tuple[int, int]:
 def make_env(
     n_envs: int = 1, use_async_envs: bool = False, cfg: Any = None, *, env: str = "VLNCE", **options: Any
 ) -> dict[str, dict[int, gym.vector.VectorEnv]]:
-    """What LeRobot's EnvHub calls: {suite: {number of the task: environments}}.
+    """Make the environments that LeRobot's EnvHub asks for: {suite: {number of the task: environments}}.
 
     Args:
       use_async_envs: a process for each; otherwise they share their houses in one.

@@ -19,7 +19,7 @@ from embodied.gym.lerobot import make_env, sizes
 @EnvConfig.register_subclass("embodied")
 @dataclass
 class EmbodiedEnvConfig(EnvConfig):
-    """What is played, and how large its pictures are."""
+    """Task, houses and size of the pictures."""
 
     task: str | None = "VLNCE"
     """One of embodied.gym.lerobot.ENVS."""
@@ -31,7 +31,7 @@ class EmbodiedEnvConfig(EnvConfig):
     height: int = 128
     width: int = 128
     blind: bool = False
-    """Whether pictures are black."""
+    """Pictures are black."""
     steps: int = 500
     """Longest episode of VLNCE and ObjectNav, in actions."""
     fps: int = 4

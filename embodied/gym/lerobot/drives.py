@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from embodied.datasets.lerobot import COLUMNS, Columns, RecordedCamera, Writer, whole_folder
+from embodied.datasets.lerobot import STEP_COLUMNS, Columns, RecordedCamera, Writer, whole_folder
 from embodied.gym.driving import expert_action
 from embodied.gym.lerobot import DriveForLeRobot
 from embodied.seeds import stream
@@ -23,7 +23,7 @@ STATE = ("metres per second", "radians per second", "touched", "metres to goal",
 """observation.state: motion ahead and to the left, touch, and where the goal is, left positive."""
 COMMAND = ("ahead", "left")
 DRIVES: Columns = {
-    **COLUMNS,
+    **STEP_COLUMNS,
     "observation.state": (pa.list_(pa.float32(), len(STATE)), STATE),
     "action": (pa.list_(pa.float32(), len(COMMAND)), COMMAND),
 }
@@ -69,15 +69,15 @@ def export_drives(
             rows = {"observation.state": np.stack([o["agent_pos"] for o in seen]), "action": np.stack(labels)}
             facts = {"embodied/task": f"{name}_{k}", "embodied/house": name, "embodied/agent": "expert"}
             words = [env.task_description] * len(seen)
-            said = [""] * len(seen)
-            writer.add(rows, [o["pixels"] for o in seen], [], words, said, infos[-1]["is_success"], facts)
+            replies = [""] * len(seen)
+            writer.add(rows, [o["pixels"] for o in seen], [], words, replies, infos[-1]["is_success"], facts)
         return writer.finish("embodied drive", CARD)
 
 
 def _driven(
     env: DriveForLeRobot, seen: dict[str, Any], action_noise: float, rng: np.random.Generator
 ) -> Iterator[tuple[dict[str, Any], np.ndarray, dict[str, Any]]]:
-    """What is seen before each command, what the expert commands there, and info after what is done."""
+    """Observation before each command, the expert's command there, and info after the command that is given."""
     held, drawn, ended = 0, np.zeros(len(COMMAND)), False
     begin = action_noise / (HELD * (1 - action_noise))
     while not ended:
