@@ -111,8 +111,8 @@ def route_source(source: EpisodeSource) -> list[ContinuousEpisode]:
 
 def object_source(source: EpisodeSource) -> list[ContinuousEpisode]:
     """OBJECTS episodes in each house."""
-    how = {"seed": source.seed, "navmeshes": source.navmeshes}
-    return [e for w in source.worlds.values() for e in object_episodes(w, OBJECTS, **how)]
+    seed, navmeshes = source.seed, source.navmeshes
+    return [e for w in source.worlds.values() for e in object_episodes(w, OBJECTS, seed=seed, navmeshes=navmeshes)]
 
 
 CONTINUOUS_TASKS = {

@@ -13,7 +13,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from gymnasium import spaces
@@ -308,8 +308,8 @@ def checked_observations(observations: str | Sequence[str]) -> tuple[str, ...]:
     Raises:
       ValueError: something that cannot be seen, nothing, or the same twice.
     """
-    several = isinstance(observations, Sequence) and not isinstance(observations, str)
-    chosen = tuple(observations) if several else (observations,)
+    one = isinstance(observations, str) or not isinstance(observations, Sequence)
+    chosen: tuple[Any, ...] = (observations,) if one else tuple(observations)
     if not chosen or any(name not in OBSERVATIONS for name in chosen) or len(set(chosen)) < len(chosen):
         raise ValueError(f"observations should be one or several of {OBSERVATIONS}, each once, got {observations!r}")
     return chosen
