@@ -25,7 +25,7 @@ from embodied.assistants.ask import in_view
 from embodied.cli import main as start
 from embodied.envs.ask import AskSettings, Prices
 from embodied.evaluation import tables
-from embodied.evaluation.ask import acted, observed, read_seeds, submitted
+from embodied.evaluation.own_agents import acted, observed, read_seeds, submitted
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite

@@ -21,7 +21,6 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
-from embodied.evaluation.ask import ask_split
 from embodied.evaluation.evaluate import spread
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import measured
@@ -31,7 +30,7 @@ from embodied.interface import Action, Agent, Ask, Detection, Intention, Observa
 from embodied.kinds.ask import ASK, ask_environments
 from embodied.policies.ask import Asker, EpisodeMemory, PricedAskRule, between, first
 from embodied.records import save_lines
-from embodied.tasks.ask import look_of
+from embodied.tasks.ask import ask_split, look_of
 
 AREA = (90.0, 140.0)
 """Square metres of the houses."""
@@ -97,7 +96,7 @@ class AskStudy(StudyLearner):
     """All that its answers depend on."""
 
     name = "ask"
-    judges = ("embodied.agents.ask.foresight", "embodied.agents.ask.study", "embodied.evaluation.ask")
+    judges = ("embodied.agents.ask.foresight", "embodied.agents.ask.study")
 
     def tables(self) -> Mapping[str, StudyTable]:
         model, columns = (_rule(MODEL),) if self.model else (), (*ASK.columns, *ASK.metrics, *metrics.USAGE)

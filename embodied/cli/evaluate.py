@@ -258,7 +258,7 @@ def opened_splits(args: EvaluateOptions, evaluation: Evaluation) -> Iterable[Spl
 def generated(args: EvaluateOptions, evaluation: Evaluation) -> SplitData:
     """A flat, or the houses of a list of seeds, which what is written down names by their place in the list alone."""
     from embodied.datasets.store import SplitData
-    from embodied.evaluation.ask import read_seeds
+    from embodied.evaluation.own_agents import read_seeds
     from embodied.gym.playground import PlaygroundSettings, flat_playground, houses_playground
 
     kind = evaluation.kind
@@ -281,7 +281,7 @@ def agent_of(
     args: EvaluateOptions, evaluation: Evaluation, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None
 ) -> Agent:
     """An agent without training."""
-    from embodied.evaluation.ask import submitted
+    from embodied.evaluation.own_agents import submitted
 
     if name == LLM:
         return model_agent(args, split, evaluation.client())

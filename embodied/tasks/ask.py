@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -111,6 +111,20 @@ def ask_tasks(pool: AskPool, count: int, *, seed: int) -> list[Task]:
             horizon=HORIZON,
         )
         tasks.append(task)
+    return tasks
+
+
+def ask_split(
+    houses: Mapping[str, Place], look: Look, per_house: int, *, seed: int, unseen: bool | None = None
+) -> list[Task]:
+    """So many tasks of every house.
+
+    Args:
+      unseen: only classes that are kept from training, or only the others.
+    """
+    tasks: list[Task] = []
+    for place in houses.values():
+        tasks += ask_tasks(ask_pool(place, look, seed=seed, unseen=unseen), per_house, seed=seed)
     return tasks
 
 

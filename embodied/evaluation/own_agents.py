@@ -1,4 +1,4 @@
-"""Judging on Ask-v0: houses from seeds that nobody has seen, and agents from a folder or over HTTP."""
+"""Agents of people's own, from a folder, by name or over HTTP, and the lists of seeds that they are judged on."""
 
 from __future__ import annotations
 
@@ -7,28 +7,13 @@ import importlib.util
 import json
 import sys
 import urllib.parse
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from embodied.errors import UnableError
-from embodied.interface import (
-    Action,
-    Actions,
-    Agent,
-    Ask,
-    Intention,
-    Move,
-    Observation,
-    Observations,
-    Place,
-    Rngs,
-    Stop,
-    Task,
-)
+from embodied.interface import Action, Actions, Agent, Ask, Intention, Move, Observation, Observations, Rngs, Stop
 from embodied.plugins import made_by_name
 from embodied.records import RecordError, parse
-from embodied.tasks.ask import Look, ask_pool, ask_tasks
 
 MOST_BYTES = 100_000
 """Of an answer over HTTP; more is not read."""
@@ -53,23 +38,6 @@ def read_seeds(path: Path) -> list[int]:
     if not seeds or len(set(seeds)) < len(seeds):
         raise ValueError(f"{path} should hold at least one seed and none twice")
     return seeds
-
-
-def ask_split(
-    houses: Mapping[str, Place], look: Look, per_house: int, *, seed: int, unseen: bool | None = None
-) -> list[Task]:
-    """So many tasks of every house.
-
-    Args:
-      unseen: only classes that are kept from training, or only the others.
-    """
-    tasks: list[Task] = []
-    for place in houses.values():
-        tasks += ask_tasks(ask_pool(place, look, seed=seed, unseen=unseen), per_house, seed=seed)
-    return tasks
-
-
-# Agents of others -------------------------------------------------------------------------------
 
 
 def submitted(where: str) -> Agent:
@@ -158,10 +126,10 @@ def acted(o: Observation, answer: bytes) -> Action:
     except RecordError:
         return Stop()
     word = body.get("action") if isinstance(body, dict) else None
-    kind, _, what = word.partition(" ") if isinstance(word, str) else ("", "", "")
-    if kind == "go" and what.isdigit() and len(what) < 4 and int(what) < len(o.candidates):
+    verb, _, what = word.partition(" ") if isinstance(word, str) else ("", "", "")
+    if verb == "go" and what.isdigit() and len(what) < 4 and int(what) < len(o.candidates):
         return Move(int(what))
-    if kind == "ask" and what in {i.value for i in o.can_ask}:
+    if verb == "ask" and what in {i.value for i in o.can_ask}:
         question = body.get("question") if isinstance(body, dict) else None
         return Ask(Intention(what), question=question[:300] if isinstance(question, str) else None)
     return Stop()
