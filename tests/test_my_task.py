@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import pickle
 import re
 import sys
 from dataclasses import dataclass
@@ -101,6 +102,8 @@ def test_gymnasium_makes_it_by_its_title(tmp_path):
     observation, info = env.reset(seed=0)
     assert observation["rooms_left"] == 3 and info["request"].startswith("visit the ")
     assert observation_in_words(env.unwrapped.observed) == "rooms left to visit: 3", "as language models are told"
+    copied = pickle.loads(pickle.dumps(env.unwrapped))
+    assert copied.step(0)[0]["rooms_left"] == env.step(0)[0]["rooms_left"]
     envs = gym.make_vec("my_task:embodied/Visit-v0", num_envs=2, worlds=worlds, observations="oracle", cache=tmp_path)
     assert envs.reset(seed=0)[0]["rooms_left"].tolist() == [3, 3]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +14,7 @@ from gymnasium import spaces
 from embodied.envs.base import ActionError
 from embodied.gym.sensors import LARGE, Sensor
 from embodied.interface import TURNS, VIEWS, Action, Ask, Intention, Mode, Move, Observation, Stop
-from embodied.task_kind import INTENTIONS, ArraySpec, TaskKind
+from embodied.task_kind import INTENTIONS, ArraySpec, TaskKind, kind_named
 
 LONG, MANY = 100.0, 10.0
 """Steps and requests that are 1 in 'clock'."""
@@ -32,8 +32,8 @@ class SpaceLayout:
     """Questions, in the order of the actions."""
     extras: Mapping[str, ArraySpec] = field(default_factory=dict)
     """Arrays of the kind's own part of the observation, by name."""
-    encode_extras: Callable[[Observation, Mapping[str, ArraySpec]], Mapping[str, Any]] | None = None
-    """Fills them (TaskKind.extras)."""
+    kind: str = ""
+    """Name of the kind, which fills them."""
 
     @classmethod
     def of(cls, kind: TaskKind, rules: Any = None, *, candidates: int = 16) -> SpaceLayout:
@@ -41,7 +41,7 @@ class SpaceLayout:
         if kind.extras is None:
             return cls(candidates, intentions=kind.intentions)
         specs = kind.extras.specs(candidates, kind.checked_rules(rules))
-        return cls(candidates, intentions=kind.intentions, extras=specs, encode_extras=kind.extras.encode)
+        return cls(candidates, intentions=kind.intentions, extras=specs, kind=kind.name)
 
     @property
     def actions(self) -> int:
@@ -109,8 +109,8 @@ def encode(o: Observation, sensor: Sensor, layout: SpaceLayout) -> dict[str, Any
         "mode": np.int64(o.mode is Mode.SUB),
         "clock": np.array([o.time / LONG, o.time_on_task / LONG, left], dtype=np.float32),
     }
-    if layout.encode_extras is not None:
-        whole |= layout.encode_extras(o, layout.extras)
+    if layout.extras and (own := kind_named(layout.kind).extras):
+        whole |= own.encode(o, layout.extras)
     return whole
 
 
