@@ -34,7 +34,7 @@ if command -v dpkg-query >/dev/null; then
       [ ${#missing[@]} -eq 0 ] || die "these system packages are missing, and there is no root and no sudo here to install them:
     ${missing[*]}
   Ask an administrator to run:  apt-get install ${missing[*]} libllvm19
-  Without root, sweethome3d-furniture can be unpacked anywhere (apt-get download, dpkg -x) and named with --pack."
+  Without root, install wheels with pip instead: docs/get_started.md."
     fi
   fi
 else

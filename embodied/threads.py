@@ -15,7 +15,7 @@ def threads_allowed() -> int | None:
     nobody says.
 
     The workers of joblib and of Ray get it as their share of the machine. Without it every process takes all
-    processors, and threads that wait for work do so awake (docs/pictures.md has what it costs).
+    processors, and threads that wait for work do so awake (docs/scaling.md).
     """
     first = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # a list is for nested loops
     return min(int(first), processors()) if first.isdecimal() and int(first) > 0 else None

@@ -8,8 +8,6 @@ length, its SHA-256 and the magic again. Per node three pictures with the six fa
   depth  16-bit PNG of whole millimetres (error at most 0.5 mm up to 65.5 m, 0 where nothing is)
   ids    16-bit PNG, exact
 
-Chosen among JPEG, WebP and AVIF: docs/pictures.md.
-
 Every picture carries a CRC-32 that is checked when it is read.
 """
 
