@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import shlex
 
 import numpy as np
 import pytest
@@ -38,32 +39,10 @@ from embodied.teachers.hanna import segments
 pytestmark = pytest.mark.slow
 
 torch.set_num_threads(1)
-SMALL = [
-    "--hidden-size",
-    "16",
-    "--navigation-embedding",
-    "16",
-    "--ask-embedding",
-    "8",
-    "--self-heads",
-    "2",
-    "--text-heads",
-    "2",
-    "--batch",
-    "4",
-    "--training-steps",
-    "6",
-    "--evaluation-steps",
-    "8",
-    "--validation-tasks",
-    "3",
-    "--validate-every",
-    "1",
-    "--threads",
-    "1",
-    "--network",
-    "random",
-]
+SMALL = shlex.split(
+    "--hidden-size 16 --navigation-embedding 16 --ask-embedding 8 --self-heads 2 --text-heads 2 --batch 4 "
+    "--training-steps 6 --evaluation-steps 8 --validation-tasks 3 --validate-every 1 --threads 1 --network random"
+)
 
 
 def parsed(kind, *words):
@@ -95,20 +74,8 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert "continuing after update 2" in capsys.readouterr().err
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2, 3]
     best, out = tmp_path / "best.safetensors", tmp_path / "table"
-    judge = (
-        "evaluate",
-        "hanna",
-        "--data",
-        data.folder,
-        "--agent",
-        best,
-        "--network",
-        "random",
-        "--tasks",
-        4,
-        "--threads",
-        1,
-    )
+    judge = ("evaluate", "hanna", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 4)
+    judge = (*judge, "--threads", 1)
     assert run(*judge, "--out", out) == 0
     table = (out / "table.md").read_text()
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
@@ -161,7 +128,7 @@ def study(data, tmp_path_factory):
     words = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL)
     config = dataclasses.replace(words.config, iterations=2)
     learner = HannaStudy(
-        data.folder, (0, 1), tasks=3, encoder=folder / "encoder.safetensors", config=config, evaluation=words.evaluation
+        data.folder, (0,), tasks=3, encoder=folder / "encoder.safetensors", config=config, evaluation=words.evaluation
     )
     run_study(learner, ["4.4"], folder / "out", note=print)
     return learner, folder / "out"
@@ -185,7 +152,7 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     body = read_json(out / "hanna-4.4.json")
     assert [r["label"] for r in body["rows"]] == ["Target image only", "+ language instruction"]
     value = body["rows"][1]["values"]["success_test_unseen"]
-    assert value["n"] == 6 and body["rows"][1]["printed"]["success_test_unseen"] == 45.43, "three tasks by two seeds"
+    assert value["n"] == 3 and body["rows"][1]["printed"]["success_test_unseen"] == 45.43
     assert "success_test_ood" in body["rows"][0]["values"] and body["paper"] == "the dissertation, Table 4.4"
     assert any(
         note.startswith("+ language instruction minus Target image only, success, test unseen")
@@ -210,20 +177,7 @@ def test_the_papers_columns_take_the_likeliest_action_and_ours_stand_apart(study
     assert {plain.policy.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {1} and not plain.use_goal_image
     assert {shipped.policy.choose(np.array([0.4, 0.6]), rng) for rng in draws} == {0, 1} and shipped.use_goal_image
     assert plain.revisit_weight == 1 and shipped.revisit_weight < 1
-    assert plain.ask_rule(0.6, None, -1, rng=draws[0]) and not plain.ask_rule(0.4, None, -1, rng=draws[0])
-
-
-def test_what_was_judged_under_other_settings_is_not_shown_under_new_ones(study, tmp_path):
-    learner, out = study
-    shown = lambda changed: run_study(changed, ["4.4"], out, report=True, note=print)["4.4"].read_text()
-    for changed in (
-        dataclasses.replace(learner, config=dataclasses.replace(learner.config, learning_rate=0.5)),
-        dataclasses.replace(learner, tasks=2),
-        dataclasses.replace(learner, evaluation=dataclasses.replace(learner.evaluation, ask_threshold=0.9)),
-        dataclasses.replace(learner, init_from=next(iter(times(out, "best.safetensors")))),
-    ):
-        assert "Not run: Target image only, + language instruction." in shown(changed)
-    assert "Not run" not in shown(learner)
+    assert plain.policy.ask_rule(0.6, None, -1, rng=draws[0]) and not plain.policy.ask_rule(0.4, None, -1, rng=draws[0])
 
 
 def test_agents_that_are_compared_differ_in_one_setting(study):
