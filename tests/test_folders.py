@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hand_data import built, read_features
 
-from embodied import mattersim, metrics
+from embodied import mattersim
 from embodied.datasets.folders import (
     PROGRAMS,
     action_space,
@@ -30,8 +30,6 @@ from embodied.datasets.folders import (
 )
 from embodied.datasets.matterport import in_matterport_order, scan_name
 from embodied.datasets.skyboxes import write_skybox
-from embodied.evaluation.evaluate import agent
-from embodied.evaluation.rollout import play
 from embodied.render.panorama import Panorama
 
 pytestmark = pytest.mark.slow
@@ -279,43 +277,22 @@ def test_hannas_assistant_finds_a_route_of_the_active_split_wherever_it_can_be_a
         assert all(set(speakers[house_split]) <= spoken for spoken in by_path.values()), scan
 
 
-def test_hannas_tasks_start_where_their_paths_start_and_are_shortest(folders):
-    home = folders / "hanna" / "data"
+def test_hannas_tasks_start_where_their_paths_start_and_are_shortest(data_sets, folders):
+    home, data = folders / "hanna" / "data", data_sets["hanna"]
     graphs, words = program_graphs(home / "connectivity"), (home / "hanna/vocab.txt").read_text().split("\n")
     assert words[:3] == ["<PAD>", "<UNK>", "<EOS>"] and len(words) == len(set(words))
     seen = set()
     for split in ("train", "val_seen", "val_unseen", "test_seen", "test_unseen"):
-        for item in read(home / f"hanna/hanna_{split}.json"):
+        for item, task in zip(read(home / f"hanna/hanna_{split}.json"), data.tasks(split), strict=True):
             assert item["path_id"] not in seen and not seen.add(item["path_id"])
+            ids = data.place(task.world).graph.ids
+            assert [p[-1] for p in item["paths"]] == [ids[g] for g in task.goal_nodes]
             for path in item["paths"]:
                 assert path[0] == item["paths"][0][0]
                 walked = sum(graphs[item["scan"]].edges[e]["weight"] for e in zip(path, path[1:], strict=False))
                 assert walked == pytest.approx(nx.dijkstra_path_length(graphs[item["scan"]], path[0], path[-1]))
             if split == "train":
                 assert set(item["instructions"][0].split()) <= set(words)
-
-
-def forward_ten(lists: dict, item: dict) -> list[str]:
-    """HANNA's Forward10: ten times the first action of the list, then stop; at once where there is none."""
-    viewpoint, heading = item["paths"][0][0], round(item["heading"] / (math.pi / 6)) % 12
-    walked = [viewpoint]
-    for _ in range(10):
-        actions = lists[f"{item['scan']}_{viewpoint}_{heading}"]
-        if len(actions) == 1:
-            break
-        viewpoint, heading = actions[1]["nextViewpointId"], actions[1]["absViewIndex"] % 12
-        walked.append(viewpoint)
-    return walked
-
-
-def test_hannas_forward_ten_walks_through_the_folder_as_ours_walks_through_the_data_set(data_sets, folders):
-    data, home = data_sets["hanna"], folders / "hanna" / "data"
-    lists = read(home / "hanna/panoramic_action_space.json")
-    for split in ("train", "val_unseen", "test_unseen"):
-        episodes = play(data.split(split).make_env, agent("hanna", "forward 10"), data.tasks(split), seed=0)
-        for item, episode in zip(read(home / f"hanna/hanna_{split}.json"), episodes, strict=True):
-            ids = data.place(episode.task.world).graph.ids
-            assert forward_ten(lists, item) == [ids[v] for v in metrics.without_repeats(episode.nodes)]
 
 
 # VNLA --------------------------------------------------------------------------------------------

@@ -54,11 +54,6 @@ def test_the_rules_of_vnla_and_its_rooms_are_chosen_by_name(tmp):
         make("vnla", tmp, rules="algorithm 7")
 
 
-def test_all_are_registered():
-    for name in shipped_kinds().values():
-        assert gym.spec(f"embodied/{name}-v0").entry_point == "embodied.gym.env:make"
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "imports",
@@ -95,24 +90,6 @@ def test_vector_environments_agree_with_single_ones(vector, tmp):
         assert text_of(observation["instruction"][1]) == text_of(first["instruction"]) and reward[1] == r
         assert (observation["action_mask"][1] == first["action_mask"]).all()
     envs.close()
-
-
-@pytest.mark.slow
-def test_the_same_seed_plays_the_same_episode(tmp):
-    rewards = []
-    for _ in range(2):
-        env, total = make("hanna", tmp, shaping=True), []
-        observation, _ = env.reset(seed=11)
-        rng = np.random.default_rng(0)
-        for _ in range(30):
-            observation, reward, terminated, truncated, _ = env.step(
-                int(rng.choice(np.flatnonzero(observation["action_mask"])))
-            )
-            total.append(reward)
-            if terminated or truncated:
-                break
-        rewards.append(total)
-    assert rewards[0] == rewards[1]
 
 
 def test_a_forbidden_action_changes_nothing_and_says_so(tmp):

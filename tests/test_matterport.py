@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
-import json
-
 import numpy as np
 import pytest
-from hand_data import built, read_features
+from hand_data import read_features
 from hand_worlds import line_world
 
-from embodied.datasets.folders import export_folder
 from embodied.datasets.matterport import action_list, in_matterport_order, tokenised, view_index, write_features
 from embodied.geometry import heading_of_yaw
 from embodied.interface import Pose
-from embodied.navigation.connectivity import from_matterport
 
 
 def test_views_agree_about_where_they_look():
@@ -37,33 +32,6 @@ def test_the_action_list_of_a_node_on_the_line():
     assert (turned["nextViewpointId"], turned["relViewIndex"], turned["absViewIndex"]) == ("n2", 12, 15), (
         "straight ahead"
     )
-
-
-@pytest.mark.slow
-def test_hannas_files_hold_together(tmp_path):
-    data = built(tmp_path / "d")
-    export_folder("hanna", data, tmp_path)
-    items = json.loads((tmp_path / "data/hanna/hanna_train.json").read_text())
-    spaces = json.loads((tmp_path / "data/hanna/panoramic_action_space.json").read_text())
-    routes = json.loads((tmp_path / "data/hanna/routes.json").read_text())
-    tasks = data.tasks("train")
-    assert len(items) == len(tasks) and len({i["path_id"] for i in items}) == len(items)
-    for item, task in zip(items, tasks, strict=True):
-        graph = data.place(task.world).graph
-        assert [p[-1] for p in item["paths"]] == [graph.ids[g] for g in task.goal_nodes]
-        for path in item["paths"]:
-            for a, b in itertools.pairwise(path):
-                assert any(x["nextViewpointId"] == b for x in spaces[f"{item['scan']}_{a}_0"])
-    for scan, some in routes.items():
-        splits = {r["split"] for r in some}
-        assert splits == ({"train_seen", "train_unseen"} if scan.startswith("train") else {scan[:-4]})
-        assert all(isinstance(r["path_id"], str) and "_" not in r["path_id"] and 0 <= r["view_id"] < 36 for r in some)
-    scans = (tmp_path / "data/connectivity/scans.txt").read_text().split()
-    assert sorted(scans) == sorted(routes)
-    graph = from_matterport(tmp_path / "data/connectivity" / f"{scans[0]}_connectivity.json")
-    assert np.allclose(graph.positions, data.place("test_0000").graph.positions)
-    vocabulary = (tmp_path / "data/hanna/vocab.txt").read_text().split("\n")
-    assert vocabulary[:3] == ["<PAD>", "<UNK>", "<EOS>"] and "find" in vocabulary
 
 
 def test_feature_files_survive(tmp_path):

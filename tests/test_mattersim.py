@@ -114,63 +114,6 @@ def test_the_engine_is_the_minimal_standard_of_park_and_miller():
     assert engine._state == 1043618065, "the 10,000th number of minstd_rand0, as the C++ standard prints it"
 
 
-def walk(folder: Path, dialect: str, steps: int = 40, batch: int = 6):
-    """States of a random walk."""
-    rng = np.random.default_rng(1)
-    sim = simulator(folder, dialect, discrete=True, batch=batch)
-    sim.newEpisode([SCANS[k % 3] for k in range(batch)], ["v001"] * batch, rng.uniform(-9, 9, batch), [0] * batch)
-    for _ in range(steps):
-        states = sim.getState()
-        yield from states
-        sim.makeAction(
-            [int(rng.integers(len(s.navigableLocations))) for s in states],
-            rng.integers(-5, 6, batch).tolist(),
-            rng.integers(-1, 2, batch).tolist(),
-        )
-
-
-@pytest.mark.parametrize("dialect", ["upstream", "hanna"])
-def test_a_walk_keeps_the_rules_of_the_interface(dialect, folder):
-    for state in walk(folder, dialect):
-        assert 0 <= state.heading < 2 * math.pi
-        assert state.viewIndex == 12 * (round(state.elevation / (math.pi / 6)) + 1) + round(
-            state.heading / (math.pi / 6)
-        )
-        first, *others = state.navigableLocations
-        assert first == state.location and first[5:] == (0.0, 0.0, 0.0), "index 0 stays"
-        angles = [math.hypot(v.rel_heading, v.rel_elevation) for v in others]
-        assert angles == sorted(angles)
-        for v in others:
-            heading, elevation = state.heading + v.rel_heading, state.elevation + v.rel_elevation
-            there = v.rel_distance * np.array(
-                [math.sin(heading) * math.cos(elevation), math.cos(heading) * math.cos(elevation), math.sin(elevation)]
-            )
-            np.testing.assert_allclose(there, np.subtract(v[2:5], first[2:5]), atol=1e-5)
-            assert abs(v.rel_heading) <= math.radians(40) + 1e-6, "60 degrees * 640 / 480 / 2"
-
-
-def test_only_the_sign_counts_upstream_and_steps_are_counted_in_the_fork(folder):
-    views = {}
-    for dialect in ("upstream", "hanna"):
-        sim = simulator(folder, dialect)
-        sim.newEpisode([SCANS[0]], ["v001"], [0], [0])
-        sim.makeAction([0], [5], [-2])
-        views[dialect] = sim.getState()[0].viewIndex
-    assert views == {"upstream": 1, "hanna": 5}
-    assert not hasattr(mattersim.module("hanna").Simulator(), "setRestrictedNavigation")
-
-
-def test_discretized_angles_snap_to_the_nearest_30_degrees(folder):
-    sim = simulator(folder, batch=4)
-    sim.newEpisode(
-        [SCANS[0]] * 4,
-        ["v001"] * 4,
-        [math.radians(d) for d in (14.9, 15.1, 345.1, -44)],
-        [math.radians(d) for d in (14.9, 15.1, -80, -14.9)],
-    )
-    assert [s.viewIndex for s in sim.getState()] == [12, 25, 0, 23]
-
-
 def test_continuous_motion_of_the_simulators_own_test(folder):
     """The lists of its unit test: start 10 and 10 degrees, elevation between -40 and 50."""
     sim = simulator(folder, discrete=False)
@@ -186,17 +129,6 @@ def test_continuous_motion_of_the_simulators_own_test(folder):
             (heading, elevation), abs=1e-4
         )
         assert state.viewIndex == 0
-
-
-def test_discrete_motion_of_the_simulators_own_test(folder):
-    sim = simulator(folder)
-    sim.newEpisode([SCANS[0]], ["v001"], [math.radians(10)], [math.radians(10)])
-    turns, tilts = [-20, -360, 371, 89, 90, -90, -180, -180, -180], [0, -36, -30, -10, 0, 90, 5, -10, -40]
-    views = [sim.getState()[0].viewIndex]
-    for turn, tilt in zip(turns, tilts, strict=True):
-        sim.makeAction([0], [math.radians(turn)], [math.radians(tilt)])
-        views.append(sim.getState()[0].viewIndex)
-    assert views == [12, 23, 10, 11, 0, 1, 12, 35, 22, 9]
 
 
 def test_states_are_alive_and_those_of_the_first_release_are_not(folder):
