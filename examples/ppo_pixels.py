@@ -2,18 +2,21 @@
 
     pip install stable-baselines3 && python examples/ppo_pixels.py --minutes 40 --out out/ppo
 
-The same command goes on where it stopped; --minutes of processor time count over all that was done. The agent sees
-64 x 64 pixels straight ahead (90 degrees) and its goal, and goes ahead, turns by 30 degrees or stops. Flats are
-generated from --house-seed and lit, once. --task point: the goal is how far a place is and in which direction, seen
-from where the agent stands (what a compass and a positioning system tell; it knows no map and no other place), and
-stopping there is right. --task find: the goal is one of --goals requests, as a number, and stopping within 2 m of such
-an object is right. Reward: 1 for stopping right, -0.3 for stopping elsewhere, -0.01 a step, and what a step brings the
-agent nearer along the way (metres / 10). At the end: how often it succeeds, in the flats it learned in and in --unseen
-others, beside a random walk that stops as often as suits it best; the curve in OUT/curve.csv and curve.png, the numbers
-in OUT/result.json. --blind shows black pictures instead: what the goal alone gives. --eyes encoder shows what the
-encoder that ships, which does not learn, makes of three views around straight ahead. --eyes detector (of --task find)
-shows what a small network reads of these features: whether what is sought is visible in each of the three views, and
-whether it is so near that stopping is right. It is trained before, on the simulator's labels of the training flats.
+The same command resumes an interrupted run; --minutes of processor time count over all its parts. The agent sees
+64 x 64 pixels straight ahead (90 degrees) and its goal; it moves ahead, turns by 30 degrees or stops. Flats are
+generated from --house-seed and lit once.
+
+--task point is point navigation: the goal is a distance and a direction relative to the agent, which has no map.
+--task find: the goal is one of --goals requests, as a number; success is a stop within 2 m of such an object.
+Reward: 1 for success, -0.3 for a stop elsewhere, -0.01 a step, and progress along the shortest path (metres / 10).
+
+At the end the script prints success in the training flats and in --unseen others, beside a random walk with the best
+probability of stopping. OUT/curve.csv and curve.png hold the curve, OUT/result.json the numbers.
+
+--blind is an ablation with black pictures. --eyes encoder shows features of the shipped, frozen encoder of three views
+around straight ahead. --eyes detector (with --task find) shows what a small network predicts from these features:
+whether the object is visible in each of the three views, and near enough to stop. It is trained before PPO, on the
+simulator's labels of the training flats.
 """
 
 from __future__ import annotations
@@ -387,15 +390,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--task", default="point", choices=("point", "find"))
     parser.add_argument("--minutes", type=float, default=40.0, help="of processor time, for learning")
-    parser.add_argument("--steps", type=int, default=10_000_000, help="at most so many")
+    parser.add_argument("--steps", type=int, default=10_000_000, help="at most so many environment steps")
     parser.add_argument("--flats", type=int, default=3, help="how many flats it learns in")
-    parser.add_argument("--unseen", type=int, default=1, help="in how many other flats it is judged")
+    parser.add_argument("--unseen", type=int, default=1, help="in how many other flats it is evaluated")
     parser.add_argument("--eyes", default="pixels", choices=("pixels", "encoder", "detector"), help="what it sees")
     parser.add_argument("--goals", nargs="+", default=GOALS, metavar="CLASS", help="what it looks for")
     parser.add_argument("--blind", action="store_true", help="black pictures, to compare with")
     parser.add_argument("--envs", type=int, default=16)
     parser.add_argument("--rollout", type=int, default=128, help="steps of each environment between updates")
-    parser.add_argument("--judge", type=int, default=300, help="episodes")
+    parser.add_argument("--judge", type=int, default=300, help="episodes of the evaluation")
     parser.add_argument("--pictures", default="fast", choices=("unlit", "fast", "normal"))
     parser.add_argument("--seed", type=int, default=0, help="of the training")
     parser.add_argument("--house-seed", type=int, default=0, help="of the flats and their tasks")

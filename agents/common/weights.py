@@ -92,5 +92,5 @@ def check_features(found: str, learned_from: str) -> None:
     if found != learned_from:
         raise ValueError(
             f"the features come from encoder {found[:12]}, the agent learned from {learned_from[:12]}; "
-            "make features with its encoder (`embodied features DATASET --encoder FILE`) or train a new agent"
+            "make features with its encoder (`embodied features --data DATA --encoder FILE`) or train a new agent"
         )
