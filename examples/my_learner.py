@@ -1,4 +1,4 @@
-"""A learner in one file: from an expert's walks, ridge regression tells which views lead to the things that are sought.
+"""A learner in one file: ridge regression on an expert's walks learns which views lead to the object of a request.
 
 embodied dataset find --out DATA && embodied features --data DATA
 embodied train my_learner:LEARNER --data DATA --out RUN
