@@ -192,11 +192,22 @@ def test_commands_train_and_show(source, tmp_path, capsys):
     assert main(["train", "iliad", "nav", *where, *out, *sizes]) == 0
     (best,) = tmp_path.rglob("best.safetensors")
     capsys.readouterr()
-    show = ["iliad", str(best), "--world", "nav", *where, "--shared", str(tmp_path / "shared"), "--episodes", "1"]
+    show = [
+        "show",
+        "iliad",
+        str(best),
+        "--world",
+        "nav",
+        *where,
+        "--shared",
+        str(tmp_path / "shared"),
+        "--episodes",
+        "1",
+    ]
     assert main([*show, "--json"]) == 0
     (told,) = json.loads(capsys.readouterr().out)["episodes"]
     assert told["request"] and len(told["walk"]) >= 1
-    assert main(["iliad", str(best), "--world", "nav"]) == 2
+    assert main(["show", "iliad", str(best), "--world", "nav"]) == 2
     assert "--data" in capsys.readouterr().err
-    assert main(["iliad", "--rrd", str(tmp_path / "x.rrd"), "--request", "drop every vowel"]) == 2
+    assert main(["show", "iliad", "--rrd", str(tmp_path / "x.rrd"), "--request", "drop every vowel"]) == 2
     assert "--world nav" in capsys.readouterr().err

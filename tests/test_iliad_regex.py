@@ -533,9 +533,9 @@ def test_commands_train_and_show(tmp_path, capsys):
     assert main(["train", "iliad", "regex", "--out", str(tmp_path), "--iterations=2", "--batch=4", *sizes]) == 0
     (best,) = tmp_path.rglob("best.safetensors")
     capsys.readouterr()
-    assert main(["iliad", str(best), "--shared", str(tmp_path / "shared"), "--episodes", "1"]) == 0
+    assert main(["show", "iliad", str(best), "--shared", str(tmp_path / "shared"), "--episodes", "1"]) == 0
     assert "request" in capsys.readouterr().out
-    assert main(["iliad", str(best), "--request", "drop every vowel", "--word", "tea", "--json"]) == 0
+    assert main(["show", "iliad", str(best), "--request", "drop every vowel", "--word", "tea", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["word"] == "tea"
-    assert main(["iliad", str(best)]) == 2
+    assert main(["show", "iliad", str(best)]) == 2
     assert "--shared" in capsys.readouterr().err

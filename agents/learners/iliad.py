@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from embodied.agents.iliad.config import LearnerConfig, folder_name
 from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
 from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig, students_of
+from embodied.agents.iliad.show import ShowOptions, show
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import SMALL_SCALE, Nav, Repeated, StudyOptions, Tables, Threaded, Timed, study_of
 from embodied.options import InputFolder, InputPath, OutputFolder, Settings
@@ -123,5 +124,6 @@ register_learner(
             "Students that learn from descriptions of what they did.",
             {"regex": (RegexStudyOptions, regex_study), "nav": (NavStudyOptions, nav_study)},
         ),
+        show=(ShowOptions, show),
     )
 )

@@ -40,7 +40,7 @@ COMMANDS = (
     "serve",
     "llm",
     "study",
-    "iliad",
+    "show",
     "bench",
     "cache",
 )

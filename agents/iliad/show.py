@@ -1,9 +1,9 @@
-"""Show episodes of an ILIAD student: the request, what the student did, and the description that it learned from.
+"""Episodes of an ILIAD student: the request, what it did, and the description that it learned from.
 
-    embodied iliad --request "drop every vowel" --word banana
-    embodied iliad --shared SHARED
-    embodied iliad STUDY/students/learned/seed_0/adel_0.5/best.safetensors --shared STUDY/shared
-    embodied iliad --world nav --data DATA --rrd walk.rrd
+    embodied show iliad --request "drop every vowel" --word banana
+    embodied show iliad --shared SHARED
+    embodied show iliad STUDY/students/learned/seed_0/adel_0.5/best.safetensors --shared STUDY/shared
+    embodied show iliad --world nav --data DATA --rrd walk.rrd
 
 FILE is a student of `embodied train iliad` or `embodied study iliad`, whose data and teacher are in the folder `shared`
 beside it. The shipped student's are made in --shared if they are missing. In NAV the student walks through the houses
@@ -15,22 +15,21 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.agents.common.shipped import SHIPPED_STUDENT, SHIPPED_WALKER
 from embodied.agents.options import Nav
-from embodied.cli.common import Printed, note, show
 from embodied.options import AnyFolder, Count, Option, OutputRrd, any_path
 
 if TYPE_CHECKING:
-    from embodied.agents.iliad.nav.showing import NavTold
-    from embodied.agents.iliad.nav.student import NavStudent
-    from embodied.agents.iliad.nav.world import NavWalk, Trip
-    from embodied.datasets.store import Dataset
+    from embodied.agents.common.session import Note
+    from embodied.agents.learner import Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class IliadOptions(Nav, Printed):
+class ShowOptions(Nav):
+    """Episodes of a student: the request, what it did, and the description that it learned from."""
+
     student: Annotated[Path | None, Option(any_path, "FILE", name="student")] = None
     """A trained student, best.safetensors (default: the shipped one of its world)."""
     world: Annotated[str, Option(words=("regex", "nav"))] = "regex"
@@ -53,23 +52,26 @@ class IliadOptions(Nav, Printed):
     """NAV: who describes what the student does (default: who taught it)."""
     rrd: OutputRrd | None = None
     """NAV: record the first episode, for Rerun."""
+    json: bool = False
+    """Print the result as JSON."""
 
 
-def run(args: IliadOptions) -> None:
+Shown = tuple[dict[str, Any], str]
+"""What is shown as JSON, and as text."""
+
+
+def show(args: ShowOptions, *, note: Note, record: Record) -> Shown:
+    """Episodes of the student that the options name, or its answer to a request of one's own."""
     if args.world == "nav":
-        walks(args, args.student or SHIPPED_WALKER)
-        return
+        return walks(args, args.student or SHIPPED_WALKER, note, record)
     for name in ("data", "teacher", "rrd"):
         if getattr(args, name) is not None:
             raise ValueError(f"--{name} belongs to --world nav; leave it out, or add --world nav")
     student = args.student or SHIPPED_STUDENT
-    if args.request:
-        own_request(args, student, args.request)
-    else:
-        episodes(args, student)
+    return own_request(args, student, args.request) if args.request else episodes(args, student, note)
 
 
-def own_request(args: IliadOptions, file: Path, request: str) -> None:
+def own_request(args: ShowOptions, file: Path, request: str) -> Shown:
     """Apply the student's rule to the user's words."""
     from embodied.agents.iliad.regex.data import WordTask
     from embodied.agents.iliad.regex.rules import LETTERS
@@ -81,10 +83,10 @@ def own_request(args: IliadOptions, file: Path, request: str) -> None:
     (done,) = student.greedy([WordTask((request,), "", (args.word,), (args.word,))], [request])
     output = done.outputs[0] if done.outputs else None
     body = {"request": request, "word": args.word, "rule": done.rule, "output": output}
-    show(args, body, f"{args.word} -> {output or '(no rule)'}   by {done.rule}\n")
+    return body, f"{args.word} -> {output or '(no rule)'}   by {done.rule}\n"
 
 
-def episodes(args: IliadOptions, file: Path) -> None:
+def episodes(args: ShowOptions, file: Path, note: Note) -> Shown:
     """Episodes with the student's own teacher."""
     from embodied.agents.iliad.regex.run import load_student, prepare
     from embodied.agents.iliad.regex.showing import lines_of, tell
@@ -98,15 +100,16 @@ def episodes(args: IliadOptions, file: Path) -> None:
     chosen = stream(args.seed, "iliad", "shown").permutation(len(items))[: args.episodes]
     episodes = [tell(student, grounds.teacher, items[int(i)], seed=args.seed, sample=not args.greedy) for i in chosen]
     text = "\n\n".join("\n".join(lines_of(t)) for t in episodes)
-    show(args, {"episodes": [dataclasses.asdict(t) for t in episodes]}, text + "\n")
+    return {"episodes": [dataclasses.asdict(t) for t in episodes]}, text + "\n"
 
 
-def walks(args: IliadOptions, file: Path) -> None:
+def walks(args: ShowOptions, file: Path, note: Note, record: Record) -> Shown:
     """Episodes of NAV with the student's own teacher, or another one."""
     from embodied.agents.iliad.nav.config import NavConfig
     from embodied.agents.iliad.nav.run import NavSource, prepare
-    from embodied.agents.iliad.nav.showing import lines_of, tell
+    from embodied.agents.iliad.nav.showing import episode_of, lines_of, tell
     from embodied.agents.iliad.nav.stages import config_of, load_follower
+    from embodied.agents.vision.drawn import drawn_world, pictures_of
     from embodied.seeds import stream
 
     if args.data is None:
@@ -129,18 +132,8 @@ def walks(args: IliadOptions, file: Path) -> None:
         chosen = [dataclasses.replace(t, requests=(args.request,)) for t in chosen[:1]]
     shown = [tell(student, grounds.teacher, t, seed=args.seed, sample=not args.greedy) for t in chosen]
     if args.rrd:
-        _record(args, grounds.data.source, student, chosen[0], shown[0])
+        data, (told, walk) = grounds.data.source, shown[0]
+        with drawn_world(data, chosen[0].world, args.cache, pictures_of(data, chosen[0].world, args.pictures)) as eyes:
+            record(eyes, episode_of(student, chosen[0], walk, told.description), args.rrd)
     text = "\n\n".join("\n".join(lines_of(episode)) for episode, _ in shown)
-    show(args, {"episodes": [dataclasses.asdict(episode) for episode, _ in shown]}, text + "\n")
-
-
-def _record(args: IliadOptions, data: Dataset, student: NavStudent, trip: Trip, shown: tuple[NavTold, NavWalk]) -> None:
-    """The first episode as a Rerun recording, with what the student saw."""
-    from embodied.agents.iliad.nav.showing import episode_of
-    from embodied.agents.vision.drawn import drawn_world, pictures_of
-    from embodied.viz.recording import record_episode
-    from embodied.viz.sinks import Sinks
-
-    episode, walk = shown
-    with drawn_world(data, trip.world, args.cache, pictures_of(data, trip.world, args.pictures)) as eyes:
-        record_episode(eyes, episode_of(student, trip, walk, episode.description), Sinks(args.rrd), eyes=eyes)
+    return {"episodes": [dataclasses.asdict(episode) for episode, _ in shown]}, text + "\n"
