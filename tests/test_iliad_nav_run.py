@@ -12,7 +12,7 @@ import torch
 from hand_data import built, noise_features, small_house
 
 from embodied.agents.common.checkpoint import CheckpointError
-from embodied.agents.common.word_vectors import Lexicon
+from embodied.agents.common.word_vectors import PretrainedVocabulary
 from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.run import NavSource, learn, prepare, problem_of
@@ -164,7 +164,7 @@ def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(sourc
     best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
     assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm", VARIED}
     vocabularies = [load_follower(p, source.data(SMALL).eyes).eyes.vocabulary for _, p in sorted(best.items())]
-    assert [isinstance(v, Lexicon) for v in vocabularies] == [False, True, True]
+    assert [isinstance(v, PretrainedVocabulary) for v in vocabularies] == [False, True, True]
     plain, varied, vectors = map(len, vocabularies)
     assert plain == vectors < varied
     grounds = prepare(dataclasses.replace(SMALL, varied_words=True), source, tmp_path / "shared", note=silent)
@@ -192,18 +192,8 @@ def test_commands_train_and_show(source, tmp_path, capsys):
     assert main(["train", "iliad", "nav", *where, *out, *sizes]) == 0
     (best,) = tmp_path.rglob("best.safetensors")
     capsys.readouterr()
-    show = [
-        "show",
-        "iliad",
-        str(best),
-        "--world",
-        "nav",
-        *where,
-        "--shared",
-        str(tmp_path / "shared"),
-        "--episodes",
-        "1",
-    ]
+    world = ["--world", "nav", *where, "--shared", str(tmp_path / "shared")]
+    show = ["show", "iliad", str(best), *world, "--episodes", "1"]
     assert main([*show, "--json"]) == 0
     (told,) = json.loads(capsys.readouterr().out)["episodes"]
     assert told["request"] and len(told["walk"]) >= 1
