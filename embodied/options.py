@@ -224,12 +224,9 @@ def drawn_as(kinds: Sequence[str]) -> Option:
     return Option(words=kinds, helps=PICTURE_HELP)
 
 
-Command = tuple[type, Callable[[Any], int | None]]
-"""The record of its options, whose docstring describes it, and what it does; nothing returned is the status 0."""
-
-
 def add_commands(parser: argparse.ArgumentParser, commands: Mapping[str, Any], metavar: str, dest: str) -> None:
-    """Subcommands: name to a `Command`, or to (help, subcommands) where there are further ones."""
+    """Subcommands: name to (record of its options, whose docstring describes it; what it does, which returns the exit
+    status or None), or to (help, subcommands) where there are further ones."""
     subs = parser.add_subparsers(dest=dest, metavar=metavar, required=True)
     for name, (about, what) in commands.items():
         text = about if isinstance(about, str) else inspect.cleandoc(about.__doc__ or "")

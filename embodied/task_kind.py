@@ -97,17 +97,13 @@ class TimeLimits:
 # Play -------------------------------------------------------------------------------------------
 
 
-def _no_routes(world: str) -> Sequence[Route]:
-    return ()
-
-
 @dataclass(frozen=True, eq=False)
 class EnvInputs:
     """Inputs that all environments of one maker share."""
 
     worlds: Mapping[str, Place]
     """By House.name."""
-    routes: Callable[[str], Sequence[Route]] = _no_routes
+    routes: Callable[[str], Sequence[Route]] = lambda world: ()
     """Worded routes of a house, for the assistants who know them."""
     wording: str = "test"
     """The split of the routes that is spoken."""

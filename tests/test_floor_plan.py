@@ -23,8 +23,8 @@ def colour_at(image, house, x: float, y: float) -> np.ndarray:
 
 
 def test_walls_are_dark_rooms_have_their_colour_and_openings_break_the_walls():
-    house = two_rooms()
-    image = paint_plan(house, pixels_per_metre=SCALE, furniture=False)
+    house = dataclasses.replace(two_rooms(), placements=())
+    image = paint_plan(house, pixels_per_metre=SCALE)
     assert np.abs(colour_at(image, house, 5.0, 3.0) - INK).max() < 12
     assert np.abs(colour_at(image, house, 9.1, 2.0) - INK).max() < 12
     assert np.abs(colour_at(image, house, 6.0, 0.5) - ROOM_COLOURS["bedroom"]).max() < 12
@@ -35,7 +35,7 @@ def test_walls_are_dark_rooms_have_their_colour_and_openings_break_the_walls():
 
 def test_furniture_and_graph_change_the_picture_where_they_are():
     house = two_rooms()
-    bare = paint_plan(house, pixels_per_metre=SCALE, furniture=False)
+    bare = paint_plan(dataclasses.replace(house, placements=()), pixels_per_metre=SCALE)
     full = paint_plan(house, pixels_per_metre=SCALE)
     graph = build_graph(house)
     walked = paint_plan(house, pixels_per_metre=SCALE, graph=graph, path=graph.path(0, len(graph.ids) - 1))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,11 +58,6 @@ def fitted(scores: Sequence[float], ratings: Sequence[float], granularity: int) 
     spread = sum(deviation(m) ** 2 for m in s**skew)
     variance = float(((s**skew - r) ** 2).sum() / spread) if spread else 0.0
     return Rater(granularity, variance, skew)
-
-
-def rater_of(perturbation: str, strength: float) -> Rater:
-    """The rater with one of its fields off: 'granularity', 'variance' or 'skew'."""
-    return dataclasses.replace(CLEAN, **{perturbation: type(getattr(CLEAN, perturbation))(strength)})
 
 
 def granular(score: float, steps: int) -> float:

@@ -16,7 +16,7 @@ from typing import Any
 from embodied.agents.bandit.behaviour import BEHAVIOUR_MEASURES, behaviour, translator_of_run
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest
-from embodied.agents.bandit.ratings import CLEAN, Rater, rater_of
+from embodied.agents.bandit.ratings import CLEAN, Rater
 from embodied.agents.bandit.training import RATED, TokenizedCorpora, bandit, load_corpus, pretrain, train_critic
 from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.session import Note
@@ -148,8 +148,8 @@ class BanditStudy(StudyLearner):
         begun, m = self._begun(seed, folder), _corpus_of(self.data, self._settings(train, seed))
         reference = begun / "pretrain" / f"{train['reference']}.safetensors"
         critic = begun / train["reference"] / "critic.safetensors"
-        (off,) = [k for k in train if k in SWEEPS] or [""]
-        rater = rater_of(off, train[off]) if off else Rater(**train["rater"]) if "rater" in train else CLEAN
+        off = {k: type(getattr(CLEAN, k))(v) for k, v in train.items() if k in SWEEPS}
+        rater = Rater(**(off or train.get("rater", {})))
         passes = train.get("passes", 1)
         bandit(m, reference, critic, home, train["learner"], rater=rater, passes=passes, note=note)
         return home / "best.safetensors"

@@ -275,7 +275,6 @@ def run(
     step: Callable[[int], Mapping[str, float]],
     validate: Callable[[Session], Sequence[Episode]],
     *,
-    total: int | None = None,
     may_change: Collection[str],
     **options: Unpack[Options],
 ) -> Progress:
@@ -287,7 +286,6 @@ def run(
       step: does an update, and returns the numbers to report.
       validate: evaluates, keeps the weights if they are the best, and returns the episodes; called in the first of
         several processes.
-      total: updates, if not `iterations`.
       may_change: names of settings that may differ on resuming.
 
     Raises:
@@ -299,7 +297,7 @@ def run(
     """
     how: dict[str, Any] = {"minutes": options.get("minutes"), "note": options.get("note", print)}
     how |= {"may_change": may_change, "checkpoint_minutes": config.checkpoint_minutes}
-    with Session(folder, identity, parts, total or config.iterations, **how) as session:
+    with Session(folder, identity, parts, config.iterations, **how) as session:
         for update in session:
             session.add(step(update))
             if session.due(config.validate_every) and parallel.rank() == 0:

@@ -57,11 +57,6 @@ def heuristic(rule: baselines.AskRule) -> HannaAskRule:
     return lambda probability, observation, last_asked, *, rng: rule(observation, last_asked, rng=rng)
 
 
-def ask_every(steps: int) -> HannaAskRule:
-    """Ask as soon as so many steps have passed since the last request."""
-    return lambda probability, observation, last_asked, *, rng: observation.time - last_asked >= steps
-
-
 RULES: dict[str, tuple[HannaAskRule, HannaAskRule]] = {
     "learned": (ask_sampled, ask_greedily),
     "never": (heuristic(baselines.never_ask),) * 2,

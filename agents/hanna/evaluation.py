@@ -13,7 +13,7 @@ from torch import nn
 
 from embodied.agents.common.choosing import choose_at
 from embodied.agents.hanna.agent import HannaAgent
-from embodied.agents.hanna.asking import RULES, ask_every
+from embodied.agents.hanna.asking import RULES
 from embodied.agents.hanna.inputs import Percept
 from embodied.agents.hanna.map_policy import MapPolicy, PerfectInterpretation
 from embodied.agents.hanna.network import Scores
@@ -120,7 +120,7 @@ def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
         "blind, not by image": blind.changed(use_goal_image=False),
         "blind, ask every 5": blind.changed(ask_rule=every5),
         "rules only": rules,
-        "rules only, ask every 10": rules.changed(ask_rule=ask_every(10)),
+        "rules only, ask every 10": rules.changed(ask_rule=lambda p, seen, last, *, rng: seen.time - last >= 10),
         "rules only, blind": rules.changed(bank=blind.policy.bank),
     }
 

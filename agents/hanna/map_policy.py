@@ -12,7 +12,7 @@ import numpy as np
 from embodied.agents.hanna.inputs import action_index
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, Steering, unsteered
 from embodied.agents.hanna.recognition import PlaceMap
-from embodied.agents.hanna.topological_map import Trail, weigh, weigh_by_image
+from embodied.agents.hanna.topological_map import Trail, weigh_by_image
 from embodied.interface import Actions, Mode, Observation, Observations, Rngs, Situations
 from embodied.teachers.shortest import shortest_of
 
@@ -57,7 +57,8 @@ class MapPolicy:
         trails = self._arrived(memory.trails, observations)
 
         def steer(position: int, o: Observation, moves: np.ndarray) -> Steering:
-            trail, weights = trails[position], weigh(trails[position], o, moves, self.revisit_weight)
+            trail = trails[position]
+            weights = moves * np.append(1.0, self.revisit_weight ** trail.times(o))
             if not self.use_goal_image:
                 return Steering(weights, match=trail.match)
             trails[position] = trail.thinking(o, moves[1:])

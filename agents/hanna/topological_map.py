@@ -136,11 +136,6 @@ def fewest_moves(start: int, leads: Callable[[int], Iterable[tuple[int, int]]]) 
     return found
 
 
-def weigh(trail: Trail, observation: Observation, weights: np.ndarray, again: float) -> np.ndarray:
-    """`weights` of an agent that weighs a move by `again` for each time it was where the move is known to lead."""
-    return weights * np.append(1.0, again ** trail.times(observation))
-
-
 def weigh_by_image(
     trail: Trail, observation: Observation, weights: np.ndarray, search: float = 0.0
 ) -> tuple[np.ndarray, bool]:

@@ -15,8 +15,6 @@ from embodied.interface import STEP, TURNS, Candidates, Description, Feature
 
 TYPES = ("object", "room", "action", "state", "goal")
 """Of feature sets; the last two mark what is described, as the first token of a description."""
-WORD_COLUMNS = 5
-"""Name, type, horizontal, vertical, distance."""
 NAMELESS, UNKNOWN = 0, 1
 SIZES = (1 + len(TYPES), 1 + TURNS, 1 + 3, 1 + 5)
 """Sizes of the tables of types, horizontal and vertical directions and distances."""

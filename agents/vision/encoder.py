@@ -27,8 +27,6 @@ DIGESTED = "embodied-encoder-1"
 Network = ResNet | Lite
 """Makes a map of `size` channels, of which the last `peaks` are pooled as maxima, in cells of `stride` pixels."""
 SHARINGS = ("strip", "views")
-SHIPPED = SHIPPED_ENCODER
-"""The encoder of this repository, trained on our own renders; see agents/weights/README.md."""
 MARGIN = 3 * CELL
 """Pixels of the strip's other end shown beyond each end, so that its ends are no borders."""
 
@@ -167,15 +165,10 @@ def build(name: str) -> Network:
     return Lite() if name == LITE else ResNet(ARCHITECTURES[name])
 
 
-def random_encoder(name: str = COMPACT, *, seed: int, sharing: str = "strip") -> Encoder:
+def random_encoder(name: str = COMPACT, *, seed: int) -> Encoder:
     """An untrained encoder: the floor that training has to beat."""
     with seeded(seed):
-        return Encoder(build(name).eval(), name, sharing)
-
-
-def imagenet_encoder(name: str, weights: Path) -> Encoder:
-    """A torchvision network with its weights from disk; every view is looked at alone."""
-    return Encoder(load_torchvision(name, read_weights(weights)), name, "views")
+        return Encoder(build(name).eval(), name)
 
 
 def save_encoder(encoder: Encoder, path: Path, identity: Identity | None = None) -> None:
@@ -184,7 +177,7 @@ def save_encoder(encoder: Encoder, path: Path, identity: Identity | None = None)
     save_weights(path, "encoder", {k: v.detach().half() for k, v in _tensors(encoder).items()}, about, identity)
 
 
-def load_encoder(path: Path = SHIPPED) -> Encoder:
+def load_encoder(path: Path = SHIPPED_ENCODER) -> Encoder:
     """Read what `save_encoder` wrote.
 
     Raises:
@@ -216,4 +209,4 @@ def encoder_of(path: Path, network: str | None = None) -> Encoder:
     """The encoder of a file; of torchvision's weights, where `network` names one; an untrained one for 'random'."""
     if network == "random":
         return random_encoder(seed=0)
-    return imagenet_encoder(network, path) if network else load_encoder(path)
+    return Encoder(load_torchvision(network, read_weights(path)), network, "views") if network else load_encoder(path)

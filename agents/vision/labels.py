@@ -179,8 +179,3 @@ def visible_in_views(share: np.ndarray) -> np.ndarray:
     n, classes = len(share), share.shape[-1]
     flat = share.reshape(n, STRIP_ROWS * STRIP_COLUMNS, classes).astype(np.float32) / 255
     return np.einsum("vc,nck->nvk", windows().reshape(36, -1), flat, optimize=True) >= VISIBLE
-
-
-def mean_log_depth_of_views(log_depth: np.ndarray) -> np.ndarray:
-    """(n, 12, 36) -> (n, 36)."""
-    return np.einsum("vrc,nrc->nv", windows(), log_depth.astype(np.float32))

@@ -18,7 +18,8 @@ from torch import Tensor
 
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.encoder import Encoder
-from embodied.agents.vision.labels import HouseStrips, mean_log_depth_of_views, visible_in_views
+from embodied.agents.vision.labels import HouseStrips, visible_in_views
+from embodied.agents.vision.strip import windows
 from embodied.datasets.store import Dataset
 
 
@@ -156,7 +157,7 @@ def labelled(
         np.concatenate(features),
         np.concatenate([visible_in_views(h.share[..., columns]) for h in houses]),
         np.concatenate([h.room for h in houses]).astype(np.int64),
-        np.concatenate([mean_log_depth_of_views(h.log_depth) for h in houses]),
+        np.concatenate([np.einsum("vrc,nrc->nv", windows(), h.log_depth.astype(np.float32)) for h in houses]),
         np.concatenate([np.full(len(h.rgb), i) for i, h in enumerate(houses)]),
         np.concatenate([data.place(h.name).graph.positions for h in houses]),
     )

@@ -297,20 +297,15 @@ def _digest_of(houses: Sequence[HouseStrips]) -> str:
     return digest(*(digest(h.name, h.classes, h.rgb.tobytes(), h.share.tobytes()) for h in houses))
 
 
-def whitened(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Encoder:
+def whitened(encoder: Encoder, houses: Sequence[HouseStrips]) -> Encoder:
     """The encoder with features decorrelated over the views of `houses`.
 
     Raw features are all positive, so any two views have a cosine near one and the target
     similarity of D.1 says little; after whitening it is near zero for different places.
     """
-    mean, mix = whitening(_seen_by(encoder, houses, batch))
+    features = [encoder.encode_strips(h.rgb[i : i + 8]) for h in houses for i in range(0, len(h.rgb), 8)]
+    mean, mix = whitening(torch.from_numpy(np.concatenate(features)).flatten(0, 1))
     return Encoder(encoder.network, encoder.name, encoder.sharing, mean, mix)
-
-
-def _seen_by(encoder: Encoder, houses: Sequence[HouseStrips], batch: int = 8) -> Tensor:
-    """(n, D) features of all views of all strips."""
-    features = [encoder.encode_strips(h.rgb[i : i + batch]) for h in houses for i in range(0, len(h.rgb), batch)]
-    return torch.from_numpy(np.concatenate(features)).flatten(0, 1)
 
 
 def save_training(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -96,13 +96,9 @@ class TrainingData:
         )
 
     def pictures(self, name: str) -> str:
-        """How the pictures of a split's houses were drawn, as in `drawings`."""
-        return drawings(self.data, self.data.names(name), self.picture_kind)
-
-
-def drawings(data: Dataset, houses: Iterable[str], picture_kind: str | None) -> str:
-    """How the pictures of some houses were drawn, in words: 'unlit_192', or several of them."""
-    return ", ".join(sorted({drawing(pictures_of(data, n, picture_kind)) for n in houses}))
+        """How the pictures of a split's houses were drawn, in words: 'unlit_192', or several of them."""
+        drawn = (drawing(pictures_of(self.data, n, self.picture_kind)) for n in self.data.names(name))
+        return ", ".join(sorted(set(drawn)))
 
 
 def evaluation_data(data: Dataset, how: PlaySettings) -> TrainingData:

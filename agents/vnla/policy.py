@@ -250,14 +250,12 @@ class VnlaPolicy:
 
 @dataclass(frozen=True, eq=False)
 class SupervisedVnla:
-    """The same networks asking at random or when the teacher says so, and with labels for training."""
+    """The same networks asking at random or, as in training, when the teacher says so, and with labels for training."""
 
     policy: VnlaPolicy
     rules: AskRules = AskRules()
     teacher: VnlaTeacher | None = None
     """The teacher whose labels are kept, for training."""
-    forced: bool = False
-    """The learned asker asks when the teacher would, as in training."""
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: VnlaMemory | None, *, rngs: Rngs
@@ -269,7 +267,7 @@ class SupervisedVnla:
             assert situation is not None, "the episode is running"
             if asker == "random":
                 return o.time in times
-            if asker == "teacher" or (asker == "learned" and self.forced):
+            if asker in ("teacher", "learned"):
                 return ask_reason(situation, thought, self.rules) is not None
             return self.policy.wants(position, o, thought, times, rng)
 
@@ -279,7 +277,7 @@ class SupervisedVnla:
 def for_training(policy: VnlaPolicy, teacher: VnlaTeacher, environment_dropout: float = 0.0) -> SupervisedVnla:
     """The networks as they learn: moves are sampled, the learned asker asks when its teacher would."""
     sampling = dataclasses.replace(policy, choose=choose_sampled, environment_dropout=environment_dropout)
-    return SupervisedVnla(sampling, teacher.rules, teacher, forced=True)
+    return SupervisedVnla(sampling, teacher.rules, teacher)
 
 
 def carried_out(before: Observation, now: Observation) -> int:

@@ -279,12 +279,8 @@ def _episodes(
 def _begun(item: Mapping[str, Any]) -> tuple[str, str, Point, float]:
     """Id, house, start and yaw of an episode."""
     start, yaw = from_habitat(item["start_position"]), yaw_of(item["start_rotation"])
-    return str(item["episode_id"]), scene_name(item["scene_id"]), start, yaw
-
-
-def scene_name(scene_id: str) -> str:
-    """The house of 'mp3d/flat_0/flat_0.glb'."""
-    return re.sub(r"\.[^./]*$", "", re.split(r"[/\\]", scene_id)[-1])
+    house = re.sub(r"\.[^./]*$", "", re.split(r"[/\\]", item["scene_id"])[-1])  # of 'mp3d/flat_0/flat_0.glb'
+    return str(item["episode_id"]), house, start, yaw
 
 
 def _write(path: Path, value: object) -> Path:

@@ -156,7 +156,7 @@ class Driver:
         for _ in range(periods):
             before = self.position
             mujoco.mj_step(self.model, self.data, self.substeps)
-            rolled = self.noted(rolled, before, self._touched())
+            rolled = self.noted(rolled, before, self.owners_met(self.data.contact.geom1, self.data.contact.geom2))
         return rolled
 
     def command(self, speed: float, turn: float) -> None:
@@ -200,10 +200,6 @@ class Driver:
     def _command(self, speed: float, turn: float) -> None:
         for motor, side in zip(self._motors, (-1.0, 1.0), strict=True):
             self.data.ctrl[motor] = (speed + side * turn * TRACK / 2) / WHEEL
-
-    def _touched(self) -> frozenset[str]:
-        """Owners of what the body touches now, floors apart."""
-        return self.owners_met(self.data.contact.geom1, self.data.contact.geom2)
 
     def owners_met(self, geoms: np.ndarray, others: np.ndarray) -> frozenset[str]:
         """Owners, floors apart, of what the body touches, by pairs of geoms in contact (n,)."""

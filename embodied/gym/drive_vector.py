@@ -10,7 +10,6 @@ pictures are MuJoCo Warp's, so an episode is not the same to the last digit.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -128,7 +127,7 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
         self._bodies = Bodies(Driver(world.house, world.catalogue), count, self._device)
         ground = FloorWays(world.house)
         stages = [(driver, ground) for driver in self._bodies.drivers]
-        self._all = [Driving({world.name: world}, settings, functools.partial(_given, stage)) for stage in stages]
+        self._all = [Driving({world.name: world}, settings, lambda _, stage=stage: stage) for stage in stages]
         self._rngs: list[np.random.Generator] = []
         self._renderer = None
         if settings.observations:
@@ -230,7 +229,3 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
             if "depth" in arrays:
                 wp.map(wp.min, arrays["depth"], float(FAR), out=arrays["depth"])
         return {name: self._out(arrays[name]) for name in seen_space(self.settings)}
-
-
-def _given(stage: tuple[Driver, FloorWays], _: World) -> tuple[Driver, FloorWays]:
-    return stage

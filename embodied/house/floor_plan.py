@@ -75,7 +75,6 @@ def paint_plan(
     *,
     storey: int = 0,
     pixels_per_metre: float = 48.0,
-    furniture: bool = True,
     graph: Graph | None = None,
     path: tuple[int, ...] = (),
     facing: float | None = None,
@@ -85,7 +84,6 @@ def paint_plan(
 
     Args:
       pixels_per_metre: scale of the returned image.
-      furniture: draw the placements.
       graph: a NavGraph to lay over the plan.
       path: node indices of `graph` to draw as a walk.
       facing: where somebody at the end of `path` looks, radians counter-clockwise from +x; drawn as an arrowhead.
@@ -99,8 +97,7 @@ def paint_plan(
         sheet.polygon(room.polygon, fill=ROOM_COLOURS.get(room.kind, PAPER))
         if room.kind in ("bathroom", "toilet", "laundry_room", "kitchen"):
             sheet.hatch(room)
-    if furniture:
-        _draw_furniture(sheet, house, ids)
+    _draw_furniture(sheet, house, ids)
     sheet.shape(walls_of(house, rooms), INK)
     for o in house.openings:
         if o.rooms[0] in ids:

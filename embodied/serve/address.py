@@ -38,15 +38,6 @@ def origin_of(address: str) -> str:
     return f"{parts.scheme}://{parts.netloc}"
 
 
-def path_of(address: str) -> str:
-    """The path under which a page lies, without a slash at its end; '' at the root.
-
-    Raises:
-      ValueError: not the address of a page.
-    """
-    return urlsplit(page_address(address)).path
-
-
 def _host(name: str) -> str:
     """A host's name or number as browsers send it: IPv6 in brackets, other letters than English ones in Punycode."""
     if ":" in name:

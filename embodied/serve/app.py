@@ -14,6 +14,7 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from starlette.applications import Starlette
 from starlette.requests import Request
@@ -24,7 +25,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from embodied.envs.base import ActionError
 from embodied.records import parse, to_json
-from embodied.serve.address import origin_of, path_of
+from embodied.serve.address import origin_of, page_address
 from embodied.serve.driving import Live
 from embodied.serve.game import Game
 from embodied.serve.pictures import EncodedPanoramas
@@ -103,7 +104,7 @@ class Server:
         self.sessions, self.store, self.pictures, self.live = sessions, store, pictures, live
         addresses = None if addresses is None else tuple(addresses)
         self.origins = None if addresses is None else tuple(origin_of(a) for a in addresses)
-        self.paths = frozenset(path_of(a) for a in addresses or ()) - {""}
+        self.paths = frozenset(urlsplit(page_address(a)).path for a in addresses or ()) - {""}
         """Under which a proxy may pass requests on; others are as at the root."""
         self._strangers: set[str] = set()
         self._secret = secret.encode()

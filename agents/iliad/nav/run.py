@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from embodied.agents.iliad.nav.data import NAV_SPLITS, NavData, each_wording, ho
 from embodied.agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
 from embodied.agents.iliad.nav.student import LoopFree, NavStudent
 from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, OtherWords, PeopleNavTeacher
-from embodied.agents.iliad.nav.world import NavMarginal, NavWorld, Trip
+from embodied.agents.iliad.nav.world import NavMarginal, NavWorld
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, train
 from embodied.assets.catalogue import load_catalogue
@@ -116,7 +116,8 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
     eyes, splits, teacher = data.eyes.blind() if c.blind else data.eyes, data.splits, grounds.teacher
     if c.varied_words:
         say = varied(load_catalogue(grounds.cache))
-        splits, teacher = {**splits, "train": _heard_both_ways(splits["train"], say)}, OtherWords(teacher, say)
+        both = [dataclasses.replace(t, requests=(*t.requests, *map(say, t.requests))) for t in splits["train"]]
+        splits, teacher = {**splits, "train": both}, OtherWords(teacher, say)
     words = build_vocabulary(request for trip in splits["train"] for request in trip.requests).words
     eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors))
     student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
@@ -129,11 +130,6 @@ def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
         NavWorld(eyes.places), teacher, NavMarginal(eyes.places), student, explorer,
         splits["train"], validation, identity,
     )  # fmt: skip
-
-
-def _heard_both_ways(trips: Sequence[Trip], say: Callable[[str], str]) -> list[Trip]:
-    """The trips, with each of their requests as it is and as `say` rewords it."""
-    return [dataclasses.replace(t, requests=(*t.requests, *map(say, t.requests))) for t in trips]
 
 
 def learn(
