@@ -126,8 +126,8 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
         self.action_space = batch_space(self.single_action_space, count)
         self._bodies = Bodies(Driver(world.house, world.catalogue), count, self._device)
         ground = FloorWays(world.house)
-        stages = [(driver, ground) for driver in self._bodies.drivers]
-        self._all = [Driving({world.name: world}, settings, lambda _, stage=stage: stage) for stage in stages]
+        driving = lambda driver: Driving({world.name: world}, settings, lambda _: (driver, ground))
+        self._all = list(map(driving, self._bodies.drivers))
         self._rngs: list[np.random.Generator] = []
         self._renderer = None
         if settings.observations:
