@@ -66,8 +66,8 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         )
     if not isinstance(body, dict) or body.pop("format", None) != CHECKPOINT_FORMAT:
         raise CheckpointError(f"{path}: not a checkpoint of format {CHECKPOINT_FORMAT!r}; begin a new run")
-    found = body.pop("digest", None)
-    if set(body) != set(FIELDS) or found != _digest(body):
+    contents = body.pop("digest", None)
+    if set(body) != set(FIELDS) or contents != _digest(body):
         raise CheckpointError(f"{path}: its contents do not fit its digest; it was changed, delete it to begin again")
     if not all(torch.isfinite(t).all() for t in _tensors(body["parts"]) if t.is_floating_point()):
         raise CheckpointError(f"{path}: holds numbers that are not finite; delete it to begin again")

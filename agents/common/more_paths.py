@@ -72,9 +72,9 @@ class SaidBy(Dataset):
 
     def _asked(self, tasks: Iterable[Task]) -> Iterator[Task]:
         for name, many in groupby(tasks, lambda task: task.world):
-            mine = list(many)
-            said = self._said(name, [way_of(task) for task in mine])
-            yield from (dataclasses.replace(t, request=r.instruction) for t, r in zip(mine, said, strict=True))
+            own_path = list(many)
+            words = self._said(name, [way_of(task) for task in own_path])
+            yield from (dataclasses.replace(t, request=r.instruction) for t, r in zip(own_path, words, strict=True))
 
     def _said(self, name: str, routes: Sequence[Route]) -> list[Route]:
         people, novelty = People(novelty=self.novelty), self.novelty

@@ -99,15 +99,15 @@ def _said(
     clauses: Sequence[Clause], text: str, lexicon: Lexicon, wordings: Wordings, rng: np.random.Generator
 ) -> list[str]:
     """Each clause, or two at once, in a frame."""
-    said, i = [], 0
+    sentence, i = [], 0
     while i < len(clauses):
         kinds = " ".join(kind_of(c) for c in clauses[i : i + 2])
         many = 2 if i + 1 < len(clauses) and kinds in wordings.frames and rng.random() < 0.5 else 1
         now = clauses[i : i + many]
         frames = wordings.frames[" ".join(kind_of(c) for c in now)]
-        said.append(frames[int(rng.integers(len(frames)))].format(**_slots(now, text, lexicon)))
+        sentence.append(frames[int(rng.integers(len(frames)))].format(**_slots(now, text, lexicon)))
         i += many
-    return said
+    return sentence
 
 
 def _slots(clauses: Sequence[Clause], text: str, lexicon: Lexicon) -> dict[str, str]:
@@ -139,10 +139,10 @@ def _longest_in(text: str, nouns: Iterable[str]) -> str:
     return max((n for n in nouns if f" {n} " in f" {text} "), key=len, default="")
 
 
-def _joined(said: list[str], wordings: Wordings, rng: np.random.Generator) -> str:
-    text = said[0]
-    for before, more in itertools.pairwise(said):
-        if text == before and len(said) > 2 and rng.random() < BACKWARD_SHARE:
+def _joined(rewording: list[str], wordings: Wordings, rng: np.random.Generator) -> str:
+    text = rewording[0]
+    for before, more in itertools.pairwise(rewording):
+        if text == before and len(rewording) > 2 and rng.random() < BACKWARD_SHARE:
             text = wordings.backwards.format(first=before, second=more)
         else:
             text += wordings.joints[int(rng.integers(len(wordings.joints)))] + more
@@ -164,11 +164,11 @@ def _subgoal(text: str, wordings: Wordings, rng: np.random.Generator) -> str:
         return text
     if not set(words) <= set(wordings.actions) or PlainLanguage().subgoal(words) != text:
         return text
-    said = []
+    rewording = []
     for word, group in itertools.groupby(words):
         n, frames = len(list(group)), wordings.actions[word]
-        said.append(frames[int(rng.integers(len(frames)))].format(n=n if word == "forward" else 30 * n))
-    return " ; ".join(said)
+        rewording.append(frames[int(rng.integers(len(frames)))].format(n=n if word == "forward" else 30 * n))
+    return " ; ".join(rewording)
 
 
 UNHEARD = from_plain(Wordings, read_toml(Path(__file__).with_name("unheard.toml")))

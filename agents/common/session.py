@@ -159,12 +159,12 @@ class Session:
             self.sums[name] = self.sums.get(name, 0.0) + value
             self._means.setdefault(name, []).append(value)
 
-    def record(self, found: Mapping[str, float]) -> None:
+    def record(self, validation: Mapping[str, float]) -> None:
         """Keep what a validation, or a pass, found."""
-        entry = {"update": float(self.done), **found}
+        entry = {"update": float(self.done), **validation}
         self.history.append(entry)
-        self._log("validation", found)
-        self._note(f"after {self.done} updates: " + ", ".join(f"{k} {v:.4g}" for k, v in found.items()))
+        self._log("validation", validation)
+        self._note(f"after {self.done} updates: " + ", ".join(f"{k} {v:.4g}" for k, v in validation.items()))
 
     def improved(self, score: float, *, episodes: int | None = None) -> bool:
         """True if the weights at hand are to be kept: they are the best so far or, of `episodes` tasks, as good as it.
@@ -232,9 +232,9 @@ class Session:
         means = {name: math.fsum(values) / len(values) for name, values in self._means.items()}
         done, passed = max(map(len, self._means.values())), time.monotonic() - self._since
         self._log("train", means, self.progress.update)
-        said = "  ".join(f"{k} {v:.3g}" for k, v in means.items())
+        line = "  ".join(f"{k} {v:.3g}" for k, v in means.items())
         left = (self.total - update) * passed / done / 60
-        self._note(f"{update}/{self.total}  {said}  {p.seconds / 60:.1f} min, {left:.0f} to go")
+        self._note(f"{update}/{self.total}  {line}  {p.seconds / 60:.1f} min, {left:.0f} to go")
         self._means, self._since = {}, time.monotonic()
 
     def _log(self, kind: str, numbers: Mapping[str, float], update: int | None = None) -> None:

@@ -59,10 +59,10 @@ def load_tensors(path: Path, formats: Sequence[str], remedy: str) -> tuple[dict[
         about = dict(f.metadata() or {})
     if about.get("format") not in formats:
         raise ValueError(f"{path}: format {about.get('format')!r}, this version reads {formats[0]!r}; {remedy}")
-    found = about.pop(CHECKSUM, None)
-    if found is None and about["format"] == formats[0]:
+    checksum = about.pop(CHECKSUM, None)
+    if checksum is None and about["format"] == formats[0]:
         raise ValueError(f"{path}: it has no checksum, which {formats[0]!r} has; {remedy}")
-    if found is not None and found != checksum_of(tensors, about):
+    if checksum is not None and checksum != checksum_of(tensors, about):
         raise ValueError(f"{path}: its contents do not fit its checksum, somebody or something changed it; {remedy}")
     return tensors, about
 

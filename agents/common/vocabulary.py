@@ -56,15 +56,15 @@ class Vocabulary:
           backwards: the last word first; of a text that is too long, its end is left out and END is kept.
         """
         key = text, length, backwards
-        found = self._encoded.get(key)
-        if found is None:
+        encoded = self._encoded.get(key)
+        if encoded is None:
             if len(self._encoded) >= REMEMBERED:
                 self._encoded.clear()
             words = tokenize(self.reword(text) if self.reword else text)
             numbers = self.sentence(words[: length - 1][::-1] if backwards else words)[:length]
             padding = [PAD_NUMBER] * (length - len(numbers))
-            found = self._encoded[key] = np.array(numbers + padding, dtype=np.int64)
-        return found
+            encoded = self._encoded[key] = np.array(numbers + padding, dtype=np.int64)
+        return encoded
 
     def sentence(self, words: Iterable[str]) -> list[int]:
         """Numbers of words, END last."""
@@ -89,8 +89,8 @@ def build_vocabulary(texts: Iterable[str], least: int = 1, reword: Callable[[str
     """The vocabulary of `texts`: words seen at least `least` times, most frequent first, ties by alphabet; with
     `reword`, which the vocabulary keeps, of the texts as they are and as it says them."""
     every = itertools.chain.from_iterable((t, reword(t)) if reword else (t,) for t in texts)
-    found = most_frequent((word for text in every for word in tokenize(text)), least=least)
-    return Vocabulary(found.words, reword)
+    vocabulary = most_frequent((word for text in every for word in tokenize(text)), least=least)
+    return Vocabulary(vocabulary.words, reword)
 
 
 def most_frequent(words: Iterable[str], least: int = 1, most: int | None = None) -> Vocabulary:

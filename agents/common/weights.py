@@ -42,11 +42,11 @@ def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[di
       FileNotFoundError, OSError.
       ValueError: truncated, changed, of another format or kind.
     """
-    tensors, found = load_tensors(Path(path), (WEIGHTS_FORMAT,), remedy)
-    if found.get("kind") != kind:
-        raise ValueError(f"{path}: holds {found.get('kind')!r}, {kind!r} is wanted; {remedy}")
+    tensors, metadata = load_tensors(Path(path), (WEIGHTS_FORMAT,), remedy)
+    if metadata.get("kind") != kind:
+        raise ValueError(f"{path}: holds {metadata.get('kind')!r}, {kind!r} is wanted; {remedy}")
     try:
-        return tensors, from_json(about, found.get("about", ""))
+        return tensors, from_json(about, metadata.get("about", ""))
     except ValueError as e:
         raise ValueError(f"{path}: {e}; {remedy}") from e
 
@@ -59,14 +59,14 @@ def kind_of(path: Path) -> str | None:
 def origin_of(path: Path) -> dict[str, Any] | None:
     """The identity of what a file of weights was trained with; None where that was not written down."""
     text = _read(path)[1].get("identity")
-    found = None if text is None else parse(text, "an identity")
-    return found if isinstance(found, dict) else None
+    identity = None if text is None else parse(text, "an identity")
+    return identity if isinstance(identity, dict) else None
 
 
 def weights_digest(path: Path) -> str:
     """Of the weights in a file and of what is needed to use them; not of what they were trained with."""
-    tensors, found = _read(path)
-    return checksum_of(tensors, {k: v for k, v in found.items() if k != "identity"})
+    tensors, metadata = _read(path)
+    return checksum_of(tensors, {k: v for k, v in metadata.items() if k != "identity"})
 
 
 def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
@@ -87,10 +87,10 @@ def half_precision(network: nn.Module) -> dict[str, Tensor]:
     return {k: v.half() if v.is_floating_point() else v for k, v in network.state_dict().items()}
 
 
-def check_features(found: str, learned_from: str) -> None:
+def check_features(encoder: str, learned_from: str) -> None:
     """Raises ValueError where features come from another encoder than the one that an agent was trained on."""
-    if found != learned_from:
+    if encoder != learned_from:
         raise ValueError(
-            f"the features come from encoder {found[:12]}, the agent learned from {learned_from[:12]}; "
+            f"the features come from encoder {encoder[:12]}, the agent learned from {learned_from[:12]}; "
             "make features with its encoder (`embodied features --data DATA --encoder FILE`) or train a new agent"
         )

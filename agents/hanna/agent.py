@@ -72,9 +72,9 @@ def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
     Raises:
       ValueError: their networks differ, or the features that they know.
     """
-    mine, its = _kind(agent.about), _kind(other.about)
+    sizes, its = _kind(agent.about), _kind(other.about)
     vectors = agent.config.word_vectors, other.config.word_vectors
-    differ = [f"{k} {its[k]} -> {v}" for k, v in mine.items() if v != its[k]]
+    differ = [f"{k} {its[k]} -> {v}" for k, v in sizes.items() if v != its[k]]
     if differ or vectors[1] not in (LEARNED_WORDS, vectors[0]):
         changed = ", ".join(differ or [f"word_vectors {vectors[1]} -> {vectors[0]}"])
         raise ValueError(f"{source} cannot initialise this agent: {changed}; give this run its settings")

@@ -143,7 +143,7 @@ def counted(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[st
 def predictions(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:
     """Figures D.1(b) and D.2: each condition as predicted (reasons at probability 0.5 and more) against as it was, over
     steps where help could be asked: 'lost accuracy', 'lost precision', 'lost recall', 'lost predicted', 'lost true'."""
-    teacher, found = HannaTeacher(), dict[str, list[tuple[float, float]]]()
+    teacher, counts_by_name = HannaTeacher(), dict[str, list[tuple[float, float]]]()
     for e in episodes:
         pairs = [
             (label.reasons, [p >= 0.5 for p in step.action.thought.reasons])
@@ -151,19 +151,19 @@ def predictions(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dic
             if label.reasons is not None and step.action.thought is not None and step.action.thought.reasons is not None
         ]
         for i, reason in enumerate(REASONS):
-            true, said = [t[i] for t, _ in pairs], [s[i] for _, s in pairs]
-            both = sum(t and s for t, s in zip(true, said, strict=True))
-            same = sum(t == s for t, s in zip(true, said, strict=True))
+            true, predicted = [t[i] for t, _ in pairs], [s[i] for _, s in pairs]
+            both = sum(t and s for t, s in zip(true, predicted, strict=True))
+            same = sum(t == s for t, s in zip(true, predicted, strict=True))
             counts = {
                 "accuracy": (same, len(pairs)),
-                "precision": (both, sum(said)),
+                "precision": (both, sum(predicted)),
                 "recall": (both, sum(true)),
-                "predicted": (sum(said), len(pairs)),
+                "predicted": (sum(predicted), len(pairs)),
                 "true": (sum(true), len(pairs)),
             }
             for name, (some, all_) in counts.items():
-                found.setdefault(f"{reason.replace('_', ' ')} {name}", []).append((float(some), float(all_)))
-    return _ratios(found, [e.task.world for e in episodes])
+                counts_by_name.setdefault(f"{reason.replace('_', ' ')} {name}", []).append((float(some), float(all_)))
+    return _ratios(counts_by_name, [e.task.world for e in episodes])
 
 
 def _ratios(counts: Mapping[str, Sequence[tuple[float, float]]], houses: Iterable[str]) -> dict[str, Samples]:

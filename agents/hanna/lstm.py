@@ -71,10 +71,10 @@ class LstmStateNetwork(nn.Module):
         hidden, cell = self.decoder(inputs, (m.hidden, m.cell))  # (B, h)
         seen = self.dropout(hidden)
         scores = torch.einsum("bh,blh->bl", self.text_attend.query(seen) @ self.text_attend.row.weight, text)
-        said = torch.einsum("bl,blh->bh", scores.masked_fill(~text_mask, -torch.inf).softmax(-1), text)  # (B, h)
-        here = self.current_attend(said, percept.current)  # (B, D)
-        there = self.target_attend(said, percept.target)  # (B, D)
-        state = torch.tanh(self.out(torch.cat([seen, said, here, there], -1)))
+        decoded = torch.einsum("bl,blh->bh", scores.masked_fill(~text_mask, -torch.inf).softmax(-1), text)  # (B, h)
+        here = self.current_attend(decoded, percept.current)  # (B, D)
+        there = self.target_attend(decoded, percept.target)  # (B, D)
+        state = torch.tanh(self.out(torch.cat([seen, decoded, here, there], -1)))
         return state, LstmMemory(text, text_mask, hidden, cell)
 
 

@@ -162,11 +162,11 @@ class StateNetwork(nn.Module):
         inter, inter_keys = self.inter_attend(inter_in, m.inter_keys, m.inter_values, m.inter_mask)  # (B, h) D.6
 
         read = self.text_attend(inter, m.text_keys, m.text_values, m.text_mask)  # (B, h) tilde c^text, D.10
-        said = self.text_feed(read)  # (B, h) c^text, D.9
-        here = self.current_attend(said, percept.current)  # (B, D) c^cur, D.11
-        there = self.target_attend(said, percept.target)  # (B, D) c^tgt, D.12
+        decoded = self.text_feed(read)  # (B, h) c^text, D.9
+        here = self.current_attend(decoded, percept.current)  # (B, D) c^cur, D.11
+        there = self.target_attend(decoded, percept.target)  # (B, D) c^tgt, D.12
 
-        intra_in = self.intra_in(torch.cat([said, here, there, delta, extra], -1)) + global_time  # q^intra, D.15
+        intra_in = self.intra_in(torch.cat([decoded, here, there, delta, extra], -1)) + global_time  # q^intra, D.15
         seen = torch.ones_like(m.intra_keys[..., 0], dtype=torch.bool)  # (B, n): the whole episode
         attended, intra_keys = self.intra_attend(intra_in, m.intra_keys, m.intra_values, seen)
         tentative = self.intra_feed(attended)  # (B, h) bar h^intra, D.13

@@ -99,9 +99,9 @@ def auc(positive: np.ndarray, negative: np.ndarray) -> float:
 def precision_recall(asked: Sequence[Query], least: float) -> tuple[float, float]:
     """Of the places that are recognised the share that is right, and of those on the map the share that is recognised
     rightly."""
-    found = [q for q in asked if q.best >= least]
-    right = sum(q.right for q in found)
-    return right / max(len(found), 1), right / max(sum(q.known for q in asked), 1)
+    predicted = [q for q in asked if q.best >= least]
+    right = sum(q.right for q in predicted)
+    return right / max(len(predicted), 1), right / max(sum(q.known for q in asked), 1)
 
 
 def threshold(asked: Sequence[Query]) -> float:
@@ -136,7 +136,7 @@ def recognised(data: Dataset, split: str, shown: str, encoder: str, picture_kind
 
 def measured(asked: Sequence[Query], least: float) -> dict[str, Samples]:
     """COLUMNS, where a match of `least` is the same place."""
-    known, found = [q for q in asked if q.known], [q for q in asked if q.best >= least]
+    known, recognised_queries = [q for q in asked if q.known], [q for q in asked if q.best >= least]
     by_house = {h: [q for q in asked if q.house == h] for h in sorted({q.house for q in asked})}
 
     def each(queries: Sequence[Query], least: float = -np.inf) -> Samples:
@@ -152,4 +152,8 @@ def measured(asked: Sequence[Query], least: float) -> dict[str, Samples]:
 
     rings = [told(*ring) for ring in ((0.0, np.inf), *RINGS)]
     best = Samples(tuple(threshold(some) for some in by_house.values()), tuple(by_house))
-    return dict(zip(RECOGNITION_MEASURES, (each(known), each(found), each(known, least), *rings, best), strict=True))
+    return dict(
+        zip(
+            RECOGNITION_MEASURES, (each(known), each(recognised_queries), each(known, least), *rings, best), strict=True
+        )
+    )

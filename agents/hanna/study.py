@@ -172,14 +172,14 @@ class HannaStudy(SightedStudy):
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
         ood = Dataset(self.eval_data or self.data).ood
-        found = {}
+        tables = {}
         for name, table in HANNA_TABLES.items():
             splits = [s for s in table.splits if self.eval_data is None or not s.endswith("_seen")]
             splits += ood if table.splits == TEST else ()
-            found[name] = dataclasses.replace(table, splits=tuple(splits))
+            tables[name] = dataclasses.replace(table, splits=tuple(splits))
             if name in PRINTED:
-                found[name] = in_both_ways(found[name])
-        return found
+                tables[name] = in_both_ways(tables[name])
+        return tables
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
         initial = {} if self.init_from is None else {"begin": weights_digest(self.init_from)}

@@ -124,16 +124,16 @@ def fewest_moves(start: int, leads: Callable[[int], Iterable[tuple[int, int]]]) 
     Args:
       leads: the ways that are known from a place, each with the place at its end.
     """
-    found: dict[int, tuple[int, int | None]] = {start: (0, None)}
+    reached: dict[int, tuple[int, int | None]] = {start: (0, None)}
     queue = deque([start])
     while queue:
         place = queue.popleft()
-        steps, first = found[place]
+        steps, first = reached[place]
         for way, end in leads(place):
-            if end not in found:
-                found[end] = steps + 1, way if first is None else first
+            if end not in reached:
+                reached[end] = steps + 1, way if first is None else first
                 queue.append(end)
-    return found
+    return reached
 
 
 def weigh_by_image(

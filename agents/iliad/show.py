@@ -57,7 +57,7 @@ class ShowOptions(Nav):
 
 
 Shown = tuple[dict[str, Any], str]
-"""What is shown as JSON, and as text."""
+"""The result as JSON, and as text."""
 
 
 def show(args: ShowOptions, *, note: Note, record: Record) -> Shown:
@@ -132,8 +132,8 @@ def walks(args: ShowOptions, file: Path, note: Note, record: Record) -> Shown:
         chosen = [dataclasses.replace(t, requests=(args.request,)) for t in chosen[:1]]
     shown = [tell(student, grounds.teacher, t, seed=args.seed, sample=not args.greedy) for t in chosen]
     if args.rrd:
-        data, (told, walk) = grounds.data.source, shown[0]
+        data, (first, walk) = grounds.data.source, shown[0]
         with drawn_world(data, chosen[0].world, args.cache, pictures_of(data, chosen[0].world, args.pictures)) as eyes:
-            record(eyes, episode_of(student, chosen[0], walk, told.description), args.rrd)
+            record(eyes, episode_of(student, chosen[0], walk, first.description), args.rrd)
     text = "\n\n".join("\n".join(lines_of(episode)) for episode, _ in shown)
     return {"episodes": [dataclasses.asdict(episode) for episode, _ in shown]}, text + "\n"

@@ -172,8 +172,8 @@ def check(folder: Path) -> list[str]:
             continue
         parts = ["judged", *(["trained"] if "trained" in identity else [])]  # a benchmark trains nothing
         stale = [what for what in parts if not made_by_this_code(identity.get(what) or {})]
-        said = f"{' and '.join(stale)} by other code than this" if stale else "belongs to this code"
-        lines.append(f"{path}: {body['table']} {said}")
+        verdict = f"{' and '.join(stale)} by other code than this" if stale else "belongs to this code"
+        lines.append(f"{path}: {body['table']} {verdict}")
     return lines
 
 
@@ -191,9 +191,9 @@ class _Job:
 
 def _rows_of(table: StudyTable, wanted: Sequence[str] | None) -> list[StudyRow]:
     """The wanted rows, and those that they are compared with or whose numbers are subtracted."""
-    found = [r for r in table.rows if wanted is None or r.label in wanted]
+    chosen = [r for r in table.rows if wanted is None or r.label in wanted]
     pairs = [r for pair in table.compared for r in pair] if wanted is None else []
-    return [*found, *(r.minus for r in found if r.minus is not None), *pairs]
+    return [*chosen, *(r.minus for r in chosen if r.minus is not None), *pairs]
 
 
 def _in_parallel(work: Callable[[Any], str], items: Sequence[Any], workers: int, note: Note) -> None:
@@ -223,11 +223,11 @@ def _run(learner: StudyLearner, out: Path, note: Note, job: _Job) -> str:
             facts = {"weights": os.path.relpath(weights, home), "seconds": _processor(home)}
             write_finished(home / "trained.json", identity, facts)
     for judged, split in job.judgings.values():
-        path, mine = _judged(learner, home, weights, judged, split)
-        if finished(path, mine) is None:
-            found = learner.judge(weights, judged, split, seed, out, path.with_suffix(""))
-            samples = {k: dataclasses.asdict(_storable(v)) for k, v in found.items()}
-            write_finished(path, mine, {"samples": samples})
+        path, identity_of_judging = _judged(learner, home, weights, judged, split)
+        if finished(path, identity_of_judging) is None:
+            counts = learner.judge(weights, judged, split, seed, out, path.with_suffix(""))
+            samples = {k: dataclasses.asdict(_storable(v)) for k, v in counts.items()}
+            write_finished(path, identity_of_judging, {"samples": samples})
     return f"{name}: judged"
 
 
@@ -250,9 +250,9 @@ def _judged(
 ) -> tuple[Path, dict[str, Any]]:
     """The file of a judgement, and its identity."""
     about = {"weights": weights and _digest_of(weights, weights.stat().st_mtime_ns), "judge": row.judge, "split": split}
-    mine = identity_of(*learner.judges, **about, **learner.judged(row, split))
+    identity = identity_of(*learner.judges, **about, **learner.judged(row, split))
     how = "_".join(map(str, row.judge.values()))
-    return home / "judged" / f"{_slug(f'{split} {how}')}_{key_of(mine)}.json", mine
+    return home / "judged" / f"{_slug(f'{split} {how}')}_{key_of(identity)}.json", identity
 
 
 @functools.lru_cache(maxsize=256)
@@ -306,12 +306,12 @@ def result(
     shown, missing, columns, runs = [], [], dict[str, dict[str, str]](), dict[str, list[str]]()
     seconds, codes = dict[str, float](), dict[str, Any]()
     for row in table.rows:
-        found = {} if rows is not None and row.label not in rows else _found(learner, table, row, out)
-        if not found:
+        counts = {} if rows is not None and row.label not in rows else _found(learner, table, row, out)
+        if not counts:
             missing.append(row.label)
             continue
         values = {}
-        for (split, metric), samples in found.items():
+        for (split, metric), samples in counts.items():
             scale = 100.0 if in_percent(metric) else 1.0
             column = f"{metric} {split}".strip().replace(" ", "_")
             e = interval(samples)
@@ -345,7 +345,7 @@ def result(
 
 def _found(learner: StudyLearner, table: StudyTable, row: StudyRow, out: Path) -> dict[tuple[str, str], list[Samples]]:
     """Counts of a row, by split and name, per training seed; nothing if some of it is missing."""
-    found: dict[tuple[str, str], list[Samples]] = {}
+    counts: dict[tuple[str, str], list[Samples]] = {}
     for split in table.splits:
         runs = _samples(learner, row, split, out)
         others = _samples(learner, row.minus, split, out) if row.minus else None
@@ -357,12 +357,12 @@ def _found(learner: StudyLearner, table: StudyTable, row: StudyRow, out: Path) -
                     continue
                 one = run[metric] if others is None else less(run[metric], others[k % len(others)][metric])
                 where = "" if metric in table.pooled else split
-                counted = found.setdefault((where, metric), [])
+                counted = counts.setdefault((where, metric), [])
                 if len(counted) <= k:
                     counted.append(one)
                 else:  # pooled, on the next split
                     counted[k] = _together(counted[k], one)
-    return found
+    return counts
 
 
 def _together(a: Samples, b: Samples) -> Samples:
@@ -371,31 +371,31 @@ def _together(a: Samples, b: Samples) -> Samples:
 
 def _samples(learner: StudyLearner, row: StudyRow, split: str, out: Path) -> list[Measured] | None:
     """Counts of a row on a split, per training seed."""
-    found: list[Measured] = []
+    counts: list[Measured] = []
     for seed in learner.seeds(row):
         home, weights = _home(learner, out, row, seed), None
         if row.train is not None and (weights := _weights(home, learner.trained(row.train, seed, out))) is None:
             return None
-        path, mine = _judged(learner, home, weights, row, split)
-        body = finished(path, mine)
+        path, identity = _judged(learner, home, weights, row, split)
+        body = finished(path, identity)
         if body is None:
             return None
-        found.append({k: from_plain(Samples, v, f"{path}: {k}") for k, v in body["samples"].items()})
-    return found
+        counts.append({k: from_plain(Samples, v, f"{path}: {k}") for k, v in body["samples"].items()})
+    return counts
 
 
 def _comparisons(learner: StudyLearner, table: StudyTable, out: Path, rows: Sequence[str] | None) -> list[str]:
     """The differences of a table's pairs, in words."""
-    told = []
+    lines = []
     for first, second in table.compared if rows is None else ():
         pair = StudyRow(first.label, first.train, first.judge, minus=second)
         for (split, metric), samples in _found(learner, dataclasses.replace(table, pooled=()), pair, out).items():
             scale, e = 100.0 if in_percent(metric) else 1.0, interval(samples)
-            told.append(
+            lines.append(
                 f"{first.label} minus {second.label}, {metric}, {split.replace('_', ' ')}: "
                 f"{scale * e.mean:+.2f} ± {scale * e.half:.2f}{' points' * in_percent(metric)}"
             )
-    return told
+    return lines
 
 
 def _number(x: float) -> float | None:

@@ -89,12 +89,12 @@ class EpisodeStudy(StudyLearner):
         agent = None if weights is None else self.load(weights)
         whole = self.where(agent, row.judge, split)
         tasks, player = spread(whole.tasks, self.tasks), self.policies(agent, row.judge, split)
-        found: list[Episode] = []
+        all_episodes: list[Episode] = []
         for k in self.eval_seeds:
             episodes = play(whole.make_env, player, tasks, seed=k, batch=self.batch, agent=keep.name)
             save_lines(keep.with_name(f"{keep.name}_{k}.jsonl"), episodes)
-            found += episodes
-        return self.count(found, whole, row.judge)
+            all_episodes += episodes
+        return self.count(all_episodes, whole, row.judge)
 
     def about(self) -> str:
         seeds, data = ", ".join(map(str, self.repeats)), Dataset(self.data)

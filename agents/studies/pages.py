@@ -71,8 +71,8 @@ def _wanted(values: Mapping[str, Any], columns: Sequence[str]) -> list[tuple[str
 
 def _place(key: str, k: int) -> float:
     """The position at which a column is drawn: the number that its name holds, else one after the other."""
-    found = re.search(r"_at_([0-9.]+)", key)
-    return float(found[1]) if found else float(k)
+    number = re.search(r"_at_([0-9.]+)", key)
+    return float(number[1]) if number else float(k)
 
 
 def _line(cells: Sequence[str]) -> str:

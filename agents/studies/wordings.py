@@ -31,7 +31,7 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
       row: makes a row of its label and of what differs in training.
     """
     readers = [[_said(r, how) for how in ("", SYNONYMS, PARAPHRASED)] for r in _readers(row)]
-    lost = [(said, other) for said, *unheard in readers for other in unheard]
+    lost = [(rewording, other) for rewording, *unheard in readers for other in unheard]
     won = [pair for alike in [*zip(*readers, strict=True)][1:] for pair in _changes(alike)]
     title = "Instructions in unheard words and sentences"
     rows = tuple(itertools.chain(*readers))

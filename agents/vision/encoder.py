@@ -184,17 +184,17 @@ def load_encoder(path: Path = SHIPPED_ENCODER) -> Encoder:
       ValueError: truncated, of another format, or not the weights its digest names.
     """
     remedy = "train the encoder again with `embodied train vision`"
-    tensors, told = load_weights(path, "encoder", EncoderAbout, remedy)
-    if told.name not in (*ARCHITECTURES, LITE) or told.sharing not in SHARINGS:
-        raise ValueError(f"{path}: unknown settings {told}; {remedy}")
+    tensors, about = load_weights(path, "encoder", EncoderAbout, remedy)
+    if about.name not in (*ARCHITECTURES, LITE) or about.sharing not in SHARINGS:
+        raise ValueError(f"{path}: unknown settings {about}; {remedy}")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
-    network = build(told.name)
+    network = build(about.name)
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     load_into(network, {**counters, **tensors}, path)
-    encoder = Encoder(network.eval(), told.name, told.sharing, mean, mix)
-    if encoder.digest != told.digest:
-        raise ValueError(f"{path}: contents do not fit the digest {told.digest[:12]}; it was changed")
+    encoder = Encoder(network.eval(), about.name, about.sharing, mean, mix)
+    if encoder.digest != about.digest:
+        raise ValueError(f"{path}: contents do not fit the digest {about.digest[:12]}; it was changed")
     return encoder
 
 

@@ -127,10 +127,10 @@ class ViewpointPictures(torch.utils.data.Dataset[dict[str, torch.Tensor]]):
         node, k = divmod(item - before, self._each)
         known = self._known[house]
         yaw, pitch = (float(VIEW_YAWS[k]), float(VIEW_PITCHES[k])) if self._each > 1 else (0.0, 0.0)
-        found = self._seen(house, node, yaw, pitch, self._camera_of(item))
-        out = {name: torch.from_numpy(_colours_first(name, a)) for name, a in found.items()}
-        if "ids" in found:
-            out["visible"] = torch.from_numpy(_visible(found["ids"], known.class_of_id, len(self.classes)))
+        pictures = self._seen(house, node, yaw, pitch, self._camera_of(item))
+        out = {name: torch.from_numpy(_colours_first(name, a)) for name, a in pictures.items()}
+        if "ids" in pictures:
+            out["visible"] = torch.from_numpy(_visible(pictures["ids"], known.class_of_id, len(self.classes)))
         pose = np.array([*known.positions[node], yaw, pitch], np.float32)
         return {
             **out,

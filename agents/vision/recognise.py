@@ -37,10 +37,12 @@ class Recogniser:
         """The `most` surest classes in a panorama, the surest first, each where it is seen best."""
         likely = self.detector(strip_of(panorama)[None])[0][0].reshape(len(self.detector.classes), -1)  # (C, 12 * 36)
         best, cells = likely.max(1), likely.argmax(1)
-        found: list[Recognised] = []
+        recognised: list[Recognised] = []
         for k in (-best).argsort(kind="stable").tolist():
-            if best[k] < self.least or len(found) == most:
+            if best[k] < self.least or len(recognised) == most:
                 break
             if (name := self.detector.classes[k]) not in SHELL:
-                found.append(Recognised(name, float(best[k]), *cell_direction(*divmod(int(cells[k]), STRIP_COLUMNS))))
-        return found
+                recognised.append(
+                    Recognised(name, float(best[k]), *cell_direction(*divmod(int(cells[k]), STRIP_COLUMNS)))
+                )
+        return recognised

@@ -106,10 +106,10 @@ def detector_for(
             share=also.share if also else None,
         )
         detector.save(out / "detector.safetensors", learned)
-        found = detector.precision(unseen)
-        whole = float(np.mean(list(found.values())))
-        write_json(out / "readings.json", {"AP": whole, "AP by class": found}, indent=1)
-        note(f"average precision {whole:.3f}, {len(found)} classes in validation houses")
+        precision = detector.precision(unseen)
+        whole = float(np.mean(list(precision.values())))
+        write_json(out / "readings.json", {"AP": whole, "AP by class": precision}, indent=1)
+        note(f"average precision {whole:.3f}, {len(precision)} classes in validation houses")
 
 
 def _further(data: Dataset, other: Dataset) -> list[str]:

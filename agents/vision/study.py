@@ -170,9 +170,9 @@ class EncoderStudy(StudyLearner):
         unseen = drawn.strips(houses_of(data, (self.split,)), note=lambda line: None)
         goals = sought(data) or classes
         if kind_of(weights) == "detector":
-            found = Detector.load(load_encoder(), weights).precision(unseen)
+            precision = Detector.load(load_encoder(), weights).precision(unseen)
             known = [c for c in classes if _shown(c, read_in) and _shown(c, unseen)]
-            return _measured(ENCODER_MEASURES[:2], _mean_precision({c: found.get(c, 0.0) for c in known}, goals))
+            return _measured(ENCODER_MEASURES[:2], _mean_precision({c: precision.get(c, 0.0) for c in known}, goals))
         first, other = (labelled(data, houses, load_encoder(weights), classes) for houses in (read_in, unseen))
         reading = read(first, other, seed=self.config.seed)
         ap, goal_ap = _mean_precision(dict(zip(classes, reading.ap, strict=True)), goals)
