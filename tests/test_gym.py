@@ -179,7 +179,7 @@ def test_the_expert_earns_one_minus_its_steps_and_shaping_telescopes(tmp):
         env = make("find", tmp, shaping=shaping)
         env.reset(seed=2)
         inner, total, done, n = env._env, 0.0, False, 0
-        start = env._potential()
+        start = env._env.potential()
         while not done:
             s = inner.situation
             action = shortest_action(s.world.graph, s.pose, s.targets, s.candidate_nodes)

@@ -257,7 +257,7 @@ class Writer:
             self._videos.append(_Video(folder, camera, DEPTH, fps, depth=True))
         self._rows: list[dict[str, np.ndarray]] = []
         self._said: list[str] = []
-        self._counts: list[list[np.ndarray]] = [[] for _ in self._videos]
+        self._counts: list[Any] = [0 for _ in self._videos]
         self._tasks: dict[str, int] = {}
         self._episodes: list[dict[str, Any]] = []
         self._steps = 0
@@ -278,7 +278,7 @@ class Writer:
           rows: the columns that are not LeRobot's own, (n, k) each.
           frames, depths: (h, w, 3) uint8; (h, w) float32 metres, where depth is written.
           words: what the agent is to do, by step.
-          said: what an assistant says at a step; '' for nothing.
+          replies: an assistant's words by step; '' for none.
           facts: columns of its row in the table of episodes.
         """
         n, number = len(words), len(self._episodes)
@@ -295,10 +295,11 @@ class Writer:
         }
         where: dict[str, Any] = {}
         numbers = {name: _statistics(np.asarray(whole[name], np.float64)) for name in self._columns}
-        for video, pictures, counts in zip(self._videos, (frames, depths), self._counts, strict=False):
+        for k, (video, pictures) in enumerate(zip(self._videos, (frames, depths), strict=False)):
             where |= video.add(pictures)
-            counts.append(_depths(pictures) if video.depth else _colours(pictures))
-            numbers[video.key] = _statistics_of_counts(counts[-1], video.depth)
+            counts = _histogram(pictures, video.depth)
+            numbers[video.key] = _statistics_of_counts(counts, n, video.depth)
+            self._counts[k] += counts
         self._episodes.append(
             {
                 "episode_index": number,
@@ -312,7 +313,7 @@ class Writer:
                 "meta/episodes/file_index": 0,
                 **where,
                 **facts,
-                **_flat(numbers),
+                **{f"stats/{name}/{what}": v for name, values in numbers.items() for what, v in values.items()},
             }
         )
         self._rows.append(whole)
@@ -335,7 +336,7 @@ class Writer:
         statistics = {name: _statistics(np.asarray(rows[name], np.float64)) for name in self._columns}
         for video, counts in zip(self._videos, self._counts, strict=True):
             video.close()
-            statistics[video.key] = _statistics_of_counts(sum(counts[1:], counts[0]), video.depth)
+            statistics[video.key] = _statistics_of_counts(counts, self._steps, video.depth)
         write_json(self._folder / "meta" / "stats.json", statistics, indent=1)
         _save(self._folder / "meta" / "tasks.parquet", _table_of_tasks(list(self._tasks)))
         _save(
@@ -507,23 +508,17 @@ def _statistics(values: np.ndarray) -> dict[str, list]:
     return {**{name: v.tolist() for name, v in numbers.items()}, "count": [len(values)]}
 
 
-def _colours(frames: Sequence[np.ndarray]) -> np.ndarray:
-    """(4, 256) int64: how often each value of red, green and blue occurs; at the start of row 3, how many frames."""
-    counts = [np.bincount(np.stack([f[..., c] for f in frames]).ravel(), minlength=256) for c in range(3)]
-    return np.stack([*counts, np.eye(1, 256, dtype=np.int64)[0] * len(frames)])
+def _histogram(pictures: Sequence[np.ndarray], depth: bool) -> np.ndarray:
+    """(channels, bins) int64: how often each value of red, green and blue occurs, or each millimetre of depth."""
+    values, bins = np.stack(pictures), 256
+    if depth:
+        values, bins = np.rint(1000 * np.clip(values, NEAREST, FARTHEST))[..., None], round(1000 * FARTHEST) + 1
+    channels = np.moveaxis(values, -1, 0).astype(np.int64 if depth else np.uint8)
+    return np.stack([np.bincount(c.ravel(), minlength=bins) for c in channels])
 
 
-def _depths(frames: Sequence[np.ndarray]) -> np.ndarray:
-    """(2, 10001) int64: how often each millimetre occurs; at the start of row 1, how many frames."""
-    bins = round(1000 * FARTHEST) + 1
-    millimetres = [np.rint(1000 * np.clip(f, NEAREST, FARTHEST)).astype(np.int64).ravel() for f in frames]
-    counts = np.bincount(np.concatenate(millimetres), minlength=bins)
-    return np.stack([counts, np.eye(1, bins, dtype=np.int64)[0] * len(frames)])
-
-
-def _statistics_of_counts(counts: np.ndarray, depth: bool) -> dict[str, list]:
-    """Of what `_colours` or `_depths` counted: values in [0, 1] or millimetres, shaped (channels, 1, 1)."""
-    shown, frames = counts[:-1], int(counts[-1, 0])
+def _statistics_of_counts(shown: np.ndarray, frames: int, depth: bool) -> dict[str, list]:
+    """Of `_histogram`s of so many frames: values in [0, 1] or millimetres, shaped (channels, 1, 1)."""
     values = np.arange(shown.shape[1]) / (1.0 if depth else 255.0)
     total = shown.sum(1)
     mean = shown @ values / total
@@ -534,10 +529,6 @@ def _statistics_of_counts(counts: np.ndarray, depth: bool) -> dict[str, list]:
     numbers = {"min": at(1e-12), "max": values[last], "mean": mean, "std": deviation}
     numbers |= {name: at(q) for name, q in QUANTILES.items()}
     return {**{name: v.reshape(-1, 1, 1).tolist() for name, v in numbers.items()}, "count": [frames]}
-
-
-def _flat(statistics: Mapping[str, Mapping[str, list]]) -> dict[str, list]:
-    return {f"stats/{name}/{what}": v for name, numbers in statistics.items() for what, v in numbers.items()}
 
 
 HEAD = """---
