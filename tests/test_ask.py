@@ -29,7 +29,7 @@ from embodied.evaluation.own_agents import acted, observed, read_seeds, submitte
 from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite
-from embodied.gym.spaces import SpaceLayout
+from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import Ask, Intention, Move, Pose, Stop
 from embodied.kinds.ask import ASK, ask_environments, price, success_progress, weighted_success
 from embodied.language.questions import intention_of
@@ -230,6 +230,8 @@ def test_the_environment_checker_has_nothing_to_say(make_env, tasks):
         check_env(env, skip_render_check=True)
     assert env.render().ndim == 3
     assert gym.spec("embodied/Ask-v0").kwargs == {"kind": "ask"}
+    env.reset(seed=0)
+    assert env.step(number(Ask(Intention.REGION), env.layout))[-1]["price"] == Prices().region
 
 
 # Judging others ---------------------------------------------------------------------------------

@@ -145,6 +145,10 @@ class HelpEnv:
         """End the episode here, as its horizon does; nothing where it has ended."""
         self.ended = self.ended or "limit"
 
+    def facts(self) -> dict[str, float]:
+        """Numbers about the episode so far, for Gymnasium's info."""
+        return {}
+
     def reward(self, success: float) -> float:
         """Gymnasium's reward of the last step: success, at the end, less STEP_COST and what the step cost."""
         return success - STEP_COST - self.last_step.cost

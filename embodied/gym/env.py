@@ -187,7 +187,7 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
         if self._shaping:
             reward += before - self._env.potential()
         self._o = o if o is not None else self._o
-        info |= self._words()
+        info |= self._env.facts() | self._words()
         return self._encoded(self._o), float(reward), ended == "stop", ended == "limit", info
 
     def render(self) -> np.ndarray | None:
