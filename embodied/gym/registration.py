@@ -12,7 +12,7 @@ from types import ModuleType
 from embodied.plugins import for_each_kind
 
 CONTINUOUS = {"vlnce": "VLNCE", "objectnav": "ObjectNav"}
-"""The same, of continuous navigation (embodied.gym.continuous)."""
+"""Names and titles of continuous navigation (embodied.gym.continuous)."""
 
 
 def register_with_gymnasium() -> None:
