@@ -476,82 +476,62 @@ def test_alpha_is_krippendorffs():
 # Where the page is -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("typed", "spelt"),
-    [
-        ("HTTPS://Study.Example.ORG:443/", "https://study.example.org"),
-        ("http://study.example.org:80", "http://study.example.org"),
-        ("https://study.example.org:8443/Kitchen/", "https://study.example.org:8443/Kitchen"),
-        ("http://[0:0::0:1]:8080", "http://[::1]:8080"),
-        ("https://bücher.example/a b", "https://xn--bcher-kva.example/a%20b"),
-    ],
-)
-def test_an_address_is_spelt_as_browsers_spell_it(typed, spelt):
-    assert page_address(typed) == spelt == page_address(spelt)
+SPELT = {
+    "HTTPS://Study.Example.ORG:443/": "https://study.example.org",
+    "http://study.example.org:80": "http://study.example.org",
+    "https://study.example.org:8443/Kitchen/": "https://study.example.org:8443/Kitchen",
+    "http://[0:0::0:1]:8080": "http://[::1]:8080",
+    "https://bücher.example/a b": "https://xn--bcher-kva.example/a%20b",
+}
+NO_ADDRESSES = ["ftp://a", "https://", "http://a:70000", "http://me@a", "http://a?b", "http://a..b"]
 
 
-@pytest.mark.parametrize(
-    ("typed", "reason"),
-    [
-        ("study.example.org", "write https://study.example.org"),
-        ("localhost:8080", "write https://localhost:8080"),
-        *[
-            (t, "such as https://study.example.org")
-            for t in ("ftp://a", "https://", "http://a:70000", "http://me@a", "http://a?b", "http://a..b")
-        ],
-    ],
-)
-def test_what_is_no_address_of_a_page_is_refused_with_the_remedy(typed, reason, capsys):
+def test_an_address_is_spelt_as_browsers_spell_it():
+    assert {typed: page_address(typed) for typed in SPELT} == SPELT
+    assert [page_address(spelt) for spelt in SPELT.values()] == [*SPELT.values()]
+
+
+@pytest.mark.parametrize("typed", ["study.example.org", "localhost:8080", *NO_ADDRESSES])
+def test_what_is_no_address_of_a_page_is_refused_with_the_remedy(typed, capsys):
     with pytest.raises(SystemExit):
         start(["serve", "STUDY.toml", "--address", typed])
-    assert reason in capsys.readouterr().err
+    remedy = "such as https://study.example.org" if "://" in typed else f"write https://{typed}"
+    assert remedy in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")
-def opened(data, tmp_path_factory):
-    def at(*addresses):
-        study = write_study(data.folder.parent, TOGETHER, name="addressed")
-        draw = lambda data, name: data.folder / "houses" / name / "panoramas.pano"
-        return open_study(study, tmp_path_factory.mktemp("addressed"), draw, addresses=addresses or None).server
+def served_at(data, tmp_path_factory):
+    study = write_study(data.folder.parent, TOGETHER, name="addressed")
+    return lambda *at: open_study(study, tmp_path_factory.mktemp("at"), None, addresses=at or None).server
 
-    return at
+
+UNI = "https://uni.example"
 
 
 @pytest.mark.parametrize(
     ("addresses", "page", "host", "welcome"),
     [
-        (["https://Uni.example:443/kitchen"], "https://uni.example", "localhost:8080", True),
-        (["https://uni.example"], "http://uni.example", "uni.example", False),
-        (["https://uni.example"], "https://uni.example:8443", "uni.example", False),
-        (["https://uni.example"], "null", "uni.example", False),
+        (["https://Uni.example:443/kitchen"], UNI, "localhost:8080", True),
+        *[([UNI], page, "uni.example", False) for page in ("http://uni.example", UNI + ":8443", "null")],
         ([], "http://lab:8080", "LAB:8080", True),
         ([], "https://lab", "lab:443", True),
-        ([], "https://evil.example", "lab", False),
-        ([], "null", "null", False),
+        *[([], page, "lab", False) for page in ("https://evil.example", "null")],
     ],
 )
-def test_a_page_of_another_origin_is_told_which_it_is_and_which_may_connect(
-    opened, caplog, addresses, page, host, welcome
-):
-    server = opened(*addresses)
-    told = [server.refusal(SimpleNamespace(headers={"origin": page, "host": host})) for _ in range(2)]
+def test_a_page_of_another_origin_is_told_which_may_connect(served_at, caplog, addresses, page, host, welcome):
+    server = served_at(*addresses)
+    reasons = [server.refusal(SimpleNamespace(headers={"origin": page, "host": host})) for _ in range(2)]
     if welcome:
-        assert told == [None, None] and not caplog.messages
+        assert reasons == [None, None] and not caplog.messages
     else:
-        assert page in told[0] and "--address" in told[0] and all(a in told[0] for a in addresses)
+        assert page in reasons[0] and "--address" in reasons[0] and all(a in reasons[0] for a in addresses)
         assert len(caplog.messages) == 1 and page in caplog.messages[0], "said once to whoever runs the study"
 
 
-def test_a_study_under_a_path_is_served_there_and_where_a_proxy_takes_the_path_away(opened):
-    app = app_of(opened("https://uni.example/kitchen/"))
-    for path, status in (
-        ("/kitchen", 307),
-        ("/kitchen/", 200),
-        ("/", 200),
-        ("/kitchen/static/app.js", 200),
-        ("/kitchens/", 404),
-    ):
-        assert asyncio.run(fetched(app, path))[0] == status, path
+def test_a_study_under_a_path_is_served_there_and_where_a_proxy_takes_the_path_away(served_at):
+    app = app_of(served_at("https://uni.example/kitchen/"))
+    answers = {"/kitchen": 307, "/kitchen/": 200, "/": 200, "/kitchen/static/app.js": 200, "/kitchens/": 404}
+    assert {path: asyncio.run(fetched(app, path))[0] for path in answers} == answers
     page = asyncio.run(fetched(app, "/"))[1].decode()
     assert re.findall('(?:src|href)="/', page) == [] and 'src="static/app.js"' in page
 
