@@ -132,7 +132,7 @@ def test_training_texts_are_varied_and_each_always_alike():
 
 @pytest.mark.parametrize("learner", ["vln", "hanna", "vnla"])
 def test_every_reader_is_judged_in_all_wordings(learner):
-    table = importlib.import_module(f"agents.{learner}.study").TABLES["words"]
+    table = getattr(importlib.import_module(f"embodied.agents.{learner}.study"), f"{learner.upper()}_TABLES")["words"]
     assert [r.judge.get(WORDING) for r in table.rows] == [None, SYNONYMS, PARAPHRASED] * 3
     assert [bool(r.train) for r in table.rows] == [False] * 3 + [True] * 6
     assert [r.train.get("varied_words", False) for r in table.rows] == [False] * 6 + [True] * 3
@@ -140,7 +140,9 @@ def test_every_reader_is_judged_in_all_wordings(learner):
 
 @pytest.mark.parametrize("learner", ["vln", "hanna"])
 def test_people_never_heard_are_told_from_people_who_are_hard_to_follow(learner):
-    table = importlib.import_module(f"agents.{learner}.study").TABLES["speakers"]
+    table = getattr(importlib.import_module(f"embodied.agents.{learner}.study"), f"{learner.upper()}_TABLES")[
+        "speakers"
+    ]
     *rows, other, heard = table.rows
     assert {r.train["speakers"] for r in rows} == {"familiar"} and heard.train["speakers"] == "everybody"
     assert [r.judge[SPEAKERS] for r in table.rows] == ["familiar", "novel"] * 4
