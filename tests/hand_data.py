@@ -16,8 +16,8 @@ import numpy as np
 from hand_worlds import grid_world, thing
 
 from embodied.datasets.build import DatasetConfig, build_dataset, units
-from embodied.datasets.matterport import in_matterport_order
 from embodied.datasets.store import Dataset
+from embodied.mattersim.conventions import in_matterport_order
 from embodied.plugins import shipped_kinds
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas

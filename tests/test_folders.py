@@ -28,8 +28,8 @@ from embodied.datasets.folders import (
     subgoal_words,
     word_pieces,
 )
-from embodied.datasets.matterport import in_matterport_order, scan_name
-from embodied.datasets.skyboxes import write_skybox
+from embodied.mattersim.conventions import in_matterport_order, scan_name
+from embodied.mattersim.skyboxes import write_skybox
 from embodied.render.panorama import Panorama
 
 pytestmark = pytest.mark.slow

@@ -55,7 +55,7 @@ def test_the_wheel_holds_the_types_the_weights_and_the_catalogue(wheel):
         "embodied/agents/weights/iliad_regex_tiny.safetensors",
         "embodied/agents/common/varied.toml",
         "embodied/agents/studies/data/printed.json",
-        "embodied/datasets/regions.toml",
+        "embodied/mattersim/regions.toml",
         "embodied/language/speakers.toml",
     }
     assert not wanted - names

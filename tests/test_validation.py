@@ -10,13 +10,13 @@ from hand_worlds import generated
 
 from embodied.assets.catalogue import Catalogue, CatalogueError, load_catalogue
 from embodied.assets.records import ROOM_KINDS
-from embodied.datasets.matterport import REGIONS
 from embodied.generate import HouseConfig, generate_house
 from embodied.generate.furnish.tables import tables
 from embodied.house.floor_plan import ROOM_COLOURS
 from embodied.house.house import House, HouseError, Placement
 from embodied.house.validation import check_known, load_house
 from embodied.language.lexicon import ROOM_NOUNS
+from embodied.mattersim.conventions import REGIONS
 
 
 @functools.cache
@@ -109,7 +109,7 @@ def test_parameters_are_those_of_the_maker():
         pytest.param(tables().rooms, id="generate/furnish/rooms.toml"),
         pytest.param(ROOM_NOUNS, id="language/words.toml"),
         pytest.param(ROOM_COLOURS, id="house/floor_plan.py"),
-        pytest.param(REGIONS, id="datasets/matterport.py"),
+        pytest.param(REGIONS, id="mattersim/conventions.py"),
     ],
 )
 def test_every_kind_of_room_stands_in_every_table_of_kinds(table):

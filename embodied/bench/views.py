@@ -13,9 +13,9 @@ from pathlib import Path
 from embodied.assets.catalogue import Catalogue
 from embodied.bench.seen import FLAT
 from embodied.bench.timing import Measure, measure, one_core
-from embodied.datasets.skyboxes import write_skybox
 from embodied.generate import generate_house
 from embodied.mattersim.pictures import Skyboxes, skybox_folder
+from embodied.mattersim.skyboxes import write_skybox
 from embodied.render.panorama import VFOV36, Panorama, perspective_grid
 from embodied.world import open_world
 

@@ -3,7 +3,7 @@
 
 A folder has the shape of the program's repository, so that it is laid over a copy of it; its README.md says which
 program and version, what goes where, and which lines of the program a current PyTorch needs changed. The files' fields
-are those of embodied.datasets.matterport. Where a program wants something of the data that ours need not have, the
+are those of embodied.mattersim.conventions. Where a program wants something of the data that ours need not have, the
 writer says at the line how it is met.
 """
 
@@ -24,7 +24,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from embodied.assets.cache import write_bytes
-from embodied.datasets.matterport import (
+from embodied.errors import UnableError
+from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
+from embodied.language.plain_language import PlainLanguage
+from embodied.mattersim.conventions import (
     CAMERA,
     REGIONS,
     action_list,
@@ -37,9 +40,6 @@ from embodied.datasets.matterport import (
     write_features,
     write_hdf5,
 )
-from embodied.errors import UnableError
-from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
-from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.connectivity import to_matterport
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import nearest
@@ -436,7 +436,7 @@ def word_pieces() -> Callable[[Sequence[str]], list[list[int]]]:
 
 def _matterport(data: Dataset, root: Path) -> list[Path]:
     """Skyboxes of the panoramas that the data set holds, and the rooms of viewpoints."""
-    from embodied.datasets.skyboxes import drawn, write_skyboxes  # late: decodes pictures
+    from embodied.mattersim.skyboxes import drawn, write_skyboxes  # late: decodes pictures
 
     files = []
     panoramas = {name: drawn(data.panoramas(name)) for name in names_of(data)}

@@ -25,7 +25,6 @@ import numpy as np
 
 from embodied.assets.cache import write_bytes
 from embodied.assets.json_file import RecordError, parse, shown
-from embodied.datasets.matterport import tokenised
 from embodied.envs.continuous import (
     ContinuousEnv,
     ContinuousEpisode,
@@ -37,6 +36,7 @@ from embodied.envs.continuous import (
     seen_from,
 )
 from embodied.interface import FollowRoute, Place, Task
+from embodied.mattersim.conventions import tokenised
 from embodied.seeds import stream
 
 INSTRUCTION_TOKENS = 200

@@ -1,6 +1,6 @@
 """Matterport's conventions, and the fields of the files that the field's programs read.
 
-Only here, in embodied.mattersim and in exported files they apply: heading clockwise from +y, viewIndex
+Only in this package and in exported files they apply: heading clockwise from +y, viewIndex
 12 band + heading bin. Scans are named like our houses without underscores, because the programs join
 and split ids at underscores. embodied.datasets.folders writes the files; their fields:
 
