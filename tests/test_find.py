@@ -99,9 +99,10 @@ def test_a_teacher_counts_the_metres_that_are_left_after_each_option():
     assert costs[0] == math.inf and costs[1] == pytest.approx(2.0 * nearest)
 
 
-def test_who_sees_learns_to_find_things_and_who_is_blind_does_not(tmp_path):
+def test_who_sees_learns_to_find_things_and_who_is_blind_does_not(tmp_path, monkeypatch):
+    monkeypatch.setattr("embodied.agents.find.run.SINGLE_VIEWS", 0.9)
     split = split_of(grid_world(4))
-    finder, blind = finder_for(split, iterations=70), finder_for(split, sees="nothing", iterations=62)
+    finder, blind = finder_for(split, iterations=60), finder_for(split, sees="nothing", iterations=50)
     for agent in (finder, blind):
         learner = FindLearner(agent, split, labels_for(split, agent))
         numbers = [learner.learn(update) for update in range(agent.about.config.iterations)]
