@@ -47,8 +47,8 @@ def tokenize(text: str) -> list[str]:
     return _TOKEN.findall(text.lower())
 
 
-def filtered(pairs: Iterable[Pair], shortest: int = 3, longest: int = 50, ratio: float = 2.0) -> list[Pair]:
-    """Tokenized pairs of `shortest` to `longest` words a side, of similar length, each source once.
+def filtered(pairs: Iterable[Pair], shortest: int = 3) -> list[Pair]:
+    """Tokenized pairs of `shortest` to 50 words a side, neither twice as long as the other, each source once.
 
     The dissertation drops sentences of more than 50 words (3.1.5); the rest of the filter keeps
     menus and headings, of which this source is full, from ruling the ratings (docs/sources.md, S65).
@@ -57,7 +57,7 @@ def filtered(pairs: Iterable[Pair], shortest: int = 3, longest: int = 50, ratio:
     for pair in pairs:
         source, target = tokenize(pair.source), tokenize(pair.target)
         sizes = sorted((len(source), len(target)))
-        if sizes[0] < shortest or sizes[1] > longest or sizes[1] >= ratio * sizes[0]:
+        if sizes[0] < shortest or sizes[1] > 50 or sizes[1] >= 2 * sizes[0]:
             continue
         text = " ".join(source)
         if text not in seen:

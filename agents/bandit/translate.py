@@ -85,12 +85,10 @@ def decode(translator: Translator, source: Tensor, choose: Choice, longest: int)
     return [[n for n in row if n != PAD_NUMBER] for row in written.tolist()]
 
 
-def greedy(
-    translator: Translator, data: TokenizedCorpus, lexicon: Vocabulary, longest: int, batch: int = 128
-) -> list[tuple[str, ...]]:
+def greedy(translator: Translator, data: TokenizedCorpus, lexicon: Vocabulary, longest: int) -> list[tuple[str, ...]]:
     """The words of all sentences' likeliest translations (A.6), in their order."""
     translations: list[tuple[str, ...]] = [()] * len(data)
-    for chosen in in_order([len(s) for s in data.source], batch):
+    for chosen in in_order([len(s) for s in data.source], 128):
         for i, numbers in zip(
             chosen, decode(translator, padded([data.source[i] for i in chosen]), greedy_choice, longest), strict=True
         ):
@@ -99,10 +97,10 @@ def greedy(
 
 
 @torch.no_grad()
-def perplexity(translator: Translator, data: TokenizedCorpus, batch: int = 128) -> float:
+def perplexity(translator: Translator, data: TokenizedCorpus) -> float:
     """exp of the mean negative log-likelihood of the reference words, END included."""
     total, words = 0.0, 0
-    for chosen in in_order([len(s) for s in data.source], batch):
+    for chosen in in_order([len(s) for s in data.source], 128):
         target = padded([data.target[i] for i in chosen])
         total -= float(translator(padded([data.source[i] for i in chosen]), target).sum())
         words += int((target != PAD_NUMBER).sum())

@@ -7,7 +7,8 @@ k % 12 (counter-clockwise from +x), tilt k // 12 - 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import itertools
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -49,24 +50,15 @@ def views_of(panorama: Panorama, size: tuple[int, int] = VIEW_SIZE) -> np.ndarra
     )
 
 
-def encode_panoramas(encoder: Encoder, panoramas: Iterable[Panorama], batch: int = 8) -> np.ndarray:
+def encode_panoramas(encoder: Encoder, panoramas: Iterable[Panorama]) -> np.ndarray:
     """(n, 36, D) float16 features of panoramas, in order, as the encoder wants to look at them."""
     prepare, encode = (
         (strip_of, encoder.encode_strips) if encoder.sharing == "strip" else (views_of, encoder.encode_views)
     )
-    out = [encode(np.stack(group)) for group in _groups((prepare(p) for p in panoramas), batch)]
+    pictures, out = map(prepare, panoramas), []
+    while group := list(itertools.islice(pictures, 8)):
+        out.append(encode(np.stack(group)))
     return np.concatenate(out).astype(np.float16)
-
-
-def _groups(pictures: Iterator[np.ndarray], batch: int) -> Iterator[list[np.ndarray]]:
-    group: list[np.ndarray] = []
-    for picture in pictures:
-        group.append(picture)
-        if len(group) == batch:
-            yield group
-            group = []
-    if group:
-        yield group
 
 
 def feature_path(folder: Path, digest: str, world: str, pictures: PictureSettings = PLAIN) -> Path:

@@ -24,18 +24,17 @@ SIDES = (
 """Side on which something is, by its direction in steps of 30 degrees counter-clockwise from the gaze."""
 
 
-def described(description: Description, pose: Pose | None = None, most: int = 6) -> str:
+def described(description: Description, pose: Pose | None = None) -> str:
     """HARI's bag of features as a sentence.
 
     Args:
       pose: whose surroundings it describes; sides are named then. Directions of other places are left out.
-      most: objects to name.
     """
     actions = [f for f in description if f.kind == "action"]
     if actions:
         return "You are there." if actions[0].name == "stop" else "It is the next step from where you are."
     rooms = [f.name.replace("_", " ") for f in description if f.kind == "room"]
-    things = [_thing(f, pose) for f in description if f.kind == "object"][:most]
+    things = [_thing(f, pose) for f in description if f.kind == "object"][:6]
     place = f"{'You are in' if pose else 'Go to a place in'} the {rooms[0]}" if rooms else "There is no room to name"
     return f"{place}, with {_listed(things)}." if things else f"{place}."
 

@@ -329,13 +329,12 @@ class ShortestPathFollower:
     that is what DAgger asks for.
     """
 
-    def __init__(self, env: ContinuousEnv, *, along: bool = False, near: float = 0.3) -> None:
+    def __init__(self, env: ContinuousEnv, *, along: bool = False) -> None:
         """
         Args:
           along: keep to the reference path, point by point.
-          near: STOP within so many metres of a goal, or within the episode's radius where that is less.
         """
-        self._env, self._near = env, min(near, 0.9 * env.episode.radius)
+        self._env, self._near = env, min(0.3, 0.9 * env.episode.radius)
         points = env.episode.reference[1:-1] if along else ()
         cells = [np.array([env.ground.cell_at(np.array(p))]) for p in points]
         goals = tuple(replace(a, views=_middle(a)) for a in env.episode.goals)
