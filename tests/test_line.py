@@ -240,7 +240,7 @@ def test_doctor_tells_the_remedy_when_the_furniture_is_missing(shared_cache, mon
         (["render", "nowhere", "--node", "3"], "--equirect"),
         (["doctor", "--pack", "none.sh3f"], "--fix"),
         (["doctor", "--fix", "--pack", "none.sh3f"], "none.sh3f"),
-        (["light", "nowhere", "--time", "tea"], "--time"),
+        (["light", "nowhere", "--hour", "tea"], "--hour"),
         (["view", "nowhere.rrd"], "nowhere.rrd"),
         (["rollout", "--episodes", "0"], "--episodes"),
         (["assets", "list", "--class", "unicorn"], "unicorn"),

@@ -168,7 +168,7 @@ ORDERS = {
     "export parquet": ["export", "parquet", "--data", "{data}", "--out", "{out}"],
     "export streamvln": ["export", "streamvln", "--data", "{data}", "--out", "{out}"],
     "export mjcf": ["export", "mjcf", "--house", "{out}", "--light", "none", "--out", "{out}"],
-    "light": ["light", "{out}", "--time", "9"],
+    "light": ["light", "{out}", "--hour", "9"],
     "light more": ["light", "{out}", "--lights", "2"],
 }
 

@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from embodied import cli
-from embodied.cli.light import hour
+from embodied.cli.light import hour_of_day
 from embodied.options import any_folder, any_path, file_to_write, folder_to_write, positive, video_side, whole
 
 
@@ -30,9 +30,9 @@ LEARN = ("--data", "d", "--out", "o")
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("light", "x", "--lights", "0", "--time", "night"), "--lights: should be a whole number of at least 1"),
-        (("light", "x", "--time", "25:00"), "such as 17:30 or 17.5, got '25:00'"),
-        (("light", "x", "--time", "nan"), "--time: should be one of dawn"),
+        (("light", "x", "--lights", "0", "--hour", "night"), "--lights: should be a whole number of at least 1"),
+        (("light", "x", "--hour", "25:00"), "such as 17:30 or 17.5, got '25:00'"),
+        (("light", "x", "--hour", "nan"), "--hour: should be one of dawn"),
         (("light", __file__), "is a file; name the folder that it is in"),
         (("light", "/no/such/folder"), "house.json does not exist; make one with"),
         (("render", "x", "--node", "1", "--view", "v.mp4"), "--view: should end in .png, which is written"),
@@ -94,7 +94,7 @@ def test_odd_arguments_are_refused_before_any_work(words, message, capsys, tmp_p
         (whole(0), ("0",), ("-1",)),
         (video_side, ("16", "480"), ("17", "0", "4098")),
         (positive, ("0.5", "3"), ("0", "-1", "nan", "inf", "1e999", "x")),
-        (hour, ("16:00", "16.5", "night", "0"), ("24", "16:60", "noonish", "-1", "nan", "")),
+        (hour_of_day, ("16:00", "16.5", "night", "0"), ("24", "16:60", "noonish", "-1", "nan", "")),
         (any_path, (".", "ü"), ("", "a\udcff")),
         (any_folder, (".", "new/one"), (__file__,)),
         (folder_to_write, ("new/one",), (f"{__file__}/x",)),

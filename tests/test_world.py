@@ -139,7 +139,7 @@ def test_light_is_kept_beside_the_house_and_shown_by_its_folder(two_room_house, 
     monkeypatch.setattr("embodied.light.bake_all", lambda lightings, *_, **__: [baked for _ in lightings])
     monkeypatch.setattr("embodied.light.backend.device", lambda: "llvm")
     light = ["light", str(folder), "--cache", str(tmp_path)]
-    assert main([*light, "--time", "dusk"]) == main([*light, "--weather", "overcast", "--lights", "2"]) == 0
+    assert main([*light, "--hour", "dusk"]) == main([*light, "--weather", "overcast", "--lights", "2"]) == 0
     assert (folder / "house.json").read_bytes() == before, "features belong to it"
     shown = open_folder(folder, cache=tmp_path).house
     assert (shown.sky.hour, shown.sky.weather) == (19.2, "overcast") and shown.placements == house.placements

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from embodied.house.house import House
 
 TIMES = {"dawn": 6.5, "morning": 9.0, "noon": 12.5, "afternoon": 15.5, "dusk": 19.2, "night": 23.0}
-"""Words for --time, as local solar hours."""
+"""Words for --hour, as local solar hours."""
 
 
-def hour(text: str) -> float:
+def hour_of_day(text: str) -> float:
     """Hours in [0, 24) of a word, a number, or hours and minutes."""
     try:
         clock = re.fullmatch(r"(\d{1,2}):([0-5]\d)", text)
@@ -44,7 +44,7 @@ def hour(text: str) -> float:
 class LightOptions(Furnished, Printed):
     folder: Annotated[Path, Option(house_folder, "DIR", name="folder")]
     """Folder that `embodied house` wrote."""
-    time: Annotated[float | None, Option(hour, "TIME")] = None
+    hour: Annotated[float | None, Option(hour_of_day, "HOUR")] = None
     """Hour of the day: dawn, morning, noon, afternoon, dusk, night, or one such as 17:30 or 17.5."""
     weather: Annotated[str | None, Option(words=WEATHERS)] = None
     """The sky."""
@@ -69,7 +69,7 @@ def run(args: LightOptions) -> None:
     device()  # or LightError, before any work
     catalogue = catalogue_of(args)
     house = load_lit_house(args.folder, catalogue)
-    changed = with_sky(house, args.time, args.weather, args.lamps, args.landscape, args.season)
+    changed = with_sky(house, args.hour, args.weather, args.lamps, args.landscape, args.season)
     lightings = lightings_of(changed, args.lights)
     if args.lights > 1 or changed != house:
         with locked(args.folder):
@@ -93,14 +93,14 @@ def run(args: LightOptions) -> None:
 
 def with_sky(
     house: House,
-    time: float | None,
+    hour: float | None,
     weather: str | None,
     lamps: str | None,
     landscape: str | None = None,
     season: str | None = None,
 ) -> House:
     """`house` at another hour, in other weather or surroundings, with its lamps on or off; None keeps what is."""
-    given: dict[str, Any] = {"hour": time, "weather": weather, "landscape": landscape, "season": season}
+    given: dict[str, Any] = {"hour": hour, "weather": weather, "landscape": landscape, "season": season}
     sky = dataclasses.replace(house.sky, **{name: value for name, value in given.items() if value is not None})
     lights = house.lights
     if lamps is not None:
