@@ -322,7 +322,7 @@ def open_episodes(
       pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere, matte unless they name a look.
       preset: one of PRESETS: body and camera; that of the kind where not given.
       observations: some of LIVE_CHANNELS.
-      changes: fields of Body and Lens that differ from the preset's.
+      changes: fields of Body and CameraConfig that differ from the preset's.
 
     Raises:
       ValueError: an unknown preset or option, or episodes of other houses or in another frame.
