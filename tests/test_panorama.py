@@ -282,13 +282,6 @@ def test_only_channels_that_are_asked_for_are_decoded(stored, monkeypatch):
     assert np.array_equal(back.ids, panoramas[1].ids) and decoded == ["rgb", "ids"], "also once the file is closed"
 
 
-def test_lossless_colours_are_exact(tmp_path):
-    p = analytic(16)
-    write_panoramas(tmp_path / "x.pano", [p], {}, lossless=True)
-    with PanoramaFile(tmp_path / "x.pano") as file:
-        assert np.array_equal(file.rgb(0), p.rgb)
-
-
 def test_a_truncated_or_foreign_file_is_refused(stored):
     path, _ = stored
     data = path.read_bytes()

@@ -3,8 +3,7 @@
 Layout: 8 bytes magic; the encoded pictures of every node one after another; the index (JSON); its
 length, its SHA-256 and the magic again. Per node three pictures with the six faces side by side:
 
-  rgb    JPEG, quality 90 without chroma subsampling (44 dB on lit flats, ten above the light's own error), or PNG
-         when asked for lossless
+  rgb    JPEG, quality 90 without chroma subsampling (44 dB on lit flats, ten above the light's own error)
   depth  16-bit PNG of whole millimetres (error at most 0.5 mm up to 65.5 m, 0 where nothing is)
   ids    16-bit PNG, exact
 
@@ -35,7 +34,10 @@ from embodied.render.panorama import Panorama
 MAGIC = b"EMBPANO1"
 TAIL = struct.Struct("<Q32s8s")
 """Length of the index, its SHA-256, the magic."""
-JPEG_QUALITY = 90
+JPEG_OPTIONS = (
+    *(cv2.IMWRITE_JPEG_QUALITY, 90, cv2.IMWRITE_JPEG_OPTIMIZE, 1),
+    *(cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444),
+)
 SMOOTH = (cv2.IMWRITE_PNG_COMPRESSION, 6, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP)
 """For planes and areas: a fifth smaller, and read sooner, than with OpenCV's own choice."""
 FARTHEST_STORED = 65.535
@@ -55,6 +57,7 @@ class PanoramaIndex:
     size: int
     """Side of a face, pixels."""
     lossless: bool
+    """False in all files that are written."""
     nodes: tuple[dict[str, tuple[int, int, int]], ...]
     """By channel: where its picture begins, its length and its CRC-32."""
 
@@ -192,45 +195,30 @@ class _Stored(Panorama):
         return self._file.decoded(self._data["ids"], self._node, "ids")
 
 
-def write_panoramas(
-    path: Path, panoramas: Iterable[Panorama], meta: Mapping[str, object], lossless: bool = False
-) -> None:
+def write_panoramas(path: Path, panoramas: Iterable[Panorama], meta: Mapping[str, object]) -> None:
     """Write `panoramas` (node 0, 1, ...) to `path` atomically.
 
     Args:
       meta: JSON-able facts about what they were made from and with.
-      lossless: keep the colours exactly, for about four times the space.
     """
     with atomic_path(Path(path)) as temporary, open(temporary, "wb") as f:
         f.write(MAGIC)
         nodes, size = [], 0
         for panorama in panoramas:
             size, entry = panorama.size, {}
-            for channel, data in zip(CHANNELS, encode(panorama, lossless), strict=True):
+            for channel, data in zip(CHANNELS, encode(panorama), strict=True):
                 entry[channel] = [f.tell(), len(data), zlib.crc32(data)]
                 f.write(data)
             nodes.append(entry)
-        index = json.dumps({"meta": dict(meta), "size": size, "lossless": lossless, "nodes": nodes}).encode()
+        index = json.dumps({"meta": dict(meta), "size": size, "lossless": False, "nodes": nodes}).encode()
         f.write(index)
         f.write(TAIL.pack(len(index), hashlib.sha256(index).digest(), MAGIC))
 
 
-def encode(panorama: Panorama, lossless: bool = False) -> tuple[bytes, bytes, bytes]:
+def encode(panorama: Panorama) -> tuple[bytes, bytes, bytes]:
     """The three pictures of a node as files: rgb, depth, ids."""
     bgr = cv2.cvtColor(beside(panorama.rgb), cv2.COLOR_RGB2BGR)
-    if lossless:
-        rgb = _encoded(".png", bgr, cv2.IMWRITE_PNG_COMPRESSION, 3)
-    else:
-        rgb = _encoded(
-            ".jpg",
-            bgr,
-            cv2.IMWRITE_JPEG_QUALITY,
-            JPEG_QUALITY,
-            cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
-            cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
-            cv2.IMWRITE_JPEG_OPTIMIZE,
-            1,
-        )
+    rgb = _encoded(".jpg", bgr, *JPEG_OPTIONS)
     metres = np.where(np.isfinite(panorama.depth), np.minimum(panorama.depth, FARTHEST_STORED), 0)
     depth = _encoded(".png", beside(np.rint(metres * 1000).astype(np.uint16)), *SMOOTH)
     if panorama.ids.max() > 65535:
