@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from embodied.action_spaces import PanoramicMoves
-from embodied.datasets import matterport
 from embodied.interface import Pose
+from embodied.mattersim.conventions import VIEW_OF_INDEX
 from embodied.navigation.graph import graph_of
 from embodied.render import sampling
 from embodied.render.panorama import (
@@ -217,7 +217,7 @@ def test_view_k_is_the_view_that_poses_and_candidates_call_k():
 
 def test_the_matterport_order_is_its_own():
     """Matterport3DSimulator: heading 30 (k % 12) degrees clockwise from +y, elevation 30 (k // 12 - 1) degrees."""
-    views = analytic().views36(32)[matterport.VIEW_OF_INDEX]
+    views = analytic().views36(32)[VIEW_OF_INDEX]
     for k in range(36):
         heading, elevation = math.radians(30 * (k % 12)), math.radians(30 * (k // 12 - 1))
         centre = views[k, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
