@@ -1,19 +1,15 @@
 # Two commands matter: `make demo` shows it, `make test` proves it. Both do all the set-up they need.
-.PHONY: help demo test quick setup browser page lint docs wheels clean
+.PHONY: help demo test quick setup browser page linked lint docs wheels clean
 PYTHON ?=
 OUT ?= out/demo
 SEED ?=
-
-# one package in one folder, as a wheel installs it, for tools that read sources
-LINKED = rm -rf build/linked; mkdir -p build/linked/embodied; ln -s $(CURDIR)/embodied/* $(CURDIR)/agents $(CURDIR)/assets \
-  $(CURDIR)/viz build/linked/embodied/
 
 help:
 	@echo 'make demo    seed -> furnished house -> panoramas -> an agent finds something -> Rerun recording, in $(OUT)'
 	@echo 'make test    the whole test suite'
 	@echo 'make setup   only the set-up: system packages, .venv, Python packages'
 	@echo 'make quick   the tests that take less than a minute together'
-	@echo 'make lint    ruff, its formatter, import-linter, mypy'
+	@echo 'make lint    ruff, its formatter, names and docstrings, import-linter, mypy'
 	@echo 'make docs    the documentation site, in site/; warnings are errors'
 	@echo 'make browser install Chromium and Caddy (Debian), without which the tests of `embodied serve` in them are skipped'
 	@echo 'make page    build the page of `embodied serve` from web/ with Node'
@@ -28,10 +24,15 @@ demo: setup
 test: setup
 	@OMP_NUM_THREADS=1 .venv/bin/python -m pytest -q -n 2 --dist worksteal
 
-lint: setup
+# one package in one folder, as a wheel installs it, for tools that read sources
+linked:
+	@mkdir -p build/linked/embodied; find build/linked -xtype l -delete
+	@ln -sfn $(CURDIR)/embodied/* $(CURDIR)/agents $(CURDIR)/assets $(CURDIR)/viz build/linked/embodied/
+
+lint: setup linked
 	@.venv/bin/ruff check .
 	@.venv/bin/ruff format --check .
-	@$(LINKED)
+	@.venv/bin/python packaging/lint_words.py
 	@(cd build/linked && ../../.venv/bin/lint-imports --config ../../pyproject.toml --no-cache) > build/imports.log 2>&1 \
 	  || { cat build/imports.log; false; }
 	@.venv/bin/mypy
@@ -39,8 +40,7 @@ lint: setup
 quick: setup
 	@OMP_NUM_THREADS=1 .venv/bin/python -m pytest -q -m 'not slow' -n 2 --dist worksteal
 
-docs: setup
-	@$(LINKED)
+docs: setup linked
 	@.venv/bin/python docs/build_results.py
 	@.venv/bin/python docs/build_reference.py
 	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict -q

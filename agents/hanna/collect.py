@@ -50,17 +50,17 @@ def labelled(
     step."""
     labels = [teacher.relabel(e, worlds[e.task.world]) for e in episodes]
     rows = [labels[position][t] for t, m in enumerate(moments) for position in m.positions]
-    said = [m.scores for m in moments]
-    most, device = max(s.navigation.shape[1] for s in said), said[0].navigation.device
+    scores = [m.scores for m in moments]
+    most, device = max(s.navigation.shape[1] for s in scores), scores[0].navigation.device
     negatives = np.zeros((len(rows), most), dtype=bool)
     for i, label in enumerate(rows):
         for action in label.negatives:
             negatives[i, action_index(action)] = True
-    reasons = [s.reasons for s in said if s.reasons is not None]
+    reasons = [s.reasons for s in scores if s.reasons is not None]
     true_reasons = np.array([r.reasons or (False, False, False) for r in rows], dtype=np.float32)
     return Experience(
-        moves=torch.cat([F.pad(s.navigation, (0, most - s.navigation.shape[1]), value=-torch.inf) for s in said]),
-        asks=torch.cat([s.ask for s in said]),
+        moves=torch.cat([F.pad(s.navigation, (0, most - s.navigation.shape[1]), value=-torch.inf) for s in scores]),
+        asks=torch.cat([s.ask for s in scores]),
         reasons=torch.cat(reasons) if reasons else None,
         right_moves=torch.tensor([IGNORE if r.move is None else action_index(r.move) for r in rows], device=device),
         negatives=torch.from_numpy(negatives).to(device),
