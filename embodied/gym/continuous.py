@@ -214,7 +214,7 @@ class ContinuousGymEnv(LiveEnv):
         observation: dict[str, Any] = self.pixels()
         observation["instruction"] = codes_of(self.task_description, LONGEST_INSTRUCTION).copy()
         if self.dataset.task.gps:
-            observation["gps"], observation["compass"] = self.gps(), np.array([self.turned()], np.float32)
+            observation["gps"], observation["compass"] = self.odometry()[:2], np.array([self.turned()], np.float32)
         return observation
 
     def pixels(self) -> dict[str, np.ndarray]:
@@ -222,10 +222,6 @@ class ContinuousGymEnv(LiveEnv):
         camera, world = self.dataset.camera, self.dataset.world(self.play.episode.world)
         pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
         return live_pixels(world, pose, (camera.height, camera.width), self.dataset.observations)
-
-    def gps(self) -> np.ndarray:
-        """(2,) float32 metres ahead and to the left of the start, in the start's frame."""
-        return self.odometry()[:2]
 
     def turned(self) -> float:
         """Radians turned to the left since the start, in [-pi, pi)."""

@@ -91,11 +91,6 @@ def at(*shares: float) -> Shares:
     return lambda: shares
 
 
-def about_the_middle(rng: np.random.Generator) -> Shares:
-    """One share, drawn anew for each wall or stretch."""
-    return lambda: (float(rng.uniform(0.3, 0.7)),)
-
-
 def stretches(wall: Wall) -> list[tuple[float, float]]:
     """(from, to) of the stretches without openings, metres."""
     edges = [0.0, *(e for s0, s1, _ in wall.openings for e in (s0, s1)), wall.length]

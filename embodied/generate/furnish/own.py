@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 from embodied.assets.records import Asset
 from embodied.generate.furnish.ceilings import hang_from_ceiling
 from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.groups import put_group
-from embodied.generate.furnish.mounting import Hanging, about_the_middle, along_stretches, hang_first
+from embodied.generate.furnish.mounting import Hanging, along_stretches, hang_first
 from embodied.generate.furnish.tables import FurnitureGroup, GroupPart
 
 GROUP = "own"
@@ -28,19 +27,14 @@ def place_own(ctx: Context) -> None:
     for name in ctx.stock.catalogue.own_classes:
         weights = {a.key: a.rooms.get(ctx.kind, 0.0) for a in ctx.stock.of_role(name) if a.support != "surface"}
         if ctx.chance(min(max(weights.values(), default=0.0), 1.0)):
-            placed = frozenset(key for key, weight in weights.items() if weight > 0)
-            asset = ctx.pick(name, where=functools.partial(_is_one_of, placed))
+            asset = ctx.pick(name, where=lambda a: a.support != "surface" and a.rooms.get(ctx.kind, 0.0) > 0)
             if asset is not None:
                 _place(ctx, asset)
 
 
-def _is_one_of(keys: frozenset[str], asset: Asset) -> bool:
-    return asset.key in keys
-
-
 def _place(ctx: Context, asset: Asset) -> None:
     if asset.support == "wall":
-        spots = along_stretches(ctx.space.longest_walls, about_the_middle(ctx.rng))
+        spots = along_stretches(ctx.space.longest_walls, lambda: (float(ctx.rng.uniform(0.3, 0.7)),))
         hang_first(ctx, Hanging(asset, asset.elevation, GROUP, role=asset.object_class), spots)
         return
     if asset.support == "ceiling":
