@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.assets.cache import default_cache
-from embodied.plugins import named_object
+from embodied.kinds.plugins import named_object
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, SplitData

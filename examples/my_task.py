@@ -15,8 +15,8 @@ import numpy as np
 
 from embodied.envs.base import HelpEnv
 from embodied.interface import TURNS, Extras, GoTo, Pose, Task
+from embodied.kinds.task_kind import ArraySpec, ExtraArrays, Metric, StoryStyle, TaskKind, parts_of_pool, register_kind
 from embodied.seeds import stream
-from embodied.task_kind import ArraySpec, ExtraArrays, Metric, StoryStyle, TaskKind, parts_of_pool, register_kind
 
 NAME = "my_task:VISIT"
 ROOMS = 3

@@ -17,14 +17,14 @@ from hand_worlds import grid_world, thing
 
 from embodied.datasets.build import DatasetConfig, build_dataset, units
 from embodied.datasets.store import Dataset
+from embodied.kinds.plugins import shipped_kinds
+from embodied.kinds.task_kind import kind_named
 from embodied.mattersim.conventions import in_matterport_order
-from embodied.plugins import shipped_kinds
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import recorded
 from embodied.scene.house_meshes import owners
 from embodied.seeds import stream
-from embodied.task_kind import kind_named
 
 DATA_KINDS = tuple(name for name in shipped_kinds() if kind_named(name).splits)
 """Kinds of tasks with data sets."""

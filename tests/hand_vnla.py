@@ -10,9 +10,9 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent
 from embodied.agents.vnla.config import TRAINED_UNDER, VnlaSettings
-from embodied.kinds.vnla import VNLA
+from embodied.kinds.shipped.vnla import VNLA
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
-from embodied.task_kind import EnvInputs
 from embodied.tasks.vnla import vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
 

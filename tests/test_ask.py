@@ -31,9 +31,9 @@ from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite
 from embodied.gym.spaces import SpaceLayout, number
 from embodied.interface import Ask, Intention, Move, Pose, Stop
-from embodied.kinds.ask import ASK, ask_environments, price, success_progress, weighted_success
+from embodied.kinds.metrics import success
+from embodied.kinds.shipped.ask import ASK, ask_environments, price, success_progress, weighted_success
 from embodied.language.questions import intention_of
-from embodied.metrics import success
 from embodied.policies.ask import ASKER_RULES, Asker, EpisodeMemory, reached
 from embodied.records import from_json, to_json
 from embodied.tasks.ask import AMBIGUOUS, ask_pool, ask_tasks, look_of

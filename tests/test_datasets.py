@@ -13,21 +13,21 @@ import numpy as np
 import pytest
 from hand_data import DATA_KINDS, build, built, content, hand_house, small_house
 
-from embodied import metrics
 from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
 from embodied.datasets.scale import quota, scale
 from embodied.datasets.store import Dataset, DatasetError
 from embodied.evaluation.rollout import play
 from embodied.house.house import HouseError
 from embodied.interface import Ask
-from embodied.kinds.hari import object_part, room_part
+from embodied.kinds import metrics
+from embodied.kinds.shipped.hari import object_part, room_part
+from embodied.kinds.splits import DatasetSize
+from embodied.kinds.task_kind import kind_named
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import RecordError
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import Baked, Unlit
-from embodied.splits import DatasetSize
-from embodied.task_kind import kind_named
 from embodied.world import differing
 
 pytestmark = pytest.mark.slow

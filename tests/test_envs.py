@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
-from embodied import metrics
 from embodied.action_spaces import MonocularMoves, PanoramicMoves, nearest_views
 from embodied.envs.base import ActionError, HelpEnv, TaskError
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Pose, Stop
+from embodied.kinds import metrics
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest

@@ -15,8 +15,8 @@ from embodied.cli.evaluate import rows_of
 from embodied.datasets.store import Dataset
 from embodied.evaluation import tables
 from embodied.evaluation.evaluate import agent, evaluate, spread
+from embodied.kinds.task_kind import kind_named
 from embodied.records import episodes_file
-from embodied.task_kind import kind_named
 
 
 def test_the_interval_of_independent_values_is_the_textbook_one():

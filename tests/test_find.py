@@ -9,7 +9,6 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
-from embodied import metrics
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
@@ -20,8 +19,9 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split
 from embodied.evaluation.rollout import play
 from embodied.interface import Move, Sight
-from embodied.kinds.find import FIND
-from embodied.task_kind import EnvInputs
+from embodied.kinds import metrics
+from embodied.kinds.shipped.find import FIND
+from embodied.kinds.task_kind import EnvInputs
 
 torch.set_num_threads(1)
 SIZE = 24

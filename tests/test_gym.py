@@ -22,7 +22,7 @@ from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariRules
 from embodied.gym.spaces import SpaceLayout, decode, number, text_of
 from embodied.interface import Ask, Intention, Move, Reply, Stop, Subtask
-from embodied.plugins import shipped_kinds
+from embodied.kinds.plugins import shipped_kinds
 from embodied.teachers.shortest import shortest_action
 
 

@@ -12,14 +12,14 @@ import pytest
 from hand_hanna import LINE_ROUTES, LINE_TASK, grid_setup, line_env
 from hand_worlds import grid_world, line_world
 
-from embodied import metrics
 from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna, AssistantError
 from embodied.assistants.route_system import ancestors, build_routes, sampled_paths, spanning_parents, spanning_paths
 from embodied.envs.base import ActionError
 from embodied.evaluation.rollout import play
 from embodied.interface import VIEWS, Ask, Intention, Mode, Move, Pose, Route, Step, Stop, Thought, Viewpoint, viewpoint
-from embodied.kinds.hanna import subtask_success
+from embodied.kinds import metrics
+from embodied.kinds.shipped.hanna import subtask_success
 from embodied.language.detokenize import detokenized
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops

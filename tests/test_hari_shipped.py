@@ -8,7 +8,6 @@ import pytest
 import torch
 from hand_worlds import grid_world
 
-from embodied import metrics
 from embodied.agents.common.shipped import SHIPPED_HARI, WEIGHTS
 from embodied.agents.common.weights import origin_of
 from embodied.agents.hari.agent import HariAgent, load_agent
@@ -16,9 +15,10 @@ from embodied.agents.hari.policy import policy_of
 from embodied.envs.hari import HariRules
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
-from embodied.kinds.hari import HARI
+from embodied.kinds import metrics
+from embodied.kinds.shipped.hari import HARI
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
-from embodied.task_kind import EnvInputs
 from embodied.tasks.hari import hari_pool, hari_task
 
 

@@ -24,7 +24,6 @@ from hand_chat import ChatServer, Parrot, first_allowed, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
-from embodied import metrics
 from embodied.agents.language_models.agent import LanguageModelAgent, Messages
 from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
@@ -42,12 +41,13 @@ from embodied.evaluation.rollout import play
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import SensorSuite
 from embodied.interface import Ask, Episode, Intention, Mode, Move, Pose, Reply, Route, Sighting, Step, Subtask, Usage
-from embodied.kinds.ask import ask_environments
-from embodied.kinds.find import FIND
+from embodied.kinds import metrics
+from embodied.kinds.shipped.ask import ask_environments
+from embodied.kinds.shipped.find import FIND
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language import PlainLanguage
 from embodied.records import from_json, to_json
 from embodied.render.panorama import Panorama
-from embodied.task_kind import EnvInputs
 from embodied.tasks.ask import ask_pool, ask_tasks, look_of
 from embodied.tasks.find import find_pool, find_task
 

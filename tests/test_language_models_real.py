@@ -19,12 +19,12 @@ from embodied.agents.language_models.client import AnswerCache, Client, ServerSe
 from embodied.cli.llm import SMOLLM, serving
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Intention
-from embodied.kinds.ask import ask_environments
-from embodied.kinds.find import FIND
+from embodied.kinds.metrics import usage
+from embodied.kinds.shipped.ask import ask_environments
+from embodied.kinds.shipped.find import FIND
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language import PlainLanguage
-from embodied.metrics import usage
 from embodied.records import to_json
-from embodied.task_kind import EnvInputs
 from embodied.tasks.ask import ask_pool, ask_tasks, look_of
 from embodied.tasks.find import find_pool, find_task
 

@@ -26,7 +26,7 @@ from embodied.datasets.lerobot import (
     seen_depth,
 )
 from embodied.evaluation.rollout import play
-from embodied.metrics import success
+from embodied.kinds.metrics import success
 from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import save_lines
 from embodied.render.panorama_file import PanoramaFile

@@ -26,8 +26,8 @@ from embodied.evaluation.rollout import play, rollout
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.interface import Pose
+from embodied.kinds.metrics import spl, success
 from embodied.language import People
-from embodied.metrics import spl, success
 from embodied.policies.baselines import RandomWalk, Shortest
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import Baked

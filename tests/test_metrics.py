@@ -7,9 +7,9 @@ import math
 import pytest
 from hand_worlds import line_world
 
-from embodied import metrics
 from embodied.envs.base import HelpEnv
 from embodied.interface import FindObject, FollowRoute, Move, Pose, Stop, Task
+from embodied.kinds import metrics
 
 
 def task(radius: float = 0.0, start: int = 0, goals: tuple[int, ...] = (3,), horizon: int = 9) -> Task:

@@ -26,13 +26,13 @@ from embodied.datasets import build
 from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
 from embodied.interface import Move, Stop, act
-from embodied.metrics import spl, success
+from embodied.kinds.metrics import spl, success
+from embodied.kinds.task_kind import TaskKind, kind_named, register_kind
 from embodied.navigation.graph import build_graph
 from embodied.render.pictures import Baked
 from embodied.serve.game import Game, set_table
 from embodied.serve.store import Event
 from embodied.serve.study import StudyPart
-from embodied.task_kind import TaskKind, kind_named, register_kind
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 NAME = "my_task:VISIT"
@@ -182,7 +182,7 @@ def test_a_wrong_name_says_what_there_is(name):
 
 
 def test_every_shipped_kind_is_found_by_its_file():
-    from embodied.plugins import shipped_kinds
+    from embodied.kinds.plugins import shipped_kinds
 
     for name, title in shipped_kinds().items():
         kind = kind_named(name)

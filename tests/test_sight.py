@@ -13,7 +13,6 @@ from hand_vnla import TINY as VNLA
 from hand_vnla import lesson
 from test_hanna_learner import agent_for, setting
 
-from embodied import metrics
 from embodied.agents.hanna.evaluation import sight_policies
 from embodied.agents.hanna.recognition_study import Query, auc, measured, precision_recall, threshold
 from embodied.agents.vision.bank import FeatureBank
@@ -24,6 +23,7 @@ from embodied.agents.vision.training_data import Split
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import interval
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
+from embodied.kinds import metrics
 from embodied.render.panorama import Panorama, face_rays
 
 ROOT = Path(__file__).resolve().parent.parent

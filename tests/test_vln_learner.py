@@ -27,10 +27,10 @@ from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import SplitData, dataset_of
 from embodied.evaluation.rollout import play
 from embodied.interface import Move
-from embodied.kinds.vln import VLN
+from embodied.kinds.shipped.vln import VLN
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
 from embodied.policies.baselines import Forward10
-from embodied.task_kind import EnvInputs
 from embodied.tasks.vln import vln_task
 
 TINY = FollowerSettings(hidden_size=32, dropout=0.0, iterations=40, batch=12, learning_rate=5e-3, instruction_length=30)

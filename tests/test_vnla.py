@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from hand_worlds import grid_world, line_world
 
-from embodied import metrics
 from embodied.action_spaces import WORDS, MonocularMoves
 from embodied.assistants.advisor import Advisor
 from embodied.envs.base import ActionError
 from embodied.envs.vnla import RULES_OF_PLAY, Algorithm6Env, DirectVnlaEnv, MuteDirectVnlaEnv, VnlaEnv, fitted
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, FindObject, Mode, Move, Pose, Stop, Task, Thought
-from embodied.kinds.find import FIND
-from embodied.kinds.vnla import VNLA
+from embodied.kinds import metrics
+from embodied.kinds.shipped.find import FIND
+from embodied.kinds.shipped.vnla import VNLA
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage, heard_subgoal
 from embodied.policies.baselines import Shortest, SubgoalListener, VnlaAsking
-from embodied.task_kind import EnvInputs
 from embodied.tasks.vnla import MOST_ACTIONS, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import AskRules, VnlaTeacher, ask_reason
 

@@ -14,8 +14,8 @@ from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
-from embodied.kinds.vnla import VNLA
-from embodied.task_kind import EnvInputs
+from embodied.kinds.shipped.vnla import VNLA
+from embodied.kinds.task_kind import EnvInputs
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from rerun.blueprint.encodings import TextLogColumn
 
 from embodied.house.house import House
 from embodied.interface import Ask, Episode
+from embodied.kinds.task_kind import kind_named
 from embodied.render.pictures import PictureSettings
-from embodied.task_kind import kind_named
 
 LIGHT = {"unlit": "without light", "fast": "lit, fast", "normal": "lit", "traced": "lit, ray-traced"}
 """How a house is drawn, for people."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from embodied.assistants.words import described
 from embodied.interface import Ask, Intention, Mode, Place, Pose, Reply, Step, Task, Viewpoint
+from embodied.kinds.task_kind import kind_named
 from embodied.language.detokenize import detokenized
-from embodied.task_kind import kind_named
 
 QUESTIONS = {
     Intention.HELP: "Can you help me?",

@@ -21,13 +21,13 @@ import rerun as rr
 from scipy.spatial.transform import Rotation
 
 from embodied.interface import Ask, Episode, Mode, Move, Pose, Step, Stop, Task
+from embodied.kinds.task_kind import kind_named
 from embodied.language.detokenize import detokenized
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import camera_at
 from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
-from embodied.task_kind import kind_named
 from embodied.viz.blueprint import blueprint_of
 from embodied.viz.described import boxes, log_described, log_recognised
 from embodied.viz.episode_log import EpisodeLog, question_of

@@ -29,8 +29,8 @@ from embodied.interface import (
     Situations,
     Stop,
 )
-from embodied.kinds.ask import price
-from embodied.metrics import success
+from embodied.kinds.metrics import success
+from embodied.kinds.shipped.ask import price
 from embodied.policies.ask import Asker, EpisodeMemory, confirm_on_sight, onward, reached
 
 EVERY = 4

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from embodied import metrics
 from embodied.agents.ask.config import AskerConfig, AskEvaluation
 from embodied.agents.ask.foresight import Foresight
 from embodied.agents.ask.learned import Decisions, LearnedAsker, load_asker, shown, train
@@ -27,7 +26,8 @@ from embodied.evaluation.tables import measured
 from embodied.generate import HouseConfig
 from embodied.identity import Identity, identity_of
 from embodied.interface import Action, Agent, Ask, Detection, Intention, Observation, Task
-from embodied.kinds.ask import ASK, ask_environments
+from embodied.kinds import metrics
+from embodied.kinds.shipped.ask import ASK, ask_environments
 from embodied.policies.ask import Asker, EpisodeMemory, PricedAskRule, between, first
 from embodied.records import save_lines
 from embodied.tasks.ask import ask_split, look_of

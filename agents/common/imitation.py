@@ -15,7 +15,6 @@ from typing import Any, ClassVar, Unpack
 import torch
 from torch import Tensor
 
-from embodied import metrics
 from embodied.agents.common import parallel
 from embodied.agents.common.playing import TaskSet, play_with_memory
 from embodied.agents.common.session import (
@@ -34,6 +33,7 @@ from embodied.errors import UnableError
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
 from embodied.interface import Agent, Ask, Episode, Place, Task
+from embodied.kinds import metrics
 
 VALIDATION_BATCH = 32
 """Episodes evaluated in parallel; changes speed, not results."""

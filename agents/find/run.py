@@ -11,7 +11,6 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
-from embodied import metrics
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
@@ -39,10 +38,11 @@ from embodied.datasets.store import Dataset
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity, identity_of
 from embodied.interface import STEP, TURNS, VIEWS, FindObject, Place, Pose, Sight, Task
-from embodied.kinds.find import FIND
+from embodied.kinds import metrics
+from embodied.kinds.shipped.find import FIND
+from embodied.kinds.task_kind import EnvInputs
 from embodied.language.plain_language import PlainLanguage
 from embodied.seeds import stream
-from embodied.task_kind import EnvInputs
 from embodied.tasks.find import find_pool, find_task
 
 SINGLE_VIEWS = 0.75

@@ -17,8 +17,8 @@ from embodied.agents.vision.encoder import encoder_of
 from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.agents.vision.training_data import TrainingData
 from embodied.datasets.store import Dataset, SplitData
-from embodied.kinds.find import FIND
-from embodied.task_kind import EnvInputs
+from embodied.kinds.shipped.find import FIND
+from embodied.kinds.task_kind import EnvInputs
 
 SEEING, MAP, BLIND_FINDER = (
     StudyRow("Seeing"),

@@ -18,7 +18,6 @@ from typing import Any, Unpack
 import torch
 from torch import Tensor
 
-from embodied import metrics
 from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.playing import TaskSet
@@ -30,6 +29,7 @@ from embodied.envs.hari import shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
 from embodied.interface import Ask, Episode, Move, Place
+from embodied.kinds import metrics
 
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
 

@@ -16,8 +16,8 @@ from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.assistants.ask import AskAssistant
 from embodied.interface import Assistant, Intention, Reply, Situation
+from embodied.kinds.plugins import assistant_of
 from embodied.language import PlainLanguage
-from embodied.plugins import assistant_of
 
 ASSISTANT_ANSWER = object_schema(answer={"type": "string", "maxLength": 600})
 QUESTION_WORDS = {

@@ -37,7 +37,7 @@ from embodied.datasets.store import SplitData
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity, identity_of
 from embodied.interface import TURNS, Episode, FollowRoute, Place, Route, Task
-from embodied.metrics import without_repeats
+from embodied.kinds.metrics import without_repeats
 from embodied.seeds import stream
 from embodied.tasks.vln import vln_task
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.interface import Agent
-from embodied.kinds.vnla import VNLA
+from embodied.kinds.shipped.vnla import VNLA
 
 WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
 TEACHER = "learned, asks as its teacher"

@@ -13,8 +13,8 @@ from embodied.datasets.store import StoredPlace
 from embodied.envs.base import HelpEnv
 from embodied.generate import HouseConfig
 from embodied.interface import Ask, Intention, Move, Observation, Task
+from embodied.kinds.task_kind import EnvInputs, TaskInputs, kind_named
 from embodied.language.plain_language import PlainLanguage
-from embodied.task_kind import EnvInputs, TaskInputs, kind_named
 
 AIMS = {"find": 20_000.0, "hanna": 10_000.0, "vnla": None, "hari": None}
 """Steps per second that the project promises; HANNA's include the assistant's replies."""

@@ -23,9 +23,9 @@ import psutil
 
 from embodied.bench.timing import Report
 from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
+from embodied.kinds.splits import DatasetSize
 from embodied.render.pictures import Unlit
 from embodied.seeds import stream
-from embodied.splits import DatasetSize
 from embodied.threads import processors
 
 THINKING = 1.0

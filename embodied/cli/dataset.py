@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, check_machine, note, pause, show
+from embodied.kinds.splits import DATASET_SCALES, DatasetSize, described
 from embodied.options import HOUSES, Count, CubeFace, InputFolder, Option, OutputFolder, drawn_as, whole
 from embodied.render.pictures import PICTURES, PictureSettings, in_words, parse_pictures
-from embodied.splits import DATASET_SCALES, DatasetSize, described
 
 FROM_PEOPLE = "from-people"
 SCALE_HELP = {name: described(name) for name in DATASET_SCALES}
@@ -154,7 +154,7 @@ def chosen_pictures(
       held: how those that the data set holds were drawn, None where it holds none. They are gone on with rather than
         drawn again in another way that nobody asked for.
     """
-    from embodied.task_kind import kind_named
+    from embodied.kinds.task_kind import kind_named
 
     if pictures is None and held is not None:
         return parse_pictures(held, size)

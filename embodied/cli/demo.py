@@ -150,10 +150,10 @@ def inhabited(house: House, catalogue: Catalogue, args: DemoOptions) -> tuple[Ho
 def find_something(args: DemoOptions, world: World, viewers: tuple[str, ...]) -> dict:
     """The shortest-path agent walks to an object; recorded to episode.rrd."""
     from embodied.evaluation.rollout import play
-    from embodied.kinds.find import FIND
+    from embodied.kinds.shipped.find import FIND
+    from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
     from embodied.policies.baselines import Shortest
-    from embodied.task_kind import EnvInputs
     from embodied.tasks.find import find_pool, find_task
 
     task = find_task(find_pool(world, seed=args.seed), args.task, seed=args.seed, language=People())
@@ -173,9 +173,9 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
     from embodied.agents.vision.features import encode_panoramas
     from embodied.agents.vision.recognise import Recogniser
     from embodied.evaluation.rollout import play
-    from embodied.kinds.hanna import HANNA
+    from embodied.kinds.shipped.hanna import HANNA
+    from embodied.kinds.task_kind import EnvInputs
     from embodied.language import People
-    from embodied.task_kind import EnvInputs
     from embodied.tasks.hanna import hanna_pool, hanna_task
 
     agent, encoder = HannaAgent.load(SHIPPED_AGENT), load_encoder()
@@ -207,7 +207,7 @@ def recorded(
       eyes: the world whose panoramas the agent looked at; None where it looks at none.
       recognise: names what the agent recognises there.
     """
-    from embodied.metrics import navigation_error, spl, success
+    from embodied.kinds.metrics import navigation_error, spl, success
     from embodied.viz.recording import record_episode
     from embodied.viz.sinks import Sinks
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.tables import Row
     from embodied.interface import Agent, Assistant, Episode, Place, SeenPlace
-    from embodied.task_kind import TaskKind
+    from embodied.kinds.task_kind import TaskKind
 
 LLM = "llm"
 FEW_TASKS = 20
@@ -117,8 +117,8 @@ def parsed(args: EvaluateOptions) -> Evaluation:
     """
     from embodied.agents.language_models.assistant import assistant_maker
     from embodied.datasets.store import dataset_of
-    from embodied.plugins import assistant_of
-    from embodied.task_kind import kind_named
+    from embodied.kinds.plugins import assistant_of
+    from embodied.kinds.task_kind import kind_named
 
     if args.rrd and not args.out:
         raise ValueError("--rrd wants --out DIR beside it: recordings go to DIR/recordings")
@@ -348,7 +348,7 @@ def write(args: EvaluateOptions, evaluation: Evaluation, results: EvaluationResu
 
 def columns_of(evaluation: Evaluation) -> Sequence[str]:
     """The columns of the table: the learner's where a trained agent was evaluated and it names some."""
-    from embodied import metrics
+    from embodied.kinds import metrics
 
     learned = evaluation.trained[0].columns if evaluation.trained else ()
     return learned or [*evaluation.kind.columns, *metrics.USAGE]

@@ -52,8 +52,8 @@ def roll_out(args: RolloutOptions, viewers: tuple[str, ...]) -> None:
     """Play, film and record; recordings also go to `viewers`."""
     from embodied.envs.base import HelpEnv
     from embodied.evaluation.rollout import play
+    from embodied.kinds.metrics import PER_EPISODE
     from embodied.language import People
-    from embodied.metrics import PER_EPISODE
     from embodied.policies.baselines import WITHOUT_LEARNING
     from embodied.render.photograph import PhotoCamera
     from embodied.tasks.find import find_pool, find_task

@@ -25,6 +25,8 @@ from embodied.generate.novelty import furnishable
 from embodied.generate.people import add_people, place_people
 from embodied.house.house import House, HouseError
 from embodied.interface import Language
+from embodied.kinds.splits import DATASET_SCALES, DatasetSize, SplitPlan
+from embodied.kinds.task_kind import TaskInputs, TaskKind, kind_named
 from embodied.language import People, PlainLanguage
 from embodied.locks import LOCK, locked
 from embodied.navigation.connectivity import from_matterport, to_matterport
@@ -33,8 +35,6 @@ from embodied.novelty import FAMILIAR, NOVEL
 from embodied.records import load_json, read_json, save_lines
 from embodied.render.pictures import PictureSettings, parse_pictures
 from embodied.seeds import stream
-from embodied.splits import DATASET_SCALES, DatasetSize, SplitPlan
-from embodied.task_kind import TaskInputs, TaskKind, kind_named
 from embodied.world import World, open_world
 
 W = TypeVar("W")
@@ -64,7 +64,7 @@ class DatasetConfig:
     kind: str
     """Kind of task: 'find', 'vln', 'vnla', 'hanna', 'hari', or 'module:NAME' of your own."""
     scale: DatasetSize | str = "mini"
-    """One of embodied.splits.DATASET_SCALES, or a size of one's own."""
+    """One of embodied.kinds.splits.DATASET_SCALES, or a size of one's own."""
     seed: int = 0
     area: tuple[float, float] = (150.0, 420.0)
     """Smallest and largest house, square metres."""

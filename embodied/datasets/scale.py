@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from embodied.splits import DATASET_SCALES, PAPER, SMALL_SCALES, DatasetSize, SplitPlan
-from embodied.task_kind import kind_named
+from embodied.kinds.splits import DATASET_SCALES, PAPER, SMALL_SCALES, DatasetSize, SplitPlan
+from embodied.kinds.task_kind import kind_named
 
 OOD = "test_ood"
 """The split of houses out of distribution: models, looks, speakers and words that occur in no other split."""

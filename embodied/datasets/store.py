@@ -22,14 +22,14 @@ from embodied.datasets.checks import (
 from embodied.datasets.scale import OOD, Scale, quota, scale
 from embodied.house.house import House
 from embodied.interface import Assistant, Episode, Place, Route, Task
+from embodied.kinds.splits import SplitPlan
+from embodied.kinds.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 from embodied.language.plain_language import PlainLanguage
 from embodied.language.utterances import PeoplesWords, Utterance
 from embodied.navigation.connectivity import from_matterport
 from embodied.navigation.graph import NavGraph
 from embodied.records import read_lines
 from embodied.render.pictures import PictureSettings, Unlit, from_recorded, parse_pictures
-from embodied.splits import SplitPlan
-from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue

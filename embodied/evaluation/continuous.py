@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from embodied.envs.continuous import ContinuousEpisode, HabitatAction, Trajectory
-from embodied.metrics import warping, weighted_by_path, within
+from embodied.kinds.metrics import warping, weighted_by_path, within
 
 WARPING = 3.0
 """Metres that nDTW is normalised by (Magalhaes et al. 2019)."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from embodied.evaluation.rollout import play
 from embodied.evaluation.tables import Row, row
 from embodied.interface import Agent, Episode, SeenPlace, Task
-from embodied.task_kind import kind_named
+from embodied.kinds.task_kind import kind_named
 
 if TYPE_CHECKING:
     from embodied.datasets.store import SplitData

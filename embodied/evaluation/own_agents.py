@@ -12,7 +12,7 @@ from typing import Any
 
 from embodied.errors import UnableError
 from embodied.interface import Action, Actions, Agent, Ask, Intention, Move, Observation, Observations, Rngs, Stop
-from embodied.plugins import made_by_name
+from embodied.kinds.plugins import made_by_name
 from embodied.records import RecordError, parse
 
 MOST_BYTES = 100_000

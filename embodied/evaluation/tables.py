@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
-from embodied import metrics
 from embodied.assets.cache import write_bytes
 from embodied.interface import Episode
-from embodied.task_kind import kind_named, known_kinds
+from embodied.kinds import metrics
+from embodied.kinds.task_kind import kind_named, known_kinds
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph

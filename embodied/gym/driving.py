@@ -18,8 +18,8 @@ from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
 from embodied.gym.sensors import PIXELS, check_live, live_pixels
 from embodied.gym.spaces import codes_of
+from embodied.kinds.metrics import weighted_by_path, within
 from embodied.language.plain_language import with_article
-from embodied.metrics import weighted_by_path, within
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
 from embodied.render.camera import Camera, camera_at

@@ -45,13 +45,13 @@ from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, obser
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
 from embodied.interface import Assistant, FeatureSource, Observation, Place, Pose, SeenPlace, Task
+from embodied.kinds.metrics import PER_EPISODE
+from embodied.kinds.plugins import assistant_of
+from embodied.kinds.task_kind import kind_named
 from embodied.language.detokenize import detokenized
-from embodied.metrics import PER_EPISODE
-from embodied.plugins import assistant_of
 from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import instance_classes
 from embodied.seeds import checked_seed
-from embodied.task_kind import kind_named
 from embodied.world import World
 
 LAYOUT = SpaceLayout()

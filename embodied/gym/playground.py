@@ -21,9 +21,9 @@ from embodied.generate import HouseConfig
 from embodied.generate.people import add_people, place_people
 from embodied.gym.semantic_features import semantic_features
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
+from embodied.kinds.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings, Unlit, parse_pictures
-from embodied.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 from embodied.world import makers, open_world
 
 if TYPE_CHECKING:

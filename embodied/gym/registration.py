@@ -9,7 +9,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-from embodied.plugins import for_each_kind
+from embodied.kinds.plugins import for_each_kind
 
 CONTINUOUS = {"vlnce": "VLNCE", "objectnav": "ObjectNav"}
 """Names and titles of continuous navigation (embodied.gym.continuous)."""

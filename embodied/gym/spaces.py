@@ -14,7 +14,7 @@ from gymnasium import spaces
 from embodied.envs.base import ActionError
 from embodied.gym.sensors import LARGE, Sensor
 from embodied.interface import TURNS, VIEWS, Action, Ask, Intention, Mode, Move, Observation, Stop
-from embodied.task_kind import INTENTIONS, ArraySpec, TaskKind, kind_named
+from embodied.kinds.task_kind import INTENTIONS, ArraySpec, TaskKind, kind_named
 
 LONG, MANY = 100.0, 10.0
 """Steps and requests that are 1 in 'clock'."""

@@ -1,1 +1,1 @@
-"""The kinds of tasks that come with the program, a file each, which begins with the kind's title."""
+"""Kinds of tasks: their record and registry, what their tables share, and those that come with the program."""

@@ -31,7 +31,7 @@ from embodied.interface import (
     Thought,
     act,
 )
-from embodied.plugins import made_by_name
+from embodied.kinds.plugins import made_by_name
 from embodied.policies.baselines import WITHOUT_LEARNING
 from embodied.records import from_plain, parse, to_json
 from embodied.seeds import stream

@@ -20,9 +20,9 @@ from embodied.datasets.build import UnitFacts, save_facts, share, write_index
 from embodied.datasets.checks import DatasetError
 from embodied.datasets.store import SUBGOALS, Dataset
 from embodied.interface import STEP, Episode, Pose, Route, Task
+from embodied.kinds.metrics import sdtw, without_repeats
 from embodied.language.plain_language import PlainLanguage
 from embodied.language.utterances import Utterance
-from embodied.metrics import sdtw, without_repeats
 from embodied.navigation.graph import nearest
 from embodied.records import load_json, load_lines, save_lines
 from embodied.seeds import stream

@@ -14,7 +14,7 @@ from typing import Any
 
 from embodied.envs.base import ActionError
 from embodied.interface import Episode
-from embodied.metrics import strict_success
+from embodied.kinds.metrics import strict_success
 from embodied.serve.game import Game, Table
 from embodied.serve.store import Event
 from embodied.serve.study import LONGEST_TEXT, Study, StudyPart

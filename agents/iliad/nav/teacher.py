@@ -19,7 +19,7 @@ from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
 from embodied.agents.iliad.protocol import NOTHING, DescribingTeacher
 from embodied.interface import SeenPlace
-from embodied.metrics import sdtw
+from embodied.kinds.metrics import sdtw
 
 THRESHOLD = 0.5
 """Tau of Eq 3.15 and 3.16, of SDTW (C.1.1)."""

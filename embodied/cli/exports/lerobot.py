@@ -34,7 +34,7 @@ def run_lerobot(args: LeRobotOptions) -> None:
     from embodied.datasets.store import Dataset
     from embodied.evaluation.rollout import play
     from embodied.interface import Episode
-    from embodied.metrics import success
+    from embodied.kinds.metrics import success
     from embodied.records import load_lines
 
     data = Dataset(args.data)

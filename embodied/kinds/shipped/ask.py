@@ -14,11 +14,8 @@ from embodied.assistants.description_arrays import DESCRIPTION_ROWS, description
 from embodied.assistants.descriptions import Describer
 from embodied.envs.ask import AskEnv, AskSettings
 from embodied.interface import Assistant, Episode, Observation, Place, Stop
-from embodied.metrics import asked, success
-from embodied.navigation.graph import NavGraph
-from embodied.policies.ask import ASKER_RULES, Asker
-from embodied.policies.baselines import Shortest
-from embodied.task_kind import (
+from embodied.kinds.metrics import asked, success
+from embodied.kinds.task_kind import (
     UNBOUNDED,
     ArraySpec,
     EnvInputs,
@@ -31,6 +28,9 @@ from embodied.task_kind import (
     TaskKind,
     register_kind,
 )
+from embodied.navigation.graph import NavGraph
+from embodied.policies.ask import ASKER_RULES, Asker
+from embodied.policies.baselines import Shortest
 from embodied.tasks.ask import Look, ask_pool, ask_tasks, look_of
 
 AS_USUAL = AskSettings()

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 def shipped_kinds() -> dict[str, str]:
     """Names and titles of the kinds of tasks that come with the program, without importing them.
 
-    They are the files of embodied/kinds, each of which begins with its title and a colon: 'hanna' is 'HANNA'.
+    They are the files of embodied/kinds/shipped, each of which begins with its title and a colon: 'hanna' is 'HANNA'.
     """
-    files = sorted((Path(__file__).parent / "kinds").glob("[!_]*.py"))
+    files = sorted((Path(__file__).parent / "shipped").glob("[!_]*.py"))
     return {f.stem: f.read_text(encoding="utf-8").partition(":")[0].strip('"') for f in files}
 
 

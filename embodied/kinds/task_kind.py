@@ -1,6 +1,7 @@
 """Kinds of tasks: a record each, registered where it is defined. The rest of the program knows no kind by name.
 
-A kind is one file: `embodied/kinds/hanna.py`, or a module of your own that calls `register_kind` (examples/my_task.py).
+A kind is one file: `embodied/kinds/shipped/hanna.py`, or a module of your own that calls `register_kind`
+(examples/my_task.py).
 Wherever a kind is named, in commands, in data sets and for Gymnasium, a kind of your own is 'module:NAME': the name of
 an importable module, which may lie in the current folder, and of the `TaskKind` in it.
 
@@ -38,10 +39,10 @@ from embodied.interface import (
     SeenPlace,
     Task,
 )
+from embodied.kinds.plugins import announce_kind, named_object, shipped_kinds
+from embodied.kinds.splits import Splits, SplitSizes, seen_and_unseen
 from embodied.navigation.graph import NavGraph
-from embodied.plugins import announce_kind, named_object, shipped_kinds
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
-from embodied.splits import Splits, SplitSizes, seen_and_unseen
 
 Measure = Callable[[Episode, NavGraph], float]
 """A number of one finished episode, given the graph of its house."""
@@ -340,7 +341,7 @@ def kind_named(name: str) -> TaskKind:
       ValueError: unknown, or what 'module:NAME' names is no kind of that name.
     """
     if name not in _KINDS and name in shipped_kinds():
-        importlib.import_module(f"embodied.kinds.{name}")
+        importlib.import_module(f"embodied.kinds.shipped.{name}")
     elif name not in _KINDS and ":" in name:
         kind = named_object(name)
         if not isinstance(kind, TaskKind) or kind.name != name:

@@ -8,11 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from embodied.assistants.advisor import Advisor
 from embodied.envs.vnla import RULES_OF_PLAY, check_rules, fitted
 from embodied.interface import Episode, FindObject, Place, Task
-from embodied.kinds.hanna import TABLE_4_2
-from embodied.language.plain_language import PlainLanguage
-from embodied.navigation.graph import NavGraph
-from embodied.policies.baselines import RandomWalk, Shortest, SubgoalListener, VnlaAsking
-from embodied.task_kind import (
+from embodied.kinds.shipped.hanna import TABLE_4_2
+from embodied.kinds.task_kind import (
     EnvInputs,
     EnvMaker,
     Metric,
@@ -24,6 +21,9 @@ from embodied.task_kind import (
     parts_of_pool,
     register_kind,
 )
+from embodied.language.plain_language import PlainLanguage
+from embodied.navigation.graph import NavGraph
+from embodied.policies.baselines import RandomWalk, Shortest, SubgoalListener, VnlaAsking
 from embodied.tasks.vnla import MOST_ACTIONS, help_budget, limit_key, time_limits, vnla_pool, vnla_task
 from embodied.teachers.vnla import VnlaTeacher
 

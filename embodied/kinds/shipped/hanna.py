@@ -8,18 +8,8 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.assistants.anna import Anna
 from embodied.envs.hanna import HannaEnv
 from embodied.interface import Ask, Episode, Mode, Move, Stop
-from embodied.navigation.graph import NavGraph
-from embodied.policies.baselines import (
-    PerfectInterpreter,
-    PrivilegedAsking,
-    Shortest,
-    ask_at_random,
-    ask_every_5,
-    never_ask,
-)
-from embodied.policies.listeners import ListeningInterpreter
-from embodied.splits import five_splits
-from embodied.task_kind import (
+from embodied.kinds.splits import five_splits
+from embodied.kinds.task_kind import (
     PLAIN_AGENTS,
     EnvInputs,
     EnvMaker,
@@ -32,6 +22,16 @@ from embodied.task_kind import (
     parts_of_pool,
     register_kind,
 )
+from embodied.navigation.graph import NavGraph
+from embodied.policies.baselines import (
+    PerfectInterpreter,
+    PrivilegedAsking,
+    Shortest,
+    ask_at_random,
+    ask_every_5,
+    never_ask,
+)
+from embodied.policies.listeners import ListeningInterpreter
 from embodied.tasks.hanna import hanna_pool, hanna_task
 
 TABLE_4_2 = {"train": 51, "val": 7, "test": 10}, five_splits(82_484, 5_001, 5_017, 5_004, 5_012)

@@ -15,11 +15,9 @@ from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative
 from embodied.envs.hari import AS_PRINTED, HariEnv, HariRules
 from embodied.interface import Intention, Observation, Place, Task
-from embodied.metrics import asked, moves
-from embodied.policies.baselines import HalfwaySkyline, RandomWalk, Shortest
-from embodied.seeds import stream
-from embodied.splits import SplitPlan, Splits, SplitSizes
-from embodied.task_kind import (
+from embodied.kinds.metrics import asked, moves
+from embodied.kinds.splits import SplitPlan, Splits, SplitSizes
+from embodied.kinds.task_kind import (
     UNBOUNDED,
     ArraySpec,
     EnvInputs,
@@ -33,6 +31,8 @@ from embodied.task_kind import (
     TaskKind,
     register_kind,
 )
+from embodied.policies.baselines import HalfwaySkyline, RandomWalk, Shortest
+from embodied.seeds import stream
 from embodied.tasks.find import Pool
 from embodied.tasks.hari import HARI as LIMITS
 from embodied.tasks.hari import PRETRAINING, hari_pool, hari_task

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from embodied.interface import Ask, Episode, Intention, Move, Usage
-from embodied.task_kind import Measure, kind_named
+from embodied.kinds.task_kind import Measure, kind_named
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from embodied.kinds.hanna import TABLE_4_2
-from embodied.task_kind import Parts, PartTasks, StoryStyle, TaskInputs, TaskKind, parts_of_pool, register_kind
+from embodied.kinds.shipped.hanna import TABLE_4_2
+from embodied.kinds.task_kind import Parts, PartTasks, StoryStyle, TaskInputs, TaskKind, parts_of_pool, register_kind
 from embodied.tasks.find import find_pool, find_task
 
 

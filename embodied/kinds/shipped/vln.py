@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable
 
 from embodied.interface import Episode, FollowRoute, Route
-from embodied.metrics import ndtw, sdtw, without_repeats
+from embodied.kinds.metrics import ndtw, sdtw, without_repeats
+from embodied.kinds.splits import five_splits
+from embodied.kinds.task_kind import Measure, Metric, Parts, PartTasks, TaskInputs, TaskKind, register_kind
 from embodied.navigation.graph import NavGraph
 from embodied.policies.listeners import ScriptedListener
-from embodied.splits import five_splits
-from embodied.task_kind import Measure, Metric, Parts, PartTasks, TaskInputs, TaskKind, register_kind
 from embodied.tasks.vln import vln_task
 
 WORDING_OF = {"main": ("train_seen", "val", "test"), "val": ("train_unseen",), "test": ("train_unseen",)}
