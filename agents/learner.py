@@ -11,8 +11,6 @@ and of the `Learner` in it. Free of torch, as the files of agents/learners are, 
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.assets.cache import default_cache
-from embodied.kinds.plugins import named_object
+from embodied.kinds.plugins import record_named
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, SplitData
@@ -99,7 +97,7 @@ def register_learner(learner: Learner) -> Learner:
 
 def shipped_learners() -> list[str]:
     """Names of the learners that come with the program, without importing them: the files of agents/learners."""
-    return sorted(m.name for m in pkgutil.iter_modules([str(Path(__file__).parent / "learners")]))
+    return sorted(f.stem for f in (Path(__file__).parent / "learners").glob("[!_]*.py"))
 
 
 def learner_named(name: str) -> Learner:
@@ -108,16 +106,7 @@ def learner_named(name: str) -> Learner:
     Raises:
       ValueError: unknown, or what 'module:NAME' names is no learner.
     """
-    if name not in _LEARNERS and name in shipped_learners():
-        importlib.import_module(f"embodied.agents.learners.{name}")
-    if name in _LEARNERS:
-        return _LEARNERS[name]
-    if ":" not in name:
-        raise ValueError(f"unknown learner {name!r}; use one of {shipped_learners()}, or 'module:NAME' of your own")
-    learner = named_object(name)
-    if not isinstance(learner, Learner):
-        raise ValueError(f"{name!r} should be an embodied.agents.learner.Learner, got {learner!r:.60}")
-    return learner
+    return record_named(name, _LEARNERS, Learner, "embodied.agents.learners", shipped_learners())
 
 
 def playing_learner(kind: str) -> Learner | None:

@@ -528,7 +528,7 @@ class Observation:
     time_on_task: int
     """Steps since the instruction last changed; 0 tells a policy that it just did."""
     moved: bool = False
-    """The last step led to another place, as wheels know."""
+    """The last step led to another node."""
     extras: Any = None
     """The kind's own part, an `Extras`: what HARI's and Ask's agents are told besides (embodied/envs)."""
 

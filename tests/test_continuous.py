@@ -37,7 +37,8 @@ from embodied.envs.continuous import (
 )
 from embodied.evaluation.continuous import judged
 from embodied.generate import HouseConfig
-from embodied.gym.continuous import ContinuousGymEnv, make, open_episodes
+from embodied.gym.continuous import ContinuousGymEnv, make, open_episodes, register_continuous
+from embodied.gym.continuous_tasks.objectnav import OBJECTNAV
 from embodied.world import open_world
 
 SMALL = {"height": 32, "width": 32}
@@ -128,6 +129,14 @@ def test_what_is_seen_is_drawn_at_the_pose(world, dataset):
     )
     assert not np.array_equal(before["rgb"], after["rgb"])
     assert dataset.camera.vfov == pytest.approx(math.pi / 2)
+
+
+def test_a_task_of_ones_own_is_an_environment_of_gymnasium(world):
+    register_continuous(replace(OBJECTNAV, name=f"{__name__}:OWN", title="Own", gps=False))
+    env = gymnasium.make("embodied/Own-v0", worlds={world.name: world}, **SMALL)
+    assert set(env.reset(seed=0)[0]) == {"rgb", "depth", "instruction"}
+    with pytest.raises(ValueError, match=r"unknown ContinuousTask 'nowhere'; use one of .*'objectnav', .*'vlnce'"):
+        open_episodes("nowhere")
 
 
 @pytest.mark.gl

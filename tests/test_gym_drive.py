@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 from conftest import two_rooms
@@ -12,12 +14,13 @@ from handmade import HandCatalogue, furnished
 
 from embodied.gym import drive
 from embodied.gym.drive import DriveEnv, make
-from embodied.gym.driving import DriveSettings, Driving, expert_action
+from embodied.gym.driving import DriveSettings, Driving, driven_task, expert_action
 from embodied.navigation.floor_ways import FloorWays
 from embodied.world import open_world
 
 SMALL = {"height": 32, "width": 32, "farthest": 5.0}
 pytestmark = pytest.mark.gl
+STAY_HERE = replace(driven_task("reach"), name=f"{__name__}:STAY_HERE", says=True)
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +49,16 @@ def test_ways_over_free_floor_are_straight_lines_and_others_are_longer(world):
 @pytest.mark.parametrize("task", ["reach", "find"])
 def test_gymnasium_accepts_the_environment(world, task):
     check_env(env_of(world, task=task, observations=("rgb", "depth", "ids")), skip_render_check=True)
+
+
+def test_a_driven_task_of_ones_own_is_played_by_its_name(world):
+    env = gymnasium.make("embodied/Drive-v0", worlds={world.name: world}, task=STAY_HERE.name, observations=())
+    observation, _ = env.reset(seed=0)
+    assert {"motion", "touched", "goal"} == set(observation) and env.action_space.shape == (3,)
+    _, _, terminated, _, info = env.step(np.array([0, 0, 1], np.float32))
+    assert terminated and info["success"] == 0.0
+    with pytest.raises(ValueError, match="should be a DrivenTask with name"):
+        DriveSettings(task=f"{__name__}:SMALL")
 
 
 def test_depth_straight_ahead_is_how_far_the_wall_is(world):

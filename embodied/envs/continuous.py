@@ -256,15 +256,8 @@ class ContinuousEnv:
         """The way since the last reset."""
         poses = np.array(self._poses, float)
         positions = np.column_stack([poses[:, :2], np.full(len(poses), self.floor)])
-        return Trajectory(
-            self.episode,
-            positions,
-            poses[:, 2],
-            poses[:, 3].astype(int),
-            tuple(self._actions),
-            np.array(self._distances),
-            self.collisions,
-        )
+        turns, distances = (poses[:, 2], poses[:, 3].astype(int)), np.array(self._distances)
+        return Trajectory(self.episode, positions, *turns, tuple(self._actions), distances, self.collisions)
 
 
 POSITION = ("ahead", "left", "sin", "cos", "tilt")

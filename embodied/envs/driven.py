@@ -40,6 +40,9 @@ APART = 0.5
 
 SLIPPERY = {"friction": [0.02, 0.001, 0.0001], "priority": 1}
 """Priority makes the friction of casters and hull count, not the floor's."""
+TYRE = {"type": "cylinder", "size": [WHEEL, 0.02], "euler": [math.pi / 2, 0, 0], "friction": [1.4, 0.01, 0.0005]}
+MOTOR = {"kv": 6.0, "ctrlrange": [-40, 40], "forcerange": [-12, 12]}
+CASTER = {"type": "sphere", "size": [0.03], "mass": 0.3, **SLIPPERY}
 
 
 class RollingBody(composer.Entity):
@@ -50,36 +53,16 @@ class RollingBody(composer.Entity):
         root.default.geom.friction = [1.0, 0.005, 0.0001]
         body = root.worldbody.add("body", name="chassis", pos=[0, 0, WHEEL])
         body.add("geom", name="base", type="cylinder", size=[RADIUS, 0.04], pos=[0, 0, 0.04], mass=18, **SLIPPERY)
-        half = (HEIGHT - 0.3) / 2
-        body.add(
-            "geom", name="mast", type="cylinder", size=[RADIUS * 0.8, half], pos=[0, 0, 0.2 + half], mass=2, **SLIPPERY
-        )
+        size = [RADIUS * 0.8, (HEIGHT - 0.3) / 2]
+        body.add("geom", name="mast", type="cylinder", size=size, pos=[0, 0, 0.2 + size[1]], mass=2, **SLIPPERY)
         body.add("camera", name="eye", pos=[0, 0, EYE - WHEEL], xyaxes=[0, -1, 0, 0, 0, 1], fovy=60)
         for side, y in (("left", TRACK / 2), ("right", -TRACK / 2)):
             wheel = body.add("body", name=f"{side}_wheel", pos=[0, y, 0])
             wheel.add("joint", name=f"{side}_axle", type="hinge", axis=[0, 1, 0], damping=0.02)
-            wheel.add(
-                "geom",
-                name=f"{side}_tyre",
-                type="cylinder",
-                size=[WHEEL, 0.02],
-                euler=[math.pi / 2, 0, 0],
-                mass=0.8,
-                friction=[1.4, 0.01, 0.0005],
-            )
-            root.actuator.add(
-                "velocity", name=side, joint=f"{side}_axle", kv=6.0, ctrlrange=[-40, 40], forcerange=[-12, 12]
-            )
+            wheel.add("geom", name=f"{side}_tyre", mass=0.8, **TYRE)
+            root.actuator.add("velocity", name=side, joint=f"{side}_axle", **MOTOR)
         for where, x in (("front", RADIUS * 0.8), ("back", -RADIUS * 0.8)):
-            body.add(
-                "geom",
-                name=f"{where}_caster",
-                type="sphere",
-                size=[0.03],
-                pos=[x, 0, 0.032 - WHEEL],
-                mass=0.3,
-                **SLIPPERY,
-            )
+            body.add("geom", name=f"{where}_caster", pos=[x, 0, 0.032 - WHEEL], **CASTER)
         root.compiler.angle = "radian"
         self._root = root
 

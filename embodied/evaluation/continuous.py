@@ -53,7 +53,7 @@ def oracle_navigation_error(trajectory: Trajectory) -> float:
 
 def oracle_spl(trajectory: Trajectory) -> float:
     """SPL at the first position that is near enough."""
-    near = np.flatnonzero(trajectory.distances[1:] < trajectory.episode.radius)
+    near = np.flatnonzero(within(trajectory.distances[1:], trajectory.episode.radius, strict=True))
     if not len(near):
         return 0.0
     return weighted_by_path(1.0, float(trajectory.distances[0]), float(lengths(trajectory)[near[0] + 1]))
@@ -84,19 +84,9 @@ def collisions(trajectory: Trajectory) -> float:
     return trajectory.collisions / steps if steps else 0.0
 
 
-MEASURES: dict[str, Callable[[Trajectory], float]] = {
-    "success": success,
-    "spl": spl,
-    "ndtw": ndtw,
-    "sdtw": sdtw,
-    "oracle_success": oracle_success,
-    "oracle_spl": oracle_spl,
-    "distance_to_goal": distance_to_goal,
-    "oracle_navigation_error": oracle_navigation_error,
-    "path_length": path_length,
-    "steps_taken": steps_taken,
-    "collisions": collisions,
-}
+_SUCCESSES = (success, spl, ndtw, sdtw, oracle_success, oracle_spl)
+_QUANTITIES = (distance_to_goal, oracle_navigation_error, path_length, steps_taken, collisions)
+MEASURES: dict[str, Callable[[Trajectory], float]] = {f.__name__: f for f in (*_SUCCESSES, *_QUANTITIES)}
 """By the names of the published programs."""
 
 

@@ -1,4 +1,4 @@
-"""embodied/VLNCE-v0 and embodied/ObjectNav-v0: continuous navigation with Habitat's actions and live pictures.
+"""Continuous navigation with Habitat's actions and live pictures: embodied/VLNCE-v0 and embodied/ObjectNav-v0.
 
     env = gymnasium.make("embodied/VLNCE-v0", data="DIR", split="val_unseen")
     env = gymnasium.make("embodied/VLNCE-v0", data="DIR", episodes="val_unseen.json.gz", preset="streamvln")
@@ -22,7 +22,6 @@ import numpy as np
 from gymnasium import spaces
 
 from embodied.assets.cache import default_cache
-from embodied.datasets.habitat import object_episodes, read_objectnav, read_vlnce, route_episodes
 from embodied.datasets.store import Dataset
 from embodied.envs.continuous import (
     Body,
@@ -38,10 +37,11 @@ from embodied.envs.continuous import (
 from embodied.evaluation.continuous import judged
 from embodied.geometry import wrap
 from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
-from embodied.gym.playground import PlaygroundSettings, flat_playground
+from embodied.gym.registration import register_environment
 from embodied.gym.sensors import LARGE, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of
 from embodied.gym.vector_env import checked_limit
+from embodied.kinds.plugins import record_named, titled_files
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
 from embodied.seeds import checked_seed
@@ -53,8 +53,6 @@ STEP_COST, PER_METRE = 0.01, 0.1
 """Of every action, and what a metre nearer to the goal is worth."""
 KEPT = 4
 """Houses whose renderers are held open, the last used."""
-OBJECTS = 100
-"""Episodes of ObjectNav in each house where no file says otherwise."""
 LIVE_CHANNELS = ("rgb", "depth")
 PRESETS: dict[str, tuple[Body, CameraConfig]] = {
     "vlnce": (Body(), CameraConfig()),
@@ -80,9 +78,12 @@ class EpisodeSource:
 
 @dataclass(frozen=True)
 class ContinuousTask:
-    """One of Habitat's tasks."""
+    """What an agent that moves as Habitat's do has to do: a file of embodied/gym/continuous_tasks, or one's own."""
 
     name: str
+    """The file's, or 'module:NAME' of one's own, so that it is found."""
+    title: str
+    """Gymnasium has it as embodied/TITLE-v0."""
     preset: str
     """One of PRESETS."""
     read: Callable[[Path], list[ContinuousEpisode]]
@@ -92,33 +93,14 @@ class ContinuousTask:
     """Observations have gps and compass."""
 
 
-def route_source(source: EpisodeSource) -> list[ContinuousEpisode]:
-    """The routes of a data set, or of the only house.
-
-    Raises:
-      ValueError: the tasks of the data set are no routes.
-    """
-    data = source.data
-    if data is None:
-        settings = PlaygroundSettings(source.cache, source.worlds)
-        return route_episodes(flat_playground("vln", source.seed, settings).tasks, source.worlds)
-    if not data.task_kind.from_routes:
-        raise ValueError(
-            f"{data.folder} is a data set of {data.kind!r}; VLNCE-v0 plays those of 'vln', or give episodes"
-        )
-    return route_episodes(data.tasks(source.split), source.worlds)
+CONTINUOUS_TASKS: dict[str, ContinuousTask] = {}
 
 
-def object_source(source: EpisodeSource) -> list[ContinuousEpisode]:
-    """OBJECTS episodes in each house."""
-    seed, navmeshes = source.seed, source.navmeshes
-    return [e for w in source.worlds.values() for e in object_episodes(w, OBJECTS, seed=seed, navmeshes=navmeshes)]
-
-
-CONTINUOUS_TASKS = {
-    "vlnce": ContinuousTask("vlnce", "vlnce", read_vlnce, route_source),
-    "objectnav": ContinuousTask("objectnav", "objectnav", read_objectnav, object_source, gps=True),
-}
+def register_continuous(task: ContinuousTask) -> ContinuousTask:
+    """Make a task known by its name, and to Gymnasium as embodied/TITLE-v0; returns it. Call it where it is defined."""
+    CONTINUOUS_TASKS[task.name] = task
+    register_environment(gym, task.title, task.name, __name__, __name__)
+    return task
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +196,8 @@ class ContinuousGymEnv(LiveEnv):
         observation: dict[str, Any] = self.pixels()
         observation["instruction"] = codes_of(self.task_description, LONGEST_INSTRUCTION).copy()
         if self.dataset.task.gps:
-            observation["gps"], observation["compass"] = self.odometry()[:2], np.array([self.turned()], np.float32)
+            turned = float(wrap(self.play.yaw - self.play.episode.yaw))
+            observation["gps"], observation["compass"] = self.odometry()[:2], np.array([turned], np.float32)
         return observation
 
     def pixels(self) -> dict[str, np.ndarray]:
@@ -222,10 +205,6 @@ class ContinuousGymEnv(LiveEnv):
         camera, world = self.dataset.camera, self.dataset.world(self.play.episode.world)
         pose = camera_at(self.play.eye, self.play.yaw, self.play.pitch, camera.vfov)
         return live_pixels(world, pose, (camera.height, camera.width), self.dataset.observations)
-
-    def turned(self) -> float:
-        """Radians turned to the left since the start, in [-pi, pi)."""
-        return float(wrap(self.play.yaw - self.play.episode.yaw))
 
     def odometry(self) -> np.ndarray:
         """(5,) float32 of embodied.envs.continuous.POSITION."""
@@ -247,14 +226,8 @@ class ContinuousGymEnv(LiveEnv):
 
     def _facts(self) -> dict[str, Any]:
         play = self.play
-        return {
-            "success": 0.0,
-            "is_success": False,
-            "spl": 0.0,
-            "distance_to_goal": play.distance,
-            "collided": play.collided,
-            "steps_taken": play.steps,
-        }
+        state = {"distance_to_goal": play.distance, "collided": play.collided, "steps_taken": play.steps}
+        return {"success": 0.0, "is_success": False, "spl": 0.0, **state}
 
 
 def observation_space(dataset: EpisodeDataset) -> spaces.Dict:
@@ -323,9 +296,8 @@ def open_episodes(
     Raises:
       ValueError: an unknown preset or option, or episodes of other houses or in another frame.
     """
-    if kind not in CONTINUOUS_TASKS:
-        raise ValueError(f"kind is {kind!r}; use one of {sorted(CONTINUOUS_TASKS)}")
-    task = CONTINUOUS_TASKS[kind]
+    folder = "embodied.gym.continuous_tasks"
+    task = record_named(kind, CONTINUOUS_TASKS, ContinuousTask, folder, titled_files("gym/continuous_tasks"))
     body, camera = chosen(preset or task.preset, changes)
     where, navmeshes = Path(cache) if cache else default_cache(), NavMeshCache()
     whole = Dataset(Path(data)) if data is not None and worlds is None else None

@@ -21,7 +21,7 @@ from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.build import make_dataset_house
 from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
-from embodied.gym.driving import TEXT, DriveSettings, Driving
+from embodied.gym.driving import DriveSettings, Driving, driven_task
 from embodied.gym.playground import FLAT_AREA, pictures_of
 from embodied.gym.sensors import LARGE, pixel_spaces
 from embodied.render.pictures import PictureSettings, matte
@@ -81,17 +81,16 @@ class DriveEnv(LiveEnv):
             raise ValueError(f"there is no house {world!r:.80}; choose one of {sorted(self.driving.worlds)[:8]}")
         super().reset(seed=None if seed is None else checked_seed(seed))
         self.driving.reset(self.np_random, world)
-        return self.driving.look(), {"world": self.driving.world.name, "request": self.driving.request}
+        return self.driving.look(), {"world": self.driving.world.name, "request": self.driving.goal.request}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         outcome = self.driving.step(action)
-        ended = outcome.ended
-        terminated = ended in ("reached", "said")
+        terminated, truncated = outcome.ended in ("reached", "said"), outcome.ended == "limit"
         info: dict[str, Any] = {**outcome.facts, "is_success": outcome.facts["success"] > 0}
-        return self.driving.look(), outcome.reward, terminated, ended == "limit", info
+        return self.driving.look(), outcome.reward, terminated, truncated, info
 
     def _picture(self) -> np.ndarray:
-        return self.driving.picture(*VIEW)
+        return self.driving.world.renderer.rgb(self.driving.camera(), VIEW)
 
     def close(self) -> None:
         self.driving.close()
@@ -102,13 +101,7 @@ def seen_space(s: DriveSettings) -> dict[str, spaces.Box]:
     whole = pixel_spaces((s.height, s.width), s.observations)
     whole["motion"] = spaces.Box(-LARGE, LARGE, (2,), np.float32)
     whole["touched"] = spaces.Box(0.0, 1.0, (1,), np.float32)
-    if s.task == "reach":
-        low, high = np.array([0, -1, -1], np.float32), np.array([LARGE, 1, 1], np.float32)
-        whole["goal"] = spaces.Box(low, high, dtype=np.float32)
-    else:
-        whole["object"] = spaces.Box(0.0, LARGE, (1,), np.float32)
-        whole["instruction"] = spaces.Box(0, 255, (TEXT,), np.uint8)
-    return whole
+    return {**whole, **driven_task(s.task).extra_spaces}
 
 
 def make(*, render_mode: str | None = None, **options: Any) -> DriveEnv:

@@ -207,7 +207,7 @@ class DriveVectorEnv(VectorEnv[dict[str, Any], Any, Any]):
 
     @staticmethod
     def _begun(driving: Driving) -> dict[str, Any]:
-        return {"world": driving.world.name, "request": driving.request}
+        return {"world": driving.world.name, "request": driving.goal.request}
 
     def _info(self, infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
         """One for all, in the way of Gymnasium: arrays, and for each under "_" + name which bodies it is of."""

@@ -9,16 +9,18 @@ import math
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from gymnasium import spaces
 
 from embodied.assistants.description_arrays import word_number
 from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
-from embodied.gym.sensors import PIXELS, check_live, live_pixels
+from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels
 from embodied.gym.spaces import codes_of
 from embodied.kinds.metrics import weighted_by_path, within
+from embodied.kinds.plugins import record_named
 from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.navigation.free_space import EYE
@@ -28,8 +30,6 @@ from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
 if TYPE_CHECKING:
     from embodied.world import World
 
-TASKS = ("reach", "find")
-"""To reach a point, or to find an object of a class and say so."""
 TEXT = 80
 """Most characters of a request."""
 STEP_COST, COLLISION_COST, PER_METRE = 0.01, 0.05, 0.1
@@ -39,9 +39,9 @@ KEPT = 4
 AHEAD = 3
 """Cells of its way that a guide looks ahead: 30 cm."""
 POINTS = 50
-"""Goals that are tried before a house counts as too small (reach)."""
+"""Goals that are tried before a house counts as too small."""
 SAID = 0.5
-"""Above this the third number of an action says 'here it is' (find)."""
+"""Above this the third number of an action says 'here it is'."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class DriveSettings:
     """Task, observations and end of an episode."""
 
     task: str = "reach"
-    """One of TASKS."""
+    """A registered DrivenTask: 'reach', 'find', or 'module:NAME' of your own."""
     observations: tuple[str, ...] = ("rgb", "depth")
     """Some of embodied.gym.sensors.PIXELS; nothing for a blind body."""
     height: int = 128
@@ -70,8 +70,7 @@ class DriveSettings:
     """An object is found within this many metres of its outline, in its room."""
 
     def __post_init__(self) -> None:
-        if self.task not in TASKS:
-            raise ValueError(f"task is {self.task!r}; use one of {TASKS}")
+        driven_task(self.task)
         check_live(self.observations, PIXELS, self.height, self.width)
         if not 0 < self.vfov < math.pi:
             raise ValueError(f"vfov is {self.vfov} radians; a picture needs more than 0 and less than pi")
@@ -83,8 +82,50 @@ class DriveSettings:
 
     @property
     def numbers(self) -> int:
-        """Of an action: ahead, left, and, to find, whether it is here; each from -1 to 1."""
-        return 3 if self.task == "find" else 2
+        """Of an action: ahead, left, and for some tasks whether it is here; each from -1 to 1."""
+        return 3 if driven_task(self.task).says else 2
+
+
+@dataclass(frozen=True)
+class DriveGoal:
+    """Something to drive to in a house."""
+
+    request: str
+    cells: np.ndarray
+    """(n,) of the floor, to which one drives."""
+    radius: float = 0.0
+    """Metres of `DrivenTask.distance` at which it is reached."""
+    object_class: str = ""
+
+
+@dataclass(frozen=True)
+class DrivenTask:
+    """A task of Drive-v0; yours is registered with `register_driven` under the name 'module:NAME'."""
+
+    name: str
+    goals: Callable[[World, FloorWays, DriveSettings, np.random.Generator], Iterator[DriveGoal]]
+    """Drawn one by one, until one can be driven to."""
+    distance: Callable[[Driving], float]
+    """Metres to the goal from where the body is."""
+    says: bool
+    """The agent ends an episode by a third number of its action, that it is here; else arriving ends it."""
+    extra_spaces: Mapping[str, Any]
+    """The Boxes of what the observation adds, by name."""
+    observation: Callable[[Driving], dict[str, np.ndarray]]
+
+
+DRIVEN_TASKS: dict[str, DrivenTask] = {}
+
+
+def register_driven(task: DrivenTask) -> DrivenTask:
+    """Make a task known by its name; returns it. Call it where the task is defined."""
+    DRIVEN_TASKS[task.name] = task
+    return task
+
+
+def driven_task(name: str) -> DrivenTask:
+    """The task of a name; raises ValueError where there is none."""
+    return record_named(name, DRIVEN_TASKS, DrivenTask, "", ())
 
 
 @dataclass(frozen=True)
@@ -125,7 +166,7 @@ class Driving:
         self.worlds, self.settings = dict(worlds), settings
         self._names, self._stage_of = sorted(self.worlds), stage_of
         self._stages: OrderedDict[str, tuple[Driver, FloorWays]] = OrderedDict()
-        self.request = ""
+        self.task = driven_task(settings.task)
 
     def reset(self, rng: np.random.Generator, world: str | None = None) -> None:
         """Put the body somewhere with something to do.
@@ -135,7 +176,7 @@ class Driving:
           ValueError: the house has no goal as far away as the settings want.
         """
         name = self._names[int(rng.integers(len(self._names)))] if world is None else world
-        self.world, s = self.worlds[name], self.settings
+        self.world = self.worlds[name]
         if name not in self._stages:
             self._stages[name] = self._stage_of(self.world)
         self._stages.move_to_end(name)
@@ -146,7 +187,7 @@ class Driving:
         x, y = self._ground.xy[start]
         height = self.world.house.storeys[0].elevation + EYE
         self.driver.place(np.array([x, y, height]), float(rng.uniform(-math.pi, math.pi)))
-        self.shortest = max(self._ways.length(start) - (s.reached if s.task == "reach" else 0.0), 0.0)
+        self.shortest = max(self._ways.length(start) - self.goal.radius, 0.0)
         """Metres that the best driver needs."""
         self._left = self.left
         self.metres = self.seconds = 0.0
@@ -180,23 +221,22 @@ class Driving:
         return np.clip(command, -1.0, 1.0)
 
     def judged(self, command: np.ndarray, rolled: Roll) -> Outcome:
-        """Outcome of a command that moved the body so."""
-        s = self.settings
+        """Outcome of a command that moved the body so; SPL as (4.17), of metres (docs/sources.md, S125)."""
         self.metres += rolled.metres
         self.seconds += self.periods * CONTROL
         self.collisions += rolled.collisions
         self.touched = rolled.touched
         before, self._left = self._left, self.left
-        near = self.is_there
-        if s.task == "reach" and near:
-            self.ended = "reached"
-        elif s.task == "find" and command[2] > SAID:
-            self.ended = "said"
-        elif self.seconds >= s.seconds - 1e-9:
+        there = self.is_there
+        if command[2] > SAID if self.task.says else there:
+            self.ended = "said" if self.task.says else "reached"
+        elif self.seconds >= self.settings.seconds - 1e-9:
             self.ended = "limit"
-        success = float(near and self.ended in ("reached", "said"))
+        success = float(there and self.ended in ("reached", "said"))
         reward = success - STEP_COST - COLLISION_COST * len(rolled.collisions) + PER_METRE * (before - self._left)
-        return Outcome(reward, self.ended, self._facts(success))
+        facts = {"success": success, "spl": weighted_by_path(success, self.shortest, self.metres)}
+        facts |= {"collisions": float(len(self.collisions)), "metres": self.metres, "seconds": self.seconds}
+        return Outcome(reward, self.ended, {**facts, "distance_to_goal": self._left})
 
     @property
     def left(self) -> float:
@@ -206,21 +246,16 @@ class Driving:
     @property
     def is_there(self) -> bool:
         """True where the body should be, said or not."""
-        if self.settings.task == "reach":
-            return within(float(np.linalg.norm(self._goal - self.driver.position)), self.settings.reached)
-        return self._ways.metres[self._ground.cell_at(self.driver.position)] == 0.0
+        return within(self.task.distance(self), self.goal.radius)
 
     @property
-    def direction(self) -> np.ndarray:
-        """(3,) float32: metres to the goal as the crow flies, sine and cosine of where, left positive (reach)."""
-        offset = self._goal - self.driver.position
-        aside = float(wrap(math.atan2(offset[1], offset[0]) - self.driver.yaw))
-        return np.array([np.linalg.norm(offset), math.sin(aside), math.cos(aside)], np.float32)
+    def offset(self) -> np.ndarray:
+        """(2,) metres from the body to the first cell of the goal, world."""
+        return self._ground.xy[self.goal.cells[0]] - self.driver.position
 
     def way(self) -> np.ndarray:
         """(n, 2) cells of a way to the goal that keeps away from things; for teachers, never for a policy."""
-        if self._wide is None:
-            self._wide = self._ground.wide_ways(self._goals)
+        self._wide = self._wide or self._ground.wide_ways(self.goal.cells)
         return self._ground.xy[self._wide.cells(self._ground.cell_at(self.driver.position))]
 
     def look(self) -> dict[str, np.ndarray]:
@@ -230,15 +265,8 @@ class Driving:
 
     def proprioception(self) -> dict[str, np.ndarray]:
         """The observation without pixels."""
-        observation = {}
-        observation["motion"] = np.array(self.driver.motion, np.float32)
-        observation["touched"] = np.array([self.touched], np.float32)
-        if self.settings.task == "reach":
-            observation["goal"] = self.direction
-        else:
-            observation["object"] = np.array([word_number(self._wanted)], np.float32)
-            observation["instruction"] = codes_of(self.request, TEXT).copy()
-        return observation
+        motion, touched = np.array(self.driver.motion, np.float32), np.array([self.touched], np.float32)
+        return {"motion": motion, "touched": touched, **self.task.observation(self)}
 
     def camera(self) -> Camera:
         """The body's eye as it is now, upright."""
@@ -246,31 +274,16 @@ class Driving:
         x, y, z = (float(v) for v in -axes[:, 2])
         return camera_at(position, math.atan2(y, x), math.asin(max(-1.0, min(1.0, z))), self.settings.vfov)
 
-    def picture(self, height: int, width: int) -> np.ndarray:
-        """(height, width, 3) uint8 for people."""
-        return self.world.renderer.rgb(self.camera(), (height, width))
-
     def close(self) -> None:
         """Free what draws; a later use opens it again."""
         for world in self.worlds.values():
             world.close()
 
-    def _facts(self, success: float) -> dict[str, float]:
-        """SPL as (4.17), of metres (docs/sources.md, S125)."""
-        return {
-            "success": success,
-            "spl": weighted_by_path(success, self.shortest, self.metres),
-            "collisions": float(len(self.collisions)),
-            "metres": self.metres,
-            "seconds": self.seconds,
-            "distance_to_goal": self._left,
-        }
-
     def _draw(self, rng: np.random.Generator) -> int:
         """Choose goal and start, and the ways between; returns the start's cell."""
         s = self.settings
-        for goals in self._points(rng) if s.task == "reach" else self._objects(rng):
-            self._goals, self._ways = goals, self._ground.ways(goals)
+        for goal in self.task.goals(self.world, self._ground, s, rng):
+            self.goal, self._ways = goal, self._ground.ways(goal.cells)
             far = self._ways.metres
             if len(starts := np.flatnonzero((far >= s.nearest) & (far <= s.farthest))):
                 return int(rng.choice(starts))
@@ -279,26 +292,45 @@ class Driving:
             "away; choose other distances"
         )
 
-    def _points(self, rng: np.random.Generator) -> Iterator[np.ndarray]:
-        """Cells, one by one."""
-        self.request = "go there"
-        for cell in rng.integers(len(self._ground.xy), size=POINTS):
-            self._goal = self._ground.xy[cell]
-            yield np.array([cell])
 
-    def _objects(self, rng: np.random.Generator) -> Iterator[np.ndarray]:
-        """Cells near all objects of a class, in their rooms; class by class in a drawn order."""
-        ground, things = self._ground, self.world.house.placements
-        classes = sorted({p.object_class for p in things} - NOT_OBJECTS)
-        for k in rng.permutation(len(classes)):
-            self._wanted, near = classes[k], np.zeros(len(ground.xy), bool)
-            self.request = f"find {with_article(self._wanted)}"[:TEXT]
-            for p in things:
-                if p.object_class == self._wanted:
-                    close = footprint_distance(p, ground.xy) <= self.settings.found
-                    near |= close & (ground.room_of_cell == p.room)
-            if near.any():
-                yield np.flatnonzero(near)
+def points(world: World, ground: FloorWays, settings: DriveSettings, rng: np.random.Generator) -> Iterator[DriveGoal]:
+    for cell in rng.integers(len(ground.xy), size=POINTS):
+        yield DriveGoal("go there", np.array([cell]), settings.reached)
+
+
+def direction(driving: Driving) -> dict[str, np.ndarray]:
+    """'goal': metres as the crow flies, sine and cosine of where, left positive."""
+    offset = driving.offset
+    aside = float(wrap(math.atan2(offset[1], offset[0]) - driving.driver.yaw))
+    return {"goal": np.array([np.linalg.norm(offset), math.sin(aside), math.cos(aside)], np.float32)}
+
+
+def objects(world: World, ground: FloorWays, settings: DriveSettings, rng: np.random.Generator) -> Iterator[DriveGoal]:
+    """Cells near all objects of a class, in their rooms; class by class in a drawn order."""
+    things = world.house.placements
+    classes = sorted({p.object_class for p in things} - NOT_OBJECTS)
+    for k in rng.permutation(len(classes)):
+        near = np.zeros(len(ground.xy), bool)
+        for p in things:
+            if p.object_class == classes[k]:
+                close = footprint_distance(p, ground.xy) <= settings.found
+                near |= close & (ground.room_of_cell == p.room)
+        if near.any():
+            request = f"find {with_article(classes[k])}"[:TEXT]
+            yield DriveGoal(request, np.flatnonzero(near), object_class=classes[k])
+
+
+def wanted(driving: Driving) -> dict[str, np.ndarray]:
+    """'object', its class as a word's number, and 'instruction', the request."""
+    number = np.array([word_number(driving.goal.object_class)], np.float32)
+    return {"object": number, "instruction": codes_of(driving.goal.request, TEXT).copy()}
+
+
+GOAL_SPACES = {"goal": spaces.Box(np.array([0, -1, -1], np.float32), np.array([LARGE, 1, 1], np.float32))}
+CLASS_SPACES = {"object": spaces.Box(0.0, LARGE, (1,)), "instruction": spaces.Box(0, 255, (TEXT,), np.uint8)}
+"""Spaces of `direction` and `wanted`."""
+register_driven(DrivenTask("reach", points, lambda d: float(np.linalg.norm(d.offset)), False, GOAL_SPACES, direction))
+register_driven(DrivenTask("find", objects, lambda d: d.left, True, CLASS_SPACES, wanted))
 
 
 def expert_action(driving: Driving) -> np.ndarray:

@@ -9,10 +9,7 @@ from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-from embodied.kinds.plugins import for_each_kind
-
-CONTINUOUS = {"vlnce": "VLNCE", "objectnav": "ObjectNav"}
-"""Names and titles of continuous navigation (embodied.gym.continuous)."""
+from embodied.kinds.plugins import for_each_kind, titled_files
 
 
 def register_with_gymnasium() -> None:
@@ -24,12 +21,14 @@ def register_with_gymnasium() -> None:
 
 
 def register(gymnasium: ModuleType) -> None:
-    """Environments by the name of their maker, which is imported when the first is made."""
+    """Environments by the name of their maker, which is imported when the first is made: kinds of tasks, continuous
+    tasks, and the files of this folder whose title is an id."""
     for_each_kind(lambda name, title: register_environment(gymnasium, title, name))
-    for kind, title in CONTINUOUS.items():
-        register_environment(gymnasium, title, kind, "embodied.gym.continuous", "embodied.gym.continuous")
-    if "embodied/Drive-v0" not in gymnasium.registry:
-        gymnasium.register("embodied/Drive-v0", entry_point="embodied.gym.drive:make")
+    for name, title in titled_files("gym/continuous_tasks").items():
+        register_environment(gymnasium, title, name, "embodied.gym.continuous", "embodied.gym.continuous")
+    for name, title in titled_files("gym").items():
+        if title.startswith("embodied/") and title not in gymnasium.registry:
+            gymnasium.register(title, entry_point=f"embodied.gym.{name}:make")
 
 
 def register_environment(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,8 +24,9 @@ def navigation_error(episode: Episode, graph: NavGraph) -> float:
     return float(min(graph.distance[episode.nodes[-1], g] for g in episode.task.goal_nodes))
 
 
-def within(distance: float, radius: float, *, strict: bool = False) -> bool:
-    """True for an end at most `radius` metres away (docs/sources.md, S3), or less than that where `strict`."""
+def within(distance: Any, radius: float, *, strict: bool = False) -> Any:
+    """True for an end, or an array of ends, at most `radius` metres away (docs/sources.md, S3), as on graphs and in
+    Drive-v0, or less than that where `strict`, as Habitat's."""
     return distance < radius if strict else distance <= radius + 1e-9
 
 
@@ -140,8 +141,7 @@ def ndtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, rad
 
 def sdtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
     """nDTW if the ends are within the radius, else 0 (docs/sources.md, S7)."""
-    near = graph.distance[path[-1], reference[-1]] <= radius + 1e-9
-    return ndtw(path, reference, graph, radius) if near else 0.0
+    return ndtw(path, reference, graph, radius) if within(graph.distance[path[-1], reference[-1]], radius) else 0.0
 
 
 def without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
@@ -163,16 +163,8 @@ def moves(episode: Episode, graph: NavGraph) -> float:
     return float(sum(isinstance(s.action, Move) for s in episode.steps))
 
 
-PER_EPISODE: dict[str, Measure] = {
-    "success": success,
-    "strict success": strict_success,
-    "spl": spl,
-    "navigation error": navigation_error,
-    "requests": requests,
-    "oracle success": oracle_success,
-    "path length": path_length,
-    "steps": steps,
-}
+_REPORTED = (success, strict_success, spl, navigation_error, requests, oracle_success, path_length, steps)
+PER_EPISODE: dict[str, Measure] = {f.__name__.replace("_", " "): f for f in _REPORTED}
 """The numbers every task reports, by name, in the order of their columns."""
 USAGE: dict[str, Callable[[Usage], float]] = {
     "model calls": lambda u: u.calls,

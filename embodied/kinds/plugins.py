@@ -5,22 +5,28 @@ from __future__ import annotations
 import functools
 import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from embodied.interface import Assistant
 
+T = TypeVar("T")
+
 
 @functools.cache
-def shipped_kinds() -> dict[str, str]:
-    """Names and titles of the kinds of tasks that come with the program, without importing them.
+def titled_files(folder: str) -> dict[str, str]:
+    """Names and titles of the modules in a folder of this package, without importing them.
 
-    They are the files of embodied/kinds/shipped, each of which begins with its title and a colon: 'hanna' is 'HANNA'.
+    A file begins with its title and a colon: embodied/kinds/shipped/hanna.py with 'HANNA'.
     """
-    files = sorted((Path(__file__).parent / "shipped").glob("[!_]*.py"))
+    files = sorted((Path(__file__).parents[1] / folder).glob("[!_]*.py"))
     return {f.stem: f.read_text(encoding="utf-8").partition(":")[0].strip('"') for f in files}
+
+
+shipped_kinds = functools.partial(titled_files, "kinds/shipped")
+"""Names and titles of the kinds of tasks that come with the program."""
 
 
 _OWN_KINDS: dict[str, str] = {}
@@ -66,6 +72,25 @@ def named_object(name: str) -> Any:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError, TypeError, ValueError) as e:
         raise ValueError(f"expected 'module:NAME' with an importable module, got {name!r} ({e})") from e
+
+
+def record_named(name: str, records: dict[str, T], record: type[T], package: str, shipped: Collection[str]) -> T:
+    """The record of a name: in `records`, where a `shipped` module of `package` puts it, or what 'module:NAME' names.
+
+    Raises:
+      ValueError: unknown, or what 'module:NAME' names is no such record of that name.
+    """
+    if name not in records and name in shipped:
+        importlib.import_module(f"{package}.{name}")
+    elif name not in records and ":" in name:
+        made = named_object(name)
+        if not isinstance(made, record) or getattr(made, "name", None) != name:
+            raise ValueError(f"{name!r} should be a {record.__name__} with name={name!r}, got {made!r:.60}")
+        records[name] = made
+    if name not in records:
+        known = sorted({*records, *shipped})
+        raise ValueError(f"unknown {record.__name__} {name!r}; use one of {known}, or 'module:NAME' of your own")
+    return records[name]
 
 
 def made_by_name(name: str) -> Any:

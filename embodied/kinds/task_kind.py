@@ -20,7 +20,6 @@ Only `name`, `title` and `tasks` are needed. What else a kind may say, and who r
 from __future__ import annotations
 
 import dataclasses
-import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -39,7 +38,7 @@ from embodied.interface import (
     SeenPlace,
     Task,
 )
-from embodied.kinds.plugins import announce_kind, named_object, shipped_kinds
+from embodied.kinds.plugins import announce_kind, record_named, shipped_kinds
 from embodied.kinds.splits import Splits, SplitSizes, seen_and_unseen
 from embodied.navigation.graph import NavGraph
 from embodied.policies.baselines import Forward10, RandomWalk, Shortest
@@ -340,15 +339,4 @@ def kind_named(name: str) -> TaskKind:
     Raises:
       ValueError: unknown, or what 'module:NAME' names is no kind of that name.
     """
-    if name not in _KINDS and name in shipped_kinds():
-        importlib.import_module(f"embodied.kinds.shipped.{name}")
-    elif name not in _KINDS and ":" in name:
-        kind = named_object(name)
-        if not isinstance(kind, TaskKind) or kind.name != name:
-            raise ValueError(f"{name!r} should be a TaskKind with name={name!r}, got {kind!r:.60}")
-        _KINDS[name] = kind
-    if name not in _KINDS:
-        raise ValueError(
-            f"unknown kind of task {name!r}; use one of {[*shipped_kinds()]}, or 'module:NAME' of your own"
-        )
-    return _KINDS[name]
+    return record_named(name, _KINDS, TaskKind, "embodied.kinds.shipped", shipped_kinds())

@@ -32,14 +32,15 @@ DRIVEN = ("motion", "touched", "goal")
 """Parts of what Drive-v0 shows that agent_pos has, where they are there."""
 
 
-class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
+class _ForLeRobot(gym.Wrapper[dict[str, Any], np.ndarray, Any, Any]):
     """Base of both environments: `pixels`, which are black for a blind agent, and `agent_pos`. Subclasses
     define `_command`, what an action of the policy does, and `_state`, the numbers of agent_pos."""
 
+    env: Any
+
     def __init__(self, env: Any, height: int, width: int, numbers: int) -> None:
         """`numbers`: of agent_pos."""
-        self.env = env
-        self.render_mode, self.metadata = env.render_mode, env.metadata
+        super().__init__(env)
         self._black = np.zeros((height, width, 3), np.uint8)
         seen = spaces.Box(0, 255, self._black.shape, np.uint8)
         self.observation_space = spaces.Dict(
@@ -49,7 +50,6 @@ class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        super().reset(seed=seed)
         o, info = self.env.reset(seed=seed, options=options)
         return self._seen(o), info | {"is_success": False}
 
@@ -65,12 +65,6 @@ class _ForLeRobot(gym.Env[dict[str, Any], np.ndarray]):
 
     def _state(self, o: dict[str, Any]) -> np.ndarray:
         raise NotImplementedError
-
-    def render(self) -> np.ndarray | None:
-        return self.env.render()
-
-    def close(self) -> None:
-        self.env.close()
 
 
 class ContinuousForLeRobot(_ForLeRobot):
@@ -112,7 +106,7 @@ class DriveForLeRobot(_ForLeRobot):
     @property
     def task_description(self) -> str:
         """The request."""
-        return self.env.driving.request
+        return self.env.driving.goal.request
 
     @property
     def task(self) -> str:

@@ -1,0 +1,21 @@
+"""ObjectNav: go near an object of a class, as Habitat's (Anderson et al. 2018)."""
+
+from __future__ import annotations
+
+from embodied.datasets.habitat import object_episodes, read_objectnav
+from embodied.envs.continuous import ContinuousEpisode
+from embodied.gym.continuous import ContinuousTask, EpisodeSource, register_continuous
+
+OBJECTS = 100
+"""Episodes in each house where no file says otherwise."""
+
+
+def object_source(source: EpisodeSource) -> list[ContinuousEpisode]:
+    """OBJECTS episodes in each house."""
+    seed, navmeshes = source.seed, source.navmeshes
+    return [e for w in source.worlds.values() for e in object_episodes(w, OBJECTS, seed=seed, navmeshes=navmeshes)]
+
+
+OBJECTNAV = register_continuous(
+    ContinuousTask("objectnav", "ObjectNav", "objectnav", read_objectnav, object_source, gps=True)
+)
