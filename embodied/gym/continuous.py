@@ -78,7 +78,7 @@ class EpisodeSource:
 
 @dataclass(frozen=True)
 class ContinuousTask:
-    """What an agent that moves as Habitat's do has to do: a file of embodied/gym/continuous_tasks, or one's own."""
+    """A task of an agent that moves as Habitat's do: a file of embodied/gym/continuous_tasks, or one of your own."""
 
     name: str
     """The file's, or 'module:NAME' of one's own, so that it is found."""
