@@ -494,7 +494,7 @@ def test_archives_of_arrays_are_refused_by_the_size_they_declare(tmp_path):
 
 
 def test_episodes_and_checkpoints_are_unpacked_to_a_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(habitat, "MOST", 2**20)
+    monkeypatch.setattr(habitat, "LARGEST_FILE", 2**20)
     (tmp_path / "a.json.gz").write_bytes(gzip.compress(b"[" + bytes(2**23)))
     with pytest.raises(RecordError, match="a.json.gz unpacks to over 1048576 bytes"):
         habitat.read_vlnce(tmp_path / "a.json.gz")

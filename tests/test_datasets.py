@@ -72,7 +72,7 @@ def test_tasks_without_rooms_are_a_data_set_of_their_own_and_the_others_do_not_c
     assert all(t.goal.room_kind for t in with_rooms.tasks("train"))
     assert "rooms" not in (tmp_path / "a/dataset.json").read_text() + (tmp_path / "a/config.json").read_text()
     assert not Dataset(tmp_path / "b").config.rooms
-    with pytest.raises(ValueError, match="tasks without rooms are VNLA's"):
+    with pytest.raises(ValueError, match="leave rooms as it is"):
         DatasetConfig("find", rooms=False)
 
 
@@ -83,7 +83,7 @@ def test_tasks_of_vnla_get_the_time_that_their_rules_take(tmp_path):
     assert [b.horizon - a.horizon for a, b in zip(usual, longer, strict=True)] == [
         2 * int(np.ceil(t.budget)) for t in usual
     ]
-    with pytest.raises(ValueError, match="are VNLA's"):
+    with pytest.raises(ValueError, match="have no rules to choose"):
         built(tmp_path / "find", "find").split("train", rules="direct")
 
 

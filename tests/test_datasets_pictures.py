@@ -56,7 +56,7 @@ def data(tmp_path_factory) -> Dataset:
 @pytest.fixture(autouse=True)
 def hand_catalogue(monkeypatch):
     for module in (building, drawn, capture):
-        monkeypatch.setattr(module, "load_catalogue", lambda *_: HandCatalogue())
+        monkeypatch.setattr(module, "load_catalogue", lambda *_, **__: HandCatalogue())
 
 
 def files(data: Dataset) -> dict[str, int]:

@@ -80,7 +80,7 @@ def test_workers_read_what_their_parent_reads(data, start):
 @pytest.mark.slow
 def test_a_program_that_drew_its_pictures_may_load_them_with_workers(tmp_path, monkeypatch):
     """Forked workers waited for ever for the threads that OpenCV had in the process that drew."""
-    monkeypatch.setattr(building, "load_catalogue", lambda *_: HandCatalogue())
+    monkeypatch.setattr(building, "load_catalogue", lambda *_, **__: HandCatalogue())
     data = build(tmp_path / "data", tmp_path / "cache", "find", size="1x4", make_house=small_house)
     unit = Unit("train", 0)
     building.draw_unit(unit, data.folder, tmp_path / "cache", Unlit(size=64))

@@ -117,7 +117,8 @@ class DatasetSize:
         """
         sizes, slash, each = text.partition("/")
         houses, tasks, *test = (int(n) for n in sizes.split("x"))
-        return cls(houses, tasks, *test, **({"evaluation_tasks": int(each)} if slash else {}))
+        (test_houses,) = test or (None,)
+        return cls(houses, tasks, test_houses, int(each) if slash else None)
 
     @property
     def sizes(self) -> SplitSizes:
