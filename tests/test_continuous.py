@@ -135,7 +135,7 @@ def test_a_task_of_ones_own_is_an_environment_of_gymnasium(world):
     register_continuous(replace(OBJECTNAV, name=f"{__name__}:OWN", title="Own", gps=False))
     env = gymnasium.make("embodied/Own-v0", worlds={world.name: world}, **SMALL)
     assert set(env.reset(seed=0)[0]) == {"rgb", "depth", "instruction"}
-    with pytest.raises(ValueError, match=r"unknown ContinuousTask 'nowhere'; use one of .*'objectnav', .*'vlnce'"):
+    with pytest.raises(ValueError, match=r"unknown continuous task 'nowhere'; use one of .*'objectnav', .*'vlnce'"):
         open_episodes("nowhere")
 
 

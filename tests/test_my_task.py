@@ -177,7 +177,7 @@ def test_a_kind_that_nothing_could_find_is_refused(change, complaint):
 
 @pytest.mark.parametrize("name", ["hannah", "my_task:ROOMS", "nowhere:VISIT"])
 def test_a_wrong_name_says_what_there_is(name):
-    with pytest.raises(ValueError, match="unknown TaskKind|should be a TaskKind|importable module"):
+    with pytest.raises(ValueError, match="unknown task kind|should be a TaskKind|importable module"):
         kind_named(name)
 
 

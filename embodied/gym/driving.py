@@ -313,8 +313,7 @@ def objects(world: World, ground: FloorWays, settings: DriveSettings, rng: np.ra
         near = np.zeros(len(ground.xy), bool)
         for p in things:
             if p.object_class == classes[k]:
-                close = footprint_distance(p, ground.xy) <= settings.found
-                near |= close & (ground.room_of_cell == p.room)
+                near |= (footprint_distance(p, ground.xy) <= settings.found) & (ground.room_of_cell == p.room)
         if near.any():
             request = f"find {with_article(classes[k])}"[:TEXT]
             yield DriveGoal(request, np.flatnonzero(near), object_class=classes[k])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import re
 import sys
 from collections.abc import Callable, Collection
 from pathlib import Path
@@ -88,8 +89,8 @@ def record_named(name: str, records: dict[str, T], record: type[T], package: str
             raise ValueError(f"{name!r} should be a {record.__name__} with name={name!r}, got {made!r:.60}")
         records[name] = made
     if name not in records:
-        known = sorted({*records, *shipped})
-        raise ValueError(f"unknown {record.__name__} {name!r}; use one of {known}, or 'module:NAME' of your own")
+        what, known = re.sub(r"\B([A-Z])", r" \1", record.__name__).lower(), sorted({*records, *shipped})
+        raise ValueError(f"unknown {what} {name!r}; use one of {known}, or 'module:NAME' of your own")
     return records[name]
 
 

@@ -43,9 +43,8 @@ class _ForLeRobot(gym.Wrapper[dict[str, Any], np.ndarray, Any, Any]):
         super().__init__(env)
         self._black = np.zeros((height, width, 3), np.uint8)
         seen = spaces.Box(0, 255, self._black.shape, np.uint8)
-        self.observation_space = spaces.Dict(
-            {"pixels": seen, "agent_pos": spaces.Box(-LARGE, LARGE, (numbers,), np.float32)}
-        )
+        position = spaces.Box(-LARGE, LARGE, (numbers,), np.float32)
+        self.observation_space = spaces.Dict({"pixels": seen, "agent_pos": position})
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
