@@ -207,7 +207,7 @@ def test_a_device_that_is_not_there_is_one_sentence_with_its_remedy():
 
 def test_opening_and_closing_leaves_one_context_and_nothing_behind(house, tmp_path):
     places, contexts = [], set()
-    for _ in range(12):
+    for _ in range(4):
         with world_of(house, tmp_path, ignore_fields=("renderer",)) as world:
             world.panorama(0)
         with Renderer(house, HandCatalogue(), size=32) as renderer:
