@@ -15,7 +15,8 @@ from embodied.render.panorama import Panorama
 def test_every_part_that_is_named_is_measured(tmp_path, monkeypatch, capsys):
     made = timing.Measure("a thing", 2.0, "s", 1.0, 3.0, 5)
     monkeypatch.setattr(world, "houses", lambda catalogue, seed: iter([made]))
-    monkeypatch.setattr(light, "compare", lambda *args, **options: timing.Report({"rows": []}, "the ways"))
+    monkeypatch.setattr(light, "compare", lambda *args, **options: {"rows": []})
+    monkeypatch.setattr(light, "table", lambda facts: "the ways")
     assert main(["bench", "light", "houses", "--cache", str(tmp_path), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["light"] == {"rows": []} and [m["value"] for m in facts["measures"]] == [2.0]

@@ -87,11 +87,11 @@ def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
     found = drive.data_worlds
     monkeypatch.setattr(drive, "load_catalogue", lambda _: HandCatalogue())
     monkeypatch.setattr(drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, unlit))
-    order = ["export", "streamvln", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--cache"]
+    order = ["export", "vlnce", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--cache"]
     assert cli.main([*order, str(tmp_path / "cache"), "--tasks", "1", "--width", "64", "--action-noise", "0.1"]) == 0
-    (row,) = json.loads((tmp_path / "out/annotations.json").read_text())
-    assert row["instructions"] == [data.tasks("train")[0].request]
-    assert len(list((tmp_path / "out" / row["video"] / "rgb").iterdir())) == len(row["actions"])
+    rows = [json.loads(line) for line in (tmp_path / "out/samples.jsonl").read_text().splitlines()]
+    assert {row["instruction"] for row in rows} == {data.tasks("train")[0].request}
+    assert all((tmp_path / "out" / row["image"]).is_file() for row in rows)
 
 
 @pytest.mark.gl

@@ -154,7 +154,6 @@ REVIEWED = {
     "embodied/cli/cache.py": "what it was asked to, of the kinds that the program keeps in a cache",
     "agents/bandit/corpus.py": "the mark of a whole corpus, before it writes another",
     "embodied/locks.py": "its own lock",
-    "embodied/bench/serve.py": "what people did in a study that it has just written",
     "embodied/datasets/lerobot.py": "an empty folder",
     "embodied/light/baking/house.py": "a bake in the cache",
     "embodied/light/baking/stages.py": "stages of a bake in the cache",

@@ -166,7 +166,6 @@ ORDERS = {
     "evaluate": ["evaluate", "hanna", "--agent", "shortest", "--data", "{data}", "--out", "{out}"],
     "export hanna": ["export", "hanna", "--data", "{data}", "--out", "{out}"],
     "export parquet": ["export", "parquet", "--data", "{data}", "--out", "{out}"],
-    "export streamvln": ["export", "streamvln", "--data", "{data}", "--out", "{out}"],
     "export mjcf": ["export", "mjcf", "--house", "{out}", "--light", "none", "--out", "{out}"],
     "light": ["light", "{out}", "--hour", "9"],
     "light more": ["light", "{out}", "--lights", "2"],
@@ -177,7 +176,7 @@ ORDERS = {
 def test_no_command_writes_where_another_process_does(name, tmp_path, capsys):
     data, out = tmp_path / "data", tmp_path / "out"
     if "{data}" in ORDERS[name]:
-        built(data, "vln" if "streamvln" in name else "hanna")
+        built(data, "hanna")
     out.mkdir()
     two_rooms().save(out / "house.json")
     with locked(out):

@@ -57,7 +57,6 @@ LEARN = ("--data", "d", "--out", "o")
         (("evaluate", "hanna", "--data", "d", "--tasks", "0"), "--tasks: should be"),
         (("features", "--data", "d", "--workers", "-5"), "--workers: should be"),
         (("features", "--data", "d", "--pictures", "nope"), "--pictures: invalid choice: 'nope'"),
-        (("bench", "serve", "--seconds", "0"), "--seconds: should be"),
         (("train", "hanna", *LEARN, "--minutes", "-1"), "--minutes: should be a number above 0, got '-1'"),
         (("train", "hanna", *LEARN, "--minutes", "nan"), "--minutes: should be a number above 0"),
         (("train", "hanna", *LEARN, "--validation-tasks", "0"), "validation_tasks must be at least 1"),

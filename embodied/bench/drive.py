@@ -14,7 +14,7 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.bench.seen import FLAT
-from embodied.bench.timing import Measure, measure, one_core, share
+from embodied.bench.timing import Measure, measure, one_core
 from embodied.generate import generate_house
 from embodied.gym.driving import DriveSettings, Driving, expert_action
 from embodied.render.camera import Camera
@@ -24,12 +24,8 @@ from embodied.world import open_world
 
 STEPS = 60
 """Of one timed call; a command is held for a tenth of a second."""
-LIVE_SIZES = (((128, 128), 200.0), ((480, 640), 60.0))
-"""Height and width of live pictures, and how many per second the project promises."""
-TOGETHER = 1.4
-"""Times that rgb, depth and ids may take of rgb alone."""
-LINES = (("physics alone", ()), ("rgb, 128 x 128", ("rgb",)), ("rgb and depth, 128 x 128", ("rgb", "depth")))
-"""Channels that are seen at every command."""
+LIVE_SIZES = ((128, 128), (480, 640))
+"""Height and width of live pictures."""
 
 
 def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterator[Measure]:
@@ -38,14 +34,12 @@ def drive(catalogue: Catalogue, cache: Path, seed: int, pictures: str) -> Iterat
         driving = Driving({world.name: world}, DriveSettings(observations=()))
         commands, cameras = recorded(driving, seed)
         rate = functools.partial(measure, unit="1/s", per=STEPS, clock=time.process_time)
-        for size, aim in LIVE_SIZES:
+        for size in LIVE_SIZES:
             name = f"frames of {size[1]} x {size[0]}"
-            colours = rate(f"{name}, rgb", functools.partial(_film, world.renderer, cameras, size, False), aim=aim)
-            whole = rate(f"{name}, rgb, depth and ids", functools.partial(_film, world.renderer, cameras, size, True))
-            yield from (colours, whole, share(f"{name}, with depth and ids of rgb alone", colours, whole, aim=TOGETHER))
-        for name, observations in LINES:
-            driving = Driving({world.name: world}, DriveSettings(observations=observations))
-            yield rate(f"drive, {name}", functools.partial(replay, driving, commands, seed))
+            yield rate(f"{name}, rgb", functools.partial(_film, world.renderer, cameras, size, False))
+            yield rate(f"{name}, rgb, depth and ids", functools.partial(_film, world.renderer, cameras, size, True))
+        driving = Driving({world.name: world}, DriveSettings(observations=("rgb",)))
+        yield rate("drive, rgb, 128 x 128", functools.partial(replay, driving, commands, seed))
 
 
 def recorded(driving: Driving, seed: int) -> tuple[list[tuple[int, np.ndarray]], list[Camera]]:

@@ -1,4 +1,4 @@
-"""Benchmarks on a CUDA device: live pictures by OpenGL and by MuJoCo Warp, bodies on wheels, features, learning, light.
+"""Benchmarks on a CUDA device: live pictures by OpenGL and by MuJoCo Warp, features, learning, light.
 
 Where there is no CUDA device a few small pictures are drawn on the CPU, which tells that all parts work and no more.
 """
@@ -36,8 +36,6 @@ LIVE = 128
 PICTURE_SIDES, WORLDS = (64, 128, 256), (64, 256, 1024)
 """Sides of square pictures, pixels, and how many Warp draws at once."""
 CHANNELS_DRAWN = (("rgb",), ("rgb", "depth", "ids"))
-BODIES = (64, 256, 1024)
-"""On wheels at once, each with a camera of LIVE pixels."""
 CPU_FLAT = HouseConfig(area=(34.0, 44.0))
 """The flat of the check on the CPU."""
 DRAWING_SECONDS = 3.0
@@ -51,7 +49,7 @@ Works = Callable[[str], Mapping[str, tuple[Callable[[], object], int]]]
 def gpu(
     catalogue: Catalogue, cache: Path, seed: int, light: str, works: Works, *, progress: Callable[[str], None]
 ) -> Iterator[Measure]:
-    """By the clock: pictures of one lit flat, what learners do, light of the flat, and bodies on wheels in it.
+    """By the clock: pictures of one lit flat, what learners do, and light of the flat.
 
     Args:
       light: by name, 'fast' or 'normal'.
@@ -85,10 +83,6 @@ def gpu(
         for quality in QUALITIES if card else ():
             name = f"light of a flat of {house.area:.0f} m², {quality}, {card if device() == 'cuda' else device()}"
             yield measure(name, functools.partial(_light, house, catalogue, cache, quality), "s", repeats=3)
-        for count in BODIES if card else (4,):
-            yield _drive(
-                world, count, f"bodies on wheels, {card or 'CPU'}, {count} at once, {LIVE} x {LIVE}, rgb: steps"
-            )
 
 
 def _poses(world: World, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -96,23 +90,6 @@ def _poses(world: World, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]
     rng = stream(seed, "bench", "gpu")
     nodes = rng.integers(len(world.graph.positions), size=count)
     return world.graph.positions[nodes], rng.uniform(-np.pi, np.pi, count)
-
-
-def _drive(world: World, count: int, name: str) -> Measure:
-    """Steps per second of all bodies together, whose commands are drawn at random."""
-    from embodied.gym.drive_vector import DriveVectorEnv  # late: extras
-    from embodied.gym.driving import DriveSettings
-
-    rng = stream(0, "bench", "gpu", "drive")
-    envs = DriveVectorEnv(
-        world, DriveSettings(observations=("rgb",), height=LIVE, width=LIVE), count, out=lambda array: array
-    )
-    try:
-        envs.reset(seed=0)
-        step = lambda: envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))
-        return measure(name, step, "1/s", repeats=2 * TIMED_CALLS, warm=3, per=count)
-    finally:
-        envs.close()
 
 
 def _light(house: House, catalogue: Catalogue, cache: Path, quality: str) -> None:

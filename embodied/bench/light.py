@@ -1,4 +1,4 @@
-"""All ways of drawing the same views, against the path tracer: quality, milliseconds, memory, disk, one sheet."""
+"""All ways of drawing the same views, against the path tracer: quality, milliseconds, memory, disk."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from embodied import gl
-from embodied.assets.cache import write_bytes, write_json
-from embodied.bench.timing import Report
+from embodied.assets.cache import write_json
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.light.backend import device
@@ -27,7 +26,6 @@ from embodied.light.tracing.reference import Tracer
 from embodied.navigation.graph import build_graph
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
-from embodied.render.jpeg import jpeg
 from embodied.world import gloss_of
 
 if TYPE_CHECKING:
@@ -70,8 +68,8 @@ class Shot:
 
 def compare(
     catalogue: Catalogue, cache: Path, out: Path, *, seed: int = 1, progress: Callable[[str], None] = lambda text: None
-) -> Report:
-    """Draw ROOMS_SHOWN rooms of each of HOUSES houses in every way, measure, write light.jpg and light.json to `out`.
+) -> dict:
+    """Draw ROOMS_SHOWN rooms of each of HOUSES houses in every way, measure, and write light.json to `out`.
 
     Args:
       seed: of the first house; the others have the next ones, each at another time of day.
@@ -94,13 +92,12 @@ def compare(
     facts = measure(shots, bakes)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(out / "light.jpg", jpeg(sheet(shots), 74))
     write_json(out / "light.json", facts, indent=1)
-    return Report(facts, table(facts))
+    return facts
 
 
 def viewpoints(house: House, shown: Sequence[str] = ()) -> list[tuple[str, np.ndarray, float]]:
-    """VIEWS rooms of different kinds: id, eye, and the yaw with the longest view.
+    """ROOMS_SHOWN rooms of different kinds: id, eye, and the yaw with the longest view.
 
     Args:
       shown: kinds of rooms that other houses have shown, each as often as it was; the rarest come first, then the
@@ -232,25 +229,6 @@ def table(facts: dict) -> str:
         f"bias {facts['bias']:+.1%}; textures {facts['disk_mb']:.1f} MB on disk, {facts['memory_mb']:.0f} MB in memory."
     )
     return "\n".join(lines)
-
-
-def sheet(shots: Sequence[Shot]) -> np.ndarray:
-    """(h, w, 3) uint8: one row per view, one column per way, labelled."""
-    views = list(dict.fromkeys((s.room, s.hour) for s in shots))
-    by = {(s.room, s.hour, s.way): s.rgb for s in shots}
-    rows = []
-    for room, hour in views:
-        row = [by[room, hour, way].copy() for way in WAYS]
-        _write(row[0], f"{room} {hour:g} h", 6)
-        rows.append(np.concatenate(row, axis=1))
-    head = np.full((20, rows[0].shape[1], 3), 255, np.uint8)
-    for k, way in enumerate(WAYS):
-        _write(head, way, 6 + k * rows[0].shape[1] // len(WAYS))
-    return np.concatenate([head, *rows])
-
-
-def _write(picture: np.ndarray, text: str, column: int) -> None:
-    cv2.putText(picture, text, (column, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0), 1, cv2.LINE_AA)
 
 
 def psnr(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float:

@@ -23,29 +23,11 @@ class Measure:
     value: float
     """Median over the repeats."""
     unit: str
-    """'ms', 's', '1/s', 'MiB', 'x' (so many times as fast) or 'share' (of another time)."""
+    """'ms', 's', '1/s' or 'share' (of another time)."""
     low: float
     high: float
     """10th and 90th percentile."""
     repeats: int
-    aim: float | None = None
-    """The project's promise; None where it promises nothing."""
-
-    @property
-    def met(self) -> bool | None:
-        """The aim is met: rates and ratios must reach it, the rest must stay below."""
-        if self.aim is None:
-            return None
-        return self.value >= self.aim if self.unit in ("1/s", "x") else self.value <= self.aim
-
-
-@dataclass(frozen=True)
-class Report:
-    """A benchmark's result that is no list of measures."""
-
-    facts: dict
-    text: str
-    """Markdown."""
 
 
 def measure(
@@ -56,7 +38,6 @@ def measure(
     repeats: int = 9,
     warm: int = 1,
     per: int = 1,
-    aim: float | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Measure:
     """Time `body` `repeats` times after `warm` untimed calls.
@@ -74,7 +55,7 @@ def measure(
         seconds.append((clock() - start) / per)
     scale = {"ms": 1e3, "s": 1.0}
     values = [1.0 / s for s in seconds] if unit == "1/s" else [s * scale[unit] for s in seconds]
-    return from_values(name, values, unit, aim=aim)
+    return from_values(name, values, unit)
 
 
 @contextlib.contextmanager
@@ -88,17 +69,10 @@ def one_core() -> Iterator[None]:
         cv2.setNumThreads(threads)
 
 
-def from_values(name: str, values: Sequence[float], unit: str, *, aim: float | None = None) -> Measure:
+def from_values(name: str, values: Sequence[float], unit: str) -> Measure:
     """A line from values that were measured already."""
     low, middle, high = np.quantile(values, [0.1, 0.5, 0.9])
-    return Measure(name, float(middle), unit, float(low), float(high), len(values), aim)
-
-
-def share(name: str, part: Measure, whole: Measure, unit: str = "share", *, aim: float | None = None) -> Measure:
-    """`part` over `whole`, both from one run: of times, the share of the first; of rates, that of the second's time.
-    In 'x', how many times as fast: of times, the second; of rates, the first."""
-    repeats = min(part.repeats, whole.repeats)
-    return Measure(name, part.value / whole.value, unit, part.low / whole.high, part.high / whole.low, repeats, aim)
+    return Measure(name, float(middle), unit, float(low), float(high), len(values))
 
 
 def machine() -> dict[str, object]:
@@ -114,12 +88,7 @@ def machine() -> dict[str, object]:
 
 def table(measures: Sequence[Measure]) -> str:
     """The measures as a Markdown table."""
-    lines = ["| measured | median | 10-90 % | n | aim |", "|---|---|---|---|---|"]
+    lines = ["| measured | median | 10-90 % | n |", "|---|---|---|---|"]
     for m in measures:
-        aim = (
-            ""
-            if m.aim is None
-            else f"{'>=' if m.unit in ('1/s', 'x') else '<='} {m.aim:g} {'met' if m.met else 'MISSED'}"
-        )
-        lines.append(f"| {m.name} | {m.value:.4g} {m.unit} | {m.low:.4g}-{m.high:.4g} | {m.repeats} | {aim} |")
+        lines.append(f"| {m.name} | {m.value:.4g} {m.unit} | {m.low:.4g}-{m.high:.4g} | {m.repeats} |")
     return "\n".join(lines)

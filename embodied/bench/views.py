@@ -25,8 +25,8 @@ HEADINGS = 12
 """Headings of one timed call."""
 VIEWPOINTS = ("here", "there")
 """Two, of which one fits into memory."""
-AIMS = (((480, 640), 1200.0, 700.0), ((224, 224), 5000.0, 3000.0))
-"""Height and width, and how many views per second are aimed at: of rgb; of rgb, depth and ids."""
+VIEW_SIZES = ((480, 640), (224, 224))
+"""Height and width."""
 SHOWN = {"rgb": ("rgb",), "rgb, depth and ids": ("rgb", "depth", "ids")}
 
 
@@ -37,26 +37,26 @@ def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
     ) as world:
         panorama = world.renderer.panorama(world.graph.positions[0])
     with one_core(), tempfile.TemporaryDirectory() as folder:
-        for (height, width), colours, everything in AIMS:
+        for height, width in VIEW_SIZES:
             size, name = (height, width), f"views of {width} x {height}"
-            for (shown, channels), aim in zip(SHOWN.items(), (colours, everything), strict=True):
+            for shown, channels in SHOWN.items():
                 again = functools.partial(_look, panorama, channels, size, itertools.cycle(range(HEADINGS)))
-                yield _rate(f"{name}, {shown}", again, aim)
+                yield _rate(f"{name}, {shown}", again)
                 anew = functools.partial(_look, panorama, channels, size, itertools.count(0.01, 1.01))
                 yield _rate(f"{name}, {shown}, new angles", anew)
         for viewpoint in VIEWPOINTS:
             write_skybox(panorama, viewpoint, skybox_folder(folder, "scan"))
         skyboxes = Skyboxes(folder, 1)
         for shown, depth in (("rgb", False), ("rgb and depth", True)):
-            for (height, width), *_ in AIMS:
+            for height, width in VIEW_SIZES:
                 again = functools.partial(_open, skyboxes, itertools.repeat(VIEWPOINTS[0]), depth, (height, width))
                 yield _rate(f"skyboxes of {SKYBOX_SIDE} in memory, {width} x {height}, {shown}", again)
             anew = functools.partial(_open, skyboxes, itertools.cycle(VIEWPOINTS), depth, (480, 640))
             yield _rate(f"skyboxes of {SKYBOX_SIDE} not in memory, {shown}", anew)
 
 
-def _rate(name: str, body: Callable[[], object], aim: float | None = None) -> Measure:
-    return measure(name, body, "1/s", per=HEADINGS, aim=aim, clock=time.process_time)
+def _rate(name: str, body: Callable[[], object]) -> Measure:
+    return measure(name, body, "1/s", per=HEADINGS, clock=time.process_time)
 
 
 def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], turns: Iterator[float]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from embodied.assets.catalogue import Catalogue
-from embodied.bench.timing import Measure, measure, share
+from embodied.bench.timing import Measure, measure
 from embodied.generate import HouseConfig, generate_house
 from embodied.render.camera import Camera, face_cameras
 from embodied.render.classic import Renderer
@@ -27,10 +27,9 @@ def houses(catalogue: Catalogue, seed: int) -> Iterator[Measure]:
         lambda: generate_house(next(seeds), LARGE_HOUSE, catalogue),
         "s",
         repeats=7,
-        aim=1.0,
     )
     house = generate_house(seed, LARGE_HOUSE, catalogue)
-    yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5, aim=4.0)
+    yield measure("to a ready MjModel, assets cached", lambda: compile_scene(house, catalogue), "s", repeats=5)
 
 
 def pictures(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterator[Measure]:
@@ -40,33 +39,26 @@ def pictures(catalogue: Catalogue, cache: Path, seed: int, kind: str) -> Iterato
         renderer, eyes = world.renderer, world.graph.positions
         nodes = np.linspace(0, len(eyes) - 1, 12).astype(int)
         cameras = [c for n in nodes for c in face_cameras(eyes[n])]
-        face = _face(renderer, cameras, kind, 10.0 if kind == "unlit" else 12.0)
-        yield face
-        colours = measure(
+        yield _face(renderer, cameras, kind)
+        yield measure(
             f"256 panorama, six faces of rgb, {kind}",
             lambda: [[renderer.rgb(c, (256, 256)) for c in face_cameras(eyes[n])] for n in nodes],
             per=len(nodes),
             repeats=3,
-            aim=60.0,
         )
-        yield colours
-        whole = measure(
+        yield measure(
             f"256 panorama with depth and ids, {kind}",
             lambda: [renderer.panorama(eyes[n]) for n in nodes],
             per=len(nodes),
             repeats=3,
         )
-        yield whole
-        yield share("panorama with depth and ids of rgb alone", whole, colours, aim=1.4)
         panorama = renderer.panorama(eyes[0])
-        yield measure("36 views at 224 px from a panorama", lambda: panorama.views36(224), repeats=15, aim=15.0)
+        yield measure("36 views at 224 px from a panorama", lambda: panorama.views36(224), repeats=15)
     if kind != "unlit":
         with open_world(house, catalogue, cache, size=256, pictures="unlit") as plain:
-            unlit = _face(plain.renderer, cameras, "unlit", None)
-        yield unlit
-        yield share(f"{kind} cube face of unlit", face, unlit, aim=1.2)
+            yield _face(plain.renderer, cameras, "unlit")
 
 
-def _face(renderer: Renderer, cameras: Sequence[Camera], kind: str, aim: float | None) -> Measure:
+def _face(renderer: Renderer, cameras: Sequence[Camera], kind: str) -> Measure:
     name, draw = f"256x256 cube face, rgb, {kind}", lambda: [renderer.rgb(c, (256, 256)) for c in cameras]
-    return measure(name, draw, per=len(cameras), repeats=5, aim=aim)
+    return measure(name, draw, per=len(cameras), repeats=5)

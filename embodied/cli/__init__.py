@@ -67,7 +67,6 @@ EXTRAS = {
     **dict.fromkeys(("rerun", "rerun_cli", "av", "matplotlib"), "viz"),
     **dict.fromkeys(("pyarrow", "networkx", "trimesh"), "data"),
     **dict.fromkeys(("dm_control", "dm_env"), "drive"),
-    "psutil": "serve",
     "shtab": "completion",
 }
 """Which extra of the distribution brings a library that a small installation lacks."""

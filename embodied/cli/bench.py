@@ -6,7 +6,6 @@
   gpu                       pictures, features and learning on a CUDA device; without one, a short check on the CPU
   bakes                     light a flat repeatedly
   light                     compare the ways of rendering with a path tracer
-  serve                     people in a study at once: time of a step from the browser to the disk and back
 
 Close other programs first.
 """
@@ -14,20 +13,20 @@ Close other programs first.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
-from embodied.options import Count, Option, OutputFolder, drawn_as, whole
+from embodied.options import Option, OutputFolder, drawn_as
 from embodied.render.pictures import DRAWN, parse_pictures
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
     from embodied.bench.timing import Measure
 
-PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes", "light", "serve")
+PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes", "light")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,11 +38,7 @@ class BenchOptions(Furnished, Printed):
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
     """How pictures, seen and drive draw the house."""
     out: OutputFolder = Path("out/bench")
-    """Folder for the files of light and serve."""
-    people: Annotated[int, Option(whole(2), "N")] = 50
-    """serve: N people take part at once."""
-    seconds: Count = 60
-    """serve: the study runs for N seconds."""
+    """Folder for the file of light."""
 
 
 def run(args: BenchOptions) -> None:
@@ -55,8 +50,6 @@ def run(args: BenchOptions) -> None:
         raise ValueError(f"unknown benchmark {unknown}; choose from {PARTS}")
     catalogue = catalogue_of(args)
     lit = parse_pictures(args.pictures).quality or "fast"
-    if "serve" in parts:
-        from embodied.bench import serve  # needs the extra of that name
     lines = {
         "houses": lambda: world.houses(catalogue, args.seed),
         "pictures": lambda: world.pictures(catalogue, args.cache, args.seed, args.pictures),
@@ -67,26 +60,22 @@ def run(args: BenchOptions) -> None:
         "gpu": lambda: _gpu(catalogue, args.cache, args.seed, lit),
         "bakes": lambda: bakes.bakes(catalogue, args.cache, args.seed),
     }
-    reports: dict[str, Callable[[], Any]] = {
-        "light": lambda: light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note),
-        "serve": lambda: serve.measure(
-            args.out, args.cache, people=args.people, seconds=args.seconds, seed=args.seed, progress=note
-        ),
-    }
     measures = []
     for m in itertools.chain.from_iterable(lines[p]() for p in parts if p in lines):
         note(timing.table([m]).splitlines()[-1])
         measures.append(m)
-    facts = {"renderer": str(gl.info()) if gl.available() else "no OpenGL", **timing.machine(), "seed": args.seed}
+    facts: dict[str, Any] = {
+        "renderer": str(gl.info()) if gl.available() else "no OpenGL",
+        **timing.machine(),
+        "seed": args.seed,
+    }
     texts = [f"{facts['renderer']}; {facts['cores']} cores, {facts['system']}, seed {args.seed}"]
     facts["measures"] = [asdict(m) for m in measures]
     if measures:
         texts.append(timing.table(measures))
-    for part in parts:
-        if part in reports:
-            report = reports[part]()
-            facts[part] = report.facts
-            texts.append(report.text)
+    if "light" in parts:
+        facts["light"] = light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
+        texts.append(light.table(facts["light"]))
     show(args, facts, "\n\n".join(texts))
 
 

@@ -150,7 +150,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
     """
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
-        raise ValueError(f"{folder} is not empty; choose another folder for the LeRobot data set")
+        raise ValueError(f"{folder} is not empty; choose another folder")
     folder.parent.mkdir(parents=True, exist_ok=True)
     sweep(folder.parent)
     with drafts(folder.parent) as private:

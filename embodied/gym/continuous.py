@@ -1,7 +1,7 @@
 """Continuous navigation with Habitat's actions and live pictures: embodied/VLNCE-v0 and embodied/ObjectNav-v0.
 
     env = gymnasium.make("embodied/VLNCE-v0", data="DIR", split="val_unseen")
-    env = gymnasium.make("embodied/VLNCE-v0", data="DIR", episodes="val_unseen.json.gz", preset="streamvln")
+    env = gymnasium.make("embodied/VLNCE-v0", data="DIR", episodes="val_unseen.json.gz", height=480, width=640, hfov=79)
     env = gymnasium.make("embodied/ObjectNav-v0", data="DIR", split="train", sliding=False)
 
 Actions: 0 stop, 1 forward, 2 left, 3 right, and for ObjectNav 4 up, 5 down. Every picture is drawn at the pose of the
@@ -54,13 +54,6 @@ STEP_COST, PER_METRE = 0.01, 0.1
 KEPT = 4
 """Houses whose renderers are held open, the last used."""
 LIVE_CHANNELS = ("rgb", "depth")
-PRESETS: dict[str, tuple[Body, CameraConfig]] = {
-    "vlnce": (Body(), CameraConfig()),
-    "streamvln": (Body(), CameraConfig(480, 640, 79.0)),
-    "uninavid": (Body(turn=30), CameraConfig(480, 640, 120.0)),
-    "objectnav": (Body(turn=30, looks=True, eye=0.88), CameraConfig(480, 640, 79.0)),
-}
-"""Bodies and cameras of published programs, by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +77,11 @@ class ContinuousTask:
     """The file's, or 'module:NAME' of one's own, so that it is found."""
     title: str
     """Gymnasium has it as embodied/TITLE-v0."""
-    preset: str
-    """One of PRESETS."""
     read: Callable[[Path], list[ContinuousEpisode]]
     """The episodes of a file in Habitat's format."""
     episodes: Callable[[EpisodeSource], list[ContinuousEpisode]]
+    body: Body = Body()
+    camera: CameraConfig = CameraConfig()
     gps: bool = False
     """Observations have gps and compass."""
 
@@ -101,6 +94,12 @@ def register_continuous(task: ContinuousTask) -> ContinuousTask:
     CONTINUOUS_TASKS[task.name] = task
     register_environment(gym, task.title, task.name, __name__, __name__)
     return task
+
+
+def continuous_task(name: str) -> ContinuousTask:
+    """The task of a name; raises ValueError where there is none."""
+    folder = "embodied.gym.continuous_tasks"
+    return record_named(name, CONTINUOUS_TASKS, ContinuousTask, folder, titled_files("gym/continuous_tasks"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +278,6 @@ def open_episodes(
     cache: str | Path | None = None,
     pictures: PictureSettings | str | None = None,
     worlds: Mapping[str, World] | None = None,
-    preset: str | None = None,
     observations: str | Sequence[str] = LIVE_CHANNELS,
     **changes: Any,
 ) -> EpisodeDataset:
@@ -289,16 +287,14 @@ def open_episodes(
       data, split: of kind 'vln' for VLNCE-v0, of any kind for ObjectNav-v0.
       episodes: a .json.gz file in Habitat's format that plays in these houses, instead of their own episodes.
       pictures: how houses are drawn; as the data set's pictures are, 'fast' elsewhere, matte unless they name a look.
-      preset: one of PRESETS: body and camera; that of the kind where not given.
       observations: some of LIVE_CHANNELS.
-      changes: fields of Body and CameraConfig that differ from the preset's.
+      changes: fields of Body and CameraConfig that differ from the task's.
 
     Raises:
-      ValueError: an unknown preset or option, or episodes of other houses or in another frame.
+      ValueError: an unknown option, or episodes of other houses or in another frame.
     """
-    folder = "embodied.gym.continuous_tasks"
-    task = record_named(kind, CONTINUOUS_TASKS, ContinuousTask, folder, titled_files("gym/continuous_tasks"))
-    body, camera = chosen(preset or task.preset, changes)
+    task = continuous_task(kind)
+    body, camera = chosen(task, changes)
     where, navmeshes = Path(cache) if cache else default_cache(), NavMeshCache()
     whole = Dataset(Path(data)) if data is not None and worlds is None else None
     if worlds is None:
@@ -317,17 +313,14 @@ def open_episodes(
     return EpisodeDataset(task, dict(worlds), tuple(played), body, camera, seen, navmeshes)
 
 
-def chosen(preset: str, changes: Mapping[str, Any]) -> tuple[Body, CameraConfig]:
-    """A preset with some fields changed.
+def chosen(task: ContinuousTask, changes: Mapping[str, Any]) -> tuple[Body, CameraConfig]:
+    """The body and the camera of a task with some fields changed.
 
     Raises:
-      ValueError: an unknown preset or field.
+      ValueError: an unknown field.
     """
-    if preset not in PRESETS:
-        raise ValueError(f"preset is {preset!r}; use one of {sorted(PRESETS)}")
-    body, camera = PRESETS[preset]
-    names = [{f.name for f in dataclasses.fields(x)} for x in (body, camera)]
+    names = [{f.name for f in dataclasses.fields(x)} for x in (task.body, task.camera)]
     if unknown := sorted(set(changes) - names[0] - names[1]):
         raise ValueError(f"unknown options {unknown}; expected some of {sorted(names[0] | names[1])}")
     fields = [{k: v for k, v in changes.items() if k in n} for n in names]
-    return dataclasses.replace(body, **fields[0]), dataclasses.replace(camera, **fields[1])
+    return dataclasses.replace(task.body, **fields[0]), dataclasses.replace(task.camera, **fields[1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from embodied.datasets.habitat import object_episodes, read_objectnav
-from embodied.envs.continuous import ContinuousEpisode
+from embodied.envs.continuous import Body, CameraConfig, ContinuousEpisode
 from embodied.gym.continuous import ContinuousTask, EpisodeSource, register_continuous
 
 OBJECTS = 100
@@ -17,5 +17,13 @@ def object_source(source: EpisodeSource) -> list[ContinuousEpisode]:
 
 
 OBJECTNAV = register_continuous(
-    ContinuousTask("objectnav", "ObjectNav", "objectnav", read_objectnav, object_source, gps=True)
+    ContinuousTask(
+        "objectnav",
+        "ObjectNav",
+        read_objectnav,
+        object_source,
+        Body(turn=30, looks=True, eye=0.88),
+        CameraConfig(480, 640, 79.0),
+        gps=True,
+    )
 )

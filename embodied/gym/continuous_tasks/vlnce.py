@@ -23,4 +23,4 @@ def route_source(source: EpisodeSource) -> list[ContinuousEpisode]:
     return route_episodes(data.tasks(source.split), source.worlds)
 
 
-VLNCE = register_continuous(ContinuousTask("vlnce", "VLNCE", "vlnce", read_vlnce, route_source))
+VLNCE = register_continuous(ContinuousTask("vlnce", "VLNCE", read_vlnce, route_source))

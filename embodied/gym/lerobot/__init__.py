@@ -131,7 +131,7 @@ def sizes(env: str) -> tuple[int, int]:
     if env == "Drive":
         settings = DriveSettings()
         return settings.numbers, _driven(settings)
-    return continuous.PRESETS[env.lower()][0].actions, len(POSITION)
+    return continuous.continuous_task(env.lower()).body.actions, len(POSITION)
 
 
 def make_env(
