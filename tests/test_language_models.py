@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import base64
-import contextlib
 import dataclasses
 import io
-import itertools
 import json
-import os
-import socketserver
 import sqlite3
 import ssl
 import threading
-import time
 import urllib.error
 import urllib.request
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hand_chat import ChatServer, Parrot, first_allowed, said
+from hand_chat import ChatServer, Parrot, said
 from hand_worlds import HandWorld, grid_world
 from PIL import Image
 
 from embodied.agents.language_models.agent import LanguageModelAgent, Messages
 from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
-from embodied.agents.language_models.completions import misfit, object_schema
+from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.observations import OracleNames
 from embodied.agents.language_models.prompts import PromptBuilder, read_prompt
 from embodied.agents.language_models.routes import ModelJudge, followed_replies, listener_arrives, paraphrased
@@ -115,11 +110,8 @@ UNDERSTOOD = {
     "twice the same": said(f"{GOOD}\n{GOOD}"),
     "after the schema": said(f"{json.dumps(ONE)} so: {GOOD}"),
     "in parts": said([{"type": "thinking", "thinking": "{}"}, {"type": "text", "text": GOOD}]),
-    "as an object": said({"word": "yes"}),
     "where the reasoning stands": said("", reasoning_content=GOOD),
-    "where the reasoning of others stands": said(None, reasoning=GOOD),
     "arguments as a text": called(GOOD),
-    "arguments as an object": called({"word": "yes"}),
     "the same call twice": called(GOOD, {"word": "yes"}),
     "a function of old servers": said(None, function_call={"name": "answer", "arguments": GOOD}),
     "complete at the longest answer": said(GOOD, ended="length"),
@@ -139,26 +131,24 @@ INVALID = {
     "a field too many": (said('{"word": "yes", "and": "more"}'), "unknown fields"),
     "two different answers": (said(f'{GOOD} or {{"word": "no"}}'), "2 different answers"),
     "NaN": (said('{"word": NaN}'), "NaN is no JSON"),
-    "a number of a thousand digits": (said('{"word": ' + "9" * 10_000 + "}"), "no JSON"),
     "twenty thousand braces": (said("{" * 20_000), "no JSON"),
     "long text": (said("a" * (MOST_BYTES // 2)), "more than 20000 characters"),
     "unknown tools": (called(*["{}"] * 50, name="shell"), "unknown tools"),
-    "arguments that are a number": (called(7), "unknown tools"),
     "nothing": (said(None), "empty"),
+    "a refusal": (said(None, refusal="I cannot help with that"), ""),
     "cut within the answer": (said('{"word": "ye', ended="length"), "raise most_tokens"),
     "cut within the thoughts": (said(f"<think>Is it {GOOD}? I", ended="length"), "raise most_tokens"),
-    "cut before the answer": (said(None, reasoning_content="let me see", ended="length"), "raise most_tokens"),
 }
 
 
 @pytest.mark.parametrize(("reply", "problem"), INVALID.values(), ids=INVALID)
-def test_a_broken_answer_is_counted_as_invalid_and_is_nothing_else(reply, problem, answers):
+def test_a_broken_answer_is_counted_as_invalid_or_a_refusal_and_is_nothing_else(reply, problem, answers):
     with ChatServer(lambda r: reply) as server:
         client = client_of(server, answers)
         answer = client.ask(ASKED, ONE)
         assert answer.value is None and problem in answer.problem
         usage = client.usage(answer)
-        assert (usage.calls, usage.invalid, usage.refusals) == (1, 1, 0)
+        assert (usage.calls, usage.invalid, usage.refusals) == (1, bool(problem), not problem)
         assert client.ask(ASKED, ONE) == answer and len(server.requests) == 1
     assert answers.stat().st_size < 100_000
 
@@ -171,19 +161,16 @@ PARTLY = json.loads(said(GOOD)[2])
 FAILURES = {
     "HTML": (sent("<html><style>a {}</style><b>log&nbsp;in</b></html>", "text/html"), 1, r"web page \(log in\)"),
     "ten megabytes": (sent(b"[" + b"1," * 5_000_000 + b"1]"), 1, "more than 1000000 bytes"),
+    "a long error": ((400, {}, b'{"error": "' + b"x" * 2 * MOST_BYTES + b'"}'), 1, "more than 1000000 bytes"),
     "deep": (sent(b"[" * 100_000), 3, "no chat completion"),
     "gzip that is none": ((200, {"Content-Encoding": "gzip"}, b"{}"), 3, "no chat completion"),
     "an error": (sent('{"error": "out of memory"}'), 3, "out of memory"),
     "an error that passes": (sent('{"error": {"code": 503, "message": "asleep"}}'), 3, "status 503: asleep"),
     "an error that stays": (sent('{"error": {"code": 402, "message": "no credits"}}'), 1, "status 402: no credits"),
     "an error beside an answer": (sent(json.dumps(PARTLY | {"error": {"message": "lost"}})), 3, "lost"),
-    "an error at the end": (said(GOOD, ended="error"), 3, "no chat completion"),
-    "choices that are a number": (sent('{"choices": 3}'), 3, "choices"),
-    "no choices": (sent('{"choices": []}'), 3, "choices"),
     "a message that is none": (sent('{"choices": [{"message": null}]}'), 3, "choices"),
     "an empty body": (sent(""), 3, "its answer is empty"),
     "a stream of events": (sent('data: {"choices": []}\n\ndata: [DONE]', "text/event-stream"), 1, "stream of events"),
-    "half of an answer": (sent(said(GOOD)[2][:90]), 3, "no chat completion"),
     "a moved server whose address is none": ((308, {"Location": "http://[x/v1"}, b""), 1, r"sends on to 'http://\[x"),
     "a moved server": ((307, {"Location": "https://new.example/v1"}, b""), 1, "https://new.example"),
     "an error that repeats the key": (sent('{"error": "no key sk-secret"}'), 3, r"no key \*\*\*"),
@@ -252,20 +239,17 @@ def test_an_address_that_is_none_is_named_before_anything_is_sent(url, answers):
         Client(ServerSettings("m", url), AnswerCache(answers))
 
 
-@pytest.mark.parametrize("key", ["sk-abc\n", " sk-abc ", "sk-abc\r\n"])
-def test_a_key_may_have_blanks_and_line_ends_around_it(key, answers, monkeypatch):
+@pytest.mark.parametrize("key", [" sk-abc\r\n", "sk-äöü", "sk-a\nsk-b"])
+def test_a_key_is_taken_without_blanks_or_named_by_its_variable(key, answers, monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", key)
     with ChatServer(lambda r: said(GOOD)) as server:
-        client_of(server, answers).ask(ASKED, ONE)
-        assert server.headers[0]["authorization"] == "Bearer sk-abc"
-
-
-@pytest.mark.parametrize("key", ["sk-äöü", "“sk-abc”", "sk-a\nsk-b", "sk-\ud800"])
-def test_a_key_that_is_none_is_named_by_its_variable(key, answers, monkeypatch):
-    monkeypatch.setattr(os, "environ", os.environ.copy() | {"OPENAI_API_KEY": key})
-    with ChatServer(lambda r: said(GOOD)) as server, pytest.raises(UnableError, match="OPENAI_API_KEY holds") as e:
-        client_of(server, answers).ask(ASKED, ONE)
-    assert "sk-" not in str(e.value) and not server.requests
+        if key.strip() == "sk-abc":
+            client_of(server, answers).ask(ASKED, ONE)
+            assert server.headers[0]["authorization"] == "Bearer sk-abc"
+            return
+        with pytest.raises(UnableError, match="OPENAI_API_KEY holds") as e:
+            client_of(server, answers).ask(ASKED, ONE)
+        assert "sk-" not in str(e.value) and not server.requests
 
 
 @pytest.fixture
@@ -280,20 +264,13 @@ def no_proxies(monkeypatch) -> pytest.MonkeyPatch:
     ("no_proxy", "host", "direct"),
     [
         ("", "localhost", True),
-        ("", "127.8.9.1", True),
         ("", "[::1]", True),
         ("", "example.org", False),
         ("*", "example.org", True),
         ("localhost, .example.org", "a.example.org", True),
-        ("*.example.org", "a.example.org", True),
         ("example.org", "example.org", True),
-        ("example.org", "anexample.org", False),
-        ("example.org:80", "example.org", True),
         ("example.org:81", "example.org", False),
-        ("http://example.org", "example.org", True),
         ("::1,[fd07::2]", "[fd07::2]", True),
-        ("fd07:b51a:cc66:f0::/64", "[fd07:b51a:cc66:f0::7]", True),
-        ("fe11::/16", "[fd07::7]", False),
         ("10.0.0.0/8", "10.1.2.3", True),
         ("fd07::/999,[::,a/b,10.0.0.0/8", "example.org", False),
     ],
@@ -355,13 +332,6 @@ def test_certificates_that_are_gone_are_named_and_do_not_matter_without_tls(answ
 # Failures that pass, and those that do not ------------------------------------------------------
 
 
-def test_a_refusal_is_counted_as_one(answers):
-    with ChatServer(lambda r: said(None, refusal="I cannot help with that")) as server:
-        client = client_of(server, answers)
-        usage = client.usage(client.ask(ASKED, ONE))
-        assert (usage.invalid, usage.refusals) == (0, 1)
-
-
 def test_a_busy_server_is_asked_again_and_a_dead_one_is_an_error_that_says_what_to_do(answers):
     waiting = [(503, {}, b"busy"), (429, {"Retry-After": "0"}, b"slower"), said('{"word": "no"}')]
     with ChatServer(lambda r: waiting.pop(0)) as server:
@@ -371,48 +341,12 @@ def test_a_busy_server_is_asked_again_and_a_dead_one_is_an_error_that_says_what_
         client.ask([{"role": "user", "content": "something else"}], ONE)
 
 
-def test_a_rejected_request_is_an_error_that_does_not_show_the_key(answers, monkeypatch):
-    monkeypatch.setenv("OPENAI_API_KEY", "sk-very-secret")
-    body = json.dumps({"error": {"message": "Incorrect API key provided: sk-very-secret"}}).encode()
-    with ChatServer(lambda r: (401, {"Content-Type": "application/json"}, body)) as server:
-        with pytest.raises(UnableError, match="401") as e:
-            client_of(server, answers).ask(ASKED, ONE)
-        assert "secret" not in str(e.value) and len(server.requests) == 1
-
-
-@pytest.mark.parametrize("status", [302, 400])
-def test_the_body_of_an_error_is_not_read_without_a_limit(status, answers):
-    body = json.dumps({"error": {"message": "a plain word"}, "more": "x" * 2 * MOST_BYTES}).encode()
-    with ChatServer(lambda r: (status, {"Content-Type": "application/json"}, body)) as server:
-        with pytest.raises(UnableError, match=f"status {status}") as e:
-            client_of(server, answers).ask(ASKED, ONE)
-        assert "a plain word" not in str(e.value) and len(server.requests) == 1
-
-
 def test_a_server_that_does_not_answer_in_time_is_given_up(answers):
     done = threading.Event()
     with ChatServer(lambda r: said(GOOD) if done.wait() else None) as server:
         with pytest.raises(UnableError, match=r"after 2 tries: no whole answer within 0.1 s.*--timeout"):
             client_of(server, answers, timeout=0.1, tries=2).ask(ASKED, ONE)
         done.set()
-
-
-def test_headers_without_an_end_are_given_up(answers):
-    class Drips(socketserver.BaseRequestHandler):
-        def handle(self) -> None:
-            self.request.recv(100_000)
-            with contextlib.suppress(OSError):
-                for letter in itertools.chain(b"HTTP/1.1 200 OK\r\nX: ", itertools.repeat(97)):
-                    self.request.sendall(bytes([letter]))
-                    time.sleep(0.02)
-
-    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Drips) as server:
-        server.daemon_threads = True
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        url = f"http://127.0.0.1:{server.server_address[1]}/v1"
-        with pytest.raises(UnableError, match="no whole answer within 0.1 s"):
-            Client(ServerSettings("m", url, timeout=0.1, tries=1), AnswerCache(answers)).ask(ASKED, ONE)
-        server.shutdown()
 
 
 @pytest.mark.parametrize("form", ["schema", "object", "tools", "text"])
@@ -431,13 +365,6 @@ def test_another_file_is_not_taken_for_answers(tmp_path):
         other.execute("CREATE TABLE people (name TEXT)")
     with pytest.raises(ValueError, match="not of answers"):
         AnswerCache(tmp_path / "other")
-
-
-def test_a_schema_says_what_does_not_fit():
-    schema = object_schema(stars={"type": "integer", "minimum": 1, "maximum": 5})
-    assert misfit({"stars": 5}, schema) == ""
-    assert "range" in misfit({"stars": 6}, schema) and "type" in misfit({"stars": True}, schema)
-    assert "lacks" in misfit({}, schema) and "type" in misfit([1], schema)
 
 
 def test_a_prompt_of_ones_own_replaces_the_shipped_one_and_is_checked(tmp_path):
@@ -465,25 +392,6 @@ def test_twenty_tasks_replay_from_the_file_byte_for_byte_without_a_server(answer
     assert row.values["model price"].mean == pytest.approx(steps * (100 * 2 + 10 * 10) / 1e6)
     read = from_json(type(first[0]), to_json(first[0]))
     assert metrics.usage(read) == metrics.usage(first[0]) != Usage()
-
-
-def test_a_run_goes_on_where_its_server_was_killed(answers):
-    tasks = find_tasks(6)
-    with ChatServer() as whole:
-        wanted = play(find_env, LanguageModelAgent(client_of(whole, answers.with_name("whole"))), tasks, seed=0)
-    left = 10
-
-    def dies(request: dict) -> tuple:
-        nonlocal left
-        left -= 1
-        return first_allowed(request) if left >= 0 else (503, {}, b"")
-
-    with ChatServer(dies) as server, pytest.raises(UnableError, match="10 answers are kept"):
-        play(find_env, LanguageModelAgent(client_of(server, answers)), tasks, seed=0)
-    with ChatServer() as server:
-        again = play(find_env, LanguageModelAgent(client_of(server, answers)), tasks, seed=0)
-        assert len(server.requests) == len(whole.requests) - 10
-    assert [to_json(e) for e in again] == [to_json(e) for e in wanted]
 
 
 def test_an_agent_whose_model_talks_nonsense_goes_on_and_then_stops(answers):

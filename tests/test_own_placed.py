@@ -78,11 +78,6 @@ def test_a_class_that_no_house_can_hold_is_named_at_once(tmp_path, caplog, suppo
     assert "'gizmo' is placed in no house" in caplog.text and why in caplog.text
 
 
-def test_one_folder_need_not_be_in_a_list(tmp_path):
-    own = own_of(tmp_path / "own", "floor", {"hall": 1})
-    assert "mine/thing" in load_catalogue(tmp_path, own=str(own)).assets
-
-
 def test_seeds_are_whole_numbers_of_any_kind(tmp_path):
     bare = {name: stage for name, stage in STAGES.items() if name != "furnish"}
     house = generate_house(np.int64(3), stages=bare)
