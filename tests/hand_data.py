@@ -89,16 +89,16 @@ def paint(data, pictures, names=None):
         write_panoramas(data.folder / "houses" / name / "panoramas.pano", nodes, meta)
 
 
-def noise_features(data):
-    """Features of nothing for all houses of a data set, as made by an untrained encoder, which is returned."""
+def noise_features(data, encoder=None, seed=0):
+    """Features of nothing for all houses of a data set, as an encoder makes them, or an untrained one; returns it."""
     from embodied.agents.vision.drawn import pictures_of
     from embodied.agents.vision.encoder import random_encoder
     from embodied.agents.vision.features import feature_path, save_features
 
-    encoder = random_encoder(seed=0)
+    encoder = encoder or random_encoder(seed=0)
     for name in dict.fromkeys(n for split in data.splits for n in data.names(split)):
         place, pictures = data.place(name), pictures_of(data, name)
-        noise = stream(0, "noise", name).normal(size=(len(place.graph.ids), 36, encoder.size)).astype(np.float16)
+        noise = stream(seed, "noise", name).normal(size=(len(place.graph.ids), 36, encoder.size)).astype(np.float16)
         path = feature_path(data.folder / "features", encoder.digest, name, pictures)
         save_features(path, noise, encoder, place.house.digest, pictures)
     return encoder

@@ -10,8 +10,7 @@ import pytest
 import torch
 from torch import Tensor, nn
 
-from embodied.agents.common.checkpoint import CheckpointError
-from embodied.agents.common.session import Session, descend
+from embodied.agents.common.session import descend
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
 from embodied.agents.iliad.describing import by_the_program, by_the_text, kept
 from embodied.agents.iliad.learners import (
@@ -255,37 +254,6 @@ def test_a_button_that_is_never_described_is_never_learned(tmp_path):
     right = [p.student.greedy([w], [str(w.button)])[0] == w.button for w in WISHES]
     assert right[0] and right[1] and right[3]
     assert found[-1]["described"] < 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("learner", ["adel", "binary"])
-def test_a_killed_run_goes_on_exactly(tmp_path, monkeypatch, learner):
-    config = LearnerConfig(**{**vars(QUICK), "learner": learner, "checkpoint_minutes": 1e-9})
-    whole = problem()
-    expected = train(whole, config, tmp_path / "whole", lambda path, identity: None, note=silent)
-    save, saved = Session.save, []
-
-    def killed(self):
-        if len(saved) == 33:
-            raise KeyboardInterrupt
-        saved.append(self.progress)
-        save(self)
-
-    monkeypatch.setattr(Session, "save", killed)
-    with pytest.raises(KeyboardInterrupt):
-        train(problem(), config, tmp_path / "cut", lambda path, identity: None, note=silent)
-    monkeypatch.setattr(Session, "save", save)
-    again = problem()
-    assert train(again, config, tmp_path / "cut", lambda path, identity: None, note=silent) == expected
-    assert torch.equal(again.student.table.weight, whole.student.table.weight)
-    with pytest.raises(CheckpointError, match="mixing"):
-        train(
-            problem(),
-            LearnerConfig(**{**vars(config), "mixing": 0.9}),
-            tmp_path / "cut",
-            lambda p, identity: None,
-            note=silent,
-        )
 
 
 def test_adel_comes_to_the_true_marginal():

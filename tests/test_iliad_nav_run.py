@@ -97,14 +97,6 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
         learn(grounds, dataclasses.replace(config, batch=5), tmp_path / "cut", note=silent)
 
 
-def test_a_teacher_is_trained_once(source, tmp_path):
-    prepare(SMALL, source, tmp_path, note=silent)
-    times = {p: p.stat().st_mtime_ns for p in sorted(tmp_path.rglob("*.safetensors"))}
-    prepare(SMALL, source, tmp_path, note=silent)
-    assert {p.name for p in times} == {"executor.safetensors", "describer.safetensors"}
-    assert all(p.stat().st_mtime_ns == t for p, t in times.items())
-
-
 @pytest.mark.parametrize(("teacher", "voice"), [("grammar", RouteDescriber), ("people", People)])
 def test_the_grammar_or_people_teach_without_training(source, tmp_path, monkeypatch, teacher, voice):
     monkeypatch.setattr("embodied.agents.iliad.nav.run.seen_places", lambda data, cache: {})
@@ -132,13 +124,6 @@ def test_an_episode_is_told_and_recorded_as_it_was_walked(grounds):
     assert episode.nodes == (*trip.path, trip.path[-1]) and isinstance(episode.steps[-1].action, Stop)
     assert episode.steps[-1].reply.text == trip.requests[0]
     assert NavWorld(eyes.places).success(trip, walk)
-
-
-def test_a_study_has_navs_numbers_beside_its_own(source, tmp_path):
-    study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
-    text = run_study(study, ["3.5"], tmp_path, rows=["λ = 0.5"], note=silent)["3.5"].read_text()
-    assert "| λ = 0.5 | " in text and "validation" not in text.partition("|")[2].splitlines()[0]
-    assert "Not run: λ = 0, λ = 1." in text
 
 
 def test_a_study_has_a_blind_row_and_chance(source, tmp_path):

@@ -8,7 +8,7 @@ import re
 
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from embodied.agents.common.checkpoint import CheckpointError
@@ -90,36 +90,21 @@ def test_rules_by_hand(rule, word, expected):
     assert apply(rule, word) == expected
 
 
-NO_RULES = [
-    *("", "n", "a@b@c", "()(n()@c", "()(n)()@C", "()(n)()@(", "(a*)*b@c", "a+@b", "a|b@c", "[ab]@c", "a{9}@b", "a@\\3"),
-    "a" * 39 + "@b",
-]
-
-
-@pytest.mark.parametrize("rule", NO_RULES)
+@pytest.mark.parametrize("rule", ["", "n", "a@b@c", "()(n()@c", "()(n)()@C", "(a*)*b@c", "a|b@c", "[ab]@c", "a{9}@b"])
 def test_what_is_no_rule_is_none(rule):
     assert apply(rule, "banana") is None
 
 
 @pytest.mark.slow
 @given(st.text(alphabet=ALPHABET, max_size=LONGEST_BLOCK), st.text(alphabet=LETTERS, max_size=14))
+@example("(" * 17 + "." + ")" * 17 + "@a", "ab" * 7)
+@example("(.)" + "\\1" * 10 + "@b", "a" * 14)
+@example("(" + "." * 33 + ")@\\1", "a" * 14)
+@example("()()@" + "\\2" * 17, "")
 @settings(max_examples=300, deadline=None)
 def test_whatever_a_network_writes_is_carried_out_quickly_or_refused(rule, word):
-    out = apply(rule, word)  # matching never goes back: no repetition, no choice
+    out = apply(rule, word)  # hours, if matching went back: there is no repetition, no choice
     assert out is None or len(out) <= LONGEST_OUTPUT
-
-
-def test_the_worst_rules_of_the_alphabet_stay_quick():
-    worst = [
-        "(" * 17 + "." + ")" * 17 + "@a",
-        "(.)" + "\\1" * 10 + "@b",
-        "(" + "." * 33 + ")@\\1",
-        "()()@" + "\\2" * 17,
-    ]
-    for rule in worst:  # hours, if matching went back
-        assert len(rule) <= LONGEST_BLOCK
-        for word in ("a" * 14, "ab" * 7, ""):
-            apply(rule, word)
 
 
 def test_every_shape_gives_a_rule_that_changes_a_word_and_can_be_read_back():
@@ -174,15 +159,6 @@ def test_a_template_names_exactly_the_letters_of_its_shape():
         before = {f"b{k + 1}" for k in range(template.shape.before)}
         after = {f"a{k + 1}" for k in range(template.shape.after)}
         assert slots == (after if template.vague else before | after), template
-
-
-def test_specific_requests_of_different_shapes_differ(data):
-    shapes: dict[str, set] = {}
-    for part in PARTS:
-        for t in data.templates[part]:
-            if not t.vague:
-                shapes.setdefault(t.text, set()).add(t.shape)
-    assert all(len(s) == 1 for s in shapes.values())
 
 
 def test_data_points_are_changed_as_their_rule_says(data):
@@ -466,7 +442,7 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
 
 
 @pytest.mark.slow
-def test_a_teacher_is_trained_once_and_data_of_other_settings_are_refused(grounds, tmp_path):
+def test_a_teacher_is_trained_once_and_data_of_other_settings_or_damaged_are_refused(grounds, tmp_path):
     first = prepare(SMALL, tmp_path, note=silent)
     times = {p: p.stat().st_mtime_ns for p in sorted(tmp_path.rglob("*.safetensors"))}
     second = prepare(SMALL, tmp_path, note=silent)
@@ -474,16 +450,6 @@ def test_a_teacher_is_trained_once_and_data_of_other_settings_are_refused(ground
     assert first.digest == second.digest == grounds.digest
     with pytest.raises(ValueError, match="another folder"):
         prepare(dataclasses.replace(SMALL, items=10), tmp_path, note=silent)
-
-
-@pytest.mark.slow
-def test_a_stage_whose_weights_were_lost_writes_them_again_and_damaged_data_are_named(tmp_path):
-    prepare(SMALL, tmp_path, note=silent)
-    path = tmp_path / "executor.safetensors"
-    before = path.read_bytes()
-    path.unlink()  # as a kill leaves it between the last checkpoint and the weights
-    prepare(SMALL, tmp_path, note=silent)
-    assert path.read_bytes() == before
     (tmp_path / "data.json").write_text('{"identity": {}, "words": [1]}')
     with pytest.raises(ValueError, match="data.json"):
         prepare(SMALL, tmp_path, note=silent)
@@ -519,12 +485,6 @@ def test_a_study_makes_each_run_once_and_names_what_is_missing(tmp_path):
     other = dataclasses.replace(study, config=dataclasses.replace(QUICK, learning_rate=0.5))
     text = run_study(other, ["3.5"], tmp_path, report=True, note=silent)["3.5"].read_text()
     assert "Not run: λ = 0, λ = 1, λ = 0.5." in text and "learning rate 0.5" in text, "never old numbers, new caption"
-
-
-@pytest.mark.parametrize("wrong", ["--learner=nope", "--mixing=nan", "--threshold=nan", "--entropy=nan"])
-def test_what_cannot_be_learned_is_refused_before_data_are_made(wrong, tmp_path, capsys):
-    assert main(["train", "iliad", "regex", "--out", str(tmp_path / "run"), wrong]) == 2
-    assert wrong[2:].partition("=")[0] in capsys.readouterr().err and not (tmp_path / "run").exists()
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import shlex
 import numpy as np
 import pytest
 import torch
-from hand_data import build, metrics_of
+from hand_data import built, metrics_of, noise_features
 
 from embodied import options
 from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
@@ -24,16 +24,15 @@ from embodied.agents.learners.hanna import HannaTraining
 from embodied.agents.studies.engine import run_study
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.encoder import encoder_of, load_encoder, random_encoder, save_encoder
-from embodied.agents.vision.features import feature_path, save_features
+from embodied.agents.vision.features import feature_path
 from embodied.agents.vision.training_data import TrainingData
-from embodied.cli import features, main
+from embodied.cli import main
 from embodied.cli.view import looked_at
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
 from embodied.evaluation.tables import interval
 from embodied.interface import Mode, Stop
 from embodied.records import read_json
-from embodied.seeds import stream
 from embodied.teachers.hanna import segments
 
 pytestmark = pytest.mark.slow
@@ -54,16 +53,8 @@ def parsed(kind, *words):
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     """A tiny data set on grids, with features of the untrained encoder that are not computed but drawn."""
-    folder = tmp_path_factory.mktemp("line")
-    data = build(folder / "data", folder / "cache", ood=1)
-    encoder = random_encoder(seed=0)
-    rng = np.random.default_rng(0)
-    for name in sorted({n for s in data.splits for n in data.names(s)}):
-        place = data.place(name)
-        features = rng.normal(size=(len(place.graph.positions), 36, encoder.size))
-        save_features(
-            feature_path(data.folder / "features", encoder.digest, name), features, encoder, place.house.digest
-        )
+    data = built(tmp_path_factory.mktemp("line") / "data", ood=1)
+    noise_features(data)
     return data
 
 
@@ -124,7 +115,7 @@ def study(data, tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     save_encoder(random_encoder(seed=1), folder / "encoder.safetensors")
     encoder = load_encoder(folder / "encoder.safetensors")
-    give_features(data, {n for s in data.splits for n in data.names(s)}, encoder)
+    noise_features(data, encoder)
     words = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL)
     config = dataclasses.replace(words.config, iterations=2)
     learner = HannaStudy(
@@ -132,15 +123,6 @@ def study(data, tmp_path_factory):
     )
     run_study(learner, ["4.4"], folder / "out", note=print)
     return learner, folder / "out"
-
-
-def give_features(data, names, encoder, pictures=PLAIN, seed=0):
-    """Features that are drawn, not computed."""
-    for name in sorted(names):
-        place = data.place(name)
-        features = stream(seed, "features", name).normal(size=(len(place.graph.positions), 36, encoder.size))
-        path = feature_path(data.folder / "features", encoder.digest, name, pictures)
-        save_features(path, features, encoder, place.house.digest, pictures)
 
 
 def times(out, pattern):
@@ -196,14 +178,14 @@ def test_agents_that_are_compared_differ_in_one_setting(study):
 
 def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tmp_path):
     learner, out = study
-    other = build(tmp_path / "other", tmp_path / "cache", routes="spanning")
+    other = built(tmp_path / "other", routes="spanning")
     there = dataclasses.replace(learner, eval_data=other.folder)
     splits = ("test_unseen", "test_unseen as shipped")
     assert there.tables()["4.5"].splits == splits, "nobody has seen its houses, none are out of distribution"
     before = times(out, "best.safetensors")
     with pytest.raises(FileNotFoundError, match="embodied features"):
         run_study(there, ["4.4"], out, note=print)
-    give_features(other, other.names("test_unseen"), load_encoder(learner.encoder), seed=3)
+    noise_features(other, load_encoder(learner.encoder), seed=3)
     text = run_study(there, ["4.4"], out, note=print)["4.4"].read_text()
     assert times(out, "best.safetensors") == before and f"in the data set {other.digest[:16]}" in text
     assert "(45.43)" in text and "(86.67)" not in text, "the printed numbers are those of unseen houses"
@@ -257,18 +239,10 @@ def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
     assert len(vocabulary_of(data, 1).words) <= len(vocabulary_of(data).words)
 
 
-def test_weights_of_another_network_are_named(data, tmp_path):
-    words = ("--data", data.folder, "--encoder", _empty(tmp_path), "--network")
-    with pytest.raises(SystemExit):
-        parsed(features.FeatureOptions, *words, "resnet1")
+def test_weights_of_another_network_are_named(tmp_path):
+    torch.save({}, tmp_path / "weights.pth")
     with pytest.raises(ValueError, match="not the weights of resnet18"):
-        encoder_of(_empty(tmp_path), "resnet18")
-
-
-def _empty(folder):
-    path = folder / "weights.pth"
-    torch.save({}, path)
-    return path
+        encoder_of(tmp_path / "weights.pth", "resnet18")
 
 
 def test_a_data_set_of_another_kind_of_task_is_refused_with_the_command_that_makes_the_right_one(data):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import os
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import cv2
@@ -266,23 +264,6 @@ def test_drawing_keeps_to_the_threads_of_a_process(monkeypatch):
     monkeypatch.setenv("LP_NUM_THREADS", "1")
     keep_drawing_to_threads()
     assert os.environ["LP_NUM_THREADS"] == "1", "whoever set Mesa's own switch meant it"
-
-
-@pytest.mark.slow
-def test_workers_share_the_processors(monkeypatch):
-    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
-    code = """
-import joblib
-from embodied.light.backend import drjit
-
-def threads(k):
-    return drjit().thread_count()
-
-many = 2 * joblib.cpu_count()
-print(joblib.Parallel(n_jobs=many)(joblib.delayed(threads)(k) for k in range(2)))
-"""
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert told.stdout == "[1, 1]\n"
 
 
 def test_where_numpy_puts_its_arrays_no_kernel_is_compiled_for():

@@ -229,30 +229,3 @@ def test_doctor_tells_the_remedy_when_the_furniture_is_missing(shared_cache, mon
     monkeypatch.setattr("embodied.assets.importing.packs._installed", tuple)
     main(["doctor", "--cache", str(shared_cache)])
     assert "no furniture library found" in (said := capsys.readouterr().out) and "doctor --fix" in said
-
-
-@pytest.mark.parametrize(
-    ("command", "complaint"),
-    [
-        (["house", "--seed", "1", "--area", "900", "950", "--out", "x"], "area should be"),
-        (["house", "--seed", "1", "--storeys", "9", "--out", "x"], "storeys"),
-        (["render", "nowhere"], "house.json"),
-        (["render", "nowhere", "--node", "3"], "--equirect"),
-        (["doctor", "--pack", "none.sh3f"], "--fix"),
-        (["doctor", "--fix", "--pack", "none.sh3f"], "none.sh3f"),
-        (["light", "nowhere", "--hour", "tea"], "--hour"),
-        (["view", "nowhere.rrd"], "nowhere.rrd"),
-        (["rollout", "--episodes", "0"], "--episodes"),
-        (["assets", "list", "--class", "unicorn"], "unicorn"),
-        (["bench", "nonsense"], "nonsense"),
-    ],
-)
-def test_wrong_input_gives_one_clear_line(command, complaint, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    try:
-        assert main([*command, "--cache", str(tmp_path)] if command[0] != "view" else command) == 2
-    except SystemExit as e:  # words that the parser refuses
-        assert e.code == 2
-    said = capsys.readouterr().err.strip()
-    assert complaint in said and said.startswith("error: ") and len(said.splitlines()) == 1
-    assert not (tmp_path / "x").exists()

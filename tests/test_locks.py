@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import shutil
 import signal
 import socket
 import stat
@@ -77,30 +76,15 @@ with atomic_path(Path(sys.argv[1]) / "weights.safetensors") as temporary:
     assert (left / "weights.safetensors").read_text() == "half"
 
 
-NAMES = (
-    ".backup.home-2023.tar.gz",
-    ".report.v2-2024.pdf",
-    ".bashrc",
-    ".lock",
-    ".mark",
-    f".a.{socket.gethostname()}-99999999.x.json",
-    f"{DRAFTS}notes.txt",
-    ".embodied-unfinished",
-    "weights.safetensors.tmp",
-)
-
-
 def own_files(folder) -> set[Path]:
-    """Files and folders of every name that looks like a draft, a lock or a mark, and none is."""
-    for name in NAMES:
+    """Files and folders of names that look like drafts, locks or marks, and none is."""
+    for name in (".lock", ".mark", f"{DRAFTS}notes.txt", f".a.{socket.gethostname()}-99999999.x.json", "weights.tmp"):
         (folder / name).write_text("mine")
-    for name in (".photos.italy-2019.d", f"{DRAFTS}holidays", f"{DRAFTS}"):
+    for name in (f"{DRAFTS}holidays", f"{DRAFTS}"):
         (folder / name).mkdir()
         (folder / name / "one.jpg").write_text("mine")
         (folder / name / MARK).write_text("unfinished files of the program embodied, 7\n")
-    (folder / "elsewhere").mkdir()
-    (folder / "elsewhere" / "dear").write_text("mine")
-    (folder / f"{DRAFTS}link").symlink_to(folder / "elsewhere")
+    (folder / f"{DRAFTS}link").symlink_to(folder / f"{DRAFTS}holidays")
     return set(folder.rglob("*"))
 
 
@@ -124,15 +108,6 @@ def test_files_written_together_leave_nothing_unfinished_and_errors_name_theirs(
     assert Path(error.value.filename) == tmp_path / "house" / "c"
     assert {p.name for p in (tmp_path / "house").iterdir()} == {"a.json", "b.npz", "c"}
     assert (tmp_path / "house" / "b.npz").read_bytes() == b"34"
-
-
-def test_a_copy_of_what_was_killed_is_nobodys_draft(tmp_path):
-    killed_draft(tmp_path)
-    (left,) = tmp_path.glob(f"{DRAFTS}*")
-    shutil.copytree(left, tmp_path / f"{DRAFTS}copy")
-    sweep.cache_clear()
-    sweep(tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == [f"{DRAFTS}copy"]
 
 
 def test_whoever_takes_a_folder_finds_nothing_that_a_killed_process_left_in_it(tmp_path):
@@ -186,43 +161,6 @@ def test_no_command_writes_where_another_process_does(name, tmp_path, capsys):
         assert f"{out} is being written by process {os.getpid()} on " in said and content(out) == there
 
 
-APART = ["unshare", "--user", "--map-root-user", "--pid", "--fork"]
-DRAW = """
-import os, sys, time
-from pathlib import Path
-from embodied.assets.cache import atomic_path
-with atomic_path(Path(sys.argv[1]) / "first.json") as temporary:
-    temporary.write_text("first")
-    print(os.getpid(), flush=True)
-    sys.stdin.readline()
-"""
-
-
-WRITE = """
-import sys
-from pathlib import Path
-from embodied.assets.cache import write_bytes
-write_bytes(Path(sys.argv[1]), b"second")
-"""
-
-
-def test_containers_that_share_a_folder_leave_each_others_drafts(tmp_path):
-    """The host has one name, and the number of the first process is nobody's where the second runs."""
-    if subprocess.run([*APART, "true"], capture_output=True).returncode:
-        pytest.skip("this system lets nobody make process namespaces")
-    first = subprocess.Popen(
-        [*APART, "sh", "-c", '"$@"; true', "sh", sys.executable, "-c", DRAW, str(tmp_path)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert first.stdout is not None and first.stdout.readline() == "2\n"
-    subprocess.run([*APART, sys.executable, "-c", WRITE, str(tmp_path / "second.json")], check=True)
-    first.communicate("go on\n")
-    assert first.returncode == 0
-    assert content(tmp_path) == {"first.json": b"first", "second.json": b"second"}
-
-
 def test_files_and_folders_are_made_as_the_umask_says(tmp_path):
     before = os.umask(0o027)
     try:
@@ -255,12 +193,10 @@ def test_every_failed_write_names_the_file_that_was_wanted(body, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_may_not_be_written_is_named(tmp_path):
+@pytest.mark.parametrize("name", ["file/x.json", "folder"])
+def test_a_place_that_cannot_be_written_is_named(name, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OSError) as caught:
-        write_bytes(tmp_path / "file" / "x.json", b"")
-    assert "file" in str(caught.value.filename)
     (tmp_path / "folder").mkdir()
-    with pytest.raises(IsADirectoryError) as caught:
-        write_bytes(tmp_path / "folder", b"")
-    assert caught.value.filename == str(tmp_path / "folder")
+    with pytest.raises(OSError) as caught:
+        write_bytes(tmp_path / name, b"")
+    assert name.split("/")[0] in str(caught.value.filename)

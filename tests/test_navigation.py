@@ -207,7 +207,7 @@ def test_excluded_viewpoints_are_left_out_and_broken_files_refused(tmp_path):
     assert from_matterport(path).ids == ("a", "b", "c")
     items[0]["unobstructed"][1] = False
     path.write_text(json.dumps(items))
-    with pytest.raises(HouseError, match="symmetric"):
+    with pytest.raises(HouseError, match="symmetric.*'a' to 'b'"):
         from_matterport(path)
     path.write_text(path.read_text()[:50])
     with pytest.raises(HouseError, match="connectivity file"):
@@ -238,46 +238,11 @@ def test_of_a_real_scan_in_pieces_the_largest_is_taken_and_the_rest_is_named(tmp
         from_matterport(path)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"pose": [float("nan")] * 16},
-        {"pose": [float("inf")] * 16},
-        {"pose": ["1"] * 16},
-        {"pose": 3},
-        {"pose": [1.0] * 12},
-        {"included": {}},
-        {"included": None},
-        {"unobstructed": "true"},
-        {"unobstructed": [True]},
-        {"unobstructed": [{}] * 4},
-        {"image_id": 7},
-        {"image_id": None},
-    ],
-)
+@pytest.mark.parametrize("changes", [{"pose": [float("nan")] * 16}, {"included": None}, {"unobstructed": [True]}])
 def test_a_viewpoint_that_is_none_is_named_with_its_file_by_both_readers(tmp_path, changes):
+    """For what else may be damaged see test_damaged_files.py."""
     path, _ = real(tmp_path, **changes)
     for read in (lambda: from_matterport(path), lambda: load_graphs(str(tmp_path), ("scan",))):
-        with pytest.raises(
-            ValueError, match=r"scan_connectivity\.json.*(viewpoint 3|is no JSON).*write one with"
-        ) as caught:
+        with pytest.raises(ValueError, match=r"scan_connectivity\.json.*(viewpoint 3|is no JSON).*write one with"):
             read()
-        assert len(str(caught.value)) < 400
     load_graphs.cache_clear()
-
-
-@pytest.mark.parametrize("text", ["[" * 100_000, "{}x", "3", '{"a": 1}', "\xff", "[[]]", "[null]", "[]", ""])
-def test_what_is_no_connectivity_file_is_refused_by_both_readers(tmp_path, text):
-    path = tmp_path / "scan_connectivity.json"
-    path.write_bytes(text.encode("latin-1"))
-    for read in (lambda: from_matterport(path), lambda: load_graphs(str(tmp_path), ("scan",))):
-        with pytest.raises(ValueError, match=r"scan_connectivity\.json"):
-            read()
-
-
-def test_the_way_that_is_open_in_one_direction_only_is_named(tmp_path):
-    path, items = real(tmp_path)
-    items[0]["unobstructed"][1] = False
-    path.write_text(json.dumps(items))
-    with pytest.raises(HouseError, match="symmetric.*'a' to 'b'"):
-        from_matterport(path)

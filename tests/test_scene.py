@@ -12,7 +12,7 @@ from handmade import HandCatalogue, box_mesh, furnished
 
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.importing.packs import find_packs
-from embodied.assets.records import Asset, Finish, MeshPart, SupportSurface
+from embodied.assets.records import Asset, Finish, SupportSurface
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import Placement
 from embodied.scene import collision
@@ -62,6 +62,11 @@ def test_only_boxes_collide_and_only_meshes_are_drawn(compiled):
             assert m.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH and not m.geom_contype[g] and not m.geom_conaffinity[g]
 
 
+def _part_points(part) -> np.ndarray:
+    c, s = np.cos(part.yaw), np.sin(part.yaw)
+    return part.mesh.vertices @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + part.position
+
+
 def test_geoms_stand_where_the_parts_say(house, compiled):
     """The vertices of the drawn meshes in the model are those of the parts, in the world."""
     data = mujoco.MjData(compiled.model)
@@ -69,7 +74,7 @@ def test_geoms_stand_where_the_parts_say(house, compiled):
     m = compiled.model
     for owner in ("table_1", "mug_1", "living_room_1/wall_0"):
         parts = [p for p in house_parts(house, HandCatalogue()) if p.owner == owner]
-        expected = np.concatenate([_world(p) for p in parts])
+        expected = np.concatenate([_part_points(p) for p in parts])
         found = []
         for g in range(m.ngeom):
             if m.geom(g).name.startswith(f"{owner}#") and compiled.kind_of_geom[g] != "collision":
@@ -79,11 +84,6 @@ def test_geoms_stand_where_the_parts_say(house, compiled):
         found = np.concatenate(found)
         for end in (np.min, np.max):
             assert np.allclose(end(found, axis=0), end(expected, axis=0), atol=1e-4), owner
-
-
-def _world(part) -> np.ndarray:
-    c, s = np.cos(part.yaw), np.sin(part.yaw)
-    return part.mesh.vertices @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T + part.position
 
 
 def test_equal_meshes_are_shared(house, compiled):
@@ -134,14 +134,9 @@ def test_a_generated_flat_stays_put_for_a_second(shared_cache):
 
 def test_a_floating_mug_falls(house):
     """The check above can fail."""
-    lifted = dataclasses.replace(
-        house,
-        placements=tuple(
-            dataclasses.replace(p, position=(1.3, 1.0, 1.2)) if p.id == "mug_1" else p for p in house.placements
-        ),
-    )
-    moved = displacements(scene.compile_scene(lifted, HandCatalogue(), free=["mug_1"]))
-    assert moved["mug_1"] > 0.3
+    lift = lambda p: dataclasses.replace(p, position=(1.3, 1.0, 1.2)) if p.id == "mug_1" else p
+    lifted = dataclasses.replace(house, placements=tuple(map(lift, house.placements)))
+    assert displacements(scene.compile_scene(lifted, HandCatalogue(), free=["mug_1"]))["mug_1"] > 0.3
 
 
 def test_a_free_body_weighs_what_its_boxes_weigh(house):
@@ -201,31 +196,11 @@ def test_a_table_keeps_its_underside_free_and_its_top_exact():
 
 def test_collision_boxes_leave_support_surfaces_free():
     """Ornament above a declared surface is no obstacle for what stands on it."""
-    asset = Asset(
-        "t/shelf",
-        "shelf",
-        "shelf",
-        (1.0, 0.4, 1.0),
-        "floor",
-        surfaces=(SupportSurface("shelf_1", 0.5, -0.5, -0.2, 0.5, 0.2, 0.4),),
-    )
-    parts = (
-        box_mesh((-0.5, -0.2, 0), (0.5, 0.2, 0.5), (1, 1, 1, 1)),
-        box_mesh((-0.1, -0.1, 0.5), (0.1, 0.1, 0.6), (1, 1, 1, 1)),
-    )
-    boxes = collision.object_boxes(asset, parts, asset.size)
+    shelf = SupportSurface("shelf_1", 0.5, -0.5, -0.2, 0.5, 0.2, 0.4)
+    asset = Asset("t/shelf", "shelf", "shelf", (1.0, 0.4, 1.0), "floor", surfaces=(shelf,))
+    body, ornament = ((-0.5, -0.2, 0), (0.5, 0.2, 0.5)), ((-0.1, -0.1, 0.5), (0.1, 0.1, 0.6))
+    boxes = collision.object_boxes(asset, [box_mesh(*ends, (1, 1, 1, 1)) for ends in (body, ornament)], asset.size)
     assert max(b.centre[2] + b.half[2] for b in boxes) == pytest.approx(0.5, abs=5e-3)
-
-
-def test_cutting_a_box_out_of_a_box_keeps_the_rest():
-    rng = np.random.default_rng(2)
-    one, other = (np.zeros(3), np.array([1.0, 2.0, 3.0])), (np.array([0.2, -1.0, 1.0]), np.array([0.7, 1.5, 2.0]))
-    pieces = collision.without(one, other)
-    assert sum(float(np.prod(h - low)) for low, h in pieces) == pytest.approx(6.0 - 0.5 * 1.5 * 1.0)
-    for point in rng.uniform(one[0], one[1], (200, 3)):
-        inside = [bool(np.all(point > low) and np.all(point < h)) for low, h in pieces]
-        assert sum(inside) == (not (np.all(point > other[0]) and np.all(point < other[1])))
-    assert collision.without(one, (one[1], one[1] + 1)) == [one]
 
 
 def test_few_boxes_cover_a_complicated_thing():
@@ -240,33 +215,24 @@ def test_few_boxes_cover_a_complicated_thing():
         assert covered.all()
 
 
-def test_lit_pages_replace_the_materials(house):
+def lit_rug() -> LitPages:
     corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], np.float32)
-    mesh = LitMesh(
-        "rug_1",
-        "object",
-        "living_room_1",
-        0,
-        corners,
-        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
-        np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32),
-    )
-    pages = LitPages((mesh,), (np.full((8, 8, 3), 77, np.uint8),), "x")
-    s = scene.compile_scene(house, HandCatalogue(), collisions=False, lit=pages)
+    faces, uv = np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros((4, 2), np.float32)
+    mesh = LitMesh("rug_1", "object", "living_room_1", 0, corners, faces, uv)
+    return LitPages((mesh,), (np.full((8, 8, 3), 77, np.uint8),), "x")
+
+
+def test_lit_pages_replace_the_materials(house):
+    s = scene.compile_scene(house, HandCatalogue(), collisions=False, lit=lit_rug())
     assert s.model.ngeom == 1 and s.owners[s.owner_of_geom[0] - 1] == "rug_1" and s.room_of_geom == ("living_room_1",)
     with pytest.raises(ValueError, match="static"):
-        scene.build_spec(house, HandCatalogue(), free=frozenset({"mug_1"}), lit=pages)
+        scene.build_spec(house, HandCatalogue(), free=frozenset({"mug_1"}), lit=lit_rug())
 
 
 def test_people_are_seen_from_inside_where_their_models_have_gaps(house):
-    corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], np.float32)
-    faces, uv = np.array([[0, 1, 2], [0, 2, 3]], np.int32), np.zeros((4, 2), np.float32)
-    pages = (np.full((8, 8, 3), 77, np.uint8),)
-    rug = LitMesh("rug_1", "object", "living_room_1", 0, corners, faces, uv)
-    count = lambda h: scene.compile_scene(h, HandCatalogue(), collisions=False, lit=LitPages((rug,), pages, "x"))
+    count = lambda h: scene.compile_scene(h, HandCatalogue(), collisions=False, lit=lit_rug()).model.nmeshface
     person = [dataclasses.replace(p, object_class="person") if p.id == "rug_1" else p for p in house.placements]
-    lit = count(dataclasses.replace(house, placements=tuple(person)))
-    assert (count(house).model.nmeshface, lit.model.nmeshface) == (2, 4)
+    assert (count(house), count(dataclasses.replace(house, placements=tuple(person)))) == (2, 4)
 
 
 def test_light_of_another_house_is_refused(house):
@@ -295,25 +261,10 @@ def test_placements_outside_the_catalogue_are_named(house):
 
 
 def test_kept_boxes_are_those_that_were_computed_and_damage_is_mended(tmp_path):
-    plate = MeshPart(
-        *(
-            np.asarray(a, t)
-            for a, t in (
-                ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.4]], np.float32),
-                ([[0, 1, 2], [0, 2, 3]], np.int32),
-                ([[0, 0, 1]] * 4, np.float32),
-                ([[0, 0]] * 4, np.float32),
-            )
-        ),
-        Finish(),
-    )
+    plate = [box_mesh((0, 0, 0), (1, 1, 0.4), (1, 1, 1, 1))]
     asset = Asset("hand/plate", "plate", "plate", (1.0, 1.0, 0.4), "floor")
-    first = collision.kept_boxes(asset, [plate], asset.size, tmp_path)
-    assert (
-        first
-        == collision.object_boxes(asset, [plate], asset.size)
-        == collision.kept_boxes(asset, [plate], asset.size, tmp_path)
-    )
+    first, again = (collision.kept_boxes(asset, plate, asset.size, tmp_path) for _ in range(2))
+    assert first == again == collision.object_boxes(asset, plate, asset.size)
     kept = next((tmp_path / "collision").iterdir())
     kept.write_text(kept.read_text()[:-9])
-    assert collision.kept_boxes(asset, [plate], asset.size, tmp_path) == first
+    assert collision.kept_boxes(asset, plate, asset.size, tmp_path) == first

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from embodied.agents.hanna.asking import ask_patiently
@@ -13,13 +15,14 @@ LOOKS = np.random.default_rng(0).normal(size=(12, 36, 24)).astype(np.float32)
 """(12, 36, 24) features of twelve places, which look nothing like each other."""
 
 
-def test_a_trail_knows_the_way_back_and_how_often_it_was_there():
-    def seen(node: int, views: list[int], words: str = "go") -> Observation:
-        n = len(views)
-        flat = np.zeros(n, dtype=np.float32)
-        candidates = Candidates(flat, flat, np.array(views), np.ones(n, dtype=bool))
-        return Observation(Sight("house", node), 0, 0, candidates, words, None, Mode.MAIN, (), None, 0, 0)
+def seen(node: int, views: list[int], words: str = "go", mode: Mode = Mode.MAIN) -> Observation:
+    n = len(views)
+    flat = np.zeros(n, dtype=np.float32)
+    candidates = Candidates(flat, flat, np.array(views), np.ones(n, dtype=bool))
+    return Observation(Sight("house", node), 0, 0, candidates, words, None, mode, (), None, 3, 3)
 
+
+def test_a_trail_knows_the_way_back_and_how_often_it_was_there():
     first, second = seen(0, [12, 15]), seen(1, [18, 21])  # 12 is level, along +x; 18 lies behind it
     trail = Trail().here(first, LOOKS[0])
     assert trail.times(first).tolist() == [0, 0]
@@ -34,13 +37,6 @@ def test_a_trail_knows_the_way_back_and_how_often_it_was_there():
 
 def test_who_is_shown_where_to_go_stops_there_alone_and_goes_straight_to_where_it_was():
     """A corridor of three places along +x, walked from end to end; the way back is known, the way on is not."""
-
-    def seen(node: int, views: list[int]) -> Observation:
-        n = len(views)
-        flat = np.zeros(n, dtype=np.float32)
-        candidates = Candidates(flat, flat, np.array(views), np.ones(n, dtype=bool))
-        return Observation(Sight("house", node), 0, 0, candidates, "go", None, Mode.MAIN, (), None, 0, 0)
-
     ahead, behind, likely = 12, 18, np.array([0.5, 0.4, 0.1])
     trail = Trail()
     for node, views in ((0, [ahead]), (1, [ahead, behind])):
@@ -66,13 +62,6 @@ def test_who_is_shown_where_to_go_stops_there_alone_and_goes_straight_to_where_i
 
 def test_who_looks_for_what_it_was_shown_goes_back_to_the_way_that_seemed_best():
     """At the first place two ways seemed likely, 12 and 15; 12 was taken and ends blind."""
-    words = "find a mug"
-
-    def seen(node: int, views: list[int], mode: Mode = Mode.MAIN) -> Observation:
-        n = len(views)
-        flat = np.zeros(n, dtype=np.float32)
-        candidates = Candidates(flat, flat, np.array(views), np.ones(n, dtype=bool))
-        return Observation(Sight("house", node), 0, 0, candidates, words, None, mode, (), None, 3, 3)
 
     def step(trail: Trail, o: Observation, node: int) -> Trail:
         return trail.here(o, LOOKS[node], LOOKS[9])
@@ -87,7 +76,7 @@ def test_who_looks_for_what_it_was_shown_goes_back_to_the_way_that_seemed_best()
     assert trail.untried(blind, 0.2) == opposite(20) == 14, "back, and back again, to 15"
     weights, known = weigh_by_image(step(trail, second, 1), second, np.array([0.2, 0.1, 0.7]), 0.2)
     assert weights.tolist() == [0.0, 0.1, 0.0] and not known
-    weights, _ = weigh_by_image(before, seen(1, [18, 20], Mode.SUB), np.array([0.2, 0.1, 0.7]), 0.2)
+    weights, _ = weigh_by_image(before, seen(1, [18, 20], mode=Mode.SUB), np.array([0.2, 0.1, 0.7]), 0.2)
     assert weights.tolist() == [0.0, 0.1, 0.7], "on a route it follows the words"
     everywhere = step(step(trail.left(blind, Move(0)), second, 1).left(second, Move(0)), first, 0).left(first, Move(1))
     assert step(everywhere, seen(3, [21]), 3).untried(first, 0.2) is None
@@ -132,11 +121,8 @@ def test_who_sees_black_recognises_nothing():
 
 
 def test_asking_patiently_waits_after_a_route_and_asks_sooner_before_the_first():
-    flat = np.zeros(0, dtype=np.float32)
-    nowhere = Candidates(flat, flat, np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool))
-
     def asks(probability: float, target: Sight | None, mode: Mode, time_on_task: int) -> bool:
-        o = Observation(Sight("house", 0), 0, 0, nowhere, "go", target, mode, (), None, 9, time_on_task)
+        o = dataclasses.replace(seen(0, [], mode=mode), target=target, time_on_task=time_on_task)
         return ask_patiently(0.5, first=0.25, on_route=0.7, patience=2)(probability, o, -1, rng=None)
 
     image = Sight("house", 1)

@@ -73,15 +73,6 @@ def test_sheets_listed_once_per_side_are_unwrapped_once():
     ).all()
 
 
-def test_packed_rectangles_do_not_overlap():
-    sizes = np.random.default_rng(3).integers(2, 40, (60, 2))
-    places, sheet = pack(sizes)
-    taken = np.zeros(sheet[::-1], int)
-    for (x, y), (w, h) in zip(places, sizes):
-        taken[y : y + h, x : x + w] += 1
-    assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
-
-
 def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
     def some(name, fineness, side):
         flat = SimpleNamespace(size=np.array([side, side]))
