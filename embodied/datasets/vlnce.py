@@ -26,9 +26,9 @@ from embodied.envs.continuous import (
     CameraConfig,
     ContinuousEnv,
     ContinuousEpisode,
+    ContinuousTrajectory,
     HabitatAction,
     ShortestPathFollower,
-    Trajectory,
     odometry,
 )
 from embodied.render.camera import camera_at
@@ -53,7 +53,7 @@ Chosen = Callable[[int], int]
 class Taught:
     """A walk and what the expert would have done before each of its actions."""
 
-    trajectory: Trajectory
+    trajectory: ContinuousTrajectory
     labels: tuple[int, ...]
     world: World
     eye: float
@@ -181,6 +181,5 @@ def _lerobot(folder: Path, walks: Iterable[Taught], camera: CameraConfig, with_d
             "embodied/house": trajectory.episode.world,
             "embodied/agent": "expert",
         }
-        reached = trajectory.stopped and bool(trajectory.distances[-1] < trajectory.episode.radius)
-        writer.add(rows, rgb, depth, [trajectory.episode.instruction] * n, [""] * n, reached, facts)
+        writer.add(rows, rgb, depth, [trajectory.episode.instruction] * n, [""] * n, trajectory.success > 0, facts)
     return writer.finish("embodied vlnce", CARD)

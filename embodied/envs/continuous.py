@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from embodied.house.house import House
-from embodied.interface import Place
+from embodied.interface import Place, SuccessRule, Trajectory
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
 from embodied.tasks.goals import NOT_OBJECTS, footprint_distance
 
@@ -136,9 +136,9 @@ class ContinuousEpisode:
     """VLN-CE: the path's id, which several instructions share."""
 
 
-@dataclass(frozen=True)
-class Trajectory:
-    """An agent's way through an episode."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ContinuousTrajectory(Trajectory):
+    """An agent's way through an episode, of which the places after each action are judged."""
 
     episode: ContinuousEpisode
     positions: np.ndarray
@@ -148,13 +148,7 @@ class Trajectory:
     pitches: np.ndarray
     """(n + 1,) degrees, integers."""
     actions: tuple[int, ...]
-    distances: np.ndarray
-    """(n + 1,) metres along the floor to the nearest goal."""
     collisions: int
-
-    @property
-    def stopped(self) -> bool:
-        return bool(self.actions) and self.actions[-1] == HabitatAction.STOP
 
 
 class NavMeshCache:
@@ -252,12 +246,24 @@ class ContinuousEnv:
         """Actions taken."""
         return len(self._actions)
 
-    def trajectory(self) -> Trajectory:
-        """The way since the last reset."""
-        poses = np.array(self._poses, float)
+    def trajectory(self) -> ContinuousTrajectory:
+        """The way since the last reset, in straight lines between consecutive positions."""
+        poses, first = np.array(self._poses, float), min(1, self.steps)
         positions = np.column_stack([poses[:, :2], np.full(len(poses), self.floor)])
-        turns, distances = (poses[:, 2], poses[:, 3].astype(int)), np.array(self._distances)
-        return Trajectory(self.episode, positions, *turns, tuple(self._actions), distances, self.collisions)
+        metres = np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))
+        return ContinuousTrajectory(
+            rule=SuccessRule(self.episode.radius, strict=True),
+            distances=np.array(self._distances[first:]),
+            lengths=metres if self.steps else np.zeros(1),
+            shortest=self._distances[0],
+            stopped=self._actions[-1:] == [HabitatAction.STOP],
+            episode=self.episode,
+            positions=positions,
+            yaws=poses[:, 2],
+            pitches=poses[:, 3].astype(int),
+            actions=tuple(self._actions),
+            collisions=self.collisions,
+        )
 
 
 POSITION = ("ahead", "left", "sin", "cos", "tilt")

@@ -19,7 +19,7 @@ from embodied.envs.driven import CONTROL, FASTEST, TURNING, Driver, Roll
 from embodied.geometry import wrap
 from embodied.gym.sensors import LARGE, PIXELS, check_live, live_pixels
 from embodied.gym.spaces import codes_of
-from embodied.kinds.metrics import weighted_by_path, within
+from embodied.interface import SuccessRule, Trajectory
 from embodied.kinds.plugins import record_named
 from embodied.language.plain_language import with_article
 from embodied.navigation.floor_ways import DrivingWays, FloorWays
@@ -191,6 +191,7 @@ class Driving:
         """Metres that the best driver needs."""
         self._left = self.left
         self.metres = self.seconds = 0.0
+        self._distances, self._lengths = [self.task.distance(self)], [0.0]
         self.collisions: list[str] = []
         self.touched = False
         self.ended: str | None = None
@@ -227,16 +228,25 @@ class Driving:
         self.collisions += rolled.collisions
         self.touched = rolled.touched
         before, self._left = self._left, self.left
+        self._distances.append(self.task.distance(self))
+        self._lengths.append(self.metres)
         there = self.is_there
         if command[2] > SAID if self.task.says else there:
             self.ended = "said" if self.task.says else "reached"
         elif self.seconds >= self.settings.seconds - 1e-9:
             self.ended = "limit"
-        success = float(there and self.ended in ("reached", "said"))
-        reward = success - STEP_COST - COLLISION_COST * len(rolled.collisions) + PER_METRE * (before - self._left)
-        facts = {"success": success, "spl": weighted_by_path(success, self.shortest, self.metres)}
+        trajectory = self.trajectory()
+        reward = (
+            trajectory.success - STEP_COST - COLLISION_COST * len(rolled.collisions) + PER_METRE * (before - self._left)
+        )
+        facts = {"success": trajectory.success, "spl": trajectory.spl}
         facts |= {"collisions": float(len(self.collisions)), "metres": self.metres, "seconds": self.seconds}
         return Outcome(reward, self.ended, {**facts, "distance_to_goal": self._left})
+
+    def trajectory(self) -> Trajectory:
+        """The way since the last reset, as it is judged."""
+        way = {"distances": np.array(self._distances), "lengths": np.array(self._lengths), "shortest": self.shortest}
+        return Trajectory(rule=SuccessRule(self.goal.radius), stopped=self.ended in ("reached", "said"), **way)
 
     @property
     def left(self) -> float:
@@ -246,7 +256,7 @@ class Driving:
     @property
     def is_there(self) -> bool:
         """True where the body should be, said or not."""
-        return within(self.task.distance(self), self.goal.radius)
+        return bool(SuccessRule(self.goal.radius).near(self.task.distance(self)))
 
     @property
     def offset(self) -> np.ndarray:

@@ -6,78 +6,65 @@ its world; tables over many episodes are in embodied.evaluation.tables.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from embodied.interface import Ask, Episode, Intention, Move, Usage
+from embodied.interface import Ask, Episode, Intention, Move, SuccessRule, Trajectory, Usage
 from embodied.kinds.task_kind import Measure, kind_named
 
 if TYPE_CHECKING:
     from embodied.navigation.graph import NavGraph
 
 
-def navigation_error(episode: Episode, graph: NavGraph) -> float:
-    """Distance from the last node to the nearest goal (4.2.5)."""
-    return float(min(graph.distance[episode.nodes[-1], g] for g in episode.task.goal_nodes))
+def trajectory_of(episode: Episode, graph: NavGraph) -> Trajectory:
+    """An episode on a graph as it is judged.
 
-
-def within(distance: Any, radius: float, *, strict: bool = False) -> Any:
-    """True for an end, or an array of ends, at most `radius` metres away (docs/sources.md, S3), as on graphs and in
-    Drive-v0, or less than that where `strict`, as Habitat's."""
-    return distance < radius if strict else distance <= radius + 1e-9
-
-
-def weighted_by_path(success: float, shortest: float, travelled: float) -> float:
-    """SPL of one episode: its success times the shortest way over the longer of the two, metres (Anderson et al. 2018).
-
-    Where the shortest way is 0, who did not move scores its success and who moved 0.
+    Its way is as long as the graph's distances between consecutive nodes (docs/sources.md, S4). The shortest way is
+    what the kind of task says, or that from the start to the goal nearest the *final* node.
     """
-    longest = max(shortest, travelled)
-    return success * (shortest / longest if longest > 0 else 1.0)
+    task, kind, nodes, goals = episode.task, kind_named(episode.task.kind), [*episode.nodes], [*episode.task.goal_nodes]
+    metres, steps = np.asarray(graph.distance), np.asarray(graph.distance)[nodes[:-1], nodes[1:]]
+    goal = min(goals, key=lambda g: (metres[nodes[-1], g], g))
+    return Trajectory(
+        rule=SuccessRule(task.radius, needs_stop=kind.needs_stop),
+        distances=metres[np.ix_(nodes, goals)].min(axis=1),
+        lengths=np.concatenate([[0.0], np.cumsum(steps)]),
+        shortest=float(kind.shortest(episode, graph) if kind.shortest else metres[nodes[0], goal]),
+        stopped=episode.ended == "stop",
+        achieved=kind.success and kind.success(episode, graph),
+    )
 
 
 def success(episode: Episode, graph: NavGraph) -> float:
     """1 if the episode ended within the radius of a goal, or did what its kind of task calls a success; else 0."""
-    kind = kind_named(episode.task.kind)
-    if kind.needs_stop and episode.ended != "stop":
-        return 0.0
-    if kind.success is not None:
-        return kind.success(episode, graph)
-    return float(within(navigation_error(episode, graph), episode.task.radius))
+    return trajectory_of(episode, graph).success
+
+
+def spl(episode: Episode, graph: NavGraph) -> float:
+    """Success weighted by path length, one term of (4.17)."""
+    return trajectory_of(episode, graph).spl
+
+
+def navigation_error(episode: Episode, graph: NavGraph) -> float:
+    """Distance from the last node to the nearest goal (4.2.5)."""
+    return float(trajectory_of(episode, graph).distances[-1])
+
+
+def oracle_success(episode: Episode, graph: NavGraph) -> float:
+    """1 if any visited node lies within the radius of a goal."""
+    return trajectory_of(episode, graph).oracle_success
+
+
+def path_length(episode: Episode, graph: NavGraph) -> float:
+    """Metres walked."""
+    return float(trajectory_of(episode, graph).lengths[-1])
 
 
 def strict_success(episode: Episode, graph: NavGraph) -> float:
     """Success of an episode whose agent said that it is done; running out of steps near a goal is none."""
     return success(episode, graph) if episode.ended == "stop" else 0.0
-
-
-def oracle_success(episode: Episode, graph: NavGraph) -> float:
-    """1 if any visited node lies within the radius of a goal."""
-    nearest = min(graph.distance[v, g] for v in episode.nodes for g in episode.task.goal_nodes)
-    return float(within(nearest, episode.task.radius))
-
-
-def path_length(episode: Episode, graph: NavGraph) -> float:
-    """Metres walked: the sum of graph distances between consecutive nodes (docs/sources.md, S4)."""
-    nodes = episode.nodes
-    return float(sum(graph.distance[a, b] for a, b in itertools.pairwise(nodes)))
-
-
-def spl(episode: Episode, graph: NavGraph) -> float:
-    """Success weighted by path length, one term of (4.17).
-
-    L is what the kind of task says, or the distance from the start to the goal nearest the *final* node. An episode
-    whose start is that goal has L = 0; it scores 1 if the agent did not walk, else 0.
-    """
-    if measure := kind_named(episode.task.kind).shortest:
-        return weighted_by_path(success(episode, graph), measure(episode, graph), path_length(episode, graph))
-    goals = episode.task.goal_nodes
-    goal = min(goals, key=lambda g: (graph.distance[episode.nodes[-1], g], g))
-    shortest = float(graph.distance[episode.nodes[0], goal])
-    return weighted_by_path(success(episode, graph), shortest, path_length(episode, graph))
 
 
 def requests(episode: Episode, graph: NavGraph) -> float:
@@ -141,7 +128,11 @@ def ndtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, rad
 
 def sdtw(path: tuple[int, ...], reference: tuple[int, ...], graph: NavGraph, radius: float = 3.0) -> float:
     """nDTW if the ends are within the radius, else 0 (docs/sources.md, S7)."""
-    return ndtw(path, reference, graph, radius) if within(graph.distance[path[-1], reference[-1]], radius) else 0.0
+    return (
+        ndtw(path, reference, graph, radius)
+        if SuccessRule(radius).near(graph.distance[path[-1], reference[-1]])
+        else 0.0
+    )
 
 
 def without_repeats(nodes: tuple[int, ...]) -> tuple[int, ...]:
