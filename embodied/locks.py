@@ -9,7 +9,6 @@ import json
 import logging
 import os
 import socket
-import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -20,8 +19,6 @@ from embodied.errors import UnableError
 
 LOCK = ".embodied.lock"
 """Name of the file in a folder that somebody writes to."""
-LOCK_FIELDS = {"pid", "host", "since", "command"}
-"""Keys of its content."""
 CANNOT = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
 """Errors of disks that know no locks."""
 log = logging.getLogger(__name__)
@@ -44,7 +41,6 @@ def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
 
     Raises:
       LockedError: another process holds it; the message names process, machine and command.
-      UnableError: what stands in the lock's place is no lock of this program; it is left as it is.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,12 +58,10 @@ def locked(folder: Path, *, wait: bool = False) -> Iterator[None]:
 def _take(path: Path, wait: bool) -> int:
     """The descriptor of the locked file `path`, with this process written into it."""
     while True:
-        handle = _open(path)
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
         try:
             _flock(handle, path, wait)
             if _is_same(handle, path):  # else its holder removed it between open and lock
-                if not _is_ours(handle):
-                    raise UnableError(f"{path} is no lock of this program; move it away, or choose another folder")
                 os.ftruncate(handle, 0)
                 os.pwrite(handle, json.dumps(_myself()).encode(), 0)
                 return handle
@@ -75,27 +69,6 @@ def _take(path: Path, wait: bool) -> int:
             os.close(handle)
             raise
         os.close(handle)
-
-
-def _open(path: Path) -> int:
-    try:
-        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
-    except OSError as e:
-        if e.errno in (errno.ELOOP, errno.EISDIR, errno.ENXIO):
-            raise UnableError(f"{path} is no lock of this program; move it away, or choose another folder") from e
-        raise
-
-
-def _is_ours(handle: int) -> bool:
-    """True where the open file is a lock: a file of one name, empty or with what `_myself` writes."""
-    facts = os.fstat(handle)
-    if not stat.S_ISREG(facts.st_mode) or facts.st_nlink > 1 or facts.st_size > 4096:
-        return False
-    content = os.pread(handle, 4096, 0)
-    try:
-        return not content or set(json.loads(content)) == LOCK_FIELDS
-    except (ValueError, TypeError, RecursionError):
-        return False
 
 
 def _flock(handle: int, path: Path, wait: bool) -> None:

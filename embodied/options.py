@@ -76,28 +76,10 @@ video_side = whole(16, 4096, even=True)
 
 
 def any_path(text: str) -> Path:
-    """A path that libraries can open: not empty, and text in UTF-8.
-
-    MuJoCo, MjSpec and others take paths as UTF-8 text only.
-    """
+    """A path, there or not."""
     if not text:
         raise argparse.ArgumentTypeError("should be a path, got an empty word; use . for this folder")
-    try:
-        os.fsencode(text).decode("utf-8")
-        text.encode("utf-8")
-    except (UnicodeDecodeError, UnicodeEncodeError):
-        raise argparse.ArgumentTypeError(
-            f"should be a path in UTF-8, which MuJoCo wants, got {os.fsencode(text)!r}; "
-            "rename it, or set LC_ALL=C.UTF-8 if it is meant as UTF-8"
-        ) from None
-    path = Path(text)
-    try:
-        path.stat()
-    except (FileNotFoundError, NotADirectoryError, PermissionError):
-        pass
-    except OSError as e:  # a link that leads to itself, a name too long
-        raise argparse.ArgumentTypeError(f"{text[:80]!r} cannot be used: {e.strerror}; choose another path") from None
-    return path
+    return Path(text)
 
 
 def any_folder(text: str) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hand_worlds import line_world
 
@@ -22,7 +23,7 @@ from embodied.interface import (
     Viewpoint,
 )
 from embodied.viz.episode_log import QUESTIONS, EpisodeLog
-from embodied.viz.recording import event_text
+from embodied.viz.recording import event_text, pixels_towards
 
 GOAL = FindObject("mug", "hall", ("mug_1",))
 
@@ -96,6 +97,13 @@ def test_a_long_dialogue_keeps_the_request_and_its_end():
 def test_an_answer_too_long_for_the_pane_is_shown_all_the_same():
     story = told(EpisodeLog(task_of("hanna")), *(step_of(Ask(), reply=Reply(t)) for t in ("short.", "long " * 300)))
     assert story.dialogue_text().split("\n\n")[-1].startswith("**Assistant:** long")
+
+
+def test_names_stand_where_the_panorama_shows_the_thing():
+    """512 pixels round, the gaze in the middle; a quarter to the left is 128 pixels to the left."""
+    yaw = np.radians([0.0, 90.0, 180.0])
+    assert pytest.approx(np.array([[256, 128, 0], [128] * 3])) == pixels_towards(yaw, yaw * 0, Pose(0), 256).T
+    assert pixels_towards(yaw, yaw * 0, Pose(0, 3), 256)[:, 0] == pytest.approx([384, 256, 128])
 
 
 @pytest.mark.parametrize("intention", Intention)

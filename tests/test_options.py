@@ -51,7 +51,6 @@ LEARN = ("--data", "d", "--out", "o")
         (("evaluate", "hanna", "--data", "d", "--threads", "0"), "--threads: should be a whole number of at least 1"),
         (("evaluate", "hanna", "--data", "d", "--batch", "-3"), "--batch: should be"),
         (("evaluate", "hanna", "--data", "d", "--tasks", "-2"), "--tasks: should be"),
-        (("evaluate", "hanna", "--data", "d", "--rrd", "2"), "--rrd wants --out DIR beside it"),
         (("features", "--data", "d", "--workers", "-5"), "--workers: should be"),
         (("features", "--data", "d", "--pictures", "nope"), "--pictures: invalid choice: 'nope'"),
         (("train", "hanna", *LEARN, "--minutes", "-1"), "--minutes: should be a number above 0, got '-1'"),
@@ -69,8 +68,6 @@ LEARN = ("--data", "d", "--out", "o")
         (("export", "usd", "--house", "x", "--out", "a.glb"), "--out: should end in .usdz"),
         (("export", "mjcf", "--house", "x", "--out", "/dev/null"), "--out: /dev/null is a file, a folder is wanted"),
         (("render", "x", "--node", "1", "--equirect", "."), "--equirect: . is a folder, a file is wanted"),
-        (("house", "--out", "x", "--cache", "loop"), "--cache: 'loop' cannot be used"),
-        (("house", "--out", b"bad\xff".decode("utf-8", "surrogateescape")), "should be a path in UTF-8"),
         (("demo", "--size", "5000"), "at most 4096"),
         (("house", "--seed", "1", "--area", "900", "950", "--out", "x"), "area should be"),
         (("house", "--seed", "1", "--storeys", "9", "--out", "x"), "storeys"),
@@ -97,7 +94,7 @@ def test_odd_arguments_are_refused_before_any_work(words, message, capsys, tmp_p
         (video_side, ("16", "480"), ("17", "0", "4098")),
         (positive, ("0.5", "3"), ("0", "-1", "nan", "inf", "1e999", "x")),
         (hour_of_day, ("16:00", "16.5", "night", "0"), ("24", "16:60", "noonish", "-1", "nan", "")),
-        (any_path, (".", "ü"), ("", "a\udcff")),
+        (any_path, (".", "ü"), ("",)),
         (any_folder, (".", "new/one"), (__file__,)),
         (folder_to_write, ("new/one",), (f"{__file__}/x",)),
         (file_to_write, ("new/one",), (".", f"{__file__}/x")),
@@ -122,14 +119,3 @@ def test_a_terminal_that_knows_no_unicode_gets_question_marks_not_an_error():
     plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, env=plain)
     assert (done.returncode, done.stdout) == (0, "50.0 ? 3.1\n"), done.stderr
-
-
-def test_a_shell_completes_commands_options_and_their_words(tmp_path, capsys):
-    pytest.importorskip("shtab")
-    with pytest.raises(SystemExit):
-        cli.main(["--print-completion", "bash"])
-    script = tmp_path / "embodied.bash"
-    script.write_text(capsys.readouterr().out)
-    asked = f'. {script}; COMP_WORDS=(embodied render home --pictures nor); COMP_CWORD=4; _shtab_embodied "" nor; '
-    said = subprocess.run(["bash", "-c", asked + "echo ${COMPREPLY[@]}"], capture_output=True, text=True, check=True)
-    assert said.stdout.split() == ["normal", "normal-matte"]

@@ -7,13 +7,9 @@ import json
 import pytest
 from hand_data import built, metrics_of, noise_features
 
-from embodied.agents.vision.config import drawing
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.cli import main
-from embodied.cli.view import looked_at
 from embodied.identity import read_finished
-from embodied.interface import Episode
-from embodied.records import episodes_file, load_lines
 
 pytestmark = pytest.mark.slow
 
@@ -61,7 +57,6 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert "trained on pictures unlit_192" in said_by_judge.err and (tmp_path / "judged/table.md").exists()
     run_json = json.loads((tmp_path / "judged/run.json").read_text())
     assert "learned" in run_json["looking"] and "shortest" not in run_json["looking"] and run_json["pictures"]
-    assert run(*judge, "--rrd", 1) == 2 and "--rrd wants --out" in capsys.readouterr().err
     assert run(*judge, "--rows", "listener") == 2 and "unknown rows ['listener']" in capsys.readouterr().err
 
 
@@ -92,20 +87,6 @@ def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path,
     assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
     (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")
     assert read_finished(trained)[0]["settings"]["rules"] == "algorithm-6"
-
-
-def test_the_first_episodes_are_recorded_as_the_agent_saw_them(data, tmp_path, monkeypatch):
-    recorded = []
-    monkeypatch.setattr("embodied.cli.view.record_again", lambda run, data, episode, *_, **__: recorded.append(episode))
-    train = ("train", "vnla", "--data", data.folder, "--out", tmp_path, *SMALL, "--asker", "first", "--iterations", 1)
-    assert run(*train) == 0
-    judge = ("evaluate", "vnla", "--data", data.folder, "--agent", tmp_path / "best.safetensors", "--network", "random")
-    rows = ("--rows", "learned", "shortest")
-    assert run(*judge, "--tasks", 3, *rows, "--out", tmp_path / "judged", "--rrd", 2) == 0
-    played = list(load_lines(tmp_path / "judged" / episodes_file("test_unseen", "learned"), Episode))
-    assert [(e.task, e.agent) for e in recorded] == [(e.task, "learned") for e in played[:2]]
-    seen = looked_at(tmp_path / "judged").by("learned", played[0].task.world)
-    assert seen is not None and drawing(seen) == "unlit_192"
 
 
 def test_a_rule_of_play_is_chosen_on_the_command_line(data, capsys):

@@ -4,7 +4,6 @@ Entity tree (timeline 'step'):
   house/<room>/<owner>   meshes, once              graph/...        viewpoints and edges, once
   task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
   agent/path, agent/route  walked, spoken of       view/panorama, view/target, view/lit
-  view/panorama/described, task/described   what HARI's assistant spoke of
   view/panorama/recognised   what the agent's encoder recognises
   text/...               request, instruction, dialogue, goals (HARI's stack)
   plot/...               distance to the goal, requests, HARI's cost, probabilities     events   a log
@@ -29,7 +28,6 @@ from embodied.render.jpeg import jpeg
 from embodied.render.panorama import Panorama, Recognised
 from embodied.render.photograph import PhotoCamera
 from embodied.viz.blueprint import blueprint_of
-from embodied.viz.described import boxes, log_described, log_recognised
 from embodied.viz.episode_log import EpisodeLog, question_of
 from embodied.viz.house3d import light_meshes, lit_meshes, log_house
 from embodied.viz.sinks import Sinks, open_recording
@@ -43,6 +41,7 @@ PALETTE = {
     "start": (90, 90, 90),
     "agent": (31, 119, 255),
     "person": (255, 120, 0),
+    "recognised": (60, 220, 255),
 }
 HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20}
 """Metres above the floor that things are drawn at, so that none hides another."""
@@ -192,7 +191,15 @@ def log_task(recording: rr.RecordingStream, world: World, task: Task) -> None:
         world.house.placement_by_id[p] for p in getattr(task.goal, "placements", ()) if p in world.house.placement_by_id
     ]
     if sought:
-        recording.log("task/sought", boxes(sought, [p.object_class for p in sought], PALETTE["goal"]), static=True)
+        boxes = rr.Boxes3D(  # a little larger than the things
+            centers=[np.add(p.position, (0.0, 0.0, p.size[2] / 2)) for p in sought],
+            half_sizes=[np.divide(p.size, 2) + 0.05 for p in sought],
+            rotation_axis_angles=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=p.yaw) for p in sought],
+            labels=[p.object_class for p in sought],
+            colors=PALETTE["goal"],
+            radii=0.012,
+        )
+        recording.log("task/sought", boxes, static=True)
     recording.log(
         "task/start",
         rr.Points3D(on_floor(at[task.start.node], HEIGHTS["mark"]), radii=0.13, colors=PALETTE["start"]),
@@ -238,7 +245,6 @@ def log_step(
     if kind_named(task.kind).story.goal_stack:
         recording.log("text/goals", markdown(state.stack(world, step)))
         recording.log("plot/cost", rr.Scalars(state.cost + step.cost))
-        log_described(recording, world, step, views.sizes.panorama)
     log_thought(recording, step)
     log_path(recording, world, state.nodes)
     state.after(step)
@@ -298,6 +304,20 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
             lengths=1.0, radii=0.2, translations=[on_floor(eye, HEIGHTS["body"])], colors=(*PALETTE["agent"], 200)
         ),
     )
+
+
+def log_recognised(recording: rr.RecordingStream, objects: Sequence[Recognised], pose: Pose, height: int) -> None:
+    """What an agent recognises around it, in its panorama of (height, 2 height) pixels."""
+    at = pixels_towards(np.array([f.yaw for f in objects]), np.array([f.pitch for f in objects]), pose, height)
+    names, colour = [f"{f.name.replace('_', ' ')} {f.probability:.0%}" for f in objects], PALETTE["recognised"]
+    recording.log("view/panorama/recognised", rr.Points2D(at, labels=names, show_labels=True, radii=3.0, colors=colour))
+
+
+def pixels_towards(yaw: np.ndarray, pitch: np.ndarray, pose: Pose, height: int) -> np.ndarray:
+    """(n, 2) pixels, column and row, of directions (n,) and (n,) in radians in a panorama whose middle column is the
+    agent's gaze."""
+    column = (np.pi - (yaw - pose.yaw)) % (2 * np.pi) * height / np.pi
+    return np.stack([column, (np.pi / 2 - pitch) * height / np.pi], axis=1)
 
 
 def ahead(panorama: Panorama, pose: Pose, sizes: PictureSizes, vfov: float = VIEW_VFOV) -> rr.EncodedImage:

@@ -114,12 +114,6 @@ def near_placements(world: Place, node: int, radius: float) -> list[tuple[Featur
     return [(feature, p) for _, _, feature, p in sorted(features, key=lambda x: x[:2])[:MOST_OBJECTS]]
 
 
-def spoken_of(world: Place, node: int, description: Description) -> list[tuple[Feature, Placement]]:
-    """The objects that a description of `node` names, nearest first."""
-    named = set(description)
-    return [(f, p) for f, p in near_placements(world, node, STATE_RADIUS) if f in named]
-
-
 def frequent_classes(worlds: Iterable[Place], share: float = FREQUENT_SHARE) -> tuple[str, ...]:
     """A share of the object classes of some (training) houses, the most frequent ones, most frequent first."""
     counts = Counter(p.object_class for w in worlds for p in w.house.placements if p.object_class not in NOT_OBJECTS)

@@ -15,7 +15,7 @@ import os
 import sys
 import typing
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
 from typing import NoReturn
@@ -67,7 +67,6 @@ EXTRAS = {
     **dict.fromkeys(("rerun", "rerun_cli", "av", "matplotlib"), "viz"),
     **dict.fromkeys(("pyarrow", "networkx", "trimesh"), "data"),
     **dict.fromkeys(("dm_control", "dm_env"), "drive"),
-    "shtab": "completion",
 }
 """Which extra of the distribution brings a library that a small installation lacks."""
 
@@ -76,34 +75,6 @@ KILLED = (
     "perhaps with fewer --workers. Finished files are kept"
 )
 """The message about a killed worker."""
-
-
-class PrintCompletion(argparse.Action):
-    """--print-completion: a script for a shell, from the options of all commands."""
-
-    def __call__(self, parser: object, namespace: object, values: object, option_string: str | None = None) -> NoReturn:
-        import shtab  # of the extra `completion`
-
-        whole = globals()["parser"](*COMMANDS)
-        for action in _actions(whole):
-            if (getattr(action.type, "__module__", "") or "").endswith("embodied.options") and action.metavar in FILES:
-                action.complete = shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE  # type: ignore[attr-defined]
-        print(shtab.complete(whole, str(values)))
-        raise SystemExit(0)
-
-
-FILES = ("DIR", "FILE", "PATH", "PNG", "MP4", "RUN", "STUDY.toml")
-"""Metavariables of options whose values are files or folders."""
-
-
-def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """The actions of a parser and of its subcommands."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for sub in dict.fromkeys(action.choices.values()):
-                yield from _actions(sub)
-        else:
-            yield action
 
 
 class Parser(argparse.ArgumentParser):
@@ -126,13 +97,6 @@ def parser(*chosen: str, words: Sequence[str] = ()) -> argparse.ArgumentParser:
     )
     top.add_argument(
         "--traceback", action="store_true", help="show where in the code an error comes from (before COMMAND)"
-    )
-    top.add_argument(
-        "--print-completion",
-        action=PrintCompletion,
-        choices=("bash", "zsh", "tcsh"),
-        help="print a script that completes commands and options in a shell: embodied --print-completion bash "
-        "> ~/.local/share/bash-completion/completions/embodied",
     )
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:

@@ -120,8 +120,6 @@ def parsed(args: EvaluateOptions) -> Evaluation:
     from embodied.kinds.plugins import assistant_of
     from embodied.kinds.task_kind import kind_named
 
-    if args.rrd and not args.out:
-        raise ValueError("--rrd wants --out DIR beside it: recordings go to DIR/recordings")
     kind = kind_named(args.kind)
     data = dataset_of(args.data, args.kind) if args.data else None
     agents, trained = agents_of(args, kind)
@@ -340,10 +338,6 @@ def write(args: EvaluateOptions, evaluation: Evaluation, results: EvaluationResu
     if client.cache_info().currsize:  # type: ignore[attr-defined]
         text += f"\n{client().sent} requests were sent; all other answers were in {args.answers}"
     show(args, result, text)
-    if args.rrd and args.out and evaluation.trained and data is not None:
-        from embodied.cli.evaluate_trained import record_trained
-
-        record_trained(args, data, args.out, args.rrd)
 
 
 def columns_of(evaluation: Evaluation) -> Sequence[str]:

@@ -48,8 +48,6 @@ class Results(Printed):
 
     out: OutputFolder | None = None
     """Folder for the table and the episodes."""
-    rrd: Count | None = None
-    """Record the first N episodes of a trained agent into OUT/recordings."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -72,18 +71,3 @@ def evaluate_trained(
     facts["pictures"] = {n: in_words(pictures_of(data, n, args.pictures)) for n in names}
     facts["goal_image"] = dataclasses.asdict(CAPTURE_CONDITIONS[args.goal_image])
     return rows, facts | {"identity": identity_of(*JUDGES)}
-
-
-def record_trained(args: EvaluateOptions, data: Dataset, run: Path, first: int) -> None:
-    """Record the `first` episodes of the trained agent on each split, in their houses as the data set holds them."""
-    from embodied.assets.catalogue import load_catalogue
-    from embodied.cli.view import record_again
-    from embodied.viz.report import load_run
-    from embodied.viz.sinks import Sinks
-
-    catalogue, counts, pictures = load_catalogue(args.cache), Counter[str](), args.pictures or "unlit"
-    for number, listed in enumerate(load_run(run)):
-        if listed.agent.endswith(" learned") and counts[listed.agent] < first:
-            counts[listed.agent] += 1
-            sinks = Sinks(run / "recordings" / f"{number}.rrd", ())
-            record_again(run, data, listed.episode, sinks, catalogue, args.cache, pictures=pictures)

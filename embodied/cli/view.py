@@ -36,7 +36,7 @@ class ViewOptions(Filmed, Viewers, Furnished, Printed):
     data: InputFolder | None = None
     """The data set of the run, for --episode."""
     page: bool = False
-    """Write RUN/index.html: plots, all episodes, links to recordings."""
+    """Write RUN/index.html: all episodes, links to recordings."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
     """How --episode draws the house."""
     rrd: OutputRrd | None = None
