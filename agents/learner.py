@@ -35,8 +35,6 @@ class PlaySettings:
     """How a trained agent sees the houses that it is evaluated in."""
 
     encoder: Path = SHIPPED_ENCODER
-    network: str | None = None
-    """Torchvision network of `encoder`, or 'random'; None for one of our own encoders."""
     pictures: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
     goal_image: str = "same"

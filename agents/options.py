@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
-from embodied.agents.vision.config import CAPTURE_CONDITIONS, RENDER_PRESETS, TORCHVISIONS
+from embodied.agents.vision.config import CAPTURE_CONDITIONS, RENDER_PRESETS
 from embodied.options import (
     PICTURE_HELP,
     REPEATS,
@@ -20,7 +17,6 @@ from embodied.options import (
     InputPath,
     Option,
     OutputFolder,
-    any_path,
     positive,
     whole,
 )
@@ -29,7 +25,6 @@ if TYPE_CHECKING:
     from embodied.agents.vision.training_data import TrainingData
 
 PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
-PRESETS = Option(words=tuple(RENDER_PRESETS), metavar="KIND")
 GOAL_IMAGES = tuple(CAPTURE_CONDITIONS)
 
 
@@ -41,29 +36,15 @@ class Drawn:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EncoderFile(Drawn):
+class Encoded(Drawn):
     encoder: InputPath = SHIPPED_ENCODER
     """An encoder of `embodied train vision` (default: shipped)."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Encoded(EncoderFile):
-    encoder: InputPath = SHIPPED_ENCODER
-    """An encoder of `embodied train vision`, or torchvision weights with --network (default: shipped)."""
-    network: Annotated[str | None, Option(words=(*TORCHVISIONS, "random"))] = None
-    """The torchvision network of --encoder; 'random' for an untrained compact one."""
-
     def encoder_digest(self) -> str:
         """The digest of the encoder, which names its features."""
-        from embodied.agents.vision.encoder import encoder_of
+        from embodied.agents.vision.encoder import load_encoder
 
-        return encoder_of(self.encoder, self.network).digest
-
-
-@dataclass(frozen=True, kw_only=True)
-class WithGoalImage:
-    goal_image: Annotated[str, Option(words=GOAL_IMAGES)] = "same"
-    """How the goal images of training differ from what the agent sees, as in `embodied features --goal-image`."""
+        return load_encoder(self.encoder).digest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,19 +97,19 @@ class Recorded:
     """Record two validation episodes at each validation, into the run folder."""
 
 
-def training_data(args: Any, kind: str, device: str = "cpu", goal_image: str = "same") -> TrainingData:
+def training_data(args: Any, kind: str, device: str = "cpu") -> TrainingData:
     """Training data by options of WithData and Encoded; under torchrun, PyTorch has its device.
 
     Raises:
       DatasetError: a data set of another kind.
     """
     from embodied.agents.common.parallel import join_launcher
-    from embodied.agents.vision.encoder import encoder_of
+    from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.training_data import TrainingData
     from embodied.datasets.store import dataset_of
 
-    data, encoder = dataset_of(args.data, kind), encoder_of(args.encoder, args.network)
-    return TrainingData(data, encoder, args.pictures, join_launcher(device), goal_image, args.cache)
+    data, encoder = dataset_of(args.data, kind), load_encoder(args.encoder)
+    return TrainingData(data, encoder, args.pictures, join_launcher(device), cache=args.cache)
 
 
 # Studies ------------------------------------------------------------------------------------------
@@ -168,27 +149,3 @@ def study_of(kind: Any, args: Any, **more: Any) -> Any:
     named = {f.name: getattr(args, f.name) for f in dataclasses.fields(kind) if hasattr(args, f.name)}
     seed = named["config"].seed
     return kind(**{"repeats": tuple(range(seed, seed + args.seeds)), **named, **more})
-
-
-class NamedFile(NamedTuple):
-    name: str
-    path: Path
-
-
-def named_file(text: str) -> NamedFile:
-    """NAME=FILE."""
-    name, _, path = text.partition("=")
-    if not name or not path:
-        raise argparse.ArgumentTypeError(f"{text!r} should be NAME=FILE, as in unlit=RUN/best.safetensors")
-    return NamedFile(name, any_path(path))
-
-
-NamedFiles = tuple[Annotated[NamedFile, Option(named_file, "NAME=FILE")], ...]
-
-
-def by_name(files: Sequence[NamedFile]) -> dict[str, list[Path]]:
-    """The files of each name, in the order in which they were given."""
-    files_by_name: dict[str, list[Path]] = {}
-    for name, path in files:
-        files_by_name.setdefault(name, []).append(path)
-    return files_by_name

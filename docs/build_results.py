@@ -146,7 +146,8 @@ def details() -> str:
         table = json.loads(path.read_text(encoding="utf-8"))
         parts += [f"## {table['table']}\n\n{markdown(table, brief=True)}", table["settings"]]
         parts += [] if (table["identity"] or {}).get("judged", {}).get("code") else [OLDER]
-        parts.append("".join(f"- {note}\n" for note in table["notes"]) + f"\n```\n{table['command']}\n```\n")
+        parts.append("".join(f"- {note}\n" for note in table["notes"]))
+        parts += [f"```\n{table['command']}\n```\n"] if table["command"] else []
     return "\n\n".join(parts)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from hand_worlds import grid_world, thing
 
+from embodied.agents.common.shipped import WEIGHTS
 from embodied.datasets.build import DatasetConfig, build_dataset, units
 from embodied.datasets.store import Dataset
 from embodied.kinds.plugins import shipped_kinds
@@ -26,6 +27,7 @@ from embodied.render.pictures import recorded
 from embodied.scene.house_meshes import owners
 from embodied.seeds import stream
 
+COMPACT = WEIGHTS / "encoder_compact.safetensors"
 DATA_KINDS = tuple(name for name in shipped_kinds() if kind_named(name).splits)
 """Kinds of tasks with data sets."""
 
@@ -90,12 +92,12 @@ def paint(data, pictures, names=None):
 
 
 def noise_features(data, encoder=None, seed=0):
-    """Features of nothing for all houses of a data set, as an encoder makes them, or an untrained one; returns it."""
+    """Features of nothing for all houses of a data set, as an encoder makes them, or that of COMPACT; returns it."""
     from embodied.agents.vision.drawn import pictures_of
-    from embodied.agents.vision.encoder import random_encoder
+    from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.features import feature_path, save_features
 
-    encoder = encoder or random_encoder(seed=0)
+    encoder = encoder or load_encoder(COMPACT)
     for name in dict.fromkeys(n for split in data.splits for n in data.names(split)):
         place, pictures = data.place(name), pictures_of(data, name)
         noise = stream(seed, "noise", name).normal(size=(len(place.graph.ids), 36, encoder.size)).astype(np.float16)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import shutil
 import sys
@@ -22,7 +21,6 @@ from embodied.agents.vision.drawn import houses_of
 from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.extract import Extractor
 from embodied.agents.vision.features import encode_panoramas, feature_path, load_features
-from embodied.agents.vision.resnet import ARCHITECTURES
 from embodied.cli.dataset import chosen_pictures
 from embodied.datasets import build as building
 from embodied.datasets.store import Dataset
@@ -145,8 +143,7 @@ def test_what_a_data_set_holds_is_read_under_other_drivers_and_later_versions_an
 def test_features_of_other_pictures_are_other_features(data, monkeypatch):
     """An unlit run must not pass for a lit one."""
     monkeypatch.setitem(RENDER_PRESETS, "unlit", SMALL)
-    tiny = dataclasses.replace(ARCHITECTURES["compact"], widths=(8, 8, 16, 16), stem=8)
-    monkeypatch.setitem(ARCHITECTURES, "compact", tiny)
+    monkeypatch.setattr("embodied.agents.vision.compact.WIDTHS", (8, 8, 16, 16))
     encoder = random_encoder(seed=0)
     names = [u.name for u in building.units(data.scale)]
     lit = Baked("fast", size=16)

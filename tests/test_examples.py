@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import pytest
 import torch
-from hand_data import built, noise_features, small_house
+from hand_data import COMPACT, built, noise_features, small_house
 
 from embodied.cli import main
 
@@ -100,7 +100,7 @@ def test_a_learner_outside_the_tree_is_trained_evaluated_and_studied(tmp_path, m
     assert len((EXAMPLES / "my_learner.py").read_text("utf-8").splitlines()) < 120
     data = built(tmp_path / "data", "find", "1x40", make_house=small_house)
     noise_features(data)
-    common = ["--data", str(data.folder), "--network", "random", "--cache", str(tmp_path / "cache")]
+    common = ["--data", str(data.folder), "--encoder", str(COMPACT), "--cache", str(tmp_path / "cache")]
     assert main(["train", "my_learner:LEARNER", *common, "--out", str(tmp_path / "run"), "--seed", "1"]) == 0
     trained = f"my_learner:LEARNER={tmp_path / 'run' / 'best.safetensors'}"
     assert main(["evaluate", "find", *common, "--split", "train", "--agent", trained, "random walk", "--json"]) == 0

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import torch
-from hand_data import built, noise_features, small_house
+from hand_data import COMPACT, built, noise_features, small_house
 
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.word_vectors import PretrainedVocabulary
@@ -172,7 +172,7 @@ def test_commands_train_and_show(source, tmp_path, capsys):
         for k, v in vars(SMALL).items()
         if k not in ("teacher", "pragmatics", "blind", "varied_words")
     ]
-    where = ["--data", str(source.folder), "--cache", str(source.cache), "--network", "random"]
+    where = ["--data", str(source.folder), "--cache", str(source.cache), "--encoder", str(COMPACT)]
     out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]
     assert main(["train", "iliad", "nav", *where, *out, *sizes]) == 0
     (best,) = tmp_path.rglob("best.safetensors")

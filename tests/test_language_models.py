@@ -191,15 +191,6 @@ def test_a_failure_of_the_server_is_no_answer_and_the_run_goes_on_from_it(reply,
         assert client.ask(ASKED, ONE).value == {"word": "yes"} and client.sent == 1
 
 
-def test_a_request_is_sent_on_within_its_host(answers):
-    moves = [(307, {"Location": "/v1/chat/completions/"}, b""), said(GOOD)]
-    with ChatServer(lambda r: moves.pop(0)) as server:
-        assert client_of(server, answers).ask(ASKED, ONE).value == {"word": "yes"}
-        server.behaviour = lambda r: (308, {"Location": "/v1/chat/completions"}, b"")
-        with pytest.raises(UnableError, match="status 308; it sends on to '/v1/chat/completions'"):
-            client_of(server, answers, temperature=1.0).ask(ASKED, ONE)
-
-
 def test_a_newer_model_is_asked_with_the_settings_that_it_knows(answers):
     def strict(request: dict) -> tuple:
         if "max_tokens" in request:
@@ -269,10 +260,8 @@ def no_proxies(monkeypatch) -> pytest.MonkeyPatch:
         ("*", "example.org", True),
         ("localhost, .example.org", "a.example.org", True),
         ("example.org", "example.org", True),
+        ("example.org:80", "example.org:80", True),
         ("example.org:81", "example.org", False),
-        ("::1,[fd07::2]", "[fd07::2]", True),
-        ("10.0.0.0/8", "10.1.2.3", True),
-        ("fd07::/999,[::,a/b,10.0.0.0/8", "example.org", False),
     ],
 )
 def test_no_proxy_is_read_as_it_is_written(no_proxy, host, direct, no_proxies):
@@ -284,14 +273,14 @@ def test_no_proxy_is_read_as_it_is_written(no_proxy, host, direct, no_proxies):
 @pytest.mark.parametrize(
     ("variable", "value", "problem"),
     [
-        ("ALL_PROXY", "socks5://127.0.0.1:9", "ALL_PROXY names the proxy 'socks5://127.0.0.1:9', which cannot be used"),
-        ("all_proxy", "https://h:1", "a proxy is written http://HOST:PORT; unset all_proxy"),
-        ("http_proxy", "http://me:secret@h:x", r"http_proxy names the proxy 'http://\*\*\*@h:x'"),
+        ("ALL_PROXY", "socks5://127.0.0.1:9", "the proxy socks5://127.0.0.1:9 of .*ALL_PROXY cannot be used"),
+        ("all_proxy", "https://h:1", "a proxy is written http://HOST:PORT; unset it"),
+        ("http_proxy", "http://me:secret@h:x", r"the proxy http://\*\*\*@h:x of HTTP_PROXY"),
         ("HTTP_PROXY", "127.0.0.1:9", r"nobody listens there.*the proxy http://127.0.0.1:9 of HTTP_PROXY"),
-        ("HTTP_PROXY", "PROXY", r"status 503: no such luck \(.*of HTTP_PROXY; .*add models.example to NO_PROXY"),
+        ("HTTP_PROXY", "PROXY", r"status 503: no such luck \(.*of HTTP_PROXY.*add models.example to NO_PROXY"),
     ],
 )
-def test_a_proxy_that_fails_is_named_by_its_variable(variable, value, problem, no_proxies, answers):
+def test_a_proxy_that_fails_is_named(variable, value, problem, no_proxies, answers):
     with ChatServer(lambda r: (503, {}, b"no such luck")) as proxy:
         no_proxies.setenv(variable, value.replace("PROXY", proxy.url.removesuffix("/v1")))
         client = Client(ServerSettings("m", "http://models.example/v1", **FAST), AnswerCache(answers))
@@ -323,9 +312,7 @@ def test_certificates_that_are_gone_are_named_and_do_not_matter_without_tls(answ
 
     monkeypatch.setattr(urllib.request.OpenerDirector, "open", unverified)
     client = Client(ServerSettings("m", "https://127.0.0.1:9/v1", **FAST), AnswerCache(answers))
-    with pytest.raises(
-        UnableError, match=r"local issuer.*SSL_CERT_FILE names '/gone/cacert.pem', which does not exist"
-    ):
+    with pytest.raises(UnableError, match=r"local issuer.*SSL_CERT_FILE \(now: SSL_CERT_FILE=/gone/cacert.pem"):
         client.ask([{"role": "user", "content": "safely"}], ONE)
 
 

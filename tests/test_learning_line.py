@@ -10,7 +10,7 @@ import shlex
 import numpy as np
 import pytest
 import torch
-from hand_data import built, metrics_of, noise_features
+from hand_data import COMPACT, built, metrics_of, noise_features
 
 from embodied import options
 from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
@@ -23,7 +23,7 @@ from embodied.agents.hanna.study import HannaStudy
 from embodied.agents.learners.hanna import HannaTraining
 from embodied.agents.studies.engine import run_study
 from embodied.agents.vision.config import PLAIN
-from embodied.agents.vision.encoder import encoder_of, load_encoder, random_encoder, save_encoder
+from embodied.agents.vision.encoder import load_encoder, random_encoder, save_encoder
 from embodied.agents.vision.features import feature_path
 from embodied.agents.vision.training_data import TrainingData
 from embodied.cli import main
@@ -40,7 +40,7 @@ pytestmark = pytest.mark.slow
 torch.set_num_threads(1)
 SMALL = shlex.split(
     "--hidden-size 16 --navigation-embedding 16 --ask-embedding 8 --self-heads 2 --text-heads 2 --batch 4 "
-    "--training-steps 6 --evaluation-steps 8 --validation-tasks 3 --validate-every 1 --threads 1 --network random"
+    "--training-steps 6 --evaluation-steps 8 --validation-tasks 3 --validate-every 1 --threads 1"
 )
 
 
@@ -60,12 +60,12 @@ def data(tmp_path_factory):
 
 def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, capsys):
     run = lambda *words: main([str(w) for w in words])
-    train = ("train", "hanna", "--data", data.folder, "--out", tmp_path, *SMALL, "--iterations")
-    assert run(*train, 2) == 0 and run(*train, 3) == 0
+    train = ("train", "hanna", "--data", data.folder, "--out", tmp_path, "--encoder", COMPACT, *SMALL)
+    assert run(*train, "--iterations", 2) == 0 and run(*train, "--iterations", 3) == 0
     assert "continuing after update 2" in capsys.readouterr().err
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2, 3]
     best, out = tmp_path / "best.safetensors", tmp_path / "table"
-    judge = ("evaluate", "hanna", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 4)
+    judge = ("evaluate", "hanna", "--data", data.folder, "--agent", best, "--encoder", COMPACT, "--tasks", 4)
     judge = (*judge, "--threads", 1)
     assert run(*judge, "--out", out) == 0
     table = (out / "table.md").read_text()
@@ -84,7 +84,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
 def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
     config = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL).config
-    bank = TrainingData(data, random_encoder(seed=0)).split("test_unseen").bank
+    bank = TrainingData(data, load_encoder(COMPACT)).split("test_unseen").bank
     words = vocabulary_of(data).words
     torch.manual_seed(0)
     agent = HannaAgent.new(HannaAbout(config=config, encoder=bank.digest, feature_size=bank.size, words=words))
@@ -232,17 +232,11 @@ def test_more_training_houses_than_there_are_are_refused(study, tmp_path):
 
 
 def test_fewer_training_houses_mean_fewer_tasks_and_words(data):
-    encoder = random_encoder(seed=0)
+    encoder = load_encoder(COMPACT)
     some, every = (TrainingData(data, encoder).split("train", houses=n) for n in (1, None))
     assert {t.world for t in some.tasks} == {data.names("train")[0]}
     assert 0 < len(some.tasks) < len(every.tasks)
     assert len(vocabulary_of(data, 1).words) <= len(vocabulary_of(data).words)
-
-
-def test_weights_of_another_network_are_named(tmp_path):
-    torch.save({}, tmp_path / "weights.pth")
-    with pytest.raises(ValueError, match="not the weights of resnet18"):
-        encoder_of(tmp_path / "weights.pth", "resnet18")
 
 
 def test_a_data_set_of_another_kind_of_task_is_refused_with_the_command_that_makes_the_right_one(data):

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hand_data import noise_features
+from hand_data import COMPACT, noise_features
 from hand_serve import HEAD, TOGETHER, make_data, write_study
 
 from embodied.agents.bandit.ratings import Rater, fitted
@@ -596,7 +596,8 @@ def test_iliad_and_vnla_train_on_what_people_said(tmp_path, shared_cache, kind):
     noise_features(data)
     people = ["--people", str(tmp_path / "people"), "--data", str(data.folder), "--out", str(tmp_path / "made")]
     assert start(["dataset", "from-people", *people]) == 0
-    learn = ["--data", str(tmp_path / "made"), "--out", str(tmp_path / "out"), "--network", "random", "--iterations=2"]
+    learn = ["--data", str(tmp_path / "made"), "--out", str(tmp_path / "out")]
+    learn += ["--encoder", str(COMPACT), "--iterations=2"]
     if kind == "vnla":
         small = ["--hidden-size=16", "--batch=4", "--validate-every=2", "--validation-tasks=4"]
         assert start(["train", "vnla", *learn, *small]) == 0

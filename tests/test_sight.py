@@ -13,18 +13,12 @@ from hand_vnla import TINY as VNLA
 from hand_vnla import lesson
 from test_hanna_learner import agent_for, setting
 
-from embodied.agents.hanna.evaluation import sight_policies
-from embodied.agents.hanna.recognition_study import Query, auc, measured, precision_recall, threshold
+from embodied.agents.hanna.evaluation import hanna_policies
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.capture import strip_around
-from embodied.agents.vision.features import VIEW_SIZE, strip_of
-from embodied.agents.vision.strip import VFOV
 from embodied.agents.vision.training_data import Split
 from embodied.evaluation.rollout import play
-from embodied.evaluation.tables import interval
 from embodied.interface import Agent, Episode, Observation, Sight, Viewpoint, is_picture, viewpoint
 from embodied.kinds import metrics
-from embodied.render.panorama import Panorama, face_rays
 
 ROOT = Path(__file__).resolve().parent.parent
 SEEING = {"agents/language_models/observations.py", "agents/vision/bank.py", "agents/vision/live.py"}
@@ -97,7 +91,7 @@ def test_an_agent_behaves_the_same_whatever_its_sights_are_called():
     agent.network.eval(), vnla.network.eval()
     for split, player in (
         (hanna, agent.policy),
-        (hanna, lambda bank: sight_policies(agent, bank)["rules only"]),
+        (hanna, lambda bank: hanna_policies(agent, bank)["rules only"]),
         (walked, vnla.player),
     ):
         bank, rows = both(split)
@@ -114,14 +108,14 @@ def test_with_black_pictures_the_rules_of_an_agent_are_worth_nothing():
     """The rules stop at what the helper's picture shows: who sees black finds it no more often than by chance."""
     split = setting()
     agent = agent_for(split)
-    policies = sight_policies(agent, split.bank)
+    rules = hanna_policies(agent, split.bank)["rules only"]
     tasks = [dataclasses.replace(t, horizon=60) for t in split.tasks]
 
-    def success(name: str) -> float:
-        episodes: list[Episode] = play(split.make_env, policies[name], tasks, seed=0, batch=len(tasks))
+    def success(policy: Agent) -> float:
+        episodes: list[Episode] = play(split.make_env, policy, tasks, seed=0, batch=len(tasks))
         return float(np.mean([metrics.success(e, split.worlds[e.task.world].graph) for e in episodes]))
 
-    assert success("rules only") > success("rules only, blind") + 0.3
+    assert success(rules) > success(rules.changed(bank=split.bank.blind())) + 0.3
 
 
 def test_pictures_are_of_another_time_and_what_is_seen_is_of_now():
@@ -133,29 +127,3 @@ def test_pictures_are_of_another_time_and_what_is_seen_is_of_now():
     assert not bank.blind().features(picture).any()
     with pytest.raises(ValueError, match="same worlds"):
         FeatureBank(own, "digest").with_goal_images({"b": own["a"]})
-
-
-def test_precision_and_recall_count_places_that_are_found_where_they_are():
-    near, far = np.array([0.0, 2.0]), np.array([3.0, 5.0])
-    asked = [
-        Query("h", np.array([0.9, 0.2]), near),
-        Query("h", np.array([0.3, 0.6]), near),
-        Query("h", np.array([0.4, 0.1]), far),
-    ]
-    assert precision_recall(asked, 0.35) == (1 / 3, 1 / 2), "right once, wrong twice, of two that are on the map"
-    assert precision_recall(asked, 0.8) == (1.0, 1 / 2) and 0.6 < threshold(asked) < 0.9
-    found = measured(asked, 0.35)
-    shares = [interval([found[k]]).mean for k in ("right place first", "precision", "recall")]
-    assert shares == [1 / 2, 1 / 3, 1 / 2]
-    assert auc(np.array([1.0, 2.0]), np.array([0.0, 1.5])) == 3 / 4
-
-
-def test_a_single_view_lies_in_its_strip_where_a_panorama_shows_it():
-    """Directions as colours: within the view's field the strip around it is that of the whole panorama."""
-    size = 64
-    rays = face_rays(size)
-    rgb = np.round((rays / np.linalg.norm(rays, axis=-1, keepdims=True) + 1) * 127).astype(np.uint8)
-    panorama = Panorama(rgb, np.ones((6, size, size), np.float32), np.zeros((6, size, size), np.int32))
-    whole, part = strip_of(panorama), strip_around(panorama.view_rgb(0.0, 0.0, VFOV, VIEW_SIZE))
-    field = slice(60, 132), slice(288 - 55, 288 + 55)
-    assert part.shape == whole.shape and np.abs(part[field].astype(int) - whole[field]).max() <= 4

@@ -23,11 +23,12 @@ def panorama() -> Panorama:
 
 
 @pytest.fixture(scope="module")
-def trained() -> Detector:
+def trained(tmp_path_factory) -> Detector:
     """Learned in strips in which a red cell is a 'rose' and a green one a 'fern'."""
     config = StripTraining(epochs=6, batch=2, least_views=1, learning_rate=0.01)
     encoder = random_encoder(seed=0)
-    return train_detector([coloured_strips("a", 12, seed=0)], encoder, config, note=lambda line: None)
+    houses, folder = [coloured_strips("a", 12, seed=0)], tmp_path_factory.mktemp("detector")
+    return train_detector(houses, encoder, config, folder, note=lambda line: None)
 
 
 def test_cells_lie_where_the_strip_shows_them():

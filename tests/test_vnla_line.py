@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from hand_data import built, metrics_of, noise_features
+from hand_data import COMPACT, built, metrics_of, noise_features
 
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.cli import main
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 SMALL = [
     *("--hidden-size", 16, "--word-embedding", 8, "--navigation-embedding", 4, "--ask-embedding", 4),
     *("--budget-embedding", 4, "--coverage", 2, "--batch", 4, "--validation-tasks", 3, "--validate-every", 1),
-    *("--threads", 1, "--network", "random"),
+    *("--threads", 1, "--encoder", COMPACT),
 ]
 
 
@@ -47,7 +47,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2]
     best = tmp_path / "best.safetensors"
     assert VnlaAgent.load(best).about.pictures == "unlit_192"
-    judge = ("evaluate", "vnla", "--data", data.folder, "--agent", best, "--network", "random", "--tasks", 2, "--json")
+    judge = ("evaluate", "vnla", "--data", data.folder, "--agent", best, "--encoder", COMPACT, "--tasks", 2, "--json")
     rows = ("learned", "learned, asks never", "learned, direct intervention", "shortest")
     assert run(*judge, "--out", tmp_path / "judged", "--rows", *rows) == 0
     said_by_judge = capsys.readouterr()

@@ -42,18 +42,13 @@ def load_weights(path: Path, kind: str, about: type[T], remedy: str) -> tuple[di
       FileNotFoundError, OSError.
       ValueError: truncated, changed, of another format or kind.
     """
-    tensors, metadata = load_tensors(Path(path), (WEIGHTS_FORMAT,), remedy)
+    tensors, metadata = load_tensors(Path(path), WEIGHTS_FORMAT, remedy)
     if metadata.get("kind") != kind:
         raise ValueError(f"{path}: holds {metadata.get('kind')!r}, {kind!r} is wanted; {remedy}")
     try:
         return tensors, from_json(about, metadata.get("about", ""))
     except ValueError as e:
         raise ValueError(f"{path}: {e}; {remedy}") from e
-
-
-def kind_of(path: Path) -> str | None:
-    """The kind of a file of weights, as `save_weights` was told."""
-    return _read(path)[1].get("kind")
 
 
 def origin_of(path: Path) -> dict[str, Any] | None:
@@ -71,7 +66,7 @@ def weights_digest(path: Path) -> str:
 
 def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     """The tensors of a file of weights, and what stands beside them."""
-    return load_tensors(Path(path), (WEIGHTS_FORMAT,), "train it again")
+    return load_tensors(Path(path), WEIGHTS_FORMAT, "train it again")
 
 
 @contextmanager

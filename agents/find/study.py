@@ -13,7 +13,7 @@ from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.run import Finder, tasks_in, train_finder
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.vision.encoder import encoder_of
+from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.agents.vision.training_data import TrainingData
 from embodied.datasets.store import Dataset, SplitData
@@ -75,7 +75,7 @@ class FindStudy(SightedStudy):
 
     def training_data_in(self, folder: Path) -> TrainingData:
         """Of any kind: its houses are all that counts."""
-        return TrainingData(Dataset(folder), encoder_of(self.encoder, self.network), self.pictures, cache=self.cache)
+        return TrainingData(Dataset(folder), load_encoder(self.encoder), self.pictures, cache=self.cache)
 
     def about(self) -> str:
         return f"{super().about()} {self.house_tasks} tasks of each house; hidden size {self.config.hidden_size}."

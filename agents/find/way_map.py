@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from embodied.agents.hanna.recognition import Likeness, matches
+from embodied.agents.hanna.recognition import SAME_PLACE, matches
 from embodied.agents.hanna.topological_map import fewest_moves
 from embodied.geometry import wrap
 from embodied.interface import Observation
@@ -91,4 +91,4 @@ class WayMap:
         mean = (self._looks.sum((0, 1)) + panorama.sum(0)) / ((len(self._looks) + 1) * len(panorama))
         scores = matches(panorama, self._looks[alike], mean, turned=False)
         best = int(scores.argmax())
-        return alike[best] if scores[best] >= Likeness().place else None
+        return alike[best] if scores[best] >= SAME_PLACE else None

@@ -26,54 +26,38 @@ from embodied.teachers.hanna import HannaTeacher
 REASONS = ("lost", "uncertain_wrong", "never_asked")
 WITHOUT_LEARNING = ("random walk", "forward 10", "shortest", "perfect interpretation")
 """Agents of embodied.evaluation.evaluate that are judged beside the learned one; they need no pictures."""
-EVAL_ABLATIONS: Mapping[str, Mapping[str, Any]] = {
-    "learned, without search": {"frontier_discount": 0.0},
-    "learned, not by image": {"use_goal_image": False},
-    "learned, without a trail": {"use_goal_image": False, "revisit_weight": 1.0},
-    "learned, likeliest move": {"choose": choose_at(0.0)},
-    "learned, likeliest move, without a trail": {
-        "choose": choose_at(0.0),
-        "use_goal_image": False,
-        "revisit_weight": 1.0,
-    },
-}
-"""Changed settings, by name, where an agent is judged more nearly as the text has it, the last wholly so but for when
-it asks (docs/sources.md, S36, S161; S162 stays)."""
-
-
+BY_THE_TEXT = {"choose": choose_at(0.0), "use_goal_image": False, "revisit_weight": 1.0}
+"""Changed settings where an agent is judged as the text has it (docs/sources.md, S36, S161)."""
 Judged = Callable[[HannaAgent, FeatureBank], MapPolicy]
 """How an agent acts when it is judged."""
-
-
-def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent.policy) -> dict[str, Agent]:
-    """Variants of a learned agent by the names of Tables 4.3 to 4.5.
-
-    'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
-    authors train an agent for each rule (`embodied train hanna --ask-rule ...`; docs/sources.md, S39).
-    """
-    learned = of(agent, bank)
-    return {
-        "learned": learned,
-        "learned, no ask": learned.changed(ask_rule=RULES["never"][1]),
-        "learned, random ask": learned.changed(ask_rule=RULES["random"][1]),
-        "learned, ask every 5": learned.changed(ask_rule=RULES["every5"][1]),
-        "learned, target image only": learned.changed(read_assistance=False),
-        "learned, perfect interpretation": PerfectInterpretation(learned),
-    }
 
 
 def by_the_text(agent: HannaAgent, bank: FeatureBank) -> MapPolicy:
     """The agent as the text judges it: the likeliest move and decision to ask, without rules of ours (docs/sources.md,
     S36, S161, S162)."""
-    plain = EVAL_ABLATIONS["learned, likeliest move, without a trail"]
-    return agent.policy(bank).changed(**plain, ask_rule=RULES[agent.config.ask_rule][1])
+    return agent.policy(bank).changed(**BY_THE_TEXT, ask_rule=RULES[agent.config.ask_rule][1])
 
 
-def all_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent.policy) -> dict[str, Agent]:
-    """Those of `hanna_policies` and `sight_policies`, and the agent in each way of EVAL_ABLATIONS."""
-    learned = of(agent, bank)
-    plainer = {name: learned.changed(**changed) for name, changed in EVAL_ABLATIONS.items()}
-    return {**hanna_policies(agent, bank, of), **plainer, **sight_policies(agent, bank)}
+def hanna_policies(agent: HannaAgent, bank: FeatureBank, of: Judged = HannaAgent.policy) -> dict[str, Agent]:
+    """Variants of a learned agent by the names of Tables 4.3 to 4.5, and two that show the worth of sight.
+
+    'no ask', 'random ask' and 'ask every 5' put another rule before the same networks; the
+    authors train an agent for each rule (`embodied train hanna --ask-rule ...`; docs/sources.md, S39).
+    'blind' sees black with network and matcher alike; 'rules only' draws moves evenly, stops by the picture alone and
+    asks every 5 steps.
+    """
+    learned, every5 = of(agent, bank), RULES["every5"][1]
+    nothing: Any = Uniform(agent.network.action_size)
+    return {
+        "learned": learned,
+        "learned, no ask": learned.changed(ask_rule=RULES["never"][1]),
+        "learned, random ask": learned.changed(ask_rule=RULES["random"][1]),
+        "learned, ask every 5": learned.changed(ask_rule=every5),
+        "learned, target image only": learned.changed(read_assistance=False),
+        "learned, perfect interpretation": PerfectInterpretation(learned),
+        "blind": agent.policy(bank.blind()),
+        "rules only": agent.policy(bank).changed(network=nothing, ask_rule=every5),
+    }
 
 
 UNWILLING = 20.0
@@ -104,31 +88,10 @@ class Forgetting:
         return self
 
 
-def sight_policies(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
-    """Agents that show the worth of sight, by name: the learned agent without it, and its rules with sight but without
-    learning.
-
-    'blind' sees black with network and matcher alike; 'rules only' draws moves evenly, stops by the picture alone and
-    asks every 5 steps, or every 10.
-    """
-    learned, blind = agent.policy(bank), agent.policy(bank.blind())
-    every5 = RULES["every5"][1]
-    nothing: Any = Uniform(learned.policy.network.action_size)
-    rules = learned.changed(network=nothing, ask_rule=every5)
-    return {
-        "blind": blind,
-        "blind, not by image": blind.changed(use_goal_image=False),
-        "blind, ask every 5": blind.changed(ask_rule=every5),
-        "rules only": rules,
-        "rules only, ask every 10": rules.changed(ask_rule=lambda p, seen, last, *, rng: seen.time - last >= 10),
-        "rules only, blind": rules.changed(bank=blind.policy.bank),
-    }
-
-
-def players(agent: HannaAgent, bank: FeatureBank) -> tuple[dict[str, Agent], list[str]]:
-    """All rows that an agent gives, and the names of those of the paper's tables, of the sighted and the unsighted."""
+def players(agent: HannaAgent, bank: FeatureBank) -> dict[str, Agent]:
+    """All rows that an agent gives, beside agents without learning."""
     without = {name: agent_without_learning("hanna", name) for name in WITHOUT_LEARNING}
-    return {**without, **all_policies(agent, bank)}, [*without, *hanna_policies(agent, bank), "blind", "rules only"]
+    return {**without, **hanna_policies(agent, bank)}
 
 
 def counted(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, Samples]:

@@ -14,30 +14,17 @@ import numpy as np
 
 from embodied.agents.hanna.inputs import HEADINGS, VIEWS
 
-
-@dataclass(frozen=True)
-class Likeness:
-    """Least matches, cosines, at which pictures are of one place. The defaults suit the shipped encoder: `picture` and
-    `view` have nearly the best F1 in validation houses (agents.hanna.recognition_study), and `place` is above its best,
-    0.44, so that places are not merged; `encoder_compact` wants 0.68, 0.58 and 0.42."""
-
-    place: float = 0.55
-    """Of two panoramas of the agent's own, whose headings it knows."""
-    picture: float = 0.42
-    """Of a panorama of another day and hour, through a noisy camera."""
-    view: float = 0.25
-    """Of a single view of another day and hour, through a noisy camera."""
-
-    def of(self, picture: np.ndarray) -> float:
-        """For a picture that is shown, (36, D) features, zero in views that it does not show."""
-        return self.view if np.count_nonzero(picture.any(-1)) == 1 else self.picture
+SAME_PLACE, SAME_PICTURE = 0.55, 0.42
+"""Least matches, cosines, at which two panoramas are of one place: of the agent's own, whose headings it knows, and of
+another day and hour, through a noisy camera. They suit the shipped encoder: the second has nearly the best F1 in
+validation houses, the first is above its best, 0.44, so that places are not merged; `encoder_compact` wants 0.68 and
+0.58."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlaceMap:
     """The places that one episode has seen so far, numbered as they were met, and the pictures it was shown."""
 
-    least: Likeness = Likeness()
     panoramas: np.ndarray = field(default_factory=lambda: np.zeros((0, VIEWS, 1), np.float32))
     """(k, 36, D) features of each place, as first seen."""
     pictures: np.ndarray = field(default_factory=lambda: np.zeros((0, VIEWS, 1), np.float32))
@@ -65,14 +52,14 @@ class PlaceMap:
         """The place where a picture was taken, None where it is not on the map, and the match (k,) of every place."""
         scores = matches(self.pictures[picture], self.panoramas, self.mean)
         best = int(scores.argmax())
-        return (best if scores[best] >= self.least.of(self.pictures[picture]) else None), scores
+        return (best if scores[best] >= SAME_PICTURE else None), scores
 
     def _known(self, among: np.ndarray, one: np.ndarray, *, turned: bool) -> int | None:
         if not len(among):
             return None
         scores = matches(one, among, self.mean, turned=turned)
         best = int(scores.argmax())
-        return best if scores[best] >= self.least.place else None
+        return best if scores[best] >= SAME_PLACE else None
 
 
 def matches(picture: np.ndarray, panoramas: np.ndarray, mean: np.ndarray, *, turned: bool = True) -> np.ndarray:

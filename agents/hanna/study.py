@@ -9,17 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.common.session import Note
-from embodied.agents.common.weights import weights_digest
 from embodied.agents.hanna.agent import HannaAgent
-from embodied.agents.hanna.evaluation import all_policies, by_the_text, counted
-from embodied.agents.hanna.recognition_study import AGAIN, RECOGNITION_MEASURES, recognised
+from embodied.agents.hanna.evaluation import by_the_text, counted, hanna_policies
 from embodied.agents.hanna.run import train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import speakers_table, words_table
-from embodied.agents.vision.config import CAPTURE_CONDITIONS
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy, spoken
 from embodied.agents.vision.training_data import TrainingData
@@ -47,20 +44,6 @@ LEARNED = learned("Learned")
 HALF = learned("half curiosity", alpha=0.5)
 IMAGE_ONLY = learned("Target image only", read_assistance=False)
 LANGUAGE = learned("+ language instruction")
-OURS_SEEING = learned("Seeing")
-SIGHT_ROWS = (
-    learned("Blind", "blind"),
-    learned("Rules only", "rules only"),
-    learned("No help, trained so", ask_rule="never", alpha=0.5),
-    *(
-        learned(name.capitalize(), f"learned, {name}")
-        for name in ("ask every 5", "random ask", "perfect interpretation")
-    ),
-    without("Random walk", "random walk"),
-)
-"""Rows beside the seeing agent: without sight, without learning, without help, with other rules of asking."""
-PICTURE = "picture"
-"""In a row's `judge`: no agent plays; places are recognised in pictures that were taken then."""
 LSTM = learned("LSTM encoder-decoder", model="lstm", alpha=0.0, predict_reasons=False)
 NO_CURIOSITY = learned("Our model, alpha = 0", alpha=0.0)
 OURS = learned("Our model, alpha = 1")
@@ -90,21 +73,8 @@ HANNA_TABLES: Mapping[str, StudyTable] = {
         FULL,
         TEST,
     ),
-    "sight": StudyTable(
-        "HANNA with sight and without",
-        (OURS_SEEING, *SIGHT_ROWS),
-        ("success", "spl", "navigation error", "requests", "steps"),
-        ("test_unseen",),
-        tuple((OURS_SEEING, row) for row in SIGHT_ROWS if row.train is not None),
-    ),
     "words": words_table(learned, FULL, TEST[1:]),
     "speakers": speakers_table(learned, FULL, TEST[1:]),
-    "places": StudyTable(
-        "Recognising places in pictures from another time",
-        tuple(StudyRow(name, None, {PICTURE: name}) for name in (AGAIN, *CAPTURE_CONDITIONS)),
-        RECOGNITION_MEASURES,
-        ("test_unseen",),
-    ),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
     "4.5": StudyTable(
         "Help-request policies",
@@ -153,21 +123,17 @@ def in_both_ways(table: StudyTable) -> StudyTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(SightedStudy):
-    """Tables 4.3 to 4.6, D.1 and D.2, what sight is worth, and how well places are recognised."""
+    """Tables 4.3 to 4.6, D.1 and D.2, and those of unheard words and people."""
 
     config: TrainingConfig
     evaluation: HannaEvaluation
     device: str = "cpu"
-    init_from: Path | None = None
-    """A trained agent whose weights and words every row begins with; None: random weights."""
     eval_data: Path | None = None
     """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
-    goal_image: str = "same"
-    """How the pictures that helpers show were taken, of agents.vision.config.CAPTURE_CONDITIONS, in training too."""
 
     name, agent_kind = "hanna", HannaAgent
     makers = ("embodied.agents.hanna.run",)
-    judges = (*JUDGES, "embodied.agents.hanna.evaluation", "embodied.agents.hanna.recognition_study")
+    judges = (*JUDGES, "embodied.agents.hanna.evaluation")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
@@ -181,19 +147,13 @@ class HannaStudy(SightedStudy):
                 tables[name] = in_both_ways(tables[name])
         return tables
 
-    def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
-        initial = {} if self.init_from is None else {"begin": weights_digest(self.init_from)}
-        return {**super().depends(train), "encoder": weights_digest(self.encoder), **initial}
-
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
             self.evaluation_data({}).split(split)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(
-            self.training_data(), self.settings(train, seed), self.evaluation, home, init_from=self.init_from, note=note
-        )
+        train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
         return home / "best.safetensors"
 
     def policies(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
@@ -201,30 +161,23 @@ class HannaStudy(SightedStudy):
             return super().policies(agent, judge, split)
         bank = self.evaluation_data(judge).split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(BY_TEXT) and not split.endswith(SHIPPED)
-        policy = all_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
+        policy = hanna_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
         return self.heard(agent, policy, judge)
 
     def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         return super().where(agent, judge, split.removesuffix(SHIPPED))
 
-    def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
-        if PICTURE not in row.judge:
-            return super().judge(weights, row, split, seed, folder, keep)
-        source = self.evaluation_data({})
-        return recognised(source.data, split, row.judge[PICTURE], source.encoder.digest, self.pictures)
-
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {**super().judged(row, split.removesuffix(SHIPPED)), "shown": self.goal_image}
+        return super().judged(row, split.removesuffix(SHIPPED))
 
     def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
         return counted(episodes, split.worlds)
 
     def about(self) -> str:
-        initial = f", initialised from {self.init_from.name}" if self.init_from else ""
         other = self.judged_in({}).digest[:16]
         judged = f" Judged in the data set {other}, not that of training." if self.eval_data else ""
         return (
-            f"{super().about().removesuffix('.')}{initial}; goal images: {self.goal_image}.{judged} Judged at "
+            f"{super().about()}{judged} Judged at "
             f"temperature {self.evaluation.evaluation_temperature:g} and by docs/sources.md, S36, S161, S162; in "
             f"{', '.join(PRINTED)} so in the columns 'as shipped' alone, in the others, beside the printed numbers, "
             "the likeliest action is taken."
@@ -234,4 +187,4 @@ class HannaStudy(SightedStudy):
         return spoken(self.training_data_in(self.eval_data or self.data), judge)
 
     def training_data_in(self, folder: Path) -> TrainingData:
-        return dataclasses.replace(super().training_data_in(folder), device=self.device, goal_image=self.goal_image)
+        return dataclasses.replace(super().training_data_in(folder), device=self.device)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.learner import Learner, register_learner
-from embodied.agents.options import TRAINING, EncoderFile, Repeated, StudyOptions, WithData, study_of
+from embodied.agents.options import TRAINING, Encoded, Repeated, StudyOptions, WithData, study_of
 from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ WORDLESS = ("instruction_length", "word_vectors", "varied_words")
 
 
 @dataclass(frozen=True, kw_only=True)
-class FindStudyOptions(StudyOptions, Repeated, WithData, EncoderFile):
+class FindStudyOptions(StudyOptions, Repeated, WithData, Encoded):
     """Agents that find things without help, with sight and without."""
 
     house_tasks: Count = 50

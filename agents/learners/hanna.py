@@ -14,7 +14,6 @@ from embodied.agents.options import (
     SCALE,
     TRAINING,
     Encoded,
-    EncoderFile,
     Limited,
     Recorded,
     Repeated,
@@ -24,7 +23,6 @@ from embodied.agents.options import (
     Tables,
     WithData,
     WithDevice,
-    WithGoalImage,
     study_of,
     training_data,
 )
@@ -36,7 +34,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaTraining(Recorded, Run, Encoded, WithDevice, WithGoalImage):
+class HannaTraining(Recorded, Run, Encoded, WithDevice):
     """An agent that asks people for help (HANNA), by imitation, on a HANNA data set with features.
 
     Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
@@ -50,20 +48,16 @@ class HannaTraining(Recorded, Run, Encoded, WithDevice, WithGoalImage):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaStudyOptions(StudyOptions, Repeated, Limited, WithData, EncoderFile, WithDevice, WithGoalImage):
+class HannaStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded, WithDevice):
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, sight, words, speakers or places."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, words or speakers."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
-    eval_seed: int = 0
-    """Random seed of the evaluation."""
     eval_data: InputFolder | None = None
     """Evaluate in the unseen houses of another data set that has features (default: of --data)."""
-    init_from: InputPath | None = None
-    """Initialise with the weights of this agent."""
     config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES, skip=("training_houses",))]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
@@ -71,7 +65,7 @@ class HannaStudyOptions(StudyOptions, Repeated, Limited, WithData, EncoderFile, 
 def train(args: HannaTraining, **session: Any) -> None:
     from embodied.agents.hanna.run import train_agent
 
-    source = training_data(args, "hanna", args.device, args.goal_image)
+    source = training_data(args, "hanna", args.device)
     session["minutes"] = args.minutes
     train_agent(source, args.config, args.evaluation, args.out, init_from=args.init_from, **session)
 
@@ -79,7 +73,7 @@ def train(args: HannaTraining, **session: Any) -> None:
 def study(args: HannaStudyOptions) -> StudyLearner:
     from embodied.agents.hanna.study import HannaStudy
 
-    return study_of(HannaStudy, args, eval_seeds=(args.eval_seed,))
+    return study_of(HannaStudy, args)
 
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
@@ -91,8 +85,8 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     source, agent = evaluation_data(data, how), HannaAgent.load(file)
 
     def of_split(split: str) -> Players:
-        whole, (policies, usual) = data.split(split), players(agent, source.split(split).bank)
-        return Players({name: (whole, policy) for name, policy in policies.items()}, usual, WITHOUT_LEARNING)
+        whole, policies = data.split(split), players(agent, source.split(split).bank)
+        return Players({name: (whole, policy) for name, policy in policies.items()}, blind=WITHOUT_LEARNING)
 
     return of_split
 

@@ -9,8 +9,6 @@ from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE
 from embodied.render.photograph import check_camera
 from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, recorded
 
-TORCHVISIONS = ("resnet18", "resnet34", "resnet50", "resnet101", "resnet152")
-"""Networks that encode without training here, with weights from disk."""
 TRAINED_NETWORKS = ("compact", "lite0")
 """Networks that are trained here; the first is the default."""
 PLAIN = Unlit(size=192)
@@ -50,14 +48,12 @@ class CaptureCondition:
     """Day of embodied.generate.rearrange: people elsewhere, small things moved; 0 is the agent's own."""
     camera: str = "ideal"
     """The camera that took it, one of embodied.render.photograph.CAMERAS: exposure, balance, lens, noise, JPEG."""
-    view: bool = False
-    """A single view of 60 degrees along a drawn direction instead of a panorama."""
 
     @property
     def name(self) -> str:
         """The name that its features are filed under, after the house."""
         parts = [f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day)]
-        parts += [self.camera * (self.camera != "ideal"), "view" * self.view]
+        parts += [self.camera * (self.camera != "ideal")]
         return "".join(f"+{p}" for p in parts if p)
 
 
@@ -66,13 +62,10 @@ CAPTURE_CONDITIONS: Mapping[str, CaptureCondition] = {
     "camera": CaptureCondition(camera="robot"),
     "hour": CaptureCondition(lighting=1),
     "day": CaptureCondition(day=1),
-    "day-camera": CaptureCondition(day=1, camera="robot"),
-    "day-view": CaptureCondition(day=1, camera="robot", view=True),
     "later": CaptureCondition(lighting=1, day=1),
     "later-camera": CaptureCondition(lighting=1, day=1, camera="robot"),
-    "later-view": CaptureCondition(lighting=1, day=1, camera="robot", view=True),
 }
-"""Values of --goal-image, from what the agent sees itself to a single view at another hour of another day."""
+"""Values of --goal-image."""
 
 
 @dataclass(frozen=True)

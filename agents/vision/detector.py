@@ -139,7 +139,7 @@ def train_detector(
     houses: Sequence[HouseStrips],
     encoder: Encoder,
     config: StripTraining,
-    folder: Path | None = None,
+    folder: Path,
     *,
     device: str = "cpu",
     note: Note = print,

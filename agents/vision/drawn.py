@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import joblib
-import numpy as np
 
 from embodied.agents.vision.config import RENDER_PRESETS, drawing
 from embodied.agents.vision.labels import HouseStrips, all_classes, look
@@ -59,13 +58,15 @@ class StripSource:
     cache: Path
     picture_kind: str | None = None
     """As `pictures_of` takes it."""
-    share: float = 1.0
-    """Share of the viewpoints of each house that is drawn, in regular steps."""
 
     def strips(
-        self, names: Sequence[str], *, workers: int = 1, note: Callable[[str], None] = print
+        self, names: Sequence[str], *, lit: int = 0, workers: int = 1, note: Callable[[str], None] = print
     ) -> list[HouseStrips]:
-        """The strips of houses, drawn where they are missing."""
+        """The strips of houses, the first `lit` of them in light ('fast'), drawn where they are missing."""
+        if lit:
+            in_light = dataclasses.replace(self, picture_kind="fast")
+            strips = in_light.strips(names[:lit], workers=workers, note=note)
+            return [*strips, *self.strips(names[lit:], workers=workers, note=note)]
         data = Dataset(self.data)
         jobs = (joblib.delayed(self._draw)(n) for n in names if not self._path(data, n).exists())
         for name in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
@@ -74,15 +75,11 @@ class StripSource:
 
     def _path(self, data: Dataset, name: str) -> Path:
         """The file in which the strips of a house are."""
-        part = "" if self.share == 1 else f"_{self.share:.4f}"
-        folder = self.folder / f"{drawing(pictures_of(data, name, self.picture_kind))}{part}"
-        return folder / f"{name}.npz"
+        return self.folder / drawing(pictures_of(data, name, self.picture_kind)) / f"{name}.npz"
 
     def _draw(self, name: str) -> str:
         data = Dataset(self.data)
         pictures, classes = pictures_of(data, name, self.picture_kind), all_classes(load_catalogue(self.cache))
         with drawn_world(data, name, self.cache, pictures) as world:
-            count = len(world.graph.positions)
-            nodes = np.linspace(0, count - 1, math.ceil(self.share * count)).astype(int)
-            look(world, classes, nodes).save(self._path(data, name))
+            look(world, classes).save(self._path(data, name))
         return name

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,18 +15,20 @@ import torch
 from torch import Tensor
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
-from embodied.agents.common.tensor_file import load_into, read_weights
+from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.vision.compact import COMPACT, Compact
 from embodied.agents.vision.lite import LITE, Lite, folded
-from embodied.agents.vision.resnet import ARCHITECTURES, COMPACT, ResNet, load_torchvision
 from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, inside_windows, windows
 from embodied.identity import Identity
 
 DIGESTED = "embodied-encoder-1"
 """The beginning of what digests of encoders are made of."""
-Network = ResNet | Lite
+Network = Compact | Lite
 """Makes a map of `size` channels, of which the last `peaks` are pooled as maxima, in cells of `stride` pixels."""
-SHARINGS = ("strip", "views")
+NETWORKS: Mapping[str, type[Network]] = {COMPACT: Compact, LITE: Lite}
+SHARING = "strip"
+"""Views share one look at the panorama, of whose feature map they are windows."""
 MARGIN = 3 * CELL
 """Pixels of the strip's other end shown beyond each end, so that its ends are no borders."""
 
@@ -36,8 +38,8 @@ class EncoderAbout:
     """Metadata beside the weights in an encoder's file."""
 
     name: str
-    sharing: str
     digest: str
+    sharing: str = SHARING
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +48,7 @@ class Encoder:
 
     network: Network
     name: str
-    """Key of resnet.ARCHITECTURES, or 'lite0'."""
-    sharing: str = "strip"
-    """'strip': one look at the panorama, views are windows of the feature map; 'views': every view
-    is looked at alone, as the VLN literature does with ImageNet networks."""
+    """Key of NETWORKS."""
     mean: Tensor | None = None
     """(D,) subtracted from features; None leaves them as the network gives them."""
     mix: Tensor | None = None
@@ -63,7 +62,7 @@ class Encoder:
     @functools.cached_property
     def digest(self) -> str:
         """Hex SHA-256 over weights and settings: two encoders with one digest give the same features."""
-        h = hashlib.sha256(json.dumps([DIGESTED, self.name, self.sharing]).encode())
+        h = hashlib.sha256(json.dumps([DIGESTED, self.name, SHARING]).encode())
         for name, tensor in sorted(_tensors(self).items()):
             h.update(name.encode() + tensor.detach().cpu().half().contiguous().numpy().tobytes())
         return h.hexdigest()
@@ -124,11 +123,8 @@ def strip_map(network: Network, strips: Tensor) -> Tensor:
 
 def strip_pyramid(network: Network, strips: Tensor) -> list[Tensor]:
     """As `strip_map`, after the maps that it is made from, in cells of 8 and of 16 pixels."""
-    if strips.shape[1:] != (HEIGHT, WIDTH, 3) or network.stride != CELL:
-        raise ValueError(
-            f"expected strips (n, {HEIGHT}, {WIDTH}, 3) and a network of stride {CELL}, got {tuple(strips.shape)} and "
-            f"stride {network.stride}; use sharing 'views' for other networks"
-        )
+    if strips.shape[1:] != (HEIGHT, WIDTH, 3):
+        raise ValueError(f"expected strips (n, {HEIGHT}, {WIDTH}, 3), got {tuple(strips.shape)}")
     wide = network.normalise(torch.cat([strips[:, :, -MARGIN:], strips, strips[:, :, :MARGIN]], 2))
     # pixel by pixel is faster, but PyTorch 2.13 may corrupt memory on the way back (embodied.agents.vision.training)
     maps = network.pyramid(wide.contiguous() if torch.is_grad_enabled() else wide)
@@ -160,20 +156,15 @@ def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
     return mean, ((vectors * scale) @ vectors.T).float()
 
 
-def build(name: str) -> Network:
-    """The network of a name with random weights."""
-    return Lite() if name == LITE else ResNet(ARCHITECTURES[name])
-
-
 def random_encoder(name: str = COMPACT, *, seed: int) -> Encoder:
     """An untrained encoder: the floor that training has to beat."""
     with seeded(seed):
-        return Encoder(build(name).eval(), name)
+        return Encoder(NETWORKS[name]().eval(), name)
 
 
 def save_encoder(encoder: Encoder, path: Path, identity: Identity | None = None) -> None:
     """Write half-precision weights, settings and what they were trained with, atomically."""
-    about = EncoderAbout(encoder.name, encoder.sharing, encoder.digest)
+    about = EncoderAbout(encoder.name, encoder.digest)
     save_weights(path, "encoder", {k: v.detach().half() for k, v in _tensors(encoder).items()}, about, identity)
 
 
@@ -185,14 +176,14 @@ def load_encoder(path: Path = SHIPPED_ENCODER) -> Encoder:
     """
     remedy = "train the encoder again with `embodied train vision`"
     tensors, about = load_weights(path, "encoder", EncoderAbout, remedy)
-    if about.name not in (*ARCHITECTURES, LITE) or about.sharing not in SHARINGS:
+    if about.name not in NETWORKS or about.sharing != SHARING:
         raise ValueError(f"{path}: unknown settings {about}; {remedy}")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
-    network = build(about.name)
+    network = NETWORKS[about.name]()
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     load_into(network, {**counters, **tensors}, path)
-    encoder = Encoder(network.eval(), about.name, about.sharing, mean, mix)
+    encoder = Encoder(network.eval(), about.name, mean, mix)
     if encoder.digest != about.digest:
         raise ValueError(f"{path}: contents do not fit the digest {about.digest[:12]}; it was changed")
     return encoder
@@ -203,10 +194,3 @@ def _tensors(encoder: Encoder) -> dict[str, Tensor]:
     body = {k: v for k, v in encoder.network.state_dict().items() if not k.endswith("num_batches_tracked")}
     extra = {k: v for k, v in (("mean", encoder.mean), ("mix", encoder.mix)) if v is not None}
     return {**body, **extra}
-
-
-def encoder_of(path: Path, network: str | None = None) -> Encoder:
-    """The encoder of a file; of torchvision's weights, where `network` names one; an untrained one for 'random'."""
-    if network == "random":
-        return random_encoder(seed=0)
-    return Encoder(load_torchvision(network, read_weights(path)), network, "views") if network else load_encoder(path)

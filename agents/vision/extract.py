@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from embodied.agents.common.parallel import use_threads
-from embodied.agents.vision.capture import captured_path, digest_at, house_at, photographed
+from embodied.agents.vision.capture import captured_path, digest_at, house_at
 from embodied.agents.vision.config import CaptureCondition
 from embodied.agents.vision.drawn import drawn_world, pictures_of
 from embodied.agents.vision.encoder import Encoder
-from embodied.agents.vision.features import has_features, save_features
+from embodied.agents.vision.features import EQUIRECT, encode_strips, has_features, margin, save_features
 from embodied.datasets.store import Dataset
+from embodied.render.photograph import PhotoCamera
 from embodied.render.pictures import Traced
 from embodied.world import World
 
@@ -24,8 +25,10 @@ def features_of(world: World, encoder: Encoder, condition: CaptureCondition = AS
     """(n, 36, D) float16 features of the panoramas of a house, as the camera of `condition` takes them."""
     if isinstance(world.pictures, Traced) or condition != AS_SEEN:
         world.render_all()  # kept: they cost minutes a house, and several conditions show the same
-    panoramas = (world.panorama(v) for v in range(len(world.graph.positions)))
-    return photographed(encoder, panoramas, condition, world.house.name)
+    camera, house = PhotoCamera(condition.camera, seed=condition.day), world.house.name
+    seen = (world.panorama(node).equirect(EQUIRECT) for node in range(len(world.graph.positions)))
+    photographs = (camera.photographed(picture, None, house, node) for node, picture in enumerate(seen))
+    return encode_strips(encoder, (photograph[margin()] for photograph in photographs))
 
 
 @dataclass(frozen=True)

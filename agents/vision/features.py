@@ -18,8 +18,8 @@ from embodied.agents.common.tensor_file import load_tensors, save_tensors
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.config import PLAIN, drawing
 from embodied.agents.vision.encoder import Encoder
-from embodied.agents.vision.strip import HEIGHT, VFOV
-from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS, Place
+from embodied.agents.vision.strip import HEIGHT
+from embodied.interface import VIEWS, Place
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings
 
@@ -28,8 +28,6 @@ KEYS = ("encoder", "source", "drawing")
 """Entries of a feature file on what it was made from."""
 EQUIRECT = 288
 """Height of the equirect that the strip is cut from: 1.6 pixels per degree."""
-VIEW_SIZE = (240, 320)
-"""Height and width of a view that is looked at alone; half of Matterport's 480 x 640."""
 
 
 def strip_of(panorama: Panorama) -> np.ndarray:
@@ -43,21 +41,16 @@ def margin() -> slice:
     return slice(above, above + HEIGHT)
 
 
-def views_of(panorama: Panorama, size: tuple[int, int] = VIEW_SIZE) -> np.ndarray:
-    """(36, h, w, 3) uint8: the perspective views, 60 degrees high, in the order of embodied.interface."""
-    return np.stack(
-        [panorama.view_rgb(yaw, pitch, VFOV, size) for yaw, pitch in zip(VIEW_YAWS, VIEW_PITCHES, strict=True)]
-    )
-
-
 def encode_panoramas(encoder: Encoder, panoramas: Iterable[Panorama]) -> np.ndarray:
-    """(n, 36, D) float16 features of panoramas, in order, as the encoder wants to look at them."""
-    prepare, encode = (
-        (strip_of, encoder.encode_strips) if encoder.sharing == "strip" else (views_of, encoder.encode_views)
-    )
-    pictures, out = map(prepare, panoramas), []
-    while group := list(itertools.islice(pictures, 8)):
-        out.append(encode(np.stack(group)))
+    """(n, 36, D) float16 features of panoramas, in order."""
+    return encode_strips(encoder, map(strip_of, panoramas))
+
+
+def encode_strips(encoder: Encoder, strips: Iterable[np.ndarray]) -> np.ndarray:
+    """(n, 36, D) float16 features of strips, in order."""
+    out, left = list[np.ndarray](), iter(strips)
+    while group := list(itertools.islice(left, 8)):
+        out.append(encoder.encode_strips(np.stack(group)))
     return np.concatenate(out).astype(np.float16)
 
 
@@ -91,7 +84,7 @@ def load_features(
     remedy = f"make it again with `{command}`"
     if not path.exists():
         raise FileNotFoundError(f"{path} does not exist; make it with `{command}`")
-    tensors, about = load_tensors(path, (FEATURES_FORMAT,), remedy)
+    tensors, about = load_tensors(path, FEATURES_FORMAT, remedy)
     features = tensors.get("features")
     if features is None or features.dim() != 3 or features.shape[1] != VIEWS or not {*KEYS} <= set(about):
         raise ValueError(f"{path}: not a feature file of format {FEATURES_FORMAT!r}; {remedy}")

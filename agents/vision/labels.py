@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -64,7 +64,7 @@ class HouseStrips:
 
     @staticmethod
     def load(path: Path) -> HouseStrips:
-        """Read what `save` wrote; the house's name is the file's stem, what follows a @ says which lighting it is.
+        """Read what `save` wrote; the house's name is the file's stem.
 
         Raises:
           FileNotFoundError, OSError.
@@ -81,7 +81,7 @@ class HouseStrips:
         wanted = {"rgb": (n, HEIGHT, WIDTH, 3), "share": (*cells, len(classes)), "rooms": cells, "log_depth": cells}
         if shapes != {**wanted, "room": (n,)}:
             raise ValueError(f"{path}: its arrays do not fit each other ({shapes}); delete it and render again")
-        return HouseStrips(Path(path).stem.partition("@")[0], classes, **arrays)
+        return HouseStrips(Path(path).stem, classes, **arrays)
 
 
 def shell_class(owner: str) -> str:
@@ -97,12 +97,12 @@ def all_classes(catalogue: Catalogue) -> tuple[str, ...]:
     return tuple(sorted({*catalogue.classes, *OPENING_KINDS, *SHELL}))
 
 
-def look(world: World, classes: Sequence[str], nodes: Iterable[int] | None = None) -> HouseStrips:
-    """Draw nodes of a world, or all, and label what is seen."""
+def look(world: World, classes: Sequence[str]) -> HouseStrips:
+    """Draw the nodes of a world, and label what is seen."""
     object_class, room_of_id = ids_to_labels(world.house, classes)
     rgb, share, rooms, depths, room = [], [], [], [], []
     rows = margin()
-    for node in range(len(world.graph.positions)) if nodes is None else nodes:
+    for node in range(len(world.graph.positions)):
         panorama = world.panorama(node)
         ids, depth = panorama.equirect_ids(EQUIRECT)[rows], panorama.equirect_depth(EQUIRECT)[rows]
         labels = cell_labels(ids, np.minimum(depth, FARTHEST), object_class, room_of_id, len(classes))

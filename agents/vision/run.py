@@ -1,7 +1,4 @@
-"""The work of the encoder's commands: train it, train a detector on it, and make features with it.
-
-What belongs to viz, such as recordings, is passed in from the console command as a function.
-"""
+"""The work of the encoder's commands: train it, train a detector on it, and make features with it."""
 
 from __future__ import annotations
 
@@ -9,6 +6,7 @@ import dataclasses
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +15,10 @@ from embodied.agents.common.session import Note
 from embodied.agents.vision.config import StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import train_detector
 from embodied.agents.vision.drawn import StripSource, houses_of, pictures_of
-from embodied.agents.vision.encoder import Encoder, load_encoder, random_encoder
+from embodied.agents.vision.encoder import Encoder, load_encoder, save_encoder
 from embodied.agents.vision.extract import Extractor
-from embodied.agents.vision.labels import HouseStrips
-from embodied.agents.vision.probe import as_numbers, labelled, read
-from embodied.agents.vision.training import save_training, train_encoder, trained_classes, whitened
+from embodied.agents.vision.probe import labelled, read
+from embodied.agents.vision.training import train_encoder, whitened
 from embodied.assets.cache import write_json
 from embodied.datasets.build import for_each_unit
 from embodied.datasets.store import Dataset
@@ -30,33 +27,44 @@ from embodied.locks import locked
 
 
 def train_vision(
-    source: StripSource, config: VisionConfig, out: Path, *, device: str = "cpu", workers: int = 1, note: Note = print
+    source: StripSource,
+    config: VisionConfig,
+    out: Path,
+    *,
+    lit: int = 0,
+    device: str = "cpu",
+    workers: int = 1,
+    note: Note = print,
 ) -> None:
-    """Cut strips from the pictures of all houses, train on the training houses, evaluate on validation houses, save.
+    """Train an encoder on the training houses, and measure in validation houses what linear readers of its features
+    tell; training goes on from the last epoch that was finished.
 
-    What is there already, strips or an encoder of the same settings, is not made again; training goes on from the
-    last epoch that was finished.
+    Args:
+      lit: so many training houses are seen in light ('fast'). Readers are then fitted in these, and judged with light
+        and without.
 
     Raises:
       LockedError: another process writes to `out`.
     """
     check_device(device)
     data = Dataset(source.data)
+    names, unseen = training_houses(data, config), houses_of(data, ("val_unseen",))
     with locked(out):
-        seen = source.strips(training_houses(data, config), workers=workers, note=note)
-        unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
-        drawn = sorted({drawing(pictures_of(data, h.name, source.picture_kind)) for h in seen})
-        identity = identity_of(
-            "embodied.agents.vision.run", settings=config, data=data.digest, pictures=", ".join(drawn)
-        )
-        encoder, classes = trained_encoder(seen, config, out, note, identity=identity, device=device)
-        untrained = whitened(random_encoder(seed=config.seed), seen)
-        numbers = {}
-        for name, who in (("trained", encoder), ("random", untrained)):
-            halves = [labelled(data, houses, who, classes) for houses in (seen, unseen)]
-            numbers[name] = as_numbers(read(halves[0], halves[1], seed=config.seed), classes)
-            note(f"{name}: " + ", ".join(f"{k} {v:.3g}" for k, v in numbers[name].items() if not isinstance(v, dict)))
-        write_json(out / "readings.json", numbers, indent=1)
+        seen = source.strips(names, lit=lit, workers=workers, note=note)
+        encoder, classes = train_encoder(seen, config, out / "training", device=device, note=note)
+        file = out / "encoder.safetensors"
+        save_encoder(whitened(encoder, seen), file, _learned_in(source, config, lit))
+        encoder, readings = load_encoder(file), dict[str, Any]()
+        for kind in dict.fromkeys((source.picture_kind, *["fast"][:lit])):
+            drawn = dataclasses.replace(source, picture_kind=kind)
+            first, other = (
+                labelled(data, drawn.strips(houses, workers=workers, note=note), encoder, classes)
+                for houses in (names[: lit or None], unseen)
+            )
+            reading = read(first, other, classes, seed=config.seed)
+            readings[drawing(pictures_of(data, unseen[0], kind))] = reading
+            note(", ".join(f"{k} {v:.3g}" for k, v in reading.items() if not isinstance(v, dict)))
+        write_json(out / "readings.json", readings, indent=1)
 
 
 def detector_for(
@@ -66,7 +74,6 @@ def detector_for(
     out: Path,
     *,
     lit: int = 0,
-    also: StripSource | None = None,
     device: str = "cpu",
     workers: int = 1,
     note: Note = print,
@@ -75,36 +82,18 @@ def detector_for(
     goes on from the last epoch that was finished.
 
     Args:
-      lit: so many training houses are seen in light ('fast'), too.
-      also: of another data set, whose training houses are seen, too, but for those that are in the first.
+      lit: so many training houses are seen in light ('fast').
 
     Raises:
-      ValueError: `also` has no further houses.
       LockedError: another process writes to `out`.
     """
     check_device(device)
     data = Dataset(source.data)
-    names = training_houses(data, config)
-    further = _further(data, Dataset(also.data)) if also else []
     with locked(out):
-        in_light = dataclasses.replace(source, picture_kind="fast")
-        seen = source.strips(names, workers=workers, note=note)
-        seen += in_light.strips(names[:lit], workers=workers, note=note)
-        if also:
-            others = also.strips(further, workers=workers, note=note)
-            seen += [dataclasses.replace(h, name=f"also/{h.name}") for h in others]
+        seen = source.strips(training_houses(data, config), lit=lit, workers=workers, note=note)
         unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
-        learned = identity_of(
-            "embodied.agents.vision.run",
-            settings=config,
-            data=data.digest,
-            encoder=encoder.digest,
-            pictures=", ".join(sorted({drawing(pictures_of(data, n, source.picture_kind)) for n in names})),
-            lit=lit,
-            also=Dataset(also.data).digest if also else None,
-            share=also.share if also else None,
-        )
+        learned = {**_learned_in(source, config, lit), "encoder": encoder.digest}
         detector.save(out / "detector.safetensors", learned)
         precision = detector.precision(unseen)
         whole = float(np.mean(list(precision.values())))
@@ -112,42 +101,17 @@ def detector_for(
         note(f"average precision {whole:.3f}, {len(precision)} classes in validation houses")
 
 
-def _further(data: Dataset, other: Dataset) -> list[str]:
-    """Names of the training houses of another data set that are in no split of the first."""
-    known = {data.place(name).house.digest for name in houses_of(data, data.splits)}
-    further = [n for n in houses_of(other, ("train",)) if other.place(n).house.digest not in known]
-    if not further:
-        raise ValueError(f"{other.folder}: all its training houses are in {data.folder}; name a larger data set")
-    return further
-
-
-def trained_encoder(
-    seen: Sequence[HouseStrips],
-    config: VisionConfig,
-    folder: Path,
-    note: Note = print,
-    *,
-    identity: Identity | None = None,
-    device: str = "cpu",
-) -> tuple[Encoder, list[str]]:
-    """The encoder that `config` makes of strips, from `folder` if it is there, and the classes that it learned to tell.
-
-    Args:
-      identity: what it is trained with, for its file.
-    """
-    classes = trained_classes(folder, config)
-    if classes is None:
-        home = folder / "training"
-        encoder, classes = train_encoder(seen, config, home, device=device, note=note)
-        encoder = whitened(encoder, seen)
-        save_training(encoder, classes, config, folder, identity)
-        (home / "checkpoint.pt").unlink(missing_ok=True)
-    return load_encoder(folder / "encoder.safetensors"), classes
-
-
 def training_houses(data: Dataset, config: StripTraining) -> list[str]:
     """Names of the houses to learn from."""
     return houses_of(data, ("train",))[: config.training_houses or None]
+
+
+def _learned_in(source: StripSource, config: StripTraining, lit: int) -> Identity:
+    """The identity of what is trained on strips."""
+    data = Dataset(source.data)
+    drawn = {drawing(pictures_of(data, name, source.picture_kind)) for name in training_houses(data, config)}
+    pictures = ", ".join(sorted(drawn))
+    return identity_of("embodied.agents.vision.run", settings=config, data=data.digest, pictures=pictures, lit=lit)
 
 
 # Features ----------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import SPEAKERS, code_of, hearing
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.encoder import encoder_of
+from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.training_data import TrainingData
 from embodied.assets.cache import default_cache
 from embodied.datasets.store import Dataset, dataset_of
@@ -30,8 +30,6 @@ class FeatureStudy(EpisodeStudy):
     """A study of agents that see features. A learner says its tables, `train`, `load` and `policy`."""
 
     encoder: Path
-    network: str | None = None
-    """Torchvision network of `encoder`, or 'random'; None for one of our own encoders."""
     config: Any
     """Settings where the rows start from."""
     pictures: str | None = None
@@ -83,7 +81,7 @@ class FeatureStudy(EpisodeStudy):
     def training_data_in(self, folder: Path) -> TrainingData:
         """A data set with features."""
         data = dataset_of(folder, self.task_kind or self.name)
-        return TrainingData(data, encoder_of(self.encoder, self.network), self.pictures, cache=self.cache)
+        return TrainingData(data, load_encoder(self.encoder), self.pictures, cache=self.cache)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,24 +25,15 @@ from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.config import StripTraining, VisionConfig
-from embodied.agents.vision.encoder import Encoder, Network, build, pool_views, save_encoder, strip_map, whitening
+from embodied.agents.vision.encoder import NETWORKS, Encoder, Network, pool_views, strip_map, whitening
 from embodied.agents.vision.labels import HouseStrips, visible_in_views
 from embodied.agents.vision.lite import Lite, load_imagenet
 from embodied.agents.vision.strip import CELL, STRIP_COLUMNS
-from embodied.assets.cache import digest, write_json
+from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS
 from embodied.identity import Identity, identity_of
-from embodied.records import load_json
 from embodied.render.photograph import camera_traits, photograph
 from embodied.seeds import stream
-
-
-@dataclass(frozen=True)
-class Trained:
-    """classes.json of an encoder's folder."""
-
-    classes: tuple[str, ...]
-    config: VisionConfig
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,18 +98,15 @@ def batches(
     *,
     rng: np.random.Generator,
 ) -> Iterator[StripBatch]:
-    """One pass over all nodes in random order, each in one of its house's lightings, rolled, perhaps mirrored,
-    recoloured, and photographed by one of `cameras`."""
-    lightings = _by_name(houses)
-    where = [(name, i) for name, several in lightings.items() for i in range(len(several[0].rgb))]
+    """One pass over all nodes in random order, each rolled, perhaps mirrored, recoloured, and photographed by one of
+    `cameras`."""
+    where = [(house, i) for house in houses for i in range(len(house.rgb))]
     order = rng.permutation(len(where))
     columns = np.asarray(classes)
     for start in range(0, len(order) - len(order) % size, size):
         chosen = [where[k] for k in order[start : start + size]]
         rgb, share, rooms, depth, room = [], [], [], [], []
-        for name, i in chosen:
-            several = lightings[name]
-            house = several[int(rng.integers(len(several)))] if len(several) > 1 else several[0]
+        for house, i in chosen:
             turn, mirror = int(rng.integers(STRIP_COLUMNS)), bool(rng.random() < 0.5)
             seen = recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
             rgb.append(photograph_strip(seen, cameras, rng=rng) if set(cameras) != {"ideal"} else seen)
@@ -135,19 +123,6 @@ def batches(
             torch.from_numpy(np.stack(depth).astype(np.float32)),
             torch.from_numpy(np.array(room, dtype=np.int64)),
         )
-
-
-def _by_name(houses: Sequence[HouseStrips]) -> dict[str, list[HouseStrips]]:
-    """The lightings of each house."""
-    out: dict[str, list[HouseStrips]] = {}
-    for house in houses:
-        out.setdefault(house.name, []).append(house)
-    return out
-
-
-def strip_count(houses: Sequence[HouseStrips]) -> int:
-    """How many strips an epoch has: one per viewpoint, however many lightings a house has."""
-    return sum(len(several[0].rgb) for several in _by_name(houses).values())
 
 
 def turn_strip(strip: np.ndarray, columns: int, mirror: bool) -> np.ndarray:
@@ -185,12 +160,7 @@ def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
 
 
 def train_encoder(
-    houses: Sequence[HouseStrips],
-    config: VisionConfig,
-    folder: Path | None = None,
-    *,
-    device: str = "cpu",
-    note: Note = print,
+    houses: Sequence[HouseStrips], config: VisionConfig, folder: Path, *, device: str = "cpu", note: Note = print
 ) -> tuple[Encoder, list[str]]:
     """The encoder, on the CPU in the end, and the names of the classes that it learned to tell.
 
@@ -198,7 +168,7 @@ def train_encoder(
     """
     classes = classes_of(houses, config)
     with seeded(config.seed):
-        network = build(config.network)
+        network = NETWORKS[config.network]()
         heads = Heads(network.size, len(classes))
     if isinstance(network, Lite):
         load_imagenet(network)
@@ -226,7 +196,7 @@ def learn(
     config: StripTraining,
     modules: Mapping[str, nn.Module],
     loss_of: Callable[[StripBatch], tuple[Tensor, dict[str, float]]],
-    folder: Path | None,
+    folder: Path,
     identity: Identity,
     *,
     device: str = "cpu",
@@ -236,7 +206,7 @@ def learn(
 
     Args:
       loss_of: a batch's loss, and its parts for the log.
-      folder: of the run, whose state is kept after each epoch; training goes on from it. None keeps nothing.
+      folder: of the run, whose state is kept after each epoch; training goes on from it.
       identity: what else decides the result.
       device: where PyTorch computes.
 
@@ -244,8 +214,9 @@ def learn(
       DivergedError: the loss is no longer a number.
       CheckpointError: damaged, or of other settings.
     """
-    updates = strip_count(houses) // config.batch
-    note(f"{strip_count(houses)} strips an epoch, of {len(_by_name(houses))} houses, {len(classes)} classes")
+    count = sum(len(house.rgb) for house in houses)
+    updates = count // config.batch
+    note(f"{count} strips an epoch, of {len(houses)} houses, {len(classes)} classes")
     for module in modules.values():
         module.to(device)
     parameters = [p for module in modules.values() for p in module.parameters()]
@@ -269,10 +240,6 @@ def learn(
         losses = (update(batch, f"epoch {epoch + 1}, update {done}") for done, batch in enumerate(drawn, 1))
         return _watched(losses, f"epoch {epoch + 1}", updates, config.batch, note)
 
-    if folder is None:
-        for epoch in range(config.epochs):
-            pass_over(epoch)
-        return
     learned = {**identity, **identity_of(settings=config, strips=_digest_of(houses))}
     parts: dict[str, Stateful] = {**modules, "optimizer": optimizer, "schedule": schedule}
     with Session(folder, learned, parts, config.epochs, checkpoint_minutes=0.0, note=note) as session:
@@ -305,21 +272,4 @@ def whitened(encoder: Encoder, houses: Sequence[HouseStrips]) -> Encoder:
     """
     features = [encoder.encode_strips(h.rgb[i : i + 8]) for h in houses for i in range(0, len(h.rgb), 8)]
     mean, mix = whitening(torch.from_numpy(np.concatenate(features)).flatten(0, 1))
-    return Encoder(encoder.network, encoder.name, encoder.sharing, mean, mix)
-
-
-def save_training(
-    encoder: Encoder, classes: Sequence[str], config: VisionConfig, folder: Path, identity: Identity | None = None
-) -> None:
-    """encoder.safetensors (half precision) and classes.json in `folder`."""
-    save_encoder(encoder, folder / "encoder.safetensors", identity)
-    write_json(folder / "classes.json", {"classes": list(classes), "config": dataclasses.asdict(config)})
-
-
-def trained_classes(folder: Path, config: VisionConfig) -> list[str] | None:
-    """The classes of the encoder that `save_training` left in `folder` with these settings; None without one."""
-    path = folder / "classes.json"
-    if not path.exists():
-        return None
-    trained = load_json(path, Trained)
-    return list(trained.classes) if trained.config == config else None
+    return Encoder(encoder.network, encoder.name, mean, mix)

@@ -19,7 +19,7 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.capture import with_goal_images
 from embodied.agents.vision.config import CAPTURE_CONDITIONS, drawing
 from embodied.agents.vision.drawn import pictures_of
-from embodied.agents.vision.encoder import Encoder, encoder_of
+from embodied.agents.vision.encoder import Encoder, load_encoder
 from embodied.agents.vision.features import feature_path, load_bank
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
@@ -103,5 +103,5 @@ class TrainingData:
 
 def evaluation_data(data: Dataset, how: PlaySettings) -> TrainingData:
     """A data set as a trained agent is evaluated in it."""
-    encoder = encoder_of(how.encoder, how.network)
+    encoder = load_encoder(how.encoder)
     return TrainingData(data, encoder, how.pictures, goal_image=how.goal_image, cache=how.cache)

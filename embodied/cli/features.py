@@ -1,7 +1,7 @@
 """Compute features of a data set's panoramas: 36 x D per viewpoint, which learners read.
 
-Houses that have features of this encoder are skipped. The encoder is the shipped one, one of `embodied train vision`,
-or a torchvision network whose weights are on your disk.
+Houses that have features of this encoder are skipped. The encoder is the shipped one or of
+`embodied train vision`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class FeatureOptions(WithData, Encoded, WithDevice):
     goal_image: tuple[Annotated[str, Option(words=GOAL_IMAGES)], ...] = ()
     """Also make features of goal images that differ from what the agent sees there: camera: taken by a robot's camera;
     hour: at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
-    another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees; same: identical."""
+    another day; later-camera: that by a robot's camera; same: identical."""
     ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
     """Use a Ray cluster instead: its address, or 'local'."""
 
@@ -35,13 +35,13 @@ def run(args: FeatureOptions) -> None:
     from embodied.agents.common.parallel import check_device
     from embodied.agents.vision.config import CAPTURE_CONDITIONS
     from embodied.agents.vision.drawn import houses_of
-    from embodied.agents.vision.encoder import encoder_of
+    from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.extract import Extractor
     from embodied.agents.vision.run import make_features
     from embodied.datasets.store import Dataset
 
     check_device(args.device)
-    data, encoder = Dataset(args.data), encoder_of(args.encoder, args.network).to(args.device)
+    data, encoder = Dataset(args.data), load_encoder(args.encoder).to(args.device)
     conditions = tuple(CAPTURE_CONDITIONS[word] for word in ("same", *args.goal_image))
     extract = Extractor(data.folder.resolve(), encoder, args.cache, args.pictures, conditions, args.threads)
     names = houses_of(data, args.split or data.splits, args.first)

@@ -63,11 +63,11 @@ def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str
     import numpy as np
 
     from embodied.agents.vision.drawn import pictures_of
-    from embodied.agents.vision.encoder import encoder_of
+    from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.features import feature_path, load_features
     from embodied.datasets.folders import names_of
 
-    encoder = encoder_of(args.encoder, args.network)
+    encoder = load_encoder(args.encoder)
     drawn = {name: pictures_of(data, name, args.pictures) for name in names_of(data)}
     files = {name: feature_path(data.folder / "features", encoder.digest, name, how) for name, how in drawn.items()}
 
