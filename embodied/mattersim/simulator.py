@@ -8,13 +8,13 @@ resolution, its field of view and the limits of elevation, as there.
 from __future__ import annotations
 
 import math
+import operator
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from embodied.mattersim import arguments as take
 from embodied.mattersim.chance import Engine
 from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
 from embodied.mattersim.motion import Angles, DiscreteViews, Motion, counted_steps, sign_steps
@@ -104,53 +104,53 @@ class Simulator:
 
     def setDatasetPath(self, path: str, /) -> None:
         """Folder of `<scan>/matterport_skybox_images`."""
-        self._set("_dataset_path", take.text(path, "setDatasetPath"))
+        self._set("_dataset_path", str(path))
 
     def setNavGraphPath(self, path: str, /) -> None:
         """Folder of scans.txt and of `<scan>_connectivity.json`."""
-        self._set("_graph_path", take.text(path, "setNavGraphPath"))
+        self._set("_graph_path", str(path))
 
     def setRenderingEnabled(self, value: bool, /) -> None:
-        self._set("_rendering", take.flag(value, "setRenderingEnabled"))
+        self._set("_rendering", bool(value))
 
     def setDiscretizedViewingAngles(self, value: bool, /) -> None:
-        self._set("_discrete", take.flag(value, "setDiscretizedViewingAngles"))
+        self._set("_discrete", bool(value))
 
     def setRestrictedNavigation(self, value: bool, /) -> None:
-        self._set("_restricted", take.flag(value, "setRestrictedNavigation"))
+        self._set("_restricted", bool(value))
 
     def setPreloadingEnabled(self, value: bool, /) -> None:
         """Have `initialize` read all skyboxes, or not; no more than setCacheSize are kept."""
-        self._set("_preload", take.flag(value, "setPreloadingEnabled"))
+        self._set("_preload", bool(value))
 
     def setDepthEnabled(self, value: bool, /) -> None:
-        self._set("_depth", take.flag(value, "setDepthEnabled"))
+        self._set("_depth", bool(value))
 
     def setBatchSize(self, size: int, /) -> None:
-        self._set("_batch", take.index(size, "setBatchSize"))
+        self._set("_batch", operator.index(size))
 
     def setCacheSize(self, size: int, /) -> None:
         """How many decoded skyboxes are kept; one of 512 pixels takes 6 MB, and 6 more with depth."""
-        self._set("_cache", take.index(size, "setCacheSize"))
+        self._set("_cache", operator.index(size))
 
     def setSeed(self, seed: int, /) -> None:
         """Of the viewpoints of newRandomEpisode; its headings are the same at every call, as there."""
-        self._set("_seed", take.integer(seed, "setSeed"))
+        self._set("_seed", operator.index(seed))
 
     def setCameraResolution(self, width: int, height: int, /) -> None:
         """Pixels; enters the navigable field of view even without rendering."""
-        self._width = take.integer(width, "setCameraResolution: width")
-        self._height = take.integer(height, "setCameraResolution: height")
+        self._width = operator.index(width)
+        self._height = operator.index(height)
         self._watch()
 
     def setCameraVFOV(self, vfov: float, /) -> None:
         """Vertical field of view, radians."""
-        self._vfov = take.number(vfov, "setCameraVFOV")
+        self._vfov = float(vfov)
         self._watch()
 
     def setElevationLimits(self, low: float, high: float, /) -> bool:
         """True where the limits were taken: they should lie within a right angle on either side of the horizon."""
-        low, high = (take.number(v, "setElevationLimits") for v in (low, high))
+        low, high = float(low), float(high)
         if not -math.pi / 2 < low < 0.0 < high < math.pi / 2:
             return False
         self._limits = (low, high)
@@ -198,26 +198,19 @@ class Simulator:
           TypeError: no lists, or of other things.
           ValueError: an unknown or an excluded viewpoint.
         """
-        scans, viewpoints = (
-            take.texts(scanIds, "newEpisode: scanIds"),
-            take.texts(viewpointIds, "newEpisode: viewpointIds"),
-        )
-        turns = take.numbers(headings, "newEpisode: headings")
-        tilts = take.numbers(elevations, "newEpisode: elevations")
         if not self._ready:
             self.initialize()
-        scans = self._each(scans)
-        rows = [self._graphs.row(s, v) for s, v in zip(scans, self._each(viewpoints), strict=True)]
-        self._moving.start(rows, self._each(turns), self._each(tilts))
+        scans, viewpoints = self._each(scanIds, str), self._each(viewpointIds, str)
+        rows = [self._graphs.row(s, v) for s, v in zip(scans, viewpoints, strict=True)]
+        self._moving.start(rows, self._each(headings, number), self._each(elevations, number))
         self._scans, self._step = scans, 0
         self._drawn = {}
 
     def newRandomEpisode(self, scanIds: Sequence[str], /) -> None:
         """Put every agent at a random viewpoint of its scan, level, along a random heading."""
-        listed = take.texts(scanIds, "newRandomEpisode: scanIds")
         if not self._ready:
             self.initialize()
-        scans, turn = self._each(listed), Engine()
+        scans, turn = self._each(scanIds, str), Engine()
         viewpoints = [self._random_viewpoint(scan) for scan in scans]
         self.newEpisode(scans, viewpoints, [turn.uniform() * 2 * math.pi for _ in scans], [0.0] * len(scans))
 
@@ -237,15 +230,14 @@ class Simulator:
           RuntimeError: before `initialize`.
           ValueError: an index that is not in an agent's list; nobody has moved.
           IndexError: fewer values than agents.
-          TypeError: no lists, or of other things: floats and negative numbers are no indices.
+          TypeError: no lists, or of other things: floats are no indices.
         """
-        moves = take.indices(index, "makeAction: index")
-        turns, tilts = take.numbers(heading, "makeAction: heading"), take.numbers(elevation, "makeAction: elevation")
         if not self._ready:
             raise RuntimeError("MatterSim: newEpisode must be called before makeAction")
         if not self._moving.started:
             raise ValueError("MatterSim: Invalid action index: there are no locations before newEpisode")
-        self._moving.act(self._each(moves), self._each(turns), self._each(tilts))
+        moves, turns = self._each(index, operator.index), self._each(heading, number)
+        self._moving.act(moves, turns, self._each(elevation, number))
         self._step += 1
         self._drawn = {}
 
@@ -270,11 +262,16 @@ class Simulator:
         assert self._motion is not None, "initialize makes it"
         return self._motion
 
-    def _each(self, values: list[Any]) -> list[Any]:
+    def _each(self, values: Any, convert: Callable[[Any], Any]) -> list[Any]:
         """A value per agent; more are ignored, as there."""
+        if isinstance(values, (str, bytes)) or not isinstance(values, (Sequence, np.ndarray)):
+            raise TypeError(
+                f"MatterSim: expected a list, one value for each agent of the batch, got {values!r:.80}; this dialect "
+                "takes lists, 'v0.1' takes single values"
+            )
         if len(values) < self._batch:
             raise IndexError(f"MatterSim: {len(values)} values for {self._batch} agents")
-        return values[: self._batch] if len(values) > self._batch else values
+        return [convert(v) for v in values[: self._batch]]
 
     def _half_field(self) -> float | None:
         return self._vfov * self._width / self._height / 2 if self._restricted else None
@@ -323,6 +320,11 @@ class Simulator:
             self._vfov,
             (self._height, self._width),
         )
+
+
+def number(value: Any) -> float:
+    """A number as a float; Python's own stay as they are, for whole steps of 30 degrees are counted faster."""
+    return value if type(value) in (int, float) else float(value)
 
 
 class ForkSimulator(Simulator):
