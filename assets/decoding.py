@@ -34,27 +34,25 @@ def size_of(data: bytes) -> tuple[int, int] | None:
         return None
 
 
-def colours(data: bytes, order: str = "RGB", memory: np.ndarray | None = None) -> np.ndarray | None:
+def colours(data: bytes, order: str = "RGB") -> np.ndarray | None:
     """(h, w, 3 or 4) uint8 pixels of a file; None where it cannot be read.
 
     Args:
       order: of the channels, 'RGB', 'BGR' or 'BGRA'.
-      memory: as many bytes, in which the pixels may be returned; fresh memory costs half of what decoding does.
     """
     if data.startswith(JFIF) and EXIF not in data:
         try:
-            return simplejpeg.decode_jpeg(data, order, buffer=memory)
+            return simplejpeg.decode_jpeg(data, order)
         except ValueError:  # OpenCV reads more of them
             pass
     pixels = _by_opencv(data, cv2.IMREAD_COLOR_RGB if order == "RGB" else cv2.IMREAD_COLOR)
     return cv2.cvtColor(pixels, cv2.COLOR_BGR2BGRA) if order == "BGRA" and pixels is not None else pixels
 
 
-def numbers(data: bytes, memory: np.ndarray | None = None) -> np.ndarray | None:
-    """(h, w) pixels of one channel of a file, uint16 where it has 16 bits; None where it cannot be read. `memory` as
-    of `colours`."""
+def numbers(data: bytes) -> np.ndarray | None:
+    """(h, w) pixels of one channel of a file, uint16 where it has 16 bits; None where it cannot be read."""
     try:
-        pixels = _filtered_up(data, memory)
+        pixels = _filtered_up(data)
     except (struct.error, deflate.DeflateError, ValueError):
         pixels = None
     return _by_opencv(data, cv2.IMREAD_ANYDEPTH) if pixels is None else pixels
@@ -67,7 +65,7 @@ def _by_opencv(data: bytes, mode: int) -> np.ndarray | None:
         return None
 
 
-def _filtered_up(data: bytes, memory: np.ndarray | None) -> np.ndarray | None:
+def _filtered_up(data: bytes) -> np.ndarray | None:
     """The pixels of a PNG of 16-bit numbers, all rows of which are filtered UP; None where it is another."""
     width, height = struct.unpack_from(">II", data, 16)
     if not data.startswith(PNG) or data[12:16] != HEADER or data[24:29] != GREY_16 or not height:
@@ -83,8 +81,7 @@ def _filtered_up(data: bytes, memory: np.ndarray | None) -> np.ndarray | None:
     rows = np.frombuffer(unpacked, np.uint8).reshape(height, 2 * width + 1)
     if not (rows[:, 0] == UP).all():
         return None
-    size = 2 * width * height
-    pixels = (np.empty(size, np.uint8) if memory is None else memory[:size]).reshape(height, 2 * width)
+    pixels = np.empty((height, 2 * width), np.uint8)
     pixels[0] = rows[0, 1:]
     for k in range(1, height):
         np.add(pixels[k - 1], rows[k, 1:], out=pixels[k])

@@ -1,4 +1,4 @@
-"""Benchmarks of views of a panorama: angles seen before and new ones, and viewpoints that are not in memory yet."""
+"""Benchmarks of views of a panorama: angles seen before and new ones."""
 
 from __future__ import annotations
 
@@ -23,8 +23,6 @@ SKYBOX_SIDE = 512
 """Side of a face, pixels."""
 HEADINGS = 12
 """Headings of one timed call."""
-VIEWPOINTS = ("here", "there")
-"""Two, of which one fits into memory."""
 VIEW_SIZES = ((480, 640), (224, 224))
 """Height and width."""
 SHOWN = {"rgb": ("rgb",), "rgb, depth and ids": ("rgb", "depth", "ids")}
@@ -44,15 +42,12 @@ def views(catalogue: Catalogue, cache: Path, seed: int) -> Iterator[Measure]:
                 yield _rate(f"{name}, {shown}", again)
                 anew = functools.partial(_look, panorama, channels, size, itertools.count(0.01, 1.01))
                 yield _rate(f"{name}, {shown}, new angles", anew)
-        for viewpoint in VIEWPOINTS:
-            write_skybox(panorama, viewpoint, skybox_folder(folder, "scan"))
+        write_skybox(panorama, "here", skybox_folder(folder, "scan"))
         skyboxes = Skyboxes(folder, 1)
         for shown, depth in (("rgb", False), ("rgb and depth", True)):
             for height, width in VIEW_SIZES:
-                again = functools.partial(_open, skyboxes, itertools.repeat(VIEWPOINTS[0]), depth, (height, width))
+                again = functools.partial(_open, skyboxes, depth, (height, width))
                 yield _rate(f"skyboxes of {SKYBOX_SIDE} in memory, {width} x {height}, {shown}", again)
-            anew = functools.partial(_open, skyboxes, itertools.cycle(VIEWPOINTS), depth, (480, 640))
-            yield _rate(f"skyboxes of {SKYBOX_SIDE} not in memory, {shown}", anew)
 
 
 def _rate(name: str, body: Callable[[], object]) -> Measure:
@@ -60,16 +55,16 @@ def _rate(name: str, body: Callable[[], object]) -> Measure:
 
 
 def _look(panorama: Panorama, channels: tuple[str, ...], size: tuple[int, int], turns: Iterator[float]) -> None:
-    """VIEWS level views, so many `turns` of 30 degrees to the left."""
+    """HEADINGS level views, so many `turns` of 30 degrees to the left."""
     for turn in itertools.islice(turns, HEADINGS):
         grid = perspective_grid(panorama.size, turn * math.pi / 6 % math.tau, 0.0, VFOV36, *size)
         for channel in channels:
             panorama.through(grid, channel)
 
 
-def _open(skyboxes: Skyboxes, viewpoints: Iterator[str], depth: bool, size: tuple[int, int]) -> None:
-    """VIEWS times a picture of a skybox."""
-    for viewpoint in itertools.islice(viewpoints, HEADINGS):
-        skyboxes.rgb("scan", viewpoint, 0.0, 0.0, VFOV36, size)
+def _open(skyboxes: Skyboxes, depth: bool, size: tuple[int, int]) -> None:
+    """HEADINGS times a picture of a skybox."""
+    for _ in range(HEADINGS):
+        skyboxes.rgb("scan", "here", 0.0, 0.0, VFOV36, size)
         if depth:
-            skyboxes.metres("scan", viewpoint, 0.0, 0.0, VFOV36, size)
+            skyboxes.metres("scan", "here", 0.0, 0.0, VFOV36, size)

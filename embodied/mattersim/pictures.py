@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import math
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,13 +17,11 @@ import numpy as np
 from embodied.assets.archives import MOST_PIXELS
 from embodied.assets.decoding import colours, numbers, size_of
 from embodied.geometry import yaw_of_heading
-from embodied.mattersim.tiles import tiles_in
 from embodied.render.panorama import (
-    EVERY_FACE,
     PixelGrid,
-    bordered,
     checked,
     padded_plane,
+    padded_rgba,
     perspective_grid,
     read_maps,
     resampled_rgb,
@@ -73,42 +70,6 @@ def write_face(face: int, tile: np.ndarray, to: np.ndarray) -> None:
         cv2.copyTo(tile, None, to)
 
 
-class SkyboxColours:
-    """The colours of a skybox, of which each face is decoded when it is first looked at."""
-
-    def __init__(self, s: int, tile: Callable[[int], np.ndarray]) -> None:
-        """Args:
-        s: side of a face, pixels.
-        tile: decodes a tile, (s, s, 4) uint8.
-        """
-        self.s, self._missing, self._lock = s, EVERY_FACE, threading.Lock()
-        self._tile: Callable[[int], np.ndarray] | None = tile
-        self._padded = np.empty((6, s + 2, s + 2, 4), np.uint8)
-
-    def showing(self, grid: PixelGrid | None = None) -> np.ndarray:
-        """`padded_rgba` with the faces that a grid shows, or all of them, and the borders between them.
-
-        Raises:
-          ValueError: a tile cannot be decoded, or has another size.
-        """
-        with self._lock:
-            if self._tile is not None:
-                self._decode(self._tile, self._missing & (grid.faces if grid else EVERY_FACE))
-        return self._padded.reshape(6 * (self.s + 2), self.s + 2, 4)
-
-    def _decode(self, tile: Callable[[int], np.ndarray], faces: frozenset[int]) -> None:
-        for face in faces:
-            picture = tile(WHERE[face][0])
-            if picture.shape[:2] != (self.s, self.s):
-                raise ValueError(f"MatterSim: tiles of {self.s} and of {picture.shape[1]} x {picture.shape[0]} pixels")
-            write_face(face, picture, self._padded[face, 1:-1, 1:-1])
-        if faces:
-            bordered(self._padded)
-        self._missing -= faces
-        if not self._missing:
-            self._tile = None  # and the file with it
-
-
 class Skyboxes:
     """The skyboxes of a folder, the last used of them in memory."""
 
@@ -122,26 +83,22 @@ class Skyboxes:
         self.colours = functools.lru_cache(maxsize=max(1, kept))(self._colours)
         self.distances = functools.lru_cache(maxsize=max(1, kept))(self._distances)
 
-    def _colours(self, scan: str, viewpoint: str) -> SkyboxColours:
-        """The colours of a skybox, blue, green, red.
+    def _colours(self, scan: str, viewpoint: str) -> np.ndarray:
+        """`padded_rgba` of a skybox's colours, blue, green, red.
 
         Raises:
           ValueError: a picture is missing, or cannot be read.
         """
         folder = skybox_folder(self.dataset, scan)
         if self.apart:
-            files = [folder / FACES.format(viewpoint, k) for k in range(6)]
-            tiles = [_contents(file) for file in files]
+            tiles = [_pixels(folder / FACES.format(viewpoint, k), _bgra) for k in range(6)]
         else:
-            files = [folder / RGB.format(viewpoint)] * 6
-            together = _contents(files[0])
-            _size(files[0], together)
-            alone = tiles_in(together, 6)
-            if alone is None:
-                return _whole(_pixels(files[0], together, _bgra))
-            tiles = alone
-        _, s = _size(files[0], tiles[0])
-        return SkyboxColours(s, lambda tile: _pixels(files[tile], tiles[tile], _bgra))
+            strip = _pixels(folder / RGB.format(viewpoint), _bgra)
+            tiles = [tile_of(strip, k) for k in range(6)]
+        side = len(tiles[0])
+        if {t.shape for t in tiles} != {(side, side, 4)}:
+            raise ValueError(f"MatterSim: the tiles of {viewpoint} in {folder} are not squares of one size")
+        return padded_rgba(side, lambda k, to: write_face(k, tiles[WHERE[k][0]], to))
 
     def _distances(self, scan: str, viewpoint: str) -> np.ndarray:
         """`padded_plane` of a skybox's depth along the ray, uint16 DEPTH_UNITS.
@@ -149,17 +106,15 @@ class Skyboxes:
         Raises:
           ValueError: the picture is missing.
         """
-        file = skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint)
-        units = _pixels(file, _contents(file), numbers)
+        units = _pixels(skybox_folder(self.dataset, scan) / DEPTH.format(viewpoint), numbers)
         return padded_plane(len(units), lambda k, to: write_face(k, tile_of(units, WHERE[k][0]), to), kind=np.uint16)
 
     def rgb(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
     ) -> np.ndarray:
         """(h, w, 3) uint8, blue, green, red: the picture of a pose; size is (height, width)."""
-        skybox = self.colours(scan, viewpoint)
-        grid = _grid(skybox.s, heading, elevation, vfov, size)
-        return resampled_rgb(skybox.showing(grid), grid)
+        padded = self.colours(scan, viewpoint)
+        return resampled_rgb(padded, _grid(padded.shape[1] - 2, heading, elevation, vfov, size))
 
     def metres(
         self, scan: str, viewpoint: str, heading: float, elevation: float, vfov: float, size: tuple[int, int]
@@ -187,56 +142,22 @@ def _grid(s: int, heading: float, elevation: float, vfov: float, size: tuple[int
     return perspective_grid(s, float(yaw_of_heading(heading)), elevation, vfov, *checked(vfov, size))
 
 
-def _whole(strip: np.ndarray) -> SkyboxColours:
-    """The colours of a skybox of which all is decoded."""
-    whole = SkyboxColours(len(strip), functools.partial(tile_of, strip))
-    whole.showing()
-    return whole
-
-
-def _contents(path: Path) -> bytes:
-    if not path.is_file():
-        raise _unable(path)
-    return path.read_bytes()
-
-
-def _size(path: Path, data: bytes) -> tuple[int, int]:
-    """Width and height of a picture.
+def _pixels(path: Path, decode: Callable[[bytes], np.ndarray | None]) -> np.ndarray:
+    """The pixels of a picture.
 
     Raises:
-      ValueError: it is none, or too large.
+      ValueError: there is none, or too large a one.
     """
+    data = path.read_bytes() if path.is_file() else b""
     width, height = size_of(data) or (0, 0)
-    if not 0 < width * height <= MOST_PIXELS:
-        raise _unable(path)
-    return width, height
-
-
-def _pixels(path: Path, data: bytes, decode: Callable[[bytes, np.ndarray], np.ndarray | None]) -> np.ndarray:
-    """The pixels of a picture, in memory that the next one of its size is read into.
-
-    Raises:
-      ValueError: it is none, or too large.
-    """
-    width, height = _size(path, data)
-    picture = decode(data, _memory(width * height, threading.get_ident()))
+    picture = decode(data) if 0 < width * height <= MOST_PIXELS else None
     if picture is None:
-        raise _unable(path)
+        raise ValueError(
+            f"MatterSim: Could not open skybox files at: {path}; write them with `embodied export matterport`, "
+            "or call setRenderingEnabled(False)"
+        )
     return picture
 
 
-def _unable(path: Path) -> ValueError:
-    return ValueError(
-        f"MatterSim: Could not open skybox files at: {path}; write them with `embodied export matterport`, "
-        "or call setRenderingEnabled(False)"
-    )
-
-
-@functools.lru_cache(maxsize=8)
-def _memory(size: int, thread: int) -> np.ndarray:
-    """Room for so many pixels of four bytes, for one thread."""
-    return np.empty(4 * size, np.uint8)
-
-
-def _bgra(data: bytes, memory: np.ndarray) -> np.ndarray | None:
-    return colours(data, "BGRA", memory)
+def _bgra(data: bytes) -> np.ndarray | None:
+    return colours(data, "BGRA")

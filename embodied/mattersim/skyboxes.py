@@ -14,7 +14,6 @@ import numpy as np
 
 from embodied.assets.cache import write_bytes
 from embodied.mattersim.pictures import DEPTH, DEPTH_UNITS, FACES, RGB, tiles_of
-from embodied.mattersim.tiles import BLOCK
 from embodied.render.panorama import Panorama, ray_stretch
 from embodied.render.panorama_file import PanoramaFile
 
@@ -54,9 +53,8 @@ def write_skybox(panorama: Panorama, viewpoint: str, folder: Path) -> list[Path]
     colours = tiles_of(panorama.rgb[..., ::-1])
     metres = np.where(np.isfinite(panorama.depth), panorama.depth * ray_stretch(panorama.size), 0)
     units = tiles_of(np.minimum(np.rint(metres * DEPTH_UNITS), 65535).astype(np.uint16))
-    marked = [*QUALITY, cv2.IMWRITE_JPEG_RST_INTERVAL, panorama.size // BLOCK]  # each tile can be decoded alone
     pictures = {
-        RGB.format(viewpoint): (np.concatenate(list(colours), axis=1), marked),
+        RGB.format(viewpoint): (np.concatenate(list(colours), axis=1), QUALITY),
         DEPTH.format(viewpoint): (np.concatenate(list(units), axis=1), PACKING),
         **{FACES.format(viewpoint, k): (tile, QUALITY) for k, tile in enumerate(colours)},
     }

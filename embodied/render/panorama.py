@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 
 from embodied.interface import VIEW_PITCHES, VIEW_YAWS, VIEWS
-from embodied.render.sampling import AXES, EVERY_FACE, Rays, locate, near, shown
+from embodied.render.sampling import AXES, Rays, locate, shown
 
 VFOV36 = math.radians(60.0)
 """Vertical field of view of the 36 views of the VLN literature (Anderson et al. 2018, sec. 3.2)."""
@@ -153,13 +153,7 @@ def padded_rgba(s: int, write: Callable[[int, np.ndarray], object]) -> np.ndarra
     padded = np.empty((6, s + 2, s + 2, 4), np.uint8)
     for k, whole in enumerate(padded):
         write(k, whole[1:-1, 1:-1])
-    return bordered(padded)
-
-
-def bordered(padded: np.ndarray) -> np.ndarray:
-    """(6 (s + 2), s + 2, 4): the faces of a `padded_rgba`, (6, s + 2, s + 2, 4), with borders from their neighbours."""
-    side = padded.shape[1]
-    flat, pad = padded.reshape(6 * side, side, 4), pad_grid(side - 2)
+    flat, pad = padded.reshape(6 * (s + 2), s + 2, 4), pad_grid(s)
     padded[pad.face, pad.row, pad.column] = cv2.remap(flat, pad.x, pad.y, cv2.INTER_LINEAR)[:, 0]
     return flat
 
@@ -241,22 +235,15 @@ class PixelGrid:
     """Places of a picture's pixels on the padded faces."""
 
     def __init__(
-        self,
-        s: int,
-        shape: tuple[int, int],
-        draw: Callable[[np.ndarray], None],
-        *,
-        keep: bool = False,
-        near: Callable[[], frozenset[int]] = lambda: EVERY_FACE,
+        self, s: int, shape: tuple[int, int], draw: Callable[[np.ndarray], None], *, keep: bool = False
     ) -> None:
         """Args:
         s: side of a face, pixels.
         shape: height and width of the picture.
         draw: writes the maps.
         keep: keep them from the first time on.
-        near: finds `faces`.
         """
-        self.s, self.shape, self.draw, self._near = s, shape, draw, near
+        self.s, self.shape, self.draw = s, shape, draw
         self._keep = keep
         self._kept: np.ndarray | None = None
 
@@ -280,11 +267,6 @@ class PixelGrid:
         self.draw(work.maps)
         work.grid = self
         return work.maps
-
-    @functools.cached_property
-    def faces(self) -> frozenset[int]:
-        """The faces that the picture shows or comes within a pixel of, and perhaps others."""
-        return self._near()
 
     @functools.cached_property
     def shown(self) -> list[tuple[slice, slice]]:
@@ -315,8 +297,7 @@ def perspective_grid(s: int, yaw: float, pitch: float, vfov: float, height: int,
     right, rows = _lens(vfov, height, width)
     columns = np.array([[cp * cy], [cp * sy], [sp]]) + np.array([[sy], [-cy], [0.0]]) * right
     rays = Rays(rows, columns.astype(np.float32), np.array([-sp * cy, -sp * sy, cp], np.float32))
-    draw, faces = functools.partial(locate, s, rays), functools.partial(near, s, rays)
-    return PixelGrid(s, (height, width), draw, near=faces)
+    return PixelGrid(s, (height, width), functools.partial(locate, s, rays))
 
 
 @functools.lru_cache(maxsize=8)

@@ -34,7 +34,6 @@ PICTURE_AXES = (AXES * [[1], [1], [-1]]).astype(np.float32)
 """(6, 3, 3): forward, right and down of every face as a picture shows it."""
 BY_AXIS = (0, 2, 1, 3, 4, 5)
 """Of faces that a ray meets at their edge, the first here has it."""
-EVERY_FACE = frozenset(range(6))
 NEXT = 16
 """From one pixel to the next of those that tell about which part of the faces a picture shows."""
 
@@ -88,17 +87,9 @@ def shown(s: int, x: np.ndarray, y: np.ndarray) -> list[tuple[slice, slice]]:
         extents = kernels.shown(x, y, s + 2, NEXT).tolist()
     else:
         across, down = x[::NEXT, ::NEXT].astype(int), y[::NEXT, ::NEXT].astype(int)
-        of = [(down[on], across[on]) for on in (down // (s + 2) == face for face in EVERY_FACE) if on.any()]
+        of = [(down[on], across[on]) for on in (down // (s + 2) == face for face in range(6)) if on.any()]
         extents = [(rows.min(), rows.max(), columns.min(), columns.max()) for rows, columns in of]
     return [(slice(top, bottom + NEXT), slice(left, right + NEXT)) for top, bottom, left, right in extents if top >= 0]
-
-
-def near(s: int, rays: Rays) -> frozenset[int]:
-    """The faces that rays meet or come within a pixel of, and perhaps others."""
-    rows, columns, _ = rays
-    pixel = 2 / s * math.hypot(1, *np.abs(columns).max(1), np.abs(rows[1]).max())
-    met = np.all(_reach(rays)[2] >= -pixel, axis=1)
-    return frozenset(np.flatnonzero(met.any(1)).tolist())
 
 
 @functools.cache
