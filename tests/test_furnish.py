@@ -18,9 +18,7 @@ from embodied.assets.records import ROOM_KINDS
 from embodied.generate import STAGES, HouseConfig, generate_house, stages
 from embodied.generate.config import RETRIES
 from embodied.generate.furnish import furnish
-from embodied.generate.furnish.lights import LUMENS
 from embodied.generate.furnish.space import box, overlap, room_space
-from embodied.generate.furnish.style import PREFERENCES
 from embodied.generate.furnish.tables import tables
 from embodied.generate.requirements import missing_requirements
 from embodied.geometry import facing_of, rectangle, wrap
@@ -266,7 +264,7 @@ def test_a_curtain_hangs_only_where_one_still_walks_past_it():
 def test_a_room_of_every_kind_gets_furniture_and_a_ceiling_lamp(kind):
     for seed in range(3):
         house = one_room(kind, seed)
-        lamps = [p for p in house.placements if p.object_class in LUMENS and p.position[2] + p.size[2] > 2.59]
+        lamps = [p for p in house.placements if p.object_class in tables().lumens and p.position[2] + p.size[2] > 2.59]
         assert lamps, f"{kind} has no ceiling lamp"
         assert {light.placement for light in house.lights} >= {p.id for p in lamps}
         assert len(house.placements) >= (3 if kind in ("corridor", "stairwell", "toilet", "pantry") else 7)
@@ -405,7 +403,7 @@ def test_a_large_house_holds_at_least_250_objects_and_a_middle_one_at_least_130(
 
 
 def test_every_style_prefers_some_furniture_and_no_other_is_taken_for_one():
-    assert tuple(PREFERENCES) == STYLES
+    assert tuple(tables().styles) == STYLES
     with pytest.raises(HouseError, match="unknown style 'rococo'"):
         furnish(dataclasses.replace(two_rooms(), style="rococo"), catalogue(), seed=1)
 

@@ -17,7 +17,6 @@ from embodied.generate.furnish.context import Context
 from embodied.generate.furnish.smalls import CarrierSurface, SurfaceOccupancy
 from embodied.generate.furnish.space import Thing, overlap, room_space
 from embodied.generate.furnish.stock import Stock
-from embodied.generate.furnish.style import house_style
 from embodied.generate.furnish.tables import AT, LIKES, tables
 from embodied.generate.household import HABITS, Household, draw_household, household_of
 from embodied.geometry import rectangle
@@ -68,7 +67,7 @@ def test_who_uses_a_room():
 
 
 def test_every_small_thing_and_every_part_of_a_group_is_something_that_the_catalogue_has():
-    stock = Stock(catalogue(), house_style("warm", 0.4, rng=np.random.default_rng(0)), tables())
+    stock = Stock(catalogue(), tables().style("warm", 0.4, rng=np.random.default_rng(0)), tables())
     known = tables()
     smalls = [*known.hung, *(s for some in known.smalls.values() for s in some)]
     assert all(stock.of_role(s.put) and s.habit in ("", *HABITS) for s in smalls)
@@ -87,7 +86,7 @@ def test_a_board_is_filled_without_overlaps_until_nothing_fits():
     space = room_space(house, room)
     x, y = space.polygon.centroid.coords[0]
     carrier = Thing(table, x, y, space.bottom, 0.0, table.size)
-    stock = Stock(catalogue(), house_style("warm", 0.4, rng=np.random.default_rng(0)), tables())
+    stock = Stock(catalogue(), tables().style("warm", 0.4, rng=np.random.default_rng(0)), tables())
     full = space.holding([carrier], [carrier.box])
     occupancy = SurfaceOccupancy(Context(full, stock, np.random.default_rng(3), ("living_room",), household_of(house)))
     board = CarrierSurface(carrier, max(table.surfaces, key=lambda s: (s.x1 - s.x0) * (s.y1 - s.y0)))
@@ -97,7 +96,7 @@ def test_a_board_is_filled_without_overlaps_until_nothing_fits():
         assert len(laid) < 500
     assert len(laid) > 20
     assert not any(overlap(p.box, q.box) for i, p in enumerate(laid) for q in laid[:i])
-    x0, x1, y0, y1 = board.area
+    x0, x1, y0, y1 = occupancy.area(board)
     assert all(x0 - 1e-6 <= t.x - x <= x1 + 1e-6 and y0 - 1e-6 <= t.y - y <= y1 + 1e-6 for t in laid)
 
 

@@ -108,7 +108,7 @@ def test_parameters_are_those_of_the_maker():
     [
         pytest.param(tables().rooms, id="generate/furnish/rooms.toml"),
         pytest.param(ROOM_NOUNS, id="language/words.toml"),
-        pytest.param(ROOM_COLOURS, id="house/floor_plan.py"),
+        pytest.param(ROOM_COLOURS, id="house/floor_plan.toml"),
         pytest.param(REGIONS, id="mattersim/conventions.py"),
     ],
 )

@@ -26,31 +26,6 @@ class SharedWall(NamedTuple):
         return self.high - self.low
 
 
-JOINS = {
-    ("kitchen", "dining_room"): 16,
-    ("dining_room", "living_room"): 16,
-    ("kitchen", "living_room"): 16,
-    ("family_room", "kitchen"): 16,
-    ("family_room", "dining_room"): 16,
-    ("hall", "living_room"): 12,
-    ("living_room", "sun_room"): 14,
-    ("dining_room", "sun_room"): 14,
-    ("hall", "corridor"): 9,
-    ("corridor", "corridor"): 9,
-    ("family_room", "sun_room"): 14,
-    ("library", "living_room"): 18,
-}
-"""Kinds joined wherever their shared wall is at least so long, decimetres."""
-ALSO_THROUGH = (
-    ("laundry_room", "garage"),
-    ("garage", "workshop"),
-    ("workshop", "garage"),
-    ("laundry_room", "workshop"),
-    ("library", "sun_room"),
-)
-"""(crossed, reached): kinds that one may cross on the way to some others only."""
-
-
 @dataclass(frozen=True)
 class Link:
     """A way between two cells."""
@@ -153,7 +128,8 @@ def connect(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> tupl
         return None
     tree = {(min(k.child, k.parent), max(k.child, k.parent)) for k in links}
     for (i, j), wall in walls.items():
-        least = JOINS.get((cells[i].kind, cells[j].kind)) or JOINS.get((cells[j].kind, cells[i].kind))
+        a, b = cells[i].kind, cells[j].kind
+        least = ROOM_TABLE[a].joins.get(b) or ROOM_TABLE[b].joins.get(a)
         if least and (i, j) not in tree and wall.length >= least:
             links.append(Link(i, j, wall))
     links += _second_doors(cells, walls, links)
@@ -184,6 +160,6 @@ def _cost(cells: list[Cell], child: int, parent: int) -> float | None:
     c, p = cells[child], cells[parent]
     if c.owner is not None:
         return 0.0 if c.owner == parent else None
-    if not ROOM_TABLE[p.kind].leads_on and (p.kind, c.kind) not in ALSO_THROUGH:
+    if not ROOM_TABLE[p.kind].leads_on and c.kind not in ROOM_TABLE[p.kind].leads_to:
         return None
     return ROOM_TABLE[c.kind].entered_from.get(p.kind)

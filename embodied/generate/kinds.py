@@ -36,6 +36,12 @@ class RoomKind:
     """0 at the public end of the house, 4 at the private one."""
     entered_from: Mapping[str, float] = field(default_factory=dict)
     """Kinds of room it may be entered from, with a cost; a room that another owns is entered from its owner."""
+    joins: Mapping[str, int] = field(default_factory=dict)
+    """Kinds it is joined with wherever their shared wall is at least so long, decimetres; said at either of the two."""
+    leads_to: tuple[str, ...] = ()
+    """Kinds that it may be crossed on the way to, where it does not lead on in general."""
+    beside: Mapping[str, float] = field(default_factory=dict)
+    """Worth of a shared wall with a room of another kind; said at either of the two."""
     is_main: bool = True
     """True if advertisements of flats count it."""
     is_bedroom: bool = False
@@ -70,4 +76,6 @@ ROOM_TABLE: dict[str, RoomKind] = from_plain(
     dict[str, RoomKind], read_toml(Path(__file__).with_name("kinds.toml")), "kinds.toml"
 )
 """Room kind to what is usual for it. The order of the kinds with an `extra` is that in which they are drawn."""
+NEIGHBOUR_VALUES = {frozenset((a, b)): worth for a, kind in ROOM_TABLE.items() for b, worth in kind.beside.items()}
+"""Worth of a shared wall between two kinds."""
 BEDROOMS = tuple(name for name, kind in ROOM_TABLE.items() if kind.is_bedroom)

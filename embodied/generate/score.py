@@ -5,32 +5,10 @@ from __future__ import annotations
 import math
 
 from embodied.generate.access import SharedWall
-from embodied.generate.kinds import BEDROOMS, ROOM_TABLE
+from embodied.generate.kinds import NEIGHBOUR_VALUES, ROOM_TABLE
 from embodied.generate.modules import Cell
 
 WET = ("bathroom", "toilet", "laundry_room", "kitchen")
-NEIGHBOUR_VALUES = {
-    ("dining_room", "kitchen"): 2.6,
-    ("dining_room", "living_room"): 1.8,
-    ("kitchen", "living_room"): 0.8,
-    ("hall", "living_room"): 1.8,
-    ("garage", "hall"): 0.6,
-    ("garage", "laundry_room"): 0.8,
-    ("garage", "kitchen"): 0.5,
-    ("kitchen", "laundry_room"): 0.4,
-    ("family_room", "kitchen"): 0.7,
-    ("garage", "workshop"): 0.8,
-    ("living_room", "sun_room"): 0.8,
-    ("hall", "toilet"): 0.6,
-    ("library", "living_room"): 0.3,
-    ("hall", "study"): 0.2,
-    ("kitchen", "pantry"): 0.5,
-    **{tuple(sorted((k, "bathroom"))): 0.35 for k in BEDROOMS},
-    **{tuple(sorted((k, "kitchen"))): -0.7 for k in BEDROOMS},
-    **{tuple(sorted((k, "garage"))): -0.6 for k in BEDROOMS},
-    **{tuple(sorted((k, "living_room"))): -0.15 for k in BEDROOMS},
-}
-"""Worth of a shared wall between two kinds."""
 
 
 def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:
@@ -43,7 +21,7 @@ def score(cells: list[Cell], walls: dict[tuple[int, int], SharedWall]) -> float:
         inner[i] += n
         inner[j] += n
         a, b = cells[i].kind, cells[j].kind
-        worth = NEIGHBOUR_VALUES.get((a, b) if a < b else (b, a))
+        worth = NEIGHBOUR_VALUES.get(frozenset((a, b)))
         if worth and n >= 12:
             value += worth
         if a in WET and b in WET:

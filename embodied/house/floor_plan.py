@@ -19,6 +19,7 @@ import shapely
 from PIL import Image, ImageDraw, ImageFont
 
 from embodied.assets.cache import write_bytes
+from embodied.assets.json_file import from_plain, read_toml
 from embodied.geometry import rectangle, rotation
 from embodied.house.house import House, Opening, Placement, Room, Stair
 from embodied.house.shapes import footprint, inward
@@ -29,31 +30,8 @@ Point = Sequence[float] | np.ndarray
 Line = Iterable[Point] | np.ndarray
 
 PAPER, INK, SOFT, GLASS_COLOUR = (250, 248, 243), (52, 50, 56), (128, 124, 122), (150, 175, 190)
-ROOM_COLOURS = {
-    "living_room": (250, 236, 208),
-    "family_room": (248, 232, 205),
-    "dining_room": (249, 228, 200),
-    "kitchen": (247, 220, 196),
-    "sun_room": (253, 243, 205),
-    "library": (236, 224, 205),
-    "main_bedroom": (214, 225, 238),
-    "bedroom": (220, 230, 241),
-    "kids_room": (226, 225, 243),
-    "guest_room": (221, 228, 236),
-    "bathroom": (204, 231, 232),
-    "toilet": (204, 231, 232),
-    "laundry_room": (214, 232, 226),
-    "hall": (240, 237, 230),
-    "corridor": (240, 237, 230),
-    "study": (224, 234, 214),
-    "playroom": (232, 226, 240),
-    "gym": (226, 232, 220),
-    "garage": (228, 227, 226),
-    "workshop": (230, 226, 218),
-    "pantry": (236, 228, 214),
-    "closet": (228, 226, 232),
-    "stairwell": (240, 237, 230),
-}
+_COLOURS = from_plain(dict[str, dict[str, Colour]], read_toml(Path(__file__).with_name("floor_plan.toml")))
+ROOM_COLOURS = _COLOURS["rooms"]
 SUPERSAMPLING = 3
 """Draw at this many times the final resolution, then shrink: smooth lines."""
 
@@ -281,41 +259,9 @@ def _draw_walker(sheet: _Sheet, at: np.ndarray, facing: float) -> None:
     sheet.line([*shape, shape[0]], 0.02, (255, 255, 255))
 
 
-TINTS = (
-    (("bed", "sofa", "couch", "armchair", "ottoman", "pouf"), (188, 200, 222)),
-    (("chair", "stool", "bench"), (214, 192, 164)),
-    (
-        ("table", "desk", "cabinet", "dresser", "wardrobe", "book", "shel", "sideboard", "chest", "stand", "console"),
-        (208, 182, 148),
-    ),
-    (("rug", "carpet", "mat"), (222, 205, 205)),
-    (("plant", "flower", "tree"), (172, 204, 162)),
-    (
-        (
-            "bath",
-            "toilet",
-            "basin",
-            "sink",
-            "shower",
-            "bidet",
-            "washing",
-            "dryer",
-            "fridge",
-            "refrigerator",
-            "cooker",
-            "oven",
-            "stove",
-            "dishwasher",
-        ),
-        (238, 240, 242),
-    ),
-    (("lamp", "light"), (250, 226, 140)),
-    (("television", "screen", "computer", "laptop"), (110, 112, 120)),
-)
-
-
 def _tint(name: str, pale: float) -> Colour:
-    base = next((c for words, c in TINTS if any(w in name for w in words)), (216, 210, 202))
+    colours = (c for words, c in _COLOURS["furniture"].items() if any(w in name for w in words.split()))
+    base = next(colours, (216, 210, 202))
     red, green, blue = (round(c + (255 - c) * pale * 0.6) for c in base)
     return red, green, blue
 

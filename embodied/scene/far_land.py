@@ -9,19 +9,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from embodied.scene.far_canvas import DrawList, FarCanvas, FarLight, transmittance
-from embodied.scene.far_trees import FIR, LEAVES, SNOW, tree
+from embodied.scene.far_trees import FIR, SNOW, tree
 from embodied.scene.landscapes import Ridge, Scenery
 
-GRASS = {
-    "spring": (0.070, 0.105, 0.028), "summer": (0.095, 0.105, 0.040), "autumn": (0.092, 0.092, 0.036),
-    "winter": (0.760, 0.780, 0.820),
-}  # fmt: skip
-FIELDS = {
-    "spring": ((0.07, 0.12, 0.025), (0.10, 0.14, 0.03), (0.15, 0.105, 0.07), (0.45, 0.36, 0.03), (0.06, 0.10, 0.03)),
-    "summer": ((0.38, 0.29, 0.12), (0.30, 0.24, 0.09), (0.08, 0.11, 0.03), (0.12, 0.13, 0.04), (0.07, 0.09, 0.03)),
-    "autumn": ((0.27, 0.20, 0.11), (0.11, 0.075, 0.05), (0.14, 0.095, 0.06), (0.08, 0.10, 0.03), (0.20, 0.16, 0.08)),
-    "winter": ((0.74, 0.76, 0.80), (0.66, 0.68, 0.72), (0.78, 0.80, 0.84), (0.56, 0.55, 0.55), (0.70, 0.72, 0.76)),
-}  # fmt: skip
 DRY = 0.2
 """Cosine of the angle from the outlook beyond which a lake has land."""
 
@@ -43,11 +33,11 @@ def paint_ground(canvas: FarCanvas, place: Scenery, light: FarLight, *, rng: np.
     if kind == "fields":
         own = _over_ground(_field_tile(place, rng=rng), 1100.0, x, y) * vary[..., None]
     elif kind == "town":
-        paved, green = np.array([0.16, 0.155, 0.15], np.float32), np.array(GRASS[place.season], np.float32)
+        paved, green = (np.array([0.16, 0.155, 0.15], np.float32), np.array(place.colours.grass, np.float32))
         share = np.clip(0.35 + 0.6 * _over_ground(_grain(3, 40), 600.0, x, y), 0, 0.75)[..., None]
         own = (paved + (green - paved) * share) * vary[..., None]
     else:
-        colour = np.array(GRASS[place.season], np.float32)
+        colour = np.array(place.colours.grass, np.float32)
         if kind == "woodland" and not place.snow:
             colour = np.array([0.075, 0.060, 0.030], np.float32)
         own = colour * vary[..., None]
@@ -137,14 +127,14 @@ def _field_tile(place: Scenery, *, rng: np.random.Generator, side: int = 256) ->
     y, x = np.mgrid[:side, :side]
     stretch = np.array([1.0, 1.7])
     near, which = cKDTree(every * stretch).query(np.column_stack([x.ravel(), y.ravel()]) * stretch, k=2)
-    colours = np.array(FIELDS[place.season])[rng.integers(5, size=len(points))]
+    colours = np.array(place.colours.fields)[rng.integers(5, size=len(points))]
     colours = colours * rng.uniform(0.85, 1.15, (len(points), 1))
     angle = rng.uniform(0, np.pi, len(points))
     field = which[:, 0] % len(points)
     rows = 1 + 0.05 * np.sin((x.ravel() * np.cos(angle[field]) + y.ravel() * np.sin(angle[field])) * 2.2)
     tile = colours[field] * rows[:, None]
     hedge = (near[:, 1] - near[:, 0] < 0.9) & (rng.random(len(points))[field] < 0.8)
-    tile[hedge] = np.array(LEAVES[place.season][2]) * 0.8
+    tile[hedge] = np.array(place.colours.leaves[2]) * 0.8
     return tile.reshape(side, side, 3).astype(np.float32)
 
 
@@ -166,7 +156,7 @@ def _cover_of(
 ) -> np.ndarray:
     """(rows, w, 3) reflectances of a ridge's face."""
     h, w = y1 - y0, canvas.w
-    leaf = np.mean(LEAVES[place.season][:3], axis=0) * (1 - place.table.firs) + np.array(FIR) * place.table.firs
+    leaf = np.mean(place.colours.leaves[:3], axis=0) * (1 - place.table.firs) + np.array(FIR) * place.table.firs
     crowns = cv2.resize(rng.random((max(h // 2, 1), w // 3)).astype(np.float32), (w, h), interpolation=cv2.INTER_LINEAR)
     patches = cv2.resize(
         rng.random((max(h // 12, 2), w // 60)).astype(np.float32), (w, h), interpolation=cv2.INTER_CUBIC
@@ -188,7 +178,7 @@ def _cover_of(
         return (rock + (leaf.astype(np.float32) - rock) * wood).astype(np.float32)
     own = leaf.astype(np.float32) * ((0.62 + 0.55 * crowns) * (0.75 + 0.5 * patches))[..., None]
     if r.distance > 3000 and not place.snow:  # meadows between the woods
-        own += (np.array(GRASS[place.season], np.float32) - own) * np.clip((patches - 0.62) * 6, 0, 0.8)[..., None]
+        own += (np.array(place.colours.grass, np.float32) - own) * np.clip((patches - 0.62) * 6, 0, 0.8)[..., None]
     if place.snow:
         share = np.clip(0.3 + (patches - 0.55) * 3, 0.22, 0.9)[..., None]
         own += (np.array(SNOW, np.float32) - own) * share

@@ -9,16 +9,10 @@ import cv2
 import numpy as np
 
 from embodied.scene.far_canvas import FarCanvas, FarLight, transmittance
-from embodied.scene.landscapes import Scenery
+from embodied.scene.landscapes import SEASON_COLOURS, Scenery
 
-LEAVES = {
-    "spring": ((0.085, 0.140, 0.030), (0.110, 0.150, 0.045), (0.060, 0.105, 0.025), (0.300, 0.230, 0.220)),
-    "summer": ((0.050, 0.085, 0.025), (0.062, 0.095, 0.028), (0.042, 0.072, 0.024), (0.070, 0.090, 0.030)),
-    "autumn": ((0.300, 0.120, 0.020), (0.330, 0.205, 0.035), (0.170, 0.095, 0.030), (0.095, 0.100, 0.030)),
-    "winter": ((0.120, 0.100, 0.085), (0.105, 0.085, 0.070), (0.120, 0.100, 0.085), (0.105, 0.085, 0.070)),
-}
-"""Linear reflectances, as everything here."""
 FIR = (0.024, 0.045, 0.024)
+"""Linear reflectance, as all here."""
 BARK = np.array([0.075, 0.058, 0.045])
 SNOW = (0.76, 0.78, 0.82)
 
@@ -69,7 +63,7 @@ def _sprite(kind: str, season: str, which: int) -> np.ndarray:
     if kind == "fir":
         _fir(brush, season)
     else:
-        _leafy(brush, np.array(LEAVES[season][which % 4]), bare=season == "winter")
+        _leafy(brush, np.array(SEASON_COLOURS[season].leaves[which % 4]), bare=season == "winter")
     alpha = (brush.cover > 0).astype(np.float32)[..., None]
     both = np.concatenate([brush.picture * alpha, alpha], axis=-1)
     return cv2.resize(both, (brush.m // 2, brush.n // 2), interpolation=cv2.INTER_AREA)

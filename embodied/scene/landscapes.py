@@ -5,11 +5,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import shapely
 
+from embodied.assets.json_file import from_plain, read_toml
+from embodied.assets.records import Color
 from embodied.house.house import LANDSCAPES, SEASONS, House
 from embodied.house.shapes import room_union
 from embodied.scene.buildings import Building
@@ -76,49 +80,28 @@ class Landscape:
     """Of the lowest floor above the ground, metres; one is drawn."""
 
 
-FAR_HILLS = (Ridge(14e3, 420, 260, "wood", 7), Ridge(6e3, 120, 90, "wood", 11))
-TABLE: dict[str, Landscape] = {
-    "suburb": Landscape(
-        0.24, "hedge", (8, 1), "meadow",
-        (*FAR_HILLS, Ridge(1800, 26, 26, "trees", 15), Town(48, 420, 90, (1, 2)), Ridge(210, 8, 6, "trees", 40)),
-        scatter=(110, 34, 190), neighbours="villas",
-    ),
-    "village": Landscape(
-        0.16, "wall", (5, 0), "fields",
-        (*FAR_HILLS, Ridge(2200, 55, 45, "fields", 8), Town(60, 260, 36, (1, 2)), Ridge(500, 7, 9, "trees", 30)),
-        scatter=(60, 40, 300), neighbours="cottages",
-    ),
-    "street": Landscape(
-        0.16, "wall", (4, 0), "town",
-        (Ridge(9e3, 160, 90, "wood", 9), Town(55, 150, 0, (3, 5), 0.25)),
-        scatter=(60, 38, 160), firs=0.02, neighbours="terrace", heights=(GROUND_DROP, 3.4, 6.5),
-    ),
-    "roofs": Landscape(
-        0.14, "none", (0, 0), "town",
-        (Ridge(22e3, 520, 330, "wood", 7), Ridge(11e3, 210, 110, "wood", 9), Town(34, 3000, 0, (2, 5), 0.2)),
-        scatter=(600, 30, 1200), firs=0.04, heights=(24.0, 30.0, 38.0),
-    ),
-    "lake": Landscape(
-        0.1, "hedge", (5, 2), "meadow",
-        (Ridge(11e3, 1250, 800, "rock", 13), Ridge(5500, 420, 330, "wood", 9), Ridge(2300, 110, 110, "wood", 12),
-         Town(1500, 1900, 60, (1, 2)), Ridge(1450, 8, 10, "trees", 60)),
-        scatter=(26, 32, 90), firs=0.3, water=(30.0, 1400.0),
-    ),
-    "fields": Landscape(
-        0.1, "fence", (4, 0), "fields",
-        (Ridge(16e3, 380, 240, "wood", 8), Ridge(7e3, 190, 130, "fields", 7), Ridge(2600, 150, 120, "fields", 6),
-         Ridge(900, 36, 34, "fields", 5), Town(380, 800, 12, (1, 2)), Ridge(330, 3.5, 6.5, "trees", 36)),
-        scatter=(70, 45, 900), firs=0.05,
-    ),
-    "forest": Landscape(
-        0.1, "none", (7, 7), "woodland",
-        (Ridge(9e3, 400, 200, "wood", 8), Ridge(900, 60, 30, "trees", 10), Ridge(130, 19, 5, "trees", 60),
-         Ridge(95, 17, 6, "trees", 60)),
-        scatter=(380, 32, 95), firs=0.55,
-    ),
-}  # fmt: skip
-"""By the names in `embodied.house.house.LANDSCAPES`."""
+@dataclass(frozen=True)
+class SeasonColours:
+    """Colours of what grows, linear reflectances."""
 
+    grass: Color
+    fields: tuple[Color, ...]
+    """Five of them."""
+    leaves: tuple[Color, ...]
+    """Of four kinds of tree."""
+
+
+@dataclass(frozen=True)
+class LandscapeTable:
+    """The content of landscapes.toml."""
+
+    landscapes: Mapping[str, Landscape]
+    """By the names in `embodied.house.house.LANDSCAPES`."""
+    seasons: Mapping[str, SeasonColours]
+
+
+_READ = from_plain(LandscapeTable, read_toml(Path(__file__).with_name("landscapes.toml")))
+TABLE, SEASON_COLOURS = _READ.landscapes, _READ.seasons
 LIKELY_SEASONS = (0.3, 0.35, 0.2, 0.15)
 """Of spring, summer, autumn and winter."""
 
@@ -138,6 +121,11 @@ class Scenery:
     def table(self) -> Landscape:
         """Pieces of its landscape."""
         return TABLE[self.landscape]
+
+    @property
+    def colours(self) -> SeasonColours:
+        """Of what grows in its season."""
+        return SEASON_COLOURS[self.season]
 
     @property
     def snow(self) -> bool:

@@ -20,7 +20,6 @@ from embodied.generate.furnish.room import furnish_room, shortage
 from embodied.generate.furnish.smalls import clutter
 from embodied.generate.furnish.space import RoomSpace, Thing, room_space
 from embodied.generate.furnish.stock import Stock
-from embodied.generate.furnish.style import house_style
 from embodied.generate.furnish.tables import tables_of
 from embodied.generate.household import household_of
 from embodied.geometry import wrap
@@ -40,8 +39,9 @@ def furnish(draft: House, catalogue: Catalogue, *, seed: int) -> House:
     Raises:
       RecordError: a table of groups beside a user's own models is none.
     """
-    style = house_style(draft.style, draft.disorder, rng=stream(seed, "furnish", "style"))
-    stock = Stock(catalogue, style, tables_of(catalogue))
+    known = tables_of(catalogue)
+    style = known.style(draft.style, draft.disorder, rng=stream(seed, "furnish", "style"))
+    stock = Stock(catalogue, style, known)
     used: Counter[str] = Counter()
     furnished: list[RoomSpace] = []
     for room in draft.rooms:
@@ -54,7 +54,7 @@ def furnish(draft: House, catalogue: Catalogue, *, seed: int) -> House:
         furnished.append(ctx.space)
         used = ctx.used
     placements = _placements(furnished)
-    shining = lights(placements, style, rng=stream(seed, "furnish", "lights"))
+    shining = lights(placements, stock, rng=stream(seed, "furnish", "lights"))
     return dataclasses.replace(draft, placements=placements, lights=shining)
 
 

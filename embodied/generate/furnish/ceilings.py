@@ -6,17 +6,7 @@ import math
 
 from embodied.assets.records import Asset
 from embodied.generate.furnish.context import Context
-from embodied.generate.furnish.lights import ALWAYS, LUMENS
 from embodied.generate.furnish.space import Thing, box, overlap
-
-BRIGHT = ("garage", "workshop")
-"""Room kinds under fluorescent tubes."""
-TRACKS = ("living_room", "study", "kitchen", "gym")
-"""Room kinds that may have track lights."""
-LOW = ("bathroom", "toilet", "corridor", "pantry", "closet", "laundry_room", "gym", "stairwell")
-"""Room kinds whose lamps are flat, because people walk close beneath."""
-FANS = ("living_room", "sun_room", "main_bedroom", "family_room")
-DETECTORS = ("hall", "corridor", "main_bedroom", "kids_room")
 
 
 def ceiling_lamps(ctx: Context) -> None:
@@ -57,11 +47,11 @@ def ceiling_lamps(ctx: Context) -> None:
 
 def detectors(ctx: Context) -> None:
     """A smoke detector on the ceiling of halls, corridors and bedrooms; now and then a fan between the lamps."""
-    if ctx.kind in FANS and ctx.chance(0.12):
+    if ctx.has("fans") and ctx.chance(0.12):
         fan = ctx.pick("ceiling fan")
         if fan is not None:
             hang_from_ceiling(ctx, fan, ctx.space.polygon.centroid.x, ctx.space.polygon.centroid.y)
-    if ctx.kind not in DETECTORS or not ctx.chance(0.6):
+    if not ctx.has("smoke detectors") or not ctx.chance(0.6):
         return
     asset = ctx.pick("smoke detector")
     c = ctx.space.polygon.representative_point()
@@ -74,15 +64,15 @@ def detectors(ctx: Context) -> None:
 def _ceiling_lamp(ctx: Context) -> Asset | None:
     """One model for the whole room; flat ones where people walk close beneath."""
     height = ctx.space.height
-    if ctx.kind in BRIGHT:
+    if ctx.has("fluorescent tubes"):
         lamp = ctx.pick("fluorescent lamp", avoid=())
         if lamp is not None:
             return lamp
-    if ctx.kind in TRACKS and ctx.chance(0.12):
+    if ctx.has("track lights") and ctx.chance(0.12):
         lamp = ctx.pick("track light", most=(1.3, 1.3, 0.45), avoid=())
         if lamp is not None:
             return lamp
-    if ctx.kind in LOW or ctx.chance(0.45):
+    if ctx.has("flat lamps") or ctx.chance(0.45):
         return ctx.pick("ceiling lamp", most=(0.9, 0.9, 0.35), avoid=())
     return ctx.pick("ceiling light", most=(0.9, 0.9, height - 2.0), avoid=()) or ctx.pick("ceiling lamp", avoid=())
 
@@ -95,7 +85,7 @@ def hang_from_ceiling(ctx: Context, asset: Asset, x: float, y: float, underside:
     """
     w, d, h = asset.size
     flat = asset.object_class == "ceiling lamp"
-    hangs_low = asset.support == "ceiling" and asset.object_class not in LUMENS
+    hangs_low = asset.support == "ceiling" and asset.object_class not in ctx.tables.lumens
     top = ctx.space.bottom + ctx.space.height - asset.elevation * hangs_low
     if underside is not None and not flat:
         scale = min(max((top - underside) / h, 0.6), 1.35)
@@ -106,7 +96,7 @@ def hang_from_ceiling(ctx: Context, asset: Asset, x: float, y: float, underside:
     low = not flat and any(overlap(filled, k) for k in ctx.space.keepouts)  # before a window or in a doorway
     if low or not ctx.space.fits(filled, passage=True):
         return False
-    role = "ceiling lamp" if asset.object_class in ALWAYS else asset.object_class
+    role = "ceiling lamp" if ctx.fits(asset, "main lamps") else asset.object_class
     thing = Thing(asset, x, y, top - h, 0.0, (w, d, h), ctx.looks(asset), group="ceiling", role=role)
     ctx.add(thing, filled)
     return True

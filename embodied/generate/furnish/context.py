@@ -16,8 +16,6 @@ from embodied.generate.furnish.stock import AssetLimits, Stock
 from embodied.generate.furnish.tables import Tables
 from embodied.generate.household import Household
 
-VARIED = ("cushion", "blanket", "curtain", "vase", "books", "towel")
-"""Object classes whose makers look different from seed to seed."""
 SEEDS = 3
 """Few, because equal arguments share one mesh."""
 
@@ -53,6 +51,14 @@ class Context:
         """All that has found its place."""
         return self.space.things
 
+    def has(self, what: str) -> bool:
+        """True in the kinds of room that have something by the tables: "curtains", "radiators", ..."""
+        return self.kind in self.tables.kinds[what]
+
+    def fits(self, asset: Asset, word: str) -> bool:
+        """True for assets of the classes that a word of the tables fits: "shelves", "cut to size", ..."""
+        return asset.object_class in self.tables.alike[word]
+
     def chance(self, probability: float) -> bool:
         """True with this probability; draws one number."""
         return bool(self.rng.random() < probability)
@@ -69,7 +75,7 @@ class Context:
         if asset.object_class == "fridge":  # what a household keeps under magnets on its door: more with children
             notes = int(self.rng.poisson(0.7 + 1.3 * len(self.household.children)))
             return (("notes", float(min(notes, 6))), ("seed", float(self.rng.integers(SEEDS)))) if notes else ()
-        return (("seed", float(self.rng.integers(SEEDS))),) if asset.object_class in VARIED else ()
+        return (("seed", float(self.rng.integers(SEEDS))),) if self.fits(asset, "varied") else ()
 
     def put(self, items: Sequence[Item], poses: Iterable[ScoredPose], group: str, tries: int = 40) -> tuple[Thing, ...]:
         """The things of an arrangement, placed; nothing if it found none."""

@@ -12,13 +12,6 @@ from embodied.generate.furnish.smalls import leave
 from embodied.generate.furnish.space import Thing, Wall
 from embodied.house.house import Opening
 
-WET = ("bathroom", "toilet")
-UNCURTAINED = ("garage", "workshop", "pantry", "closet", "laundry_room", "stairwell", "toilet", "gym")
-ONLY_BLINDS = ("kitchen", "bathroom")
-UNHEATED = ("garage", "pantry", "closet", "corridor", "stairwell", "toilet")
-SCONCED = ("corridor", "hall", "living_room", "stairwell", "family_room", "library")
-"""Room kinds that may have lamps on their walls."""
-
 
 def hang_all(ctx: Context) -> None:
     """Everything on walls and ceiling, after the furniture stands."""
@@ -37,7 +30,7 @@ def hang_all(ctx: Context) -> None:
 
 def curtains(ctx: Context) -> None:
     """Curtains at the windows of rooms one lives in, blinds where curtains do not fit."""
-    if ctx.kind in UNCURTAINED:
+    if ctx.has("bare windows"):
         return
     curtain = ctx.pick("curtain", most=(9.0, 0.2, 9.0), avoid=())
     blind = ctx.pick("window blind", avoid=())
@@ -48,7 +41,7 @@ def curtains(ctx: Context) -> None:
             if o.kind not in ("window", "french_window"):
                 continue
             done = None
-            if curtain is not None and ctx.kind not in ONLY_BLINDS:
+            if curtain is not None and not ctx.has("blinds only"):
                 done = _curtain(ctx, curtain, wall, s0, s1, o)
             if done is None and blind is not None and o.kind == "window" and ctx.chance(0.8):
                 drop = (o.head - o.sill) * ctx.rng.uniform(0.35, 1.0)
@@ -74,7 +67,7 @@ def _curtain(ctx: Context, asset: Asset, wall: Wall, s0: float, s1: float, o: Op
 
 def radiators(ctx: Context) -> None:
     """A radiator under a window, else on what is free of an outer wall."""
-    if ctx.kind in UNHEATED or ctx.roles("towel radiator"):
+    if ctx.has("no radiators") or ctx.roles("towel radiator"):
         return
     left = 1 + (ctx.space.area > 16)
     outer = [w for w in ctx.space.walls if has_window(w)]
@@ -96,7 +89,7 @@ def _radiator(ctx: Context, asset: Asset | None, wall: Wall, s: float) -> bool:
 
 def wall_lamps(ctx: Context) -> None:
     """Sconces in halls, corridors and living rooms."""
-    if ctx.kind not in SCONCED or not ctx.chance(0.45):
+    if not ctx.has("wall lamps") or not ctx.chance(0.45):
         return
     hanging = Hanging(ctx.pick("wall lamp", most=(0.5, 0.35, 0.7)), 1.75, "wall_lamp", "wall lamp", margin=0.15)
     for wall, s in along_walls(ctx.space.longest_walls[:2], at(0.25, 0.75)):
@@ -125,7 +118,7 @@ def switches(ctx: Context) -> None:
 def sockets(ctx: Context) -> None:
     """Sockets 0.3 m above the floor on free wall, over the worktop in kitchens."""
     asset = ctx.pick("socket", avoid=())
-    if asset is None or ctx.kind in (*WET, "closet"):
+    if asset is None or ctx.has("no sockets"):
         return
     z = 1.1 if ctx.kind == "kitchen" else 0.26
     if ctx.kind == "kitchen" and ctx.chance(0.5):

@@ -12,34 +12,12 @@ from embodied.generate.furnish.space import Thing, Wall
 
 MIDDLE = 1.5
 """Height of the middle of a picture, metres."""
-BELOW_PICTURES = (
-    "sofa",
-    "bed",
-    "sideboard",
-    "dresser",
-    "console",
-    "desk",
-    "bench",
-    "cupboard",
-    "chest",
-    "fireplace",
-    "dressing",
-    "tv stand",
-    "storage",
-)
-"""Roles of furniture over which something hangs."""
-BELOW_MIRRORS = ("console", "dressing", "dresser")
-BARE = ("bathroom", "toilet", "garage", "pantry", "closet", "workshop", "laundry_room")
-"""Room kinds without pictures."""
-SOMETIMES_BARE = ("kitchen", "gym")
-MIRRORED = ("hall", "closet", "main_bedroom", "gym", "bedroom")
-"""Room kinds where one dresses or goes out: a tall mirror."""
 
 
 def above_furniture(ctx: Context) -> None:
     """Pictures and mirrors over sofas, beds, sideboards, desks and consoles; a television over its bench."""
     for thing in ctx.things:
-        if thing.role not in BELOW_PICTURES:
+        if thing.role not in ctx.tables.alike["below pictures"]:
             continue
         spot = spot_behind(ctx, thing)
         top = thing.z - ctx.space.bottom + thing.size[2]
@@ -50,7 +28,7 @@ def above_furniture(ctx: Context) -> None:
                 screen = ctx.pick("wall television", most=(1.8, 0.2, 1.1))
                 mount(ctx, Hanging(screen, max(top + 0.2, 0.85), "television"), *spot)
             continue
-        if thing.role in BELOW_MIRRORS and ctx.chance(0.6) and _mirror_over(ctx, thing, top, *spot):
+        if thing.role in ctx.tables.alike["below mirrors"] and ctx.chance(0.6) and _mirror_over(ctx, thing, top, *spot):
             continue
         if ctx.chance(0.8):
             _picture_group(ctx, *spot, thing.size[0], max(top + 0.18, 1.15))
@@ -66,7 +44,7 @@ def _mirror_over(ctx: Context, thing: Thing, top: float, wall: Wall, s: float) -
 
 def pictures(ctx: Context) -> None:
     """Pictures on what is left of free wall."""
-    if ctx.kind in BARE or (ctx.kind in SOMETIMES_BARE and ctx.chance(0.5)):
+    if ctx.has("no pictures") or (ctx.has("few pictures") and ctx.chance(0.5)):
         return
     target = sum(w.length for w in ctx.space.walls) / (4.5 if ctx.kind in ("corridor", "hall") else 6.0)
     hung = sum(t.role in ("picture", "mirror") for t in ctx.things)
@@ -135,7 +113,7 @@ def _image(key: str) -> str:
 
 def mirrors(ctx: Context) -> None:
     """A tall mirror where one dresses or goes out."""
-    if ctx.kind not in MIRRORED or ctx.roles("mirror") or (ctx.kind == "bedroom" and ctx.chance(0.5)):
+    if not ctx.has("tall mirrors") or ctx.roles("mirror") or (ctx.kind == "bedroom" and ctx.chance(0.5)):
         return
     mirror = ctx.pick("mirror", most=(2.5, 0.2, 2.2))
     if mirror is None:

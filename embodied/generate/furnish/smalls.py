@@ -26,39 +26,8 @@ EDGE, THING_GAP = 0.012, 0.008
 """Free strip at the edge of a surface, and between two things on it, metres."""
 GRID, MOST_STEPS = 0.03, 16
 """Between places that are looked at for a gap, metres, and how many are along one side."""
-SEATS = {
-    "sofa": (0.16, 0.36),
-    "corner sofa": (0.3, 0.3),
-    "armchair": (0.14, 0.34),
-    "rattan sofa": (0.1, 0.3),
-    "bed": (0.05, 0.24),
-    "child bed": (0.05, 0.24),
-    "day bed": (0.05, 0.24),
-    "bunk bed": (0.1, 0.24),
-    "lounge chair": (0.14, 0.4),
-    "sofa bed": (0.16, 0.36),
-}
-"""Object class to the width of its arms in metres and the share of its depth that back or pillows take."""
-BOWLS = ("bathtub", "corner bathtub", "washbasin", "wall washbasin", "shower", "kitchen sink")
-"""Object classes whose middle is hollow: only their rims carry things."""
-SHELVES = (
-    "bookcase",
-    "shelving unit",
-    "wall unit",
-    "storage shelf",
-    "open wall shelf",
-    "clothes rack",
-    "cupboard",
-    "media cabinet",
-    "workbench",
-)
-STORING = ("pantry", "closet", "garage", "workshop", "laundry_room", "bathroom", "kitchen", "gym")
-"""Room kinds whose shelves hold what is kept there instead of books."""
-CHILDRENS = ("kids_room", "playroom")
 MOST_FLOOR_TAKEN = 0.25
 """Most of the floor that one can walk on which a thing left on it takes from it, square metres."""
-CUT_TO_FIT = ("storage box", "folded clothes", "towel", "row of folders", "cushion", "heap of clothes")
-"""Object classes that come in many sizes."""
 
 
 @dataclass(frozen=True)
@@ -73,17 +42,6 @@ class CarrierSurface:
         """By how much the carrier is larger than its asset, along each axis."""
         kx, ky, kz = (a / b for a, b in zip(self.carrier.size, self.carrier.asset.size))
         return kx, ky, kz
-
-    @property
-    def area(self) -> tuple[float, float, float, float]:
-        """x0, x1, y0, y1 of what things may lie on: off the arms, backs and pillows of seats."""
-        s, (kx, ky, _), parent = self.surface, self.scale, self.carrier
-        x0, x1, y0, y1 = s.x0 * kx, s.x1 * kx, s.y0 * ky, s.y1 * ky
-        if parent.asset.object_class in SEATS:
-            arm, back = SEATS[parent.asset.object_class]
-            x0, x1 = max(x0, arm - parent.size[0] / 2), min(x1, parent.size[0] / 2 - arm)
-            y1 = min(y1, (0.5 - back) * parent.size[1])
-        return x0, x1, y0, y1
 
     @property
     def top(self) -> float:
@@ -121,6 +79,15 @@ class SurfaceOccupancy:
         key = (id(parent), thing.surface or "")
         self.taken.setdefault(key, []).append((u - a, v - b, u + a, v + b))
 
+    def area(self, board: CarrierSurface) -> tuple[float, float, float, float]:
+        """x0, x1, y0, y1 of what things may lie on: off the arms, backs and pillows of seats."""
+        s, (kx, ky, _), (w, d, _) = board.surface, board.scale, board.carrier.size
+        x0, x1, y0, y1 = s.x0 * kx, s.x1 * kx, s.y0 * ky, s.y1 * ky
+        if seat := self.ctx.tables.seats.get(board.carrier.asset.object_class):
+            arm, back = seat
+            x0, x1, y1 = max(x0, arm - w / 2), min(x1, w / 2 - arm), min(y1, (0.5 - back) * d)
+        return x0, x1, y0, y1
+
     def put(
         self, asset: Asset | None, board: CarrierSurface, spot: str = "any", turn: float = 0.2, size: Size | None = None
     ) -> Thing | None:
@@ -135,7 +102,7 @@ class SurfaceOccupancy:
         w, d, h = size or asset.size
         if h > board.headroom - 0.01 or board.top + h > ctx.space.bottom + ctx.space.height:
             return None
-        x0, x1, y0, y1 = board.area
+        x0, x1, y0, y1 = self.area(board)
         drawn = float(rng.uniform(-turn, turn)) if turn < 3 else float(rng.uniform(-math.pi, math.pi))
         for yaw in (drawn, 0.0) if drawn else (0.0,):
             a, b = _reach((w, d, h), yaw)
@@ -233,7 +200,7 @@ def _in_frame(carrier: Thing, thing: Thing) -> tuple[float, float]:
 def clutter(ctx: Context) -> None:
     """Put the small things of daily life onto everything in the room that can carry them."""
     occupancy = SurfaceOccupancy(ctx)
-    carriers = [t for t in ctx.things if t.asset.surfaces and not _hollow(t.asset)]
+    carriers = [t for t in ctx.things if t.asset.surfaces and not _hollow(ctx, t.asset)]
     for thing in carriers:
         if thing.role == "dining table":
             _set_table(occupancy, thing)
@@ -245,10 +212,10 @@ def clutter(ctx: Context) -> None:
         _more(occupancy, thing)
 
 
-def _hollow(asset: Asset) -> bool:
+def _hollow(ctx: Context, asset: Asset) -> bool:
     """True if its one surface is the opening of a bowl rather than a rim."""
     return (
-        asset.object_class in BOWLS
+        ctx.fits(asset, "bowls")
         and max((s.x1 - s.x0) * (s.y1 - s.y0) for s in asset.surfaces) > 0.5 * asset.size[0] * asset.size[1]
     )
 
@@ -289,10 +256,10 @@ def _shelves(occupancy: SurfaceOccupancy, thing: Thing) -> None:
     surfaces = [s for s in thing.asset.surfaces if 0.1 < s.headroom < 1.2] or (
         list(thing.asset.surfaces) if thing.asset.object_class == "shelving unit" else []
     )
-    if not surfaces or thing.asset.object_class not in SHELVES:
+    if not surfaces or not ctx.fits(thing.asset, "shelves"):
         return
     books = ctx.pick("row of books", avoid=())
-    bookish = ctx.kind not in STORING
+    bookish = not ctx.has("stores")
     for board in (CarrierSurface(thing, s) for s in surfaces):
         if books is not None and bookish and board.surface.headroom < 0.45 and ctx.chance(0.8):
             _book_row(occupancy, board, ctx.pick("row of books", avoid=()) or books)
@@ -366,7 +333,7 @@ def _weighted(ctx: Context, options: list[tuple[Asset, float]]) -> Asset:
 def _more(occupancy: SurfaceOccupancy, thing: Thing) -> None:
     """A few more things that the catalogue says lie on this class of object in this kind of room."""
     ctx = occupancy.ctx
-    if thing.asset.object_class in SHELVES or thing.role in ("bed", "dining chair", "bedside table", "bench"):
+    if ctx.fits(thing.asset, "shelves") or thing.role in ("bed", "dining chair", "bedside table", "bench"):
         return
     top = main_board(thing)
     area = (top.surface.x1 - top.surface.x0) * (top.surface.y1 - top.surface.y0)
@@ -391,9 +358,7 @@ def leave(ctx: Context, smalls: Iterable[SmallObject], occupancy: SurfaceOccupan
     """Put small things of the table where they go, as many as its people have or leave there."""
     occupancy = occupancy or SurfaceOccupancy(ctx)
     for small in smalls:
-        if (small.kinds and ctx.kind not in small.kinds) or (
-            ctx.kind in CHILDRENS and small.put in ctx.tables.grown_up
-        ):
+        if (small.kinds and ctx.kind not in small.kinds) or (ctx.has("children") and small.put in ctx.tables.grown_up):
             continue
         carriers = [t for t in ctx.called(*small.on) if t.asset.surfaces]
         if small.on and not carriers:
@@ -449,21 +414,21 @@ def _lay_on(occupancy: SurfaceOccupancy, small: SmallObject, asset: Asset, carri
         carriers = [carriers[int(k)] for k in rng.permutation(len(carriers))]
     for carrier in carriers[:3]:
         boards = [main_board(carrier)]
-        if carrier.asset.object_class in (*SHELVES, "shoe rack"):
+        if occupancy.ctx.fits(carrier.asset, "shelves") or carrier.asset.object_class == "shoe rack":
             surfaces = [CarrierSurface(carrier, s) for s in carrier.asset.surfaces]
             boards = [surfaces[int(k)] for k in rng.permutation(len(surfaces))[:4]]
         for board in boards:
-            if occupancy.put(asset, board, small.spot, small.turn, _fitting(asset, board)) is not None:
+            if occupancy.put(asset, board, small.spot, small.turn, _fitting(occupancy, asset, board)) is not None:
                 return
 
 
-def _fitting(asset: Asset, board: CarrierSurface) -> tuple[float, float, float] | None:
+def _fitting(occupancy: SurfaceOccupancy, asset: Asset, board: CarrierSurface) -> tuple[float, float, float] | None:
     """The size of cloth and boxes that come in the size of what they lie on; None for what keeps its own."""
-    x0, x1, y0, y1 = board.area
+    x0, x1, y0, y1 = occupancy.area(board)
     w, d, h = asset.size
     if asset.object_class == "duvet":
         return min(w, 0.96 * (x1 - x0)), min(d, 0.7 * (y1 - y0)), h
-    if asset.object_class not in CUT_TO_FIT:
+    if not occupancy.ctx.fits(asset, "cut to size"):
         return None
     shrink = min(1.0, 0.92 * (x1 - x0) / w, 0.96 * (y1 - y0) / d, 0.92 * board.headroom / h)
     return (shrink * w, shrink * d, shrink * h) if shrink > 0.55 else None

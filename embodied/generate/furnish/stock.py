@@ -16,10 +16,6 @@ from embodied.generate.furnish.tables import Tables
 
 NO_LEAST_SIZE, NO_MOST_SIZE = (0.0, 0.0, 0.0), (99.0, 99.0, 99.0)
 """Bounds where no others are asked for, metres."""
-CHILDREN = ("kids_room", "playroom", None)
-"""Room kinds where anything made for children may stand."""
-CHILDISH = ("high chair", "stroller", "kick scooter", "tricycle", "bicycle")
-"""Things for children that are kept elsewhere too."""
 
 
 class AssetLimits(TypedDict, total=False):
@@ -73,8 +69,8 @@ class Stock:
             for a in self.of_role(role)
             if all(lo <= s <= hi for lo, s, hi in zip(least, a.size, most)) and (where is None or where(a))
         ]
-        if kind not in CHILDREN:
-            fit = [a for a in fit if "child" not in a.tags or role in CHILDISH] or (fit if role in CHILDISH else [])
+        if kind is not None and kind not in self.tables.kinds["children"] and role not in self.tables.alike["childish"]:
+            fit = [a for a in fit if "child" not in a.tags]
         fit = [a for a in fit if a.key not in avoid] or fit
         if not fit:
             return None

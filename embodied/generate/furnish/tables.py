@@ -9,13 +9,17 @@ from __future__ import annotations
 import difflib
 import functools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import RecordError, from_plain, read_toml
 from embodied.assets.records import Size
+from embodied.generate.furnish.style import Style
+from embodied.house.house import HouseError
 
 FILES = ("groups.toml", "rooms.toml", "smalls.toml")
 BUILT = ("kitchen_line",)
@@ -374,10 +378,30 @@ class Tables:
     """Things that hang on walls before pictures do."""
     centrepieces: tuple[str, ...] = ()
     """Roles of what stands in the middle of dining tables."""
+    kinds: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """A word for something to the kinds of room that have it: "curtains", "radiators", "art", ..."""
+    alike: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """A word to the object classes and roles that it fits: "shelves", "cut to size", "below pictures", ..."""
+    seats: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Object class to the width of its arms in metres and the share of its depth that back or pillows take."""
+    lumens: Mapping[str, float] = field(default_factory=dict)
+    """Object class to the flux of its bulbs."""
+    styles: Mapping[str, Style] = field(default_factory=dict)
+    """Name of a style (embodied.house.validation.STYLES) to what its owner prefers."""
 
     def classes(self, role: str) -> tuple[str, ...]:
         """The object classes that can play a role."""
         return self.roles.get(role, (role,))
+
+    def style(self, name: str, disorder: float, *, rng: np.random.Generator) -> Style:
+        """The style called `name` (House.style), for one house of that disorder.
+
+        Raises:
+          HouseError: an unknown style.
+        """
+        if name not in self.styles:
+            raise HouseError(f"the house has the unknown style {name!r}; use one of {tuple(self.styles)}")
+        return replace(self.styles[name], tidiness=1.0 - disorder, warmth=float(rng.uniform(0.2, 1.0)))
 
 
 def _one_of(what: str, word: str, known: tuple[str, ...]) -> None:
