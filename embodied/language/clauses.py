@@ -18,6 +18,20 @@ class Referent:
 
 
 @dataclass(frozen=True)
+class OfRoom:
+    """A clause that names a kind of room."""
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class OfThing:
+    """A clause that names a thing."""
+
+    thing: Referent
+
+
+@dataclass(frozen=True)
 class Turn:
     """Turn on the spot before the next step."""
 
@@ -27,29 +41,22 @@ class Turn:
     """Degrees: 45 slightly, 90, or 180 for turning back."""
 
 
-@dataclass(frozen=True)
-class Exit:
+class Exit(OfRoom):
     """Walk out of the room one is in."""
 
-    kind: str
-
 
 @dataclass(frozen=True)
-class Enter:
+class Enter(OfRoom):
     """Walk into a room of this kind."""
 
-    kind: str
     side: str | None = None
     """LEFT or RIGHT of the way walked, where doors are counted."""
     nth: int = 0
     """Through which of the doors on that side, counted along the way from 1; 0 where nobody counts."""
 
 
-@dataclass(frozen=True)
-class Cross:
+class Cross(OfRoom):
     """Walk on through the room one is in."""
-
-    kind: str
 
 
 @dataclass(frozen=True)
@@ -64,48 +71,32 @@ class Metres:
     count: int
 
 
-@dataclass(frozen=True)
-class To:
+class To(OfThing):
     """Walk up to something."""
 
-    thing: Referent
-
 
 @dataclass(frozen=True)
-class Past:
+class Past(OfThing):
     """Walk past something."""
 
-    thing: Referent
     side: str | None = None
     """The side on which it is passed."""
 
 
-@dataclass(frozen=True)
-class Avoid:
+class Avoid(OfRoom):
     """A warning: do not go into a room of this kind."""
 
-    kind: str
 
-
-@dataclass(frozen=True)
-class Notice:
+class Notice(OfThing):
     """Something one sees on the way; nothing to do about it."""
 
-    thing: Referent
 
-
-@dataclass(frozen=True)
-class StopBy:
+class StopBy(OfThing):
     """The end is beside something."""
 
-    thing: Referent
 
-
-@dataclass(frozen=True)
-class StopIn:
+class StopIn(OfRoom):
     """The end is in a room of this kind."""
-
-    kind: str
 
 
 @dataclass(frozen=True)
@@ -121,7 +112,7 @@ REMARKS = (Avoid, Notice)
 
 def room_of(clause: Clause) -> str | None:
     """The kind of room that a clause names, if it names one."""
-    return clause.kind if isinstance(clause, Exit | Enter | Cross | Avoid | StopIn) else None
+    return clause.kind if isinstance(clause, OfRoom) else None
 
 
 def side_of(clause: Clause) -> str | None:

@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
 from embodied.language.clauses import (
     LEFT,
-    Avoid,
     Clause,
     Cross,
     Enter,
     Exit,
-    Forward,
     Metres,
-    Notice,
+    OfRoom,
+    OfThing,
     Past,
     Referent,
     RouteInstruction,
-    StopBy,
-    StopHere,
-    StopIn,
-    To,
     Turn,
     room_of,
     side_of,
@@ -56,22 +51,11 @@ def kind_of(clause: Clause) -> str:
         return "past" if clause.side is None else "past_side"
     if isinstance(clause, Enter):
         return "door" if clause.nth else "enter"
-    return KIND_NAMES[type(clause)]
+    return _NAMES[type(clause)]
 
 
-KIND_NAMES: Mapping[type, str] = {
-    Exit: "exit",
-    Cross: "cross",
-    Forward: "forward",
-    Metres: "metres",
-    To: "to",
-    Avoid: "avoid",
-    Notice: "notice",
-    StopBy: "stop_by",
-    StopIn: "stop_in",
-    StopHere: "stop_here",
-}
-"""Names in templates of the clauses that have one name only."""
+_NAMES = {c: re.sub(r"\B(?=[A-Z])", "_", c.__name__).lower() for c in get_args(Clause)}
+"""'stop_by' for StopBy."""
 _BY_KINDS: dict[tuple[str, ...], tuple[Template, ...]] = {
     kinds: tuple(t for t in TEMPLATES if t.kinds == kinds) for kinds in {t.kinds: None for t in TEMPLATES}
 }
@@ -243,7 +227,7 @@ def parse(text: str, lexicon: Lexicon) -> RouteInstruction:
             rest = rest.partition(" ")[2]
             continue
         rooms = iter([ROOM_OF_NOUN[noun] for slot in ("room", "other") if (noun := heard.slots.get(slot))])
-        clauses += [MAKERS[kind](heard.slots, rooms, heard.thing) for kind in heard.template.kinds]
+        clauses += [_made(kind, heard.slots, rooms, heard.thing) for kind in heard.template.kinds]
         rest = rest[heard.length :].lstrip()
     if not clauses:
         raise ValueError(
@@ -354,27 +338,18 @@ def _any(words: Iterable[str]) -> str:
     return "|".join(re.escape(w) for w in sorted(words, key=lambda w: (-len(w), w)))
 
 
-def _number(word: str) -> int:
-    return SPOKEN.numbers.index(word) if word in SPOKEN.numbers else int(word)
-
-
-MAKERS: Mapping[str, Callable[[Mapping[str, str], Iterator[str], Any], Clause]] = {
-    "turn": lambda slots, rooms, thing: Turn(slots["side"]),
-    "slight": lambda slots, rooms, thing: Turn(slots["side"], 45),
-    "around": lambda slots, rooms, thing: Turn(LEFT, 180),
-    "exit": lambda slots, rooms, thing: Exit(next(rooms)),
-    "enter": lambda slots, rooms, thing: Enter(next(rooms)),
-    "cross": lambda slots, rooms, thing: Cross(next(rooms)),
-    "door": lambda slots, rooms, thing: Enter(next(rooms), slots["side"], SPOKEN.ordinals.index(slots["nth"])),
-    "forward": lambda slots, rooms, thing: Forward(),
-    "metres": lambda slots, rooms, thing: Metres(_number(slots["n"])),
-    "to": lambda slots, rooms, thing: To(thing),
-    "past": lambda slots, rooms, thing: Past(thing),
-    "past_side": lambda slots, rooms, thing: Past(thing, slots["side"]),
-    "avoid": lambda slots, rooms, thing: Avoid(next(rooms)),
-    "notice": lambda slots, rooms, thing: Notice(thing),
-    "stop_by": lambda slots, rooms, thing: StopBy(thing),
-    "stop_in": lambda slots, rooms, thing: StopIn(next(rooms)),
-    "stop_here": lambda slots, rooms, thing: StopHere(),
-}
-"""The clause that each name of the templates means, of what its slots held: words, kinds of rooms in turn, a thing."""
+def _made(name: str, slots: Mapping[str, str], rooms: Iterator[str], thing: Referent | None) -> Clause:
+    """The clause that a name of the templates means, of what its slots held: words, kinds of rooms in turn, a thing."""
+    if name in ("turn", "slight"):
+        return Turn(slots["side"], 90 if name == "turn" else 45)
+    if name == "around":
+        return Turn(LEFT, 180)
+    if name == "door":
+        return Enter(next(rooms), slots["side"], SPOKEN.ordinals.index(slots["nth"]))
+    if name == "metres":
+        n = slots["n"]
+        return Metres(SPOKEN.numbers.index(n) if n in SPOKEN.numbers else int(n))
+    if name == "past_side":
+        return Past(cast(Referent, thing), slots["side"])
+    made: Any = next(c for c, known in _NAMES.items() if known == name)
+    return made(next(rooms)) if issubclass(made, OfRoom) else made(thing) if issubclass(made, OfThing) else made()
