@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import BLACK, CHROME, GAP, STEEL, BuildRequest, parts_of, plain
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import box, cylinder, lathe
-from embodied.assets.records import Finish, MeshPart
-
-ENAMEL = plain((0.90, 0.90, 0.89), 0.25)
-DOOR = Finish(color=(0.16, 0.19, 0.21, 0.45), roughness=0.04)
-"""Dark glass."""
+from embodied.assets.records import MeshPart
 
 
 def washer(spec: BuildRequest) -> list[MeshPart]:
@@ -49,14 +45,14 @@ def washer(spec: BuildRequest) -> list[MeshPart]:
     drawer = box([-0.27, panel_y - 0.004, z - 0.026], [-0.11, panel_y + 0.001, z + 0.026], 0.003)
     pull = box([-0.225, panel_y - 0.0045, z - 0.016], [-0.155, panel_y, z - 0.004], 0.001)
     return parts_of(
-        (ENAMEL, [*body, flap, drawer]),
+        ("enamel", [*body, flap, drawer]),
         (plain((0.5, 0.51, 0.52), 0.3), ring),
-        (CHROME, [grip, *dial]),
+        ("chrome", [grip, *dial]),
         (plain((0.035, 0.04, 0.045), 0.15), dark),
-        (STEEL, drum),
-        (DOOR, glass),
-        (GAP, seam),
+        ("steel", drum),
+        ("dark glass", glass),
+        ("gap", seam),
         (plain((0.35, 0.36, 0.37), 0.4), [*ticks, *keys, pull]),
-        (BLACK, [*feet, mark]),
+        ("black", [*feet, mark]),
         (plain((0.03, 0.05, 0.06), 0.1), display),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import BLACK, PORCELAIN, BuildRequest, handle, parts_of, plain
+from embodied.assets.built.parametric import BuildRequest, handle, parts_of, plain
 from embodied.assets.built.primitives import Shape, bar, box, cylinder, lathe, pillow
 from embodied.assets.records import MeshPart
 
@@ -113,7 +113,7 @@ def office_chair(spec: BuildRequest) -> list[MeshPart]:
         pillow(w * 0.8, d * 0.78, 0.11).moved(0, -d * 0.05, seat - 0.01),
         pillow(w * 0.74, h - seat - 0.1, 0.1).turned(np.pi / 2, "x").moved(0, d / 2 - 0.06, (h + seat) / 2 + 0.05),
     ]
-    return parts_of((BLACK, dark), (spec.material("cloth", "tweed/0"), pads))
+    return parts_of(("black", dark), (spec.material("cloth", "tweed/0"), pads))
 
 
 def toilet(spec: BuildRequest) -> list[MeshPart]:
@@ -131,7 +131,7 @@ def toilet(spec: BuildRequest) -> list[MeshPart]:
         box([-0.1, d / 2 - tank - 0.08, 0], [0.1, d / 2, rim - 0.02], 0.02),
     ]
     button = cylinder(0.025, h - 0.006, h).moved(0, d / 2 - tank / 2)
-    return parts_of((PORCELAIN, [*oval, *cistern]), (spec.metal("chrome"), button))
+    return parts_of(("porcelain", [*oval, *cistern]), (spec.metal("chrome"), button))
 
 
 def bathtub(spec: BuildRequest) -> list[MeshPart]:
@@ -151,7 +151,7 @@ def bathtub(spec: BuildRequest) -> list[MeshPart]:
         bar([x0 - 0.02, 0, h], [x0 - 0.02, 0, h + 0.12], 0.03, 0.03),
         bar([x0 - 0.02, 0, h + 0.12], [x0 + 0.12, 0, h + 0.1], 0.026, 0.02),
     ]
-    return parts_of((PORCELAIN, shell), (spec.metal("chrome"), tap))
+    return parts_of(("porcelain", shell), (spec.metal("chrome"), tap))
 
 
 def television(spec: BuildRequest) -> list[MeshPart]:
@@ -161,7 +161,7 @@ def television(spec: BuildRequest) -> list[MeshPart]:
     case = [box([-w / 2, y, 0.06], [w / 2, y + 0.03, h], 0.004), box([-0.04, y + 0.005, 0.01], [0.04, y + 0.03, 0.1])]
     foot = box([-w * 0.2, -d / 2, 0], [w * 0.2, d / 2, 0.012], 0.003)
     screen = box([-w / 2 + 0.01, y - 0.001, 0.072], [w / 2 - 0.01, y, h - 0.01])
-    return parts_of((BLACK, [*case, foot]), (plain((0.02, 0.02, 0.025), 0.08), screen))
+    return parts_of(("black", [*case, foot]), (plain((0.02, 0.02, 0.025), 0.08), screen))
 
 
 def low_cabinet(spec: BuildRequest) -> list[MeshPart]:

@@ -5,18 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.parametric import (
-    CHROME,
-    GLASS,
-    PAPER,
-    PORCELAIN,
-    BuildRequest,
-    carcass,
-    front,
-    handle,
-    parts_of,
-    plain,
-)
+from embodied.assets.built.parametric import BuildRequest, FinishedShapes, carcass, front, handle, parts_of, plain
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -64,8 +53,8 @@ def vanity(spec: BuildRequest) -> list[MeshPart]:
     return parts_of(
         (wood, [body, *doors]),
         (spec.metal("black"), grips),
-        (PORCELAIN, [slab, bowl]),
-        (CHROME, [drain, spout, lever, base]),
+        ("porcelain", [slab, bowl]),
+        ("chrome", [drain, spout, lever, base]),
     )
 
 
@@ -100,7 +89,7 @@ def shower(spec: BuildRequest) -> list[MeshPart]:
     stays = [box([-0.012, by, z], [0.012, d / 2, z + 0.02]) for z in (1.07, h - 0.12)]
     drain = cylinder(0.045, 0, 0.004, 0.001, 18).moved(-w * 0.1, d * 0.25, 0.02)
     return parts_of(
-        (PORCELAIN, tray), (GLASS, glass), (CHROME, [*posts, rail, neck, head, *mixer, hose, *stays, drain])
+        ("porcelain", tray), ("glass", glass), ("chrome", [*posts, rail, neck, head, *mixer, hose, *stays, drain])
     )
 
 
@@ -166,7 +155,7 @@ def hanging_towel(spec: BuildRequest) -> list[MeshPart]:
     pile = [sheet(cloth[: low + 1], 0.006), sheet(cloth[high:], 0.006)]
     red, green, blue = (0.45 + 0.5 * c for c in terry.color[:3])
     border = plain((red, green, blue), 0.85, specular=0.1)
-    return parts_of((CHROME, hook), (terry, pile), (border, sheet(cloth[low : high + 1], 0.004)))
+    return parts_of(("chrome", hook), (terry, pile), (border, sheet(cloth[low : high + 1], 0.004)))
 
 
 def towels(spec: BuildRequest) -> list[MeshPart]:
@@ -191,7 +180,7 @@ def toilet_brush(spec: BuildRequest) -> list[MeshPart]:
     grip = [(0.007, h * 0.8), (0.011, h * 0.84), (0.011, h * 0.98), (0.006, h), (0, h)]
     stick = lathe([(0, h * 0.2), (0.007, h * 0.2), *grip], 12, 0.9)
     lid = lathe([(0, h * 0.42), (r * 0.8, h * 0.42), (r * 0.5, h * 0.46), (0, h * 0.47)], 24, 0.9)
-    return parts_of((spec.metal("white"), cup), (CHROME, [stick, lid]))
+    return parts_of((spec.metal("white"), cup), ("chrome", [stick, lid]))
 
 
 def soap_dispenser(spec: BuildRequest) -> list[MeshPart]:
@@ -205,15 +194,9 @@ def soap_dispenser(spec: BuildRequest) -> list[MeshPart]:
         tube([(0, 0, h * 0.955), (0, -r * 0.98, h * 0.935)], h * 0.03, 7),
         lathe([(0, h * 0.92), (r * 0.3, h * 0.93), (r * 0.3, h), (0, h)], 14),
     ]
-    colour = {
-        "white": PORCELAIN,
-        "black": plain((0.06, 0.06, 0.065), 0.35),
-        "amber": plain((0.35, 0.17, 0.06), 0.1),
-        "green": plain((0.36, 0.46, 0.38), 0.3),
-    }[spec.word("colour", "white")]
-    return parts_of(
-        (colour, body), (CHROME if spec.params.get("colour") != "black" else plain((0.1, 0.1, 0.1), 0.4), pump)
-    )
+    colour = spec.word("colour", "white")
+    bright = plain((0.1, 0.1, 0.1), 0.4) if colour == "black" else "chrome"
+    return parts_of((f"soap/{colour}", body), (bright, pump))
 
 
 def toothbrush_cup(spec: BuildRequest) -> list[MeshPart]:
@@ -228,7 +211,7 @@ def toothbrush_cup(spec: BuildRequest) -> list[MeshPart]:
         stick = tube([foot, (foot + top) / 2, top], [0.004, 0.005, 0.0035], 6)
         head = box([-0.005, -0.006, -0.014], [0.005, 0.006, 0.010], 0.001).moved(*(top + [0.004, 0, 0]))
         brushes += [(plain(c, 0.35), stick), (plain((0.93, 0.95, 0.96), 0.8), head)]
-    return parts_of((PORCELAIN, body), *brushes)
+    return parts_of(("porcelain", body), *brushes)
 
 
 def paper_roll(spec: BuildRequest) -> list[MeshPart]:
@@ -241,7 +224,7 @@ def paper_roll(spec: BuildRequest) -> list[MeshPart]:
     loose = box([-0.05, -d / 2, 0], [0.05, -d / 2 + 0.0015, z])
     arm = tube([(x, d / 2, z), (x, y, z), (-w / 2, y, z)], 0.006, 8)
     plate = box([w / 2 - 0.03, d / 2 - 0.006, h - r - 0.035], [w / 2, d / 2, h], 0.002)
-    return parts_of((plain((0.94, 0.94, 0.93), 0.95, specular=0.05), [roll, loose]), (CHROME, [arm, plate]))
+    return parts_of((plain((0.94, 0.94, 0.93), 0.95, specular=0.05), [roll, loose]), ("chrome", [arm, plate]))
 
 
 def bin_(spec: BuildRequest) -> list[MeshPart]:
@@ -263,7 +246,7 @@ def bin_(spec: BuildRequest) -> list[MeshPart]:
         dents = rng.normal(1.0, 0.13, (len(lump.vertices), 1))
         lump = _faceted(lump.vertices * dents, lump.faces)
         paper.append(lump.moved(q * np.cos(a), q * np.sin(a), 0.04 + 0.03 * (k % 3)))
-    return parts_of((main, [s.scaled(1, d / w, 1) for s in (shell, edge)]), (PAPER, paper))
+    return parts_of((main, [s.scaled(1, d / w, 1) for s in (shell, edge)]), ("paper", paper))
 
 
 def _faceted(vertices: np.ndarray, faces: np.ndarray) -> Shape:
@@ -278,7 +261,7 @@ def _faceted(vertices: np.ndarray, faces: np.ndarray) -> Shape:
     return Shape(points, np.arange(len(points)).reshape(-1, 3), normals, points[:, :2])
 
 
-def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[tuple[Finish, list[Shape]]]:
+def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[FinishedShapes]:
     """Base ring, body, a dark gap, a lid with a rim that is hinged behind, a pedal before it."""
     r, top = w / 2, h * 0.86
     base = lathe([(0, 0), (r * 0.97, 0), (r * 0.985, 0.004), (r * 0.985, h * 0.045), (0, h * 0.045)], 32)
@@ -297,7 +280,7 @@ def _pedal_bin(w: float, d: float, h: float, main: Finish) -> list[tuple[Finish,
     return [
         (main, rounds),
         (dark, [base.scaled(1, d / w, 1), gap.scaled(1, d / w, 1), hinge]),
-        (CHROME, [band.scaled(1, d / w, 1), arm, pedal]),
+        ("chrome", [band.scaled(1, d / w, 1), arm, pedal]),
     ]
 
 

@@ -8,17 +8,7 @@ import numpy as np
 import shapely
 from scipy.interpolate import PchipInterpolator
 
-from embodied.assets.built.parametric import (
-    BLACK,
-    BRASS,
-    MIRROR,
-    PAPER,
-    WHITE,
-    BuildRequest,
-    parts_of,
-    plain,
-    whole_image,
-)
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -34,21 +24,11 @@ from embodied.assets.built.primitives import (
 )
 from embodied.assets.records import MeshPart
 
-GLAZES = {
-    "white": plain((0.85, 0.83, 0.78), 0.55),
-    "blue": plain((0.16, 0.26, 0.38), 0.4),
-    "green": plain((0.25, 0.36, 0.30), 0.4),
-    "terracotta": plain((0.66, 0.40, 0.29), 0.4),
-    "black": plain((0.08, 0.08, 0.085), 0.4),
-}
-FRAME_COLOURS = {"black": BLACK, "white": WHITE, "brass": BRASS}
-
 
 def picture(spec: BuildRequest) -> list[MeshPart]:
     """Framed art: a moulded frame, a mat where params['mat'] > 0, the picture, glass over paper."""
     w, d, h = spec.size
-    name = spec.word("frame", "oak/0")
-    wood = FRAME_COLOURS[name] if name in FRAME_COLOURS else spec.finish(name)
+    wood = spec.named(spec.word("frame", "oak/0"))
     f = float(spec.params.get("width", 0.022)) * min(1.0, min(w, h) / 0.4)
     m = float(spec.params.get("mat", 0.0)) * min(w, h)
     y0, y1 = -d / 2, d / 2
@@ -65,7 +45,7 @@ def picture(spec: BuildRequest) -> list[MeshPart]:
     x0, x1, z0, z1 = -w / 2 + g, w / 2 - g, g, h - g
     image = whole_image(upright(x0, x1, z0, z1, y0 + 0.0125), art, x0, x1, z0, z1)
     mat = [between(_inset(w, h, f, y0 + 0.012), _inset(w, h, g, y0 + 0.012))] if m > 0 else []
-    return parts_of((wood, moulding), (PAPER, [*mat, back]), (art, image))
+    return parts_of((wood, moulding), ("paper", [*mat, back]), (art, image))
 
 
 def _inset(w: float, h: float, by: float, y: float) -> list[tuple[float, float, float]]:
@@ -95,8 +75,7 @@ def mirror(spec: BuildRequest) -> list[MeshPart]:
     """A looking-glass in a slim frame; round where params['round'] is 1."""
     w, d, h = spec.size
     y0, f = -d / 2, float(spec.params.get("width", 0.016))
-    name = spec.word("frame", "black")
-    rim = FRAME_COLOURS[name] if name in FRAME_COLOURS else spec.finish(name)
+    rim = spec.named(spec.word("frame", "black"))
     if spec.params.get("round"):
         ring = lathe([(0.5 - f / w, 0), (0.5, 0), (0.5, d), (0.5 - f / w, d), (0.5 - f / w, 0)], 48)
         ring = ring.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
@@ -104,10 +83,10 @@ def mirror(spec: BuildRequest) -> list[MeshPart]:
         disc = disc.turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, y0 + 0.006, h / 2)
         disc = Shape(disc.vertices, disc.faces, np.tile([0.0, -1.0, 0.0], (len(disc.vertices), 1)), disc.uv)
         back = cylinder(0.49, 0, 0.004, 0, 32).turned(np.pi / 2, "x").scaled(w, 1, h).moved(0, d / 2, h / 2)
-        return parts_of((rim, ring), (BLACK, back), (MIRROR, disc))
+        return parts_of((rim, ring), ("black", back), ("mirror", disc))
     x, boards = w / 2 - f, frame(-w / 2, w / 2, 0, h, (y0, d / 2), f, 0.002)
     glass, back = upright(-x, x, f, h - f, y0 + 0.006), upright(x, -x, f, h - f, d / 2)
-    return parts_of((rim, boards), (BLACK, back), (MIRROR, glass))
+    return parts_of((rim, boards), ("black", back), ("mirror", glass))
 
 
 def wall_clock(spec: BuildRequest) -> list[MeshPart]:
@@ -142,7 +121,7 @@ def vase(spec: BuildRequest) -> list[MeshPart]:
         *[(a * w, b * (body - 0.004)) for a, b in zip(inner[:8:-1], t[:8:-1])],
         (0, body * 0.4),
     ]
-    clay = GLAZES[spec.word("glaze", "white")]
+    clay = f"glaze/{spec.word('glaze', 'white')}"
     twigs, buds = [], []
     if branches:
         for _ in range(7):

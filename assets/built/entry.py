@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.parametric import BuildRequest, parts_of, plain
+from embodied.assets.built.parametric import TINTS, BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, bar, box, extruded, joined, lathe, sheet, tube
 from embodied.assets.records import MeshPart
 
@@ -13,12 +13,7 @@ from embodied.assets.records import MeshPart
 def shoes(spec: BuildRequest) -> list[MeshPart]:
     """A pair of low shoes, one a little askew."""
     (w, d, h), rng = spec.size, spec.rng
-    colour = {
-        "black": (0.07, 0.065, 0.06),
-        "brown": (0.32, 0.19, 0.11),
-        "white": (0.86, 0.85, 0.82),
-        "blue": (0.16, 0.22, 0.34),
-    }[spec.word("colour", "brown")]
+    colour = TINTS[f"{spec.word('colour', 'brown')} shoe"]
     length, width = d * 0.97, w * 0.44
     uppers: list[Shape] = []
     soles: list[Shape] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import BLACK, GLASS, PAPER, STEEL, BuildRequest, parts_of, plain
+from embodied.assets.built.parametric import TINTS, BuildRequest, FinishedShapes, parts_of, plain
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -20,21 +20,6 @@ from embodied.assets.built.primitives import (
     tube,
 )
 from embodied.assets.records import Finish, MeshPart, Size
-
-TINTS = {
-    "white": (0.90, 0.89, 0.86),
-    "black": (0.06, 0.06, 0.065),
-    "grey": (0.45, 0.46, 0.47),
-    "red": (0.66, 0.16, 0.13),
-    "blue": (0.15, 0.30, 0.55),
-    "green": (0.24, 0.45, 0.27),
-    "yellow": (0.90, 0.75, 0.22),
-    "orange": (0.84, 0.45, 0.14),
-    "pink": (0.85, 0.52, 0.58),
-    "brown": (0.38, 0.24, 0.15),
-    "beige": (0.78, 0.70, 0.57),
-}
-"""Colours of mass-made things, sRGB."""
 
 
 def _tint(spec: BuildRequest, name: str = "colour", default: str = "white") -> tuple[float, float, float]:
@@ -69,7 +54,7 @@ def post(spec: BuildRequest) -> list[MeshPart]:
             u, v = 0.38 * lw, 0.3 * ld
             stamps.append(_leaf(x + u * c - v * s, y + u * s + v * c, top - 0.0004, lw * 0.1, ld * 0.22, turn, 0.0006))
     return parts_of(
-        (PAPER, letters),
+        ("paper", letters),
         (plain((0.62, 0.48, 0.33), 0.9), brown),
         (plain((0.70, 0.76, 0.80), 0.3), windows),
         (plain((0.55, 0.16, 0.16), 0.8), stamps),
@@ -162,7 +147,7 @@ def wall_calendar(spec: BuildRequest) -> list[MeshPart]:
         for z in np.linspace(h * 0.06, h * 0.42, 5)
     ]
     nail = cylinder(0.004, 0, 0.012).hung(0, y, h * 0.99)
-    return parts_of((PAPER, leaf), (art, picture), (plain((0.3, 0.3, 0.33), 0.8), days), (STEEL, nail))
+    return parts_of(("paper", leaf), (art, picture), (plain((0.3, 0.3, 0.33), 0.8), days), ("steel", nail))
 
 
 def folders(spec: BuildRequest) -> list[MeshPart]:
@@ -180,7 +165,7 @@ def folders(spec: BuildRequest) -> list[MeshPart]:
             box([x - t / 2 + 0.001, -d / 2 + y, 0], [x + t / 2 - 0.001, d / 2, h], 0.002)
         )
         labels.append(box([x - t * 0.3, -d / 2 + y - 0.0006, h * 0.45], [x + t * 0.3, -d / 2 + y + 0.001, h * 0.85]))
-    return parts_of(*((plain(TINTS[n], 0.55), s) for n, s in sorted(bodies.items())), (PAPER, labels))
+    return parts_of(*((plain(TINTS[n], 0.55), s) for n, s in sorted(bodies.items())), ("paper", labels))
 
 
 # ------------------------------------------------------------------ electric
@@ -198,7 +183,7 @@ def cable(spec: BuildRequest) -> list[MeshPart]:
     plug = box([-0.014, -0.02, 0], [0.014, 0.02, h], 0.004).moved(end[0], end[1])
     tip = box([-0.004, -0.012, 0], [0.004, 0.012, 0.006], 0.001).moved(*path[0, :2])
     skin = plain(_tint(spec), 0.45)
-    return parts_of((skin, [tube(path, 0.0022, 6), plug]), (STEEL, tip))
+    return parts_of((skin, [tube(path, 0.0022, 6), plug]), ("steel", tip))
 
 
 # ------------------------------------------------------------------ cloth
@@ -281,7 +266,7 @@ def dish_rack(spec: BuildRequest) -> list[MeshPart]:
     cups = [cup.moved(0.32 * w, y, 0.024) for y in (-0.2 * d, 0.2 * d)]
     return parts_of(
         (spec.metal("chrome"), wires),
-        (BLACK, feet),
+        ("black", feet),
         (plain((0.92, 0.91, 0.89), 0.15), stand),
         (plain(_tint(spec, "cup", "blue"), 0.2), cups),
     )
@@ -294,17 +279,11 @@ def jar(spec: BuildRequest) -> list[MeshPart]:
     outside = [(0, 0), (r * 0.94, 0), (r, 0.006), (r, body * 0.88), (r * 0.86, body)]
     within = [(r * 0.82, body), (r * 0.96, body * 0.86), (r * 0.96, 0.008), (0, 0.006)]
     shell = lathe([*outside, *within], 22, 0.7)
-    grain = {
-        "pasta": (0.85, 0.70, 0.38),
-        "beans": (0.45, 0.20, 0.14),
-        "flour": (0.92, 0.90, 0.85),
-        "coffee": (0.16, 0.09, 0.05),
-    }
     inside = lathe([(0, 0.009), (r * 0.93, 0.009), (r * 0.93, h * 0.6), (0, h * 0.61)], 20)
     lid = cylinder(r * 0.9, 0, h - body, 0.004, 20).moved(0, 0, body)
     return parts_of(
-        (GLASS, shell),
-        (plain(grain[spec.word("holds", "pasta")], 0.9), inside),
+        ("glass", shell),
+        (f"stored/{spec.word('holds', 'pasta')}", inside),
         (spec.metal("steel") if "metal" in spec.params else spec.material("wood", "oak/0"), lid),
     )
 
@@ -316,7 +295,7 @@ def tin(spec: BuildRequest) -> list[MeshPart]:
     can = lathe([(0, 0), (r, 0), (r, h), (r * 0.93, h), (r * 0.92, h - 0.004), (0, h - 0.004)], 20, 0.6)
     label = lathe([(r + 0.0005, h * 0.06), (r + 0.0005, h * 0.94)], 20)
     band = lathe([(r + 0.0009, h * 0.3), (r + 0.0009, h * 0.55)], 20)
-    return parts_of((STEEL, can), (plain(_tint(spec), 0.5), label), (PAPER, band))
+    return parts_of(("steel", can), (plain(_tint(spec), 0.5), label), ("paper", band))
 
 
 def packet(spec: BuildRequest) -> list[MeshPart]:
@@ -327,7 +306,7 @@ def packet(spec: BuildRequest) -> list[MeshPart]:
     patch = box([-w * 0.34, y, h * 0.14], [w * 0.34, y + 0.001, h * 0.56])
     return parts_of(
         (plain(_tint(spec), 0.55), box([-w / 2, -d / 2, 0], [w / 2, d / 2, h], 0.0015)),
-        (PAPER, stripe),
+        ("paper", stripe),
         (plain(_tint(spec, "patch", "yellow"), 0.55), patch),
     )
 
@@ -350,7 +329,7 @@ def duck(spec: BuildRequest) -> list[MeshPart]:
     beak = ball(0.5, 8, 6).scaled(w * 0.28, d * 0.2, h * 0.1).moved(0, -d * 0.42, h * 0.7)
     eyes = [ball(h * 0.035, 6, 4).moved(s * h * 0.13, -d * 0.36, h * 0.82) for s in (-1, 1)]
     return parts_of(
-        (plain(TINTS["yellow"], 0.35), [body, head, tail]), (plain(TINTS["orange"], 0.4), beak), (BLACK, eyes)
+        (plain(TINTS["yellow"], 0.35), [body, head, tail]), (plain(TINTS["orange"], 0.4), beak), ("black", eyes)
     )
 
 
@@ -383,7 +362,7 @@ def board_game(spec: BuildRequest) -> list[MeshPart]:
     """Flat boxes of games on one another."""
     (w, d, h), rng = spec.size, spec.rng
     count = int(spec.params.get("count", 2))
-    made: list[tuple[Finish, list[Shape] | Shape]] = []
+    made: list[FinishedShapes] = []
     names = ("red", "blue", "green", "orange", "black")
     turns = rng.permutation(len(names))
     for k in range(count):
@@ -392,7 +371,7 @@ def board_game(spec: BuildRequest) -> list[MeshPart]:
         lean = 0.0 if k == 0 else rng.normal(0, 0.06)
         case = box([-a / 2, -b / 2, 0], [a / 2, b / 2, t - 0.0012], 0.002).turned(lean)
         title = box([-a * 0.3, -b * 0.12, t - 0.0014], [a * 0.3, b * 0.12, t]).turned(lean)
-        made += [(plain(TINTS[names[turns[k % 5]]], 0.45), case.moved(z=k * t)), (PAPER, title.moved(z=k * t))]
+        made += [(plain(TINTS[names[turns[k % 5]]], 0.45), case.moved(z=k * t)), ("paper", title.moved(z=k * t))]
     return parts_of(*made)
 
 
@@ -412,4 +391,4 @@ def crayons(spec: BuildRequest) -> list[MeshPart]:
         line = [(w * (0.3 * np.cos(t) * s * 2), d * (0.3 * np.sin(2 * t) * s * 2), z) for t in np.linspace(0, 6.0, 14)]
         if k < 3:
             by[name].append(tube(line, 0.0012, 4))
-    return parts_of((PAPER, leaf), *((plain(TINTS[n], 0.6), s) for n, s in sorted(by.items())))
+    return parts_of(("paper", leaf), *((plain(TINTS[n], 0.6), s) for n, s in sorted(by.items())))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import BLACK, CHROME, WHITE, BuildRequest, parts_of, plain
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, box, cylinder, lathe, quads, tube
 from embodied.assets.records import MeshPart
 
@@ -13,7 +13,7 @@ def switch(spec: BuildRequest) -> list[MeshPart]:
     w, d, h = spec.size
     plate = box([-w / 2, -d * 0.1, 0], [w / 2, d / 2, h], 0.002)
     rocker = box([-w * 0.33, -d * 0.35, -h * 0.33], [w * 0.33, d * 0.2, h * 0.33], 0.0015).turned(0.05, "x")
-    return parts_of((WHITE, [plate, rocker.moved(0, -d * 0.1, h / 2)]))
+    return parts_of(("white", [plate, rocker.moved(0, -d * 0.1, h / 2)]))
 
 
 def socket(spec: BuildRequest) -> list[MeshPart]:
@@ -23,7 +23,7 @@ def socket(spec: BuildRequest) -> list[MeshPart]:
     ring = lathe(around, 24).hung(0, -d / 2, h / 2)
     well = lathe([(0, 0), (0.0195, 0), (0.0195, 0.0006), (0, 0.0006)], 24).hung(0, -d / 2, h / 2)
     holes = [cylinder(0.0025, 0, 0.001, 0, 10).hung(x, -d / 2 - 0.0003, h / 2) for x in (-0.0095, 0.0095)]
-    return parts_of((WHITE, [plate, ring]), (plain((0.78, 0.77, 0.75), 0.5), well), (BLACK, holes))
+    return parts_of(("white", [plate, ring]), (plain((0.78, 0.77, 0.75), 0.5), well), ("black", holes))
 
 
 def radiator(spec: BuildRequest) -> list[MeshPart]:
@@ -57,9 +57,9 @@ def radiator(spec: BuildRequest) -> list[MeshPart]:
         knob, pipe = _valve(w / 2 - 0.03, right, d, h)
     return parts_of(
         (spec.material("skin", "lacquer_white/0"), made),
-        (CHROME, pipe),
+        ("chrome", pipe),
         (plain((0.35, 0.35, 0.35), 0.6), grille),
-        (WHITE, knob),
+        ("white", knob),
     )
 
 

@@ -8,12 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from embodied.assets.built.parametric import (
-    BLACK,
-    CHROME,
-    GLASS,
-    STEEL,
-    WHITE,
     BuildRequest,
+    FinishedShapes,
     carcass,
     front,
     handle,
@@ -22,7 +18,7 @@ from embodied.assets.built.parametric import (
     plain,
 )
 from embodied.assets.built.primitives import Shape, between, box, cylinder, joined, lathe, quads, tube, upright
-from embodied.assets.records import Finish, MeshPart
+from embodied.assets.records import MeshPart
 
 TOP = 0.038
 """Thickness of the worktop, metres."""
@@ -36,15 +32,15 @@ def _base(
     doors: list[Shape],
     grips: list[Shape],
     top: list[Shape] | None = None,
-    extra: Sequence[tuple[Finish, list[Shape] | Shape]] = (),
+    extra: Sequence[FinishedShapes] = (),
 ) -> list[MeshPart]:
     w, d, _ = spec.size
     body = carcass((-w / 2, -d / 2 + 0.022, PLINTH[0]), (w / 2, d / 2, h - TOP), top=top is None)
     plinth = box([-w / 2, -d / 2 + 0.022 + PLINTH[1], 0], [w / 2, -d / 2 + 0.04 + PLINTH[1], PLINTH[0]])
     worktop = [box([-w / 2, -d / 2, h - TOP], [w / 2, d / 2, h], 0.003)] if top is None else top
     return parts_of(
-        (WHITE, body),
-        (BLACK, plinth),
+        ("white", body),
+        ("black", plinth),
         joints(doors),
         (spec.material("front", "lacquer_white/0"), doors),
         (spec.metal(), grips),
@@ -129,7 +125,7 @@ def sink(spec: BuildRequest) -> list[MeshPart]:
     edges = [-w / 2, 0, w / 2] if pair else [-w / 2, w / 2]
     doors = [front(a, b, z0, z1, y, style) for a, b in itertools.pairwise(edges)]
     grips = [handle(x, z1 - 0.12, y, _on_door(grip), True) for x in ((-0.05, 0.05) if pair else (w / 2 - 0.045,))]
-    return _base(spec, h, doors, grips, worktop, ((STEEL, [*rim, basin, drain]), (CHROME, tap)))
+    return _base(spec, h, doors, grips, worktop, (("steel", [*rim, basin, drain]), ("chrome", tap)))
 
 
 def cooker(spec: BuildRequest) -> list[MeshPart]:
@@ -164,9 +160,9 @@ def cooker(spec: BuildRequest) -> list[MeshPart]:
     display = [box([-0.06, y - 0.0015, z1 - 0.075], [0.06, y + 0.002, z1 - 0.035])]
     grip = _level_grip(0, z1 - panel - 0.05, y - 0.002, ow * 0.78)
     extra = (
-        (STEEL, [*steel, grip, *knobs, *racks]),
+        ("steel", [*steel, grip, *knobs, *racks]),
         (plain((0.10, 0.095, 0.09), 0.06), pane),
-        (WHITE, [*marks, *touch]),
+        ("white", [*marks, *touch]),
         (plain((0.03, 0.03, 0.035), 0.08), [*glass, *hob, *display]),
         (plain((0.55, 0.55, 0.56), 0.3), rings),
     )
@@ -197,7 +193,7 @@ def wall_cabinet(spec: BuildRequest) -> list[MeshPart]:
     columns = max(2, round(w / 0.4)) if spec.params.get("glazed") and w > 0.45 else max(1, round(w / 0.5))
     edges = np.linspace(-w / 2, w / 2, columns + 1)
     doors, grips, panes, inside = [], [], [], []
-    crockery: list[tuple[Finish, list[Shape] | Shape]] = []
+    crockery: list[FinishedShapes] = []
     for k, (a, b) in enumerate(itertools.pairwise(edges)):
         if spec.params.get("glazed"):
             r = 0.05
@@ -218,18 +214,18 @@ def wall_cabinet(spec: BuildRequest) -> list[MeshPart]:
         inside = [box([-w / 2 + 0.018, y + 0.05, z], [w / 2 - 0.018, d / 2 - 0.01, z + 0.018]) for z in heights]
         crockery = _crockery(w - 0.06, y + 0.06, d / 2 - 0.03, (0.018, h / 3 + 0.018, 2 * h / 3 + 0.018), rng=spec.rng)
     return parts_of(
-        (WHITE, [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
+        ("white", [carcass((-w / 2, y + 0.02, 0), (w / 2, d / 2, h)), *inside]),
         joints([] if spec.params.get("glazed") else doors),
         (spec.material("front", "lacquer_white/0"), doors),
         (spec.metal(), grips),
         *crockery,
-        (GLASS, panes),
+        ("glass", panes),
     )
 
 
 def _crockery(
     width: float, y0: float, y1: float, boards: Sequence[float], *, rng: np.random.Generator
-) -> list[tuple[Finish, list[Shape] | Shape]]:
+) -> list[FinishedShapes]:
     """Plates below, bowls and cups above them, glasses on top, standing on boards between y0 and y1."""
     y, r = (y0 + y1) / 2, min(0.10, (y1 - y0) / 2)
     plate = [(0, 0), (r * 0.6, 0), (r, 0.02), (r * 0.99, 0.022), (r * 0.6, 0.006), (0, 0.005)]
@@ -249,7 +245,7 @@ def _crockery(
     for x in (width * 0.14, width * 0.34):
         light.append(joined(lathe(cup, 14, 0.6), ear).turned(float(rng.uniform(-2.6, -0.5))).moved(x, y, boards[1]))
     clear += [lathe(glass, 12, 0.6).moved(x * width, y, boards[2]) for x in (-0.38, -0.22, -0.06, 0.14, 0.3)]
-    return [(white, light), (colour, tinted), (GLASS, clear)]
+    return [(white, light), (colour, tinted), ("glass", clear)]
 
 
 def tall_cabinet(spec: BuildRequest) -> list[MeshPart]:
@@ -297,7 +293,7 @@ def fridge(spec: BuildRequest) -> list[MeshPart]:
     return parts_of(
         (skin, doors),
         (sides, body),
-        (BLACK, [base]),
+        ("black", [base]),
         (plain((0.09, 0.09, 0.095), 0.7), seal),
         (plain((0.3, 0.3, 0.31), 0.5), [*slats, *hinges]),
         (spec.metal("steel"), [*grips, badge]),
@@ -307,14 +303,14 @@ def fridge(spec: BuildRequest) -> list[MeshPart]:
     )
 
 
-def _display(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
+def _display(y: float, z: float) -> list[FinishedShapes]:
     """The temperature on a fridge's door at y."""
     panel = box([-0.055, y - 0.0012, z], [0.055, y + 0.001, z + 0.034], 0.0005)
     digits = [box([x, y - 0.0018, z + 0.012], [x + 0.007, y, z + 0.022]) for x in (-0.035, -0.024, 0.016, 0.027)]
     return [(plain((0.02, 0.02, 0.025), 0.08), panel), (plain((0.55, 0.8, 0.9), 0.3), digits)]
 
 
-def _water(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
+def _water(y: float, z: float) -> list[FinishedShapes]:
     """Water and ice from a fridge's door at y: a steel frame, a dark niche, keys over it, a spout, a tray."""
     wide, high, rim, x = 0.20, 0.36, 0.012, 0.04
     x0, x1, sill = x - wide / 2, x + wide / 2, z + 0.26
@@ -336,7 +332,7 @@ def _water(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
     lever = box([x - 0.02, y - 0.008, z + 0.07], [x + 0.02, y, sill - 0.06], 0.003)
     tray = box([x0 + rim, y - 0.022, z + rim], [x1 - rim, y, z + rim + 0.008], 0.002)
     return [
-        (STEEL, [*frame, tray]),
+        ("steel", [*frame, tray]),
         (plain((0.035, 0.035, 0.04), 0.25), [niche, keys]),
         (plain((0.2, 0.2, 0.21), 0.3), [spout, lever]),
         (plain((0.55, 0.8, 0.9), 0.3), lit),
@@ -345,9 +341,9 @@ def _water(y: float, z: float) -> list[tuple[Finish, list[Shape] | Shape]]:
 
 def _notes(
     count: int, w: float, h: float, y: float, *, rng: np.random.Generator
-) -> tuple[list[tuple[Finish, list[Shape] | Shape]], list[Shape]]:
+) -> tuple[list[FinishedShapes], list[Shape]]:
     """Papers on a fridge's door at y, and the magnets that hold them."""
-    papers: list[tuple[Finish, list[Shape] | Shape]] = []
+    papers: list[FinishedShapes] = []
     magnets: list[Shape] = []
     for k in range(count):
         x = (k % 3 - 1) * w * 0.24 + rng.normal(0, 0.015) + 0.03
@@ -391,7 +387,7 @@ def island(spec: BuildRequest) -> list[MeshPart]:
     top = box([-w / 2, -d / 2, z1], [w / 2, d / 2, h], 0.004)
     return parts_of(
         (spec.material("front", "lacquer_white/0"), [*doors, body]),
-        (BLACK, plinth),
+        ("black", plinth),
         joints(doors),
         (spec.metal(), grips),
         (spec.material("worktop", "oak_worktop/0"), top),

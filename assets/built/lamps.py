@@ -6,12 +6,9 @@ import itertools
 
 import numpy as np
 
-from embodied.assets.built.parametric import BULB, LIGHTS, SHADE, WHITE, BuildRequest, parts_of, plain, tinted
+from embodied.assets.built.parametric import LIGHTS, BuildRequest, parts_of, plain, tinted
 from embodied.assets.built.primitives import Shape, ball, box, cylinder, joined, lathe, quads, sheet, tube
 from embodied.assets.records import Finish, MeshPart
-
-OPAL = plain((0.96, 0.94, 0.89), 0.3, emission=(7.0, 5.9, 4.5))
-GLOW = plain((1.0, 0.96, 0.88), 0.3, emission=BULB)
 
 
 def _bulb(z: float, r: float = 0.03) -> Shape:
@@ -30,7 +27,7 @@ def _drum(r0: float, r1: float, z0: float, z1: float, segments: int = 32) -> Sha
 
 
 def _cloth(spec: BuildRequest) -> Finish:
-    return tinted(spec.material("shade", "linen/1"), SHADE)
+    return tinted(spec.material("shade", "linen/1"), LIGHTS["shade"])
 
 
 def pendant(spec: BuildRequest) -> list[MeshPart]:
@@ -42,18 +39,18 @@ def pendant(spec: BuildRequest) -> list[MeshPart]:
     socket = lathe([(0, body - 0.045), (0.02, body - 0.045), (0.022, body), (0.012, body + 0.03), (0, body + 0.03)], 16)
     rim, mount = spec.metal("black"), [_canopy(h), cord, socket]
     if kind == "globe":
-        return parts_of((rim, mount), (OPAL, ball(r, 28, 17).moved(0, 0, r)))
+        return parts_of((rim, mount), ("opal", ball(r, 28, 17).moved(0, 0, r)))
     if kind == "drum":
         around = [(r * 0.97 * np.cos(t), r * 0.97 * np.sin(t), 0.006) for t in np.linspace(0, 6.283, 33)[:-1]]
         ring, shade = tube(around, 0.003, 5, closed=True), _drum(r, r * 0.96, 0, body)
-        return parts_of((rim, [*mount, ring]), (_cloth(spec), shade), (GLOW, _bulb(body * 0.5)))
+        return parts_of((rim, [*mount, ring]), (_cloth(spec), shade), ("bulb", _bulb(body * 0.5)))
     t = np.linspace(0, 1, 12)
     outer = np.stack([r * (1 - 0.82 * t), body * t], 1)
     if kind == "dome":
         outer = np.stack([r * np.cos(t * 1.42), body * np.sin(t * np.pi / 2)], 1)
     shell = lathe([*outer, (0.0, body)], 32, 0.9)
     inner = lathe([(0.0, body - 0.004), *(outer[::-1] * [0.985, 0.985])], 32, 0.9)
-    return parts_of((rim, [*mount, shell]), (plain((0.95, 0.94, 0.90), 0.5), inner), (GLOW, _bulb(body * 0.45)))
+    return parts_of((rim, [*mount, shell]), (plain((0.95, 0.94, 0.90), 0.5), inner), ("bulb", _bulb(body * 0.45)))
 
 
 def flush(spec: BuildRequest) -> list[MeshPart]:
@@ -67,7 +64,7 @@ def flush(spec: BuildRequest) -> list[MeshPart]:
         hoops = [lathe(hoop(z), 36) for z in (0.0, h - 0.010)]
         nut = lathe([(0, 0.002), (0.010, 0.003), (0.013, 0.008), (0.008, 0.012), (0, 0.012)], 16, 0.9)
         shade = _drum(r * 0.995, r * 0.995, 0.002, h - 0.006, 36)
-        return parts_of((WHITE, base), (spec.metal("steel"), [*hoops, nut]), (_cloth(spec), shade), (OPAL, glass))
+        return parts_of(("white", base), (spec.metal("steel"), [*hoops, nut]), (_cloth(spec), shade), ("opal", glass))
     t = np.linspace(0, np.pi / 2, 10)
     low = 0.012
     curve = np.stack([r * 0.96 * np.sin(t), low + (h - 0.02 - low) * (1 - np.cos(t))], 1)
@@ -75,7 +72,7 @@ def flush(spec: BuildRequest) -> list[MeshPart]:
     lip = [(r * 0.93, h - 0.03), (r * 0.985, h - 0.03), (r, h - 0.022), (r, h - 0.004), (r * 0.93, h - 0.002)]
     turn = [(0, 0), (0.006, 0.001), (0.009, 0.006), (0.007, 0.011), (0.016, 0.014), (0.016, 0.017), (0, 0.017)]
     rim, nut = lathe(lip, 36), lathe(turn, 16, 0.9)
-    return parts_of((spec.metal("steel"), [base, rim, nut]), (OPAL, bowl))
+    return parts_of((spec.metal("steel"), [base, rim, nut]), ("opal", bowl))
 
 
 def panel(spec: BuildRequest) -> list[MeshPart]:
@@ -120,8 +117,8 @@ def bar(spec: BuildRequest) -> list[MeshPart]:
     return parts_of(
         (spec.material("wood", "walnut/0"), wood),
         (rim, [rod, _canopy(h), *(s.moved(x) for x in places for s in (cap, lip))]),
-        (OPAL, [shade.moved(x) for x in places]),
-        (GLOW, [_bulb(high * 0.45, r * 0.34).moved(x) for x in places]),
+        ("opal", [shade.moved(x) for x in places]),
+        ("bulb", [_bulb(high * 0.45, r * 0.34).moved(x) for x in places]),
     )
 
 
@@ -144,10 +141,10 @@ def sconce(spec: BuildRequest) -> list[MeshPart]:
     arm = tube(np.stack([0 * s, back - (back - y) * s, h * 0.35 - 0.25 * h * np.sin(np.pi * s) * 0.5], 1), 0.007, 8)
     rim = spec.metal("brass")
     if spec.params.get("kind") == "globe":
-        return parts_of((rim, [plate, arm]), (OPAL, ball(r, 20, 13).moved(0, y, h - r)))
+        return parts_of((rim, [plate, arm]), ("opal", ball(r, 20, 13).moved(0, y, h - r)))
     stem = tube([(0, y, h * 0.35), (0, y, h * 0.55)], 0.007, 8)
     shade = _drum(r, r * 0.7, h * 0.4, h, 24).moved(0, y, 0)
-    return parts_of((rim, [plate, arm, stem]), (_cloth(spec), shade), (GLOW, _bulb(h * 0.66, 0.024).moved(0, y, 0)))
+    return parts_of((rim, [plate, arm, stem]), (_cloth(spec), shade), ("bulb", _bulb(h * 0.66, 0.024).moved(0, y, 0)))
 
 
 def standing(spec: BuildRequest) -> list[MeshPart]:
@@ -165,7 +162,7 @@ def standing(spec: BuildRequest) -> list[MeshPart]:
     ]
     body = spec.material("body", "brass/0") if "body" in spec.params else spec.metal("brass")
     shade = _drum(r, r * float(spec.params.get("taper", 0.8)), z0, h - 0.004)
-    return parts_of((body, stem), (spec.metal("brass"), spider), (_cloth(spec), shade), (GLOW, _bulb(z0 + sh * 0.45)))
+    return parts_of((body, stem), (spec.metal("brass"), spider), (_cloth(spec), shade), ("bulb", _bulb(z0 + sh * 0.45)))
 
 
 def _stem(kind: str, r: float, top: float, tall: bool) -> Shape:
@@ -196,5 +193,5 @@ def desk_lamp(spec: BuildRequest) -> list[MeshPart]:
     tilt = 0.35
     place = [s.turned(-tilt, "y").moved(w * 0.2, 0, h * 0.9) for s in (head, inner, _bulb(-0.05, 0.022))]
     return parts_of(
-        (spec.metal("black"), [foot, *arms, place[0]]), (plain((0.93, 0.92, 0.88), 0.4), place[1]), (GLOW, place[2])
+        (spec.metal("black"), [foot, *arms, place[0]]), (plain((0.93, 0.92, 0.88), 0.4), place[1]), ("bulb", place[2])
     )

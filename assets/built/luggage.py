@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.parametric import BLACK, CHROME, STEEL, BuildRequest, parts_of, plain
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, box, flat, joined, sheet, tube
 from embodied.assets.records import MeshPart
-
-SEAM = plain((0.06, 0.055, 0.05), 0.8, specular=0.1)
-"""Zips and edgings."""
 
 
 def rucksack(spec: BuildRequest) -> list[MeshPart]:
@@ -41,8 +38,8 @@ def rucksack(spec: BuildRequest) -> list[MeshPart]:
     return parts_of(
         (cloth, [body, pocket.shifted_uv(0.1, 0.3), *sides]),
         (trim, [foot, loop, *straps, label]),
-        (SEAM, zips),
-        (STEEL, pulls),
+        ("seam", zips),
+        ("steel", pulls),
     )
 
 
@@ -104,8 +101,8 @@ def suitcase(spec: BuildRequest) -> list[MeshPart]:
     ]
     return parts_of(
         (spec.material("shell", "leather/0") if "shell" in spec.params else plain((0.15, 0.29, 0.46), 0.35), halves),
-        (CHROME, [seam, *locks, *posts]),
-        (BLACK, [grip, *feet]),
+        ("chrome", [seam, *locks, *posts]),
+        ("black", [grip, *feet]),
         (plain((0.55, 0.55, 0.56), 0.35, 1.0), corners),
     )
 

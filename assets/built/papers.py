@@ -4,18 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import (
-    BLACK,
-    BRASS,
-    CHROME,
-    PAPER,
-    PORCELAIN,
-    STEEL,
-    BuildRequest,
-    parts_of,
-    plain,
-    whole_image,
-)
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -32,7 +21,7 @@ from embodied.assets.built.primitives import (
     tube,
     upright,
 )
-from embodied.assets.records import Finish, MeshPart
+from embodied.assets.records import MeshPart
 
 CLOTH = (
     (0.55, 0.16, 0.14),
@@ -48,20 +37,8 @@ CLOTH = (
     (0.35, 0.16, 0.22),
     (0.80, 0.78, 0.74),
 )
-GILT, INK = plain((0.80, 0.70, 0.45), 0.45), plain((0.14, 0.12, 0.12), 0.6)
 PALE = 1.35
 """Sum of a cloth's channels from which on it is printed dark."""
-SHELVES = (
-    "bookcase",
-    "shelving unit",
-    "desk",
-    "sideboard",
-    "bedside table",
-    "coffee table",
-    "side table",
-    "open wall shelf",
-    "wall unit",
-)
 
 
 def _book(w: float, d: float, h: float, *, rng: np.random.Generator) -> tuple[Shape, Shape, Shape | None]:
@@ -110,16 +87,16 @@ def _on_front(w: float, d: float, h: float, *, rng: np.random.Generator) -> Shap
     return quads([[(x, y1, z0), (x, y0, z0), (x, y0, z1), (x, y1, z1)] for y0, y1, z0, z1 in lines])
 
 
-def _ink(cloth: int) -> Finish:
+def _ink(cloth: int) -> str:
     """Gilt on dark cloth, dark print on light cloth."""
-    return INK if sum(CLOTH[cloth]) > PALE else GILT
+    return "ink" if sum(CLOTH[cloth]) > PALE else "gilt"
 
 
 def book_row(spec: BuildRequest) -> list[MeshPart]:
     """Books side by side, of many heights and colours; the last ones may lean."""
     (w, d, h), rng = spec.size, spec.rng
     by_color: dict[int, list[Shape]] = {}
-    titles: dict[Finish, list[Shape]] = {GILT: [], INK: []}
+    titles: dict[str, list[Shape]] = {"gilt": [], "ink": []}
     pages, bands = [], []
     (prints,) = rng.spawn(1)
     x = -w / 2
@@ -143,8 +120,8 @@ def book_row(spec: BuildRequest) -> list[MeshPart]:
             break
     return parts_of(
         *((plain(CLOTH[k], 0.75, specular=0.25), s) for k, s in sorted(by_color.items())),
-        (PAPER, pages),
-        (plain((0.80, 0.70, 0.45), 0.45), bands),
+        ("paper", pages),
+        ("gilt", bands),
         *titles.items(),
     )
 
@@ -173,7 +150,7 @@ def book_stack(spec: BuildRequest) -> list[MeshPart]:
         covers += [(plain(CLOTH[cloth], 0.6, specular=0.3), place[0]), (_ink(cloth), place[2])]
         pages.append(place[1])
         z += t
-    return parts_of(*covers, (PAPER, pages))
+    return parts_of(*covers, ("paper", pages))
 
 
 def magazine(spec: BuildRequest) -> list[MeshPart]:
@@ -185,7 +162,7 @@ def magazine(spec: BuildRequest) -> list[MeshPart]:
     top = whole_image(sheet(grid), cover, -w / 2, w / 2, -d / 2, d / 2, "xy", keep_aspect=False)
     edge = between(rim(grid) * [1, 1, 0], rim(grid))
     base = quads([[(-w / 2, d / 2, 0), (w / 2, d / 2, 0), (w / 2, -d / 2, 0), (-w / 2, -d / 2, 0)]])
-    return parts_of((cover, top), (PAPER, [edge, base]))
+    return parts_of((cover, top), ("paper", [edge, base]))
 
 
 def papers(spec: BuildRequest) -> list[MeshPart]:
@@ -196,7 +173,7 @@ def papers(spec: BuildRequest) -> list[MeshPart]:
         leaf = box([-w * 0.46, -d * 0.46, 0], [w * 0.46, d * 0.46, h * 0.16])
         leaf = leaf.turned(rng.normal(0, 0.05) if k else 0.0)
         leaves.append(leaf.moved(rng.normal(0, 0.004), rng.normal(0, 0.004), z))
-    return parts_of((PAPER, leaves))
+    return parts_of(("paper", leaves))
 
 
 def photo_frame(spec: BuildRequest) -> list[MeshPart]:
@@ -209,9 +186,9 @@ def photo_frame(spec: BuildRequest) -> list[MeshPart]:
     image = whole_image(upright(*inside, 0.004), art, *inside)
     back = box([-w / 2 + 0.004, 0.010, 0.004], [w / 2 - 0.004, 0.013, h - 0.004])
     leg = bar([0, h * 0.13 + 0.012, h * 0.6], [0, h * 0.34, 0.002], 0.035, 0.003)
-    wood = {"brass": BRASS, "black": BLACK, "white": PORCELAIN}.get(spec.word("frame", "oak")) or spec.finish("oak/0")
+    wood = {"brass": "brass", "black": "black", "white": "porcelain"}.get(spec.word("frame", "oak"), "oak/0")
     lean = [s.turned(-tilt, "x") for s in (joined(*boards), image, back)]
-    return parts_of((wood, lean[0]), (art, lean[1]), (BLACK, [lean[2], leg]))
+    return parts_of((spec.named(wood), lean[0]), (art, lean[1]), ("black", [lean[2], leg]))
 
 
 def alarm_clock(spec: BuildRequest) -> list[MeshPart]:
@@ -246,8 +223,8 @@ def alarm_clock(spec: BuildRequest) -> list[MeshPart]:
         )
         for s in (-1, 1)
     ]
-    skin = {"brass": BRASS, "black": BLACK, "chrome": CHROME}[spec.word("metal", "brass")]
-    bright = BRASS if skin is BRASS else CHROME
+    skin = spec.word("metal", "brass")
+    bright = "brass" if skin == "brass" else "chrome"
     return parts_of((skin, shell), (bright, [ring, *bells, *hammer, bow, *feet]), (face, disc))
 
 
@@ -281,7 +258,7 @@ def keys(spec: BuildRequest) -> list[MeshPart]:
         )
         made.append(joined(bow, blade).turned(a).moved(0, d * 0.3, 0.001 + 0.0022 * k))
     tag = box([0.014, -0.010, 0], [0.060, 0.010, 0.003], 0.001).turned(0.3).moved(0, d * 0.3, 0.001)
-    return parts_of((STEEL, [ring, made[0], made[2]]), (BRASS, made[1]), (plain((0.36, 0.22, 0.13), 0.6), tag))
+    return parts_of(("steel", [ring, made[0], made[2]]), ("brass", made[1]), (plain((0.36, 0.22, 0.13), 0.6), tag))
 
 
 def tissue_box(spec: BuildRequest) -> list[MeshPart]:
@@ -293,7 +270,7 @@ def tissue_box(spec: BuildRequest) -> list[MeshPart]:
     slot = lathe([(0.0, 0.0), (1.0, 0.0), (1.0, 0.0008), (0.0, 0.0008)], 24)
     return parts_of(
         (spec.material("skin", "cotton/3"), box([-w / 2, -d / 2, 0], [w / 2, d / 2, top], 0.003)),
-        (BLACK, slot.scaled(w * 0.32, d * 0.2, 1).moved(0, 0, top - 0.0004)),
+        ("black", slot.scaled(w * 0.32, d * 0.2, 1).moved(0, 0, top - 0.0004)),
         (plain((0.95, 0.95, 0.95), 0.95, specular=0.05), tissue.two_sided()),
     )
 

@@ -6,35 +6,32 @@ import dataclasses
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from embodied.assets.built.primitives import Shape, between, box, fitted, frame, joined, lathe, outline, part, tube
+from embodied.assets.json_file import from_plain, read_toml
 from embodied.assets.records import Asset, Color, Finish, MeshPart, Size, SupportSurface
 
 FinishOf = Callable[[str], Finish]
 ParamValues = Mapping[str, str | float]
 """Details of a thing beside its size: the row's `look`, over which a placement lays its own params."""
+FinishedShapes = tuple[Finish | str, list[Shape] | Shape]
+"""A finish, or the name of a plain one, and what has it."""
 
-WHITE = Finish(color=(0.88, 0.87, 0.85, 1.0), roughness=0.35)
-PORCELAIN = Finish(color=(0.91, 0.90, 0.88, 1.0), roughness=0.12)
-BLACK = Finish(color=(0.045, 0.045, 0.05, 1.0), roughness=0.4)
-GAP = Finish(color=(0.05, 0.048, 0.045, 1.0), roughness=1.0, specular=0.05)
-"""The dark behind the joints of doors and drawers: they look dark, and are finer than the baked light."""
-GLASS = Finish(color=(0.88, 0.93, 0.92, 0.16), roughness=0.03)
-MIRROR = Finish(color=(0.82, 0.84, 0.84, 1.0), roughness=0.02, metallic=1.0, mirror=True)
-CHROME = Finish(color=(0.83, 0.83, 0.84, 1.0), roughness=0.09, metallic=1.0)
-STEEL = Finish(color=(0.70, 0.70, 0.69, 1.0), roughness=0.3, metallic=1.0)
-BRASS = Finish(color=(0.78, 0.62, 0.35, 1.0), roughness=0.25, metallic=1.0)
-PAPER = Finish(color=(0.90, 0.885, 0.84, 1.0), roughness=0.9, specular=0.2)
-SOIL = Finish(color=(0.13, 0.09, 0.065, 1.0), roughness=1.0, specular=0.1)
-BULB = (16.0, 13.4, 10.2)
-"""Linear radiance of a bare warm bulb."""
-SHADE = (5.0, 4.0, 2.9)
-"""Linear radiance of a lit fabric shade."""
-LIGHTS = {"bulb": BULB, "shade": SHADE, "panel": (6.0, 5.6, 5.0), "downlight": (26.0, 22.5, 18.0)}
-"""Linear relative radiance of lamps, by name."""
-METALS = {"chrome": CHROME, "steel": STEEL, "brass": BRASS, "black": BLACK, "white": WHITE}
+
+@dataclass(frozen=True)
+class _BuiltFinishes:
+    """The content of finishes.toml."""
+
+    finishes: Mapping[str, Finish]
+    tints: Mapping[str, Color]
+    lights: Mapping[str, Color]
+
+
+_READ = from_plain(_BuiltFinishes, read_toml(Path(__file__).with_name("finishes.toml")))
+PLAIN, TINTS, LIGHTS = _READ.finishes, _READ.tints, _READ.lights
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +48,12 @@ class BuildRequest:
         return str(self.params.get(name, default))
 
     def metal(self, default: str = "steel") -> Finish:
-        """The metal that params['metal'] names: one of METALS or a material key."""
-        name = self.word("metal", default)
-        return METALS[name] if name in METALS else self.finish(name)
+        """The metal that params['metal'] names: a plain finish or a material key."""
+        return self.named(self.word("metal", default))
+
+    def named(self, name: str) -> Finish:
+        """A plain finish or a material by its name."""
+        return PLAIN[name] if name in PLAIN else self.finish(name)
 
     def material(self, name: str, default: str) -> Finish:
         """The finish of the material key in params[name]."""
@@ -148,14 +148,14 @@ def front(x0: float, x1: float, z0: float, z1: float, y: float, style: str = "fl
     return joined(*frame(x0, x1, z0, z1, (y, y + thick), rail, 0.0015), panel)
 
 
-def joints(fronts: Sequence[Shape]) -> tuple[Finish, list[Shape]]:
+def joints(fronts: Sequence[Shape]) -> tuple[str, list[Shape]]:
     """The dark of the joints around doors and drawers with its finish: a narrow frame a little behind each."""
     frames = []
     for shape in fronts:
         (x0, y, z0), (x1, _, z1) = shape.vertices.min(0), shape.vertices.max(0)
         outer, inner = (outline(x0 + by, x1 - by, z0 + by, z1 - by, y + 0.003) for by in (-0.003, 0.006))
         frames.append(between(outer, inner))
-    return GAP, frames
+    return "gap", frames
 
 
 def handle(x: float, z: float, y: float, style: str = "bar", upright: bool = False, length: float = 0.14) -> Shape:
@@ -190,11 +190,11 @@ def carcass(low: tuple[float, float, float], high: tuple[float, float, float], t
     return joined(*shapes)
 
 
-def parts_of(*pairs: tuple[Finish, list[Shape] | Shape]) -> list[MeshPart]:
-    """One MeshPart per (finish, shapes), leaving out empty ones."""
+def parts_of(*pairs: FinishedShapes) -> list[MeshPart]:
+    """One MeshPart per (finish or the name of a plain one, shapes), leaving out empty ones."""
     made = []
     for f, shapes in pairs:
         shapes = [shapes] if isinstance(shapes, Shape) else list(shapes)
         if shapes:
-            made.append(part(f, *shapes))
+            made.append(part(PLAIN[f] if isinstance(f, str) else f, *shapes))
     return made

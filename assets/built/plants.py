@@ -4,23 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import SOIL, BuildRequest, parts_of, plain
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, lathe, sheet, tube
 from embodied.assets.records import MeshPart, Size
-
-GREENS = {
-    "broad": ((0.16, 0.30, 0.12), (0.26, 0.42, 0.16)),
-    "grass": ((0.24, 0.40, 0.18), (0.42, 0.55, 0.28)),
-    "trailing": ((0.20, 0.36, 0.16), (0.40, 0.54, 0.26)),
-    "rubber": ((0.09, 0.19, 0.10), (0.14, 0.27, 0.13)),
-}
-"""Kind of plant to its dark and its light leaves, sRGB."""
-POTS = {
-    "white": plain((0.88, 0.87, 0.84), 0.4),
-    "terracotta": plain((0.66, 0.40, 0.28), 0.8),
-    "grey": plain((0.45, 0.45, 0.45), 0.7),
-    "black": plain((0.09, 0.09, 0.10), 0.5),
-}
 
 
 def plant(spec: BuildRequest) -> list[MeshPart]:
@@ -32,13 +18,12 @@ def plant(spec: BuildRequest) -> list[MeshPart]:
     soil = lathe([(pr * 0.9, ph * 0.87), (0, ph * 0.87)], 20)
     soil = Shape(soil.vertices, soil.faces, np.tile([0.0, 0, 1.0], (len(soil.vertices), 1)), soil.uv)
     leaves, stems = _leaves(kind, spec.size, ph, rng=spec.rng)
-    dark, light = GREENS[kind]
     return parts_of(
-        (POTS[spec.word("pot", "white")], pot),
-        (SOIL, soil),
+        (f"pot/{spec.word('pot', 'white')}", pot),
+        ("soil", soil),
         (plain((0.28, 0.30, 0.16), 0.8), stems),
-        (plain(dark, 0.4), leaves[::2]),
-        (plain(light, 0.45), leaves[1::2]),
+        (f"dark leaf/{kind}", leaves[::2]),
+        (f"light leaf/{kind}", leaves[1::2]),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import WHITE, BuildRequest, parts_of, plain, whole_image
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -98,7 +98,7 @@ def sheer(spec: BuildRequest) -> list[MeshPart]:
     w, d, h = spec.size
     grid = folds(w * 0.97, h - 0.03, max(6, round(w / 0.09)), min(d * 0.35, 0.035), rng=spec.rng, rows=5)
     rail = box([-w / 2, -0.012, h - 0.03], [w / 2, 0.02, h], 0.002)
-    return parts_of((plain((0.93, 0.93, 0.92), 0.9, specular=0.05), sheet(grid, 0.001)), (WHITE, rail))
+    return parts_of((plain((0.93, 0.93, 0.92), 0.9, specular=0.05), sheet(grid, 0.001)), ("white", rail))
 
 
 def roller_blind(spec: BuildRequest) -> list[MeshPart]:
@@ -111,7 +111,7 @@ def roller_blind(spec: BuildRequest) -> list[MeshPart]:
     spans = ((-w / 2, -w / 2 + 0.02), (w / 2 - 0.02, w / 2))
     ends = [box([a, -d / 2, h - 2 * r], [b, d / 2, h], 0.003) for a, b in spans]
     chain = tube([(w / 2 - 0.01, -d / 2 + 0.006, h - r), (w / 2 - 0.01, -d / 2 + 0.006, h * 0.35)], 0.002, 5)
-    return parts_of((spec.material("cloth", "screen/0"), [roll, cloth]), (WHITE, [foot, *ends, chain]))
+    return parts_of((spec.material("cloth", "screen/0"), [roll, cloth]), ("white", [foot, *ends, chain]))
 
 
 def cushion(spec: BuildRequest) -> list[MeshPart]:

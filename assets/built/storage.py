@@ -7,9 +7,6 @@ import itertools
 import numpy as np
 
 from embodied.assets.built.parametric import (
-    BLACK,
-    MIRROR,
-    STEEL,
     BuildRequest,
     ParamValues,
     carcass,
@@ -93,10 +90,10 @@ def wardrobe(spec: BuildRequest) -> list[MeshPart]:
     top = box([-w / 2, -d / 2, h - 0.018], [w / 2, d / 2, h], 0.002)
     return parts_of(
         (spec.material("front", "lacquer_white/0"), [*doors, body, top]),
-        (BLACK, plinth),
+        ("black", plinth),
         joints(doors),
         (spec.metal("steel"), grips),
-        (MIRROR, glass),
+        ("mirror", glass),
     )
 
 
@@ -143,7 +140,7 @@ def storage_box(spec: BuildRequest) -> list[MeshPart]:
     body = box([-w / 2 + 0.004, -d / 2 + 0.004, 0], [w / 2 - 0.004, d / 2 - 0.004, h * 0.85], 0.004)
     lid = box([-w / 2, -d / 2, h * 0.72], [w / 2, d / 2, h], 0.005)
     label = box([-0.035, -d / 2 + 0.002, h * 0.36], [0.035, -d / 2 + 0.005, h * 0.52], 0.001)
-    return parts_of((spec.material("skin", "linen/2"), [body, lid]), (STEEL, label))
+    return parts_of((spec.material("skin", "linen/2"), [body, lid]), ("steel", label))
 
 
 def bean_bag(spec: BuildRequest) -> list[MeshPart]:

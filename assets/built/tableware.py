@@ -5,18 +5,9 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from embodied.assets.built.parametric import BLACK, BRASS, GLASS, STEEL, BuildRequest, parts_of, plain
+from embodied.assets.built.parametric import BuildRequest, parts_of, plain
 from embodied.assets.built.primitives import Shape, ball, box, cylinder, extruded, lathe, tube
 from embodied.assets.records import MeshPart
-
-MUGS = {
-    "white": plain((0.91, 0.90, 0.88), 0.18),
-    "blue": plain((0.22, 0.34, 0.48), 0.18),
-    "green": plain((0.40, 0.50, 0.42), 0.18),
-    "red": plain((0.62, 0.18, 0.15), 0.18),
-    "yellow": plain((0.86, 0.68, 0.28), 0.18),
-    "black": plain((0.09, 0.09, 0.10), 0.18),
-}
 
 
 def cup(r: float, h: float, taper: float = 0.92, wall: float = 0.004) -> Shape:
@@ -34,7 +25,7 @@ def mug(spec: BuildRequest) -> list[MeshPart]:
     ear = tube(bow, 0.0055, 8)
     drink = [lathe([(r * 0.9, 0), (0, 0.0001)], 24).moved(cx, 0, h * 0.8)] if spec.params.get("coffee") else []
     return parts_of(
-        (MUGS[spec.word("colour", "white")], [cup(r, h).moved(cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink)
+        (f"mug/{spec.word('colour', 'white')}", [cup(r, h).moved(cx), ear]), (plain((0.11, 0.06, 0.035), 0.1), drink)
     )
 
 
@@ -47,7 +38,7 @@ def tumbler(spec: BuildRequest) -> list[MeshPart]:
         if spec.params.get("water")
         else []
     )
-    return parts_of((GLASS, cup(r, h, 0.84, 0.0025)), (plain((0.75, 0.85, 0.88), 0.03), drink))
+    return parts_of(("glass", cup(r, h, 0.84, 0.0025)), (plain((0.75, 0.85, 0.88), 0.03), drink))
 
 
 def plates(spec: BuildRequest) -> list[MeshPart]:
@@ -57,9 +48,7 @@ def plates(spec: BuildRequest) -> list[MeshPart]:
     step = (h - 0.022) / max(count - 1, 1)
     below = [(0, 0), (r * 0.58, 0), (r * 0.62, 0.004), (r * 0.98, 0.018), (r, 0.021)]
     one = lathe([*below, (r * 0.985, 0.022), (r * 0.64, 0.008), (r * 0.56, 0.005), (0, 0.005)], 36, 0.6)
-    tints = {"white": (0.92, 0.91, 0.89), "blue": (0.32, 0.43, 0.52), "sand": (0.80, 0.73, 0.63)}
-    color = plain(tints[spec.word("colour", "white")], 0.15)
-    return parts_of((color, [one.moved(0, 0, k * step) for k in range(count)]))
+    return parts_of((f"plate/{spec.word('colour', 'white')}", [one.moved(0, 0, k * step) for k in range(count)]))
 
 
 def bowl(spec: BuildRequest) -> list[MeshPart]:
@@ -91,13 +80,6 @@ def bottle(spec: BuildRequest) -> list[MeshPart]:
     """A bottle with a label and a cap."""
     (w, _, h), rng = spec.size, spec.rng
     r = w / 2
-    glass = {
-        "green": plain((0.10, 0.22, 0.12), 0.05),
-        "brown": plain((0.22, 0.11, 0.05), 0.06),
-        "clear": GLASS,
-        "white": plain((0.90, 0.90, 0.89), 0.3),
-        "blue": plain((0.24, 0.42, 0.60), 0.3),
-    }[spec.word("colour", "green")]
     neck = float(spec.params.get("neck", 0.36))
     shoulder = [(r, h * 0.58), (r * 0.86, h * 0.66), (r * neck, h * 0.78), (r * neck, h * 0.95), (0, h * 0.95)]
     body = lathe([(0, 0), (r * 0.94, 0), (r, 0.006), *shoulder], 26, 0.75)
@@ -105,7 +87,7 @@ def bottle(spec: BuildRequest) -> list[MeshPart]:
     cap = lathe([(0, h * 0.90), (r * (neck + 0.06), h * 0.90), (r * (neck + 0.06), h), (0, h)], 18)
     tint = ((0.88, 0.84, 0.74), (0.72, 0.22, 0.18), (0.93, 0.92, 0.90), (0.22, 0.30, 0.40))[int(rng.integers(4))]
     return parts_of(
-        (glass, body),
+        (f"bottle/{spec.word('colour', 'green')}", body),
         (plain(tint, 0.7), label),
         (plain((0.14, 0.13, 0.13) if rng.random() < 0.5 else (0.60, 0.16, 0.14), 0.4), cap),
     )
@@ -121,8 +103,8 @@ def candle(spec: BuildRequest) -> list[MeshPart]:
     wick = tube([(0, 0, top - 0.01), (0.001, 0, h)], 0.0012, 5)
     return parts_of(
         (plain((0.91, 0.87, 0.77), 0.55), wax),
-        (BLACK if spec.params.get("dish") == "black" else BRASS, dish),
-        (BLACK, wick),
+        ("black" if spec.params.get("dish") == "black" else "brass", dish),
+        ("black", wick),
     )
 
 
@@ -133,7 +115,7 @@ def paper_towel(spec: BuildRequest) -> list[MeshPart]:
     rod = lathe([(0, 0.01), (0.007, 0.01), (0.007, h - 0.012), (0.012, h - 0.008), (0.010, h), (0, h)], 12, 0.8)
     roll = lathe([(0.02, 0.015), (r * 0.78, 0.015), (r * 0.78, h * 0.84), (0.02, h * 0.84), (0.02, 0.015)], 32)
     return parts_of(
-        (spec.finish("oak/0") if spec.params.get("wood") else STEEL, [foot, rod]),
+        (spec.finish("oak/0") if spec.params.get("wood") else "steel", [foot, rod]),
         (plain((0.94, 0.94, 0.93), 0.95, specular=0.05), roll),
     )
 
@@ -159,4 +141,4 @@ def knife_block(spec: BuildRequest) -> list[MeshPart]:
             handles.append(handle.turned(-lean, "x"))
             bolsters.append(bolster.turned(-lean, "x"))
     foot = box([-w / 2, -d * 0.28, 0], [w / 2, d * 0.55, 0.018], 0.003)
-    return parts_of((spec.material("wood", "beech/0"), [body, foot]), (BLACK, handles), (STEEL, bolsters))
+    return parts_of((spec.material("wood", "beech/0"), [body, foot]), ("black", handles), ("steel", bolsters))
