@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from embodied.assets.built.parametric import BuildRequest, parts_of, plain, whole_image
+from embodied.assets.built.parametric import BuildRequest, FinishedShapes, parts_of, plain, whole_image
 from embodied.assets.built.primitives import (
     Shape,
     ball,
@@ -131,7 +131,8 @@ def book_stack(spec: BuildRequest) -> list[MeshPart]:
     (w, d, h), rng = spec.size, spec.rng
     count = int(spec.params.get("count", 3))
     heights = rng.uniform(0.7, 1.3, count)
-    z, covers, pages = 0.0, [], []
+    covers: list[FinishedShapes] = []
+    z, pages = 0.0, []
     (prints,) = rng.spawn(1)
     colours = rng.permutation(len(CLOTH))
     for k, t in enumerate(heights / heights.sum() * h):
