@@ -57,8 +57,6 @@ class Players:
     """A line about the trained agent."""
 
 
-Record = Callable[[Any, Any, Path], None]
-"""(world, episode, file) -> None"""
 PlayersOfSplit = Callable[[str], Players]
 
 
@@ -74,8 +72,7 @@ class Learner:
     study: Commands | None = None
     """`embodied study NAME`: options, of agents.options.StudyOptions, and what makes a StudyLearner of them."""
     show: Commands | None = None
-    """`embodied show NAME`: options with `json`, and show(options, note=, record=) -> what is shown as JSON, and as
-    text. `record` writes an episode for Rerun."""
+    """`embodied show NAME`: options with `json`, and show(options, note=) -> what is shown as JSON, and as text."""
     players: Callable[[Path, Dataset, PlaySettings], PlayersOfSplit] | None = None
     """(weights or run folder, data set, how it sees) -> split -> who plays."""
     columns: tuple[str, ...] = ()

@@ -49,7 +49,6 @@ from embodied.agents.hanna.training_config import HANNA_SCALES
 from embodied.agents.hari import agent as hari
 from embodied.agents.iliad.nav.stages import config_of
 from embodied.agents.iliad.regex.run import load_student
-from embodied.agents.iliad.regex.words import read_words
 from embodied.agents.language_models.prompts import read_prompt
 from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.features import load_features, save_features
@@ -573,7 +572,7 @@ def test_a_floor_plan_is_read_as_strictly_as_all_json(room, tmp_path):
 
 
 @pytest.mark.parametrize("body", [b"\xff\xfea\x00b\x00", b"abc\n\xe9t\xe9\n"])
-@pytest.mark.parametrize("read", [read_words, read_toml, lambda path: read_prompt("a", (), path.parent)])
+@pytest.mark.parametrize("read", [read_toml, lambda path: read_prompt("a", (), path.parent)])
 def test_a_text_that_is_not_utf_8_is_named_with_its_line(read, body, tmp_path):
     (tmp_path / "a.md").write_bytes(body)
     with pytest.raises(ValueError, match=r"a\.md:[12]: not UTF-8"):

@@ -12,7 +12,6 @@ from torch import Tensor, nn
 
 from embodied.agents.common.session import descend
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.describing import by_the_program, by_the_text, kept
 from embodied.agents.iliad.learners import (
     RequestBatch,
     RunningMean,
@@ -23,7 +22,7 @@ from embodied.agents.iliad.learners import (
     reinforce,
     reinforce_loss,
 )
-from embodied.agents.iliad.protocol import NOTHING, ExecutionScores
+from embodied.agents.iliad.protocol import ExecutionScores
 from embodied.agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from embodied.seeds import stream
 
@@ -192,24 +191,6 @@ def test_the_mixture_executes_the_marginal_as_often_as_lambda_says(mixing, least
     assert bool(student.table.weight.grad[2].any()) == (mixing > 0), "learned under what was said"
 
 
-# Eq 3.15 and 3.16 ----------------------------------------------------------------------------------
-
-
-def test_only_descriptions_that_are_executed_alike_are_pragmatic():
-    assert kept(["a", "b", "c", "a"], [1.0, 0.4, 0.5, 1.0], 0.5) == ["a", "c"], "at the threshold counts, once each"
-    assert kept(["a"], [0.49], 0.5) == []
-
-
-def test_the_text_draws_among_the_pragmatic_and_nothing_the_program_takes_the_first():
-    rng = stream(0, "draws")
-    counts = dict.fromkeys(("a", "b", NOTHING), 0)
-    for _ in range(3000):
-        counts[by_the_text(["a", "b"], rng=rng)] += 1
-    assert all(abs(n - 1000) < 100 for n in counts.values())
-    assert by_the_text([], rng=rng) == NOTHING
-    assert by_the_program(["a", "b"]) == "a" and by_the_program([]) == NOTHING
-
-
 def test_lambda_is_halved_every_l_updates_down_to_its_least():
     never, often = LearnerConfig(), LearnerConfig(anneal_every=100)
     assert {mixing_at(never, u) for u in (0, 99, 10_000)} == {0.5}
@@ -220,9 +201,9 @@ def test_lambda_is_halved_every_l_updates_down_to_its_least():
 
 
 def problem(teacher: Watcher | None = None) -> IliadProblem:
-    tasks = WISHES * 8
+    tasks, save = WISHES * 8, lambda path, identity: path.touch()
     return IliadProblem(
-        Buttons(), teacher or Watcher(), AnyButton(), Presser(0), Presser(1), tasks, WISHES, {"world": "b"}
+        Buttons(), teacher or Watcher(), AnyButton(), Presser(0), Presser(1), tasks, WISHES, {"world": "b"}, save
     )
 
 
@@ -241,7 +222,7 @@ QUICK = LearnerConfig(iterations=60, batch=8, learning_rate=0.1, validate_every=
 def test_each_learner_learns_the_buttons(tmp_path, settings, least):
     config = LearnerConfig(**{**vars(QUICK), **settings})
     p = problem()
-    found = train(p, config, tmp_path, lambda path, identity: path.touch(), note=silent)
+    found = train(p, config, tmp_path, note=silent)
     assert found[-1]["success"] >= least
     assert (tmp_path / "best.safetensors").exists()
     assert [h["episodes"] for h in found] == [160, 320, 480]
@@ -250,7 +231,7 @@ def test_each_learner_learns_the_buttons(tmp_path, settings, least):
 
 def test_a_button_that_is_never_described_is_never_learned(tmp_path):
     p = problem(Watcher(dumb=(2,)))
-    found = train(p, QUICK, tmp_path, lambda path, identity: None, note=silent)
+    found = train(p, QUICK, tmp_path, note=silent)
     right = [p.student.greedy([w], [str(w.button)])[0] == w.button for w in WISHES]
     assert right[0] and right[1] and right[3]
     assert found[-1]["described"] < 1

@@ -15,7 +15,7 @@ from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.stages import new_follower
 from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent, Track
-from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, PeopleNavTeacher, encoded_walks, performance, texts_of
+from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, LearnedNavTeacher, arrives, encoded_walks, texts_of
 from embodied.agents.iliad.nav.world import (
     HORIZON,
     NavMarginal,
@@ -31,9 +31,8 @@ from embodied.agents.iliad.training import IliadProblem, success_rate, train
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vln.network import COPIES
 from embodied.assets.records import ROOM_KINDS
-from embodied.interface import FindObject, Pose, Route, Task
+from embodied.interface import Pose, Route
 from embodied.seeds import stream
-from embodied.tasks.vln import vln_task
 
 LINE = line_world()
 TRIP = Trip("line", Pose(0), (0, 1, 2), ("to the third", "two steps on"))
@@ -75,11 +74,8 @@ def test_the_marginal_walks_shortest_paths_of_two_to_six_edges():
 
 def test_tasks_of_one_path_are_one_trip():
     routes = [Route(f"r{k}", (0, 1, 2), 0, 0, text) for k, text in enumerate(("a", "b", "c"))]
-    (trip,) = trips_of([vln_task("line", r) for r in routes])
+    (trip,) = trips_of("line", routes)
     assert trip.requests == ("a", "b", "c") and trip.path == (0, 1, 2)
-    find = Task("t", "find", "line", Pose(0), FindObject("mug", "hall", ("mug_1",)), (3,), "find", 2.0, 10)
-    with pytest.raises(ValueError, match="dataset vln"):
-        trips_of([find])
 
 
 def eyes(place, name: str, texts) -> NavEyes:
@@ -175,19 +171,21 @@ def test_a_student_walks_the_same_way_whoever_walks_beside():
 class Scripted(LearnedNavTeacher):
     """Its executor goes where a description says, nodes apart by blanks."""
 
-    def __init__(self, drafts: list[str], pragmatics: str) -> None:
-        self.world, self.candidates, self.pragmatics, self.drafts = NavWorld({"line": LINE}), 1, pragmatics, drafts
+    def __init__(self, drafts: list[str]) -> None:
+        self.world, self.candidates, self.drafts = NavWorld({"line": LINE}), 1, drafts
 
-    def _pragmatic(self, trips, walks, uniforms):
-        scores = lambda walk, d: performance(self.world, TRIP, [int(n) for n in d.split()], walk.nodes)
-        return [[d for d in self.drafts if scores(w, d) >= 0.5] for w in walks]
+    def candidates_of(self, trips, walks, uniforms=None):
+        return [self.drafts for _ in walks]
+
+    def fits(self, cases):
+        return [arrives(self.world, trip, [int(n) for n in d.split()], walk.nodes) for trip, walk, d in cases]
 
 
 def test_near_walks_get_a_persons_request_and_others_what_is_executed_alike():
     one = lambda t, nodes: t.describe([TRIP], [walk_along(nodes)], rng=stream(0, "d"))[0]
-    assert one(Scripted([], "program"), [0, 1, 2]) in TRIP.requests, "SDTW 1"
-    assert one(Scripted(["0 1 2 3", "0"], "program"), [0]) == "0", "SDTW of the first is 0: it ends elsewhere"
-    assert one(Scripted(["0 1 2 3"], "program"), [0]) is None
+    assert one(Scripted([]), [0, 1, 2]) in TRIP.requests, "SDTW 1"
+    assert one(Scripted(["0 1 2 3", "0"]), [0]) == "0", "the first ends elsewhere"
+    assert one(Scripted(["0 1 2 3"]), [0]) is None
 
 
 def test_walks_are_read_and_described_whoever_is_beside():
@@ -199,7 +197,7 @@ def test_walks_are_read_and_described_whoever_is_beside():
     both = texts_of(look.vocabulary, describer.write(*encoded_walks(look, trips, walks), greedy_choice, 6))
     alone = texts_of(look.vocabulary, describer.write(*encoded_walks(look, trips[1:], walks[1:]), greedy_choice, 6))
     assert both[1:] == alone
-    teacher = LearnedNavTeacher(NavWorld({"grid": GRID}), describer, student(look), 2, "text")
+    teacher = LearnedNavTeacher(NavWorld({"grid": GRID}), describer, student(look), 2)
     found = teacher.describe(trips, walks, rng=stream(0, "t"))
     assert found[1] == "go" and (found[0] is None or isinstance(found[0], str))
 
@@ -225,12 +223,20 @@ def test_a_small_student_learns_its_way_from_descriptions(tmp_path):
     places = {"grid": GRID}
     trips = [Trip("grid", Pose(5), GRID.graph.path(5, g), (f"go to n{g}",)) for g in GOALS]
     look = eyes(GRID, "grid", [t.requests[0] for t in trips])
-    teacher = PeopleNavTeacher(NavWorld(places), places, names_the_end)
+    teacher = GrammarNavTeacher(NavWorld(places), places, names_the_end)
     walker, explorer = student(look), student(look, kind=LoopFree)
     problem = IliadProblem(
-        NavWorld(places), teacher, NearMarginal(), walker, explorer, trips * 20, trips, {"world": "grid"}
+        NavWorld(places),
+        teacher,
+        NearMarginal(),
+        walker,
+        explorer,
+        trips * 20,
+        trips,
+        {"world": "grid"},
+        lambda *_: None,
     )
     config = LearnerConfig(iterations=80, batch=12, learning_rate=5e-3, cooldown=0.4, validate_every=40)
-    found = train(problem, config, tmp_path, lambda path, identity: None, note=lambda line: None)
+    found = train(problem, config, tmp_path, note=lambda line: None)
     assert found[-1]["success"] > 0.9, found
     assert success_rate(problem.world, walker, trips) == found[-1]["success"]

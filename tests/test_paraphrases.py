@@ -10,15 +10,10 @@ import pytest
 
 from embodied.agents.common.paraphrases import UNHEARD, VARIED, Wordings, paraphrase, varied
 from embodied.agents.common.vocabulary import tokenize
-from embodied.agents.iliad.nav.config import NavConfig
-from embodied.agents.iliad.nav.data import NavData
-from embodied.agents.iliad.nav.run import NavGrounds, reworded
-from embodied.agents.iliad.nav.world import Trip
 from embodied.agents.studies import wordings as studied
-from embodied.agents.studies.wordings import PARAPHRASED, SPEAKERS, SYNONYMS, WORDING, code_of
+from embodied.agents.studies.wordings import PARAPHRASED, SYNONYMS, WORDING, code_of
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import ROOT, code_digest
-from embodied.interface import Pose
 from embodied.language import parse
 from embodied.language.clauses import Enter, Exit, Past, StopIn, Turn
 from embodied.language.grammar import Phrase, say
@@ -138,29 +133,11 @@ def test_every_reader_is_judged_in_all_wordings(learner):
     assert [r.train.get("varied_words", False) for r in table.rows] == [False] * 6 + [True] * 3
 
 
-@pytest.mark.parametrize("learner", ["vln", "hanna"])
-def test_people_never_heard_are_told_from_people_who_are_hard_to_follow(learner):
-    table = getattr(importlib.import_module(f"embodied.agents.{learner}.study"), f"{learner.upper()}_TABLES")[
-        "speakers"
-    ]
-    *rows, other, heard = table.rows
-    assert {r.train["speakers"] for r in rows} == {"familiar"} and heard.train["speakers"] == "everybody"
-    assert [r.judge[SPEAKERS] for r in table.rows] == ["familiar", "novel"] * 4
-    assert [pair for pair in table.compared if heard in pair] == [(other, heard), (heard, rows[1])]  # one setting apart
-
-
 def test_what_was_judged_names_the_code_that_words_it_and_with_it_the_texts(tmp_path):
     assert not code_of({"played": "learned"})
-    assert code_of({WORDING: SYNONYMS}) == code_of({SPEAKERS: "novel"}) == {"wording": code_digest(studied.__name__)}
+    assert code_of({WORDING: SYNONYMS}) == {"wording": code_digest(studied.__name__)}
     for package in ("agents", "assets", "embodied"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
     texts = tmp_path / "agents/common/unheard.toml"
     texts.write_text(texts.read_text().replace("mosey", "shuffle"))
     assert code_digest(studied.__name__, root=tmp_path) != code_digest(studied.__name__)
-
-
-def test_navs_test_requests_are_said_otherwise_and_those_of_training_are_not():
-    trip = Trip("house", Pose(0), (0, 1), ("walk on",))
-    data = NavData(None, None, {"train": [trip], "test": [trip]}, "")
-    said = reworded(NavGrounds(NavConfig(), data, None, None), str.upper).data.splits
-    assert said == {"train": [trip], "test": [Trip("house", Pose(0), (0, 1), ("WALK ON",))]}

@@ -20,9 +20,9 @@ from embodied.agents.vision.training_data import Split
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
 from embodied.agents.vln.network import FollowerOutputs
-from embodied.agents.vln.policy import VlnMoment, channels_of
-from embodied.agents.vln.run import VlnLearner, losses_of, mixed, teacher_share
-from embodied.agents.vln.speaker import SpeakerAbout, new_speaker, reranked, spoken_tasks
+from embodied.agents.vln.policy import VlnMoment
+from embodied.agents.vln.run import VlnLearner, losses_of, teacher_share
+from embodied.agents.vln.speaker import SpeakerAbout, new_speaker, reranked
 from embodied.assistants.route_system import build_routes
 from embodied.datasets.store import SplitData, dataset_of
 from embodied.evaluation.rollout import play
@@ -112,23 +112,6 @@ def test_a_follower_learns_its_routes(split):
     many = reranked(whole, split.tasks, new(split), speaker, split.bank, candidates=4, seed=0)
     assert walks(many) != walks(reranked(whole, split.tasks, new(split), speaker, split.bank, candidates=1, seed=0))
     assert [e.task.id for e in many] == [t.id for t in split.tasks]
-
-
-def test_a_speaker_words_other_paths_in_the_houses_that_followers_see(split):
-    words = build_vocabulary(t.request for t in split.tasks).words
-    speaker = new_speaker(SpeakerAbout(SpeakerSettings(hidden_size=16, heads=2), "hand", 16, words))
-    tasks = spoken_tasks(speaker, split, 0.5, seed=0)
-    assert len(tasks) == len(split.tasks) and all(4 <= len(t.goal.path) - 1 <= 6 for t in tasks)
-    assert len({t.request for t in tasks}) > 1
-    seen = channels_of(tasks[0].id, 4000, 0.5)
-    assert set(seen.tolist()) == {0.0, 2.0} and float(seen.mean()) == pytest.approx(1, abs=0.1)
-    policy = dataclasses.replace(new(split).policy(split.bank), environment_dropout=0.5)
-    env = split.make_env()
-    observations = [env.reset(tasks[0])]
-    _, memory = policy.play(observations, [env.situation], None, rngs=[np.random.default_rng(0)])
-    assert torch.equal(memory.channels[0], channels_of(tasks[0].id, 16, 0.5))
-    with pytest.raises(ValueError, match="wants --speaker"):
-        mixed(split, dataclasses.replace(TINY, spoken_share=0.5), None)
 
 
 def test_routes_of_a_hanna_data_set_are_tasks_of_vln(tmp_path):

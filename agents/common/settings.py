@@ -9,8 +9,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from embodied.novelty import FAMILIAR
-
 
 @dataclass(frozen=True)
 class Limit:
@@ -28,10 +26,6 @@ SHARE = Limit(lambda x: 0 <= x <= 1, "in [0, 1]")
 NOT_ALL = Limit(lambda x: 0 <= x < 1, "in [0, 1)")
 LEARNED_WORDS = "learned"
 WORD_VECTORS = (LEARNED_WORDS, "minilm")
-EVERYBODY = "everybody"
-SPEAKERS = (EVERYBODY, FAMILIAR)
-"""People whose descriptions of routes are learned from: everybody's, or those of people who are not kept from
-training."""
 
 
 def require(settings: object, limit: Limit, *names: str) -> None:

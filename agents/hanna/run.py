@@ -29,7 +29,6 @@ from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.datasets.store import Dataset
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task, Teacher
-from embodied.novelty import FAMILIAR
 from embodied.teachers.hanna import HannaTeacher
 
 
@@ -93,7 +92,6 @@ def train_agent(
       ValueError: `init_from` has networks of other sizes, learned from another encoder, or knows no varied words.
     """
     houses = config.training_houses or None
-    source = source.said_by(FAMILIAR) if config.speakers == FAMILIAR else source
     training = source.split("train", houses=houses)
     validation = source.split("val_unseen", limit=config.validation_tasks)
     other = None if init_from is None else HannaAgent.load(init_from)

@@ -16,9 +16,9 @@ from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfi
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import speakers_table, words_table
+from embodied.agents.studies.wordings import words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
-from embodied.agents.vision.sighted_study import SightedStudy, spoken
+from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.agents.vision.training_data import TrainingData
 from embodied.datasets.store import Dataset, SplitData
 from embodied.interface import Agent, Episode
@@ -74,7 +74,6 @@ HANNA_TABLES: Mapping[str, StudyTable] = {
         TEST,
     ),
     "words": words_table(learned, FULL, TEST[1:]),
-    "speakers": speakers_table(learned, FULL, TEST[1:]),
     "4.4": StudyTable("Types of assistance", (IMAGE_ONLY, LANGUAGE), ("success",), TEST, ((LANGUAGE, IMAGE_ONLY),)),
     "4.5": StudyTable(
         "Help-request policies",
@@ -184,7 +183,7 @@ class HannaStudy(SightedStudy):
         )
 
     def evaluation_data(self, judge: Mapping[str, Any]) -> TrainingData:
-        return spoken(self.training_data_in(self.eval_data or self.data), judge)
+        return self.training_data_in(self.eval_data or self.data)
 
     def training_data_in(self, folder: Path) -> TrainingData:
         return dataclasses.replace(super().training_data_in(folder), device=self.device)

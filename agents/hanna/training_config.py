@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 from embodied.agents.common.settings import (
     AT_LEAST_ONE,
-    EVERYBODY,
     NOT_ALL,
     NOT_NEGATIVE,
     SHARE,
-    SPEAKERS,
     EvaluationSettings,
     ImitationSettings,
     require,
@@ -61,8 +59,6 @@ class TrainingConfig(ImitationSettings):
     do not spoil the routes to learn from (docs/sources.md, S33)."""
     read_assistance: bool = True
     """Read the words of routes; False: show only the goal image (Table 4.4)."""
-    speakers: str = EVERYBODY
-    """Speakers of the training routes: 'everybody', or 'familiar', which holds some out for evaluation."""
     reset_inter_task: bool = True
     """Reset the inter-task module between sub-tasks; False: ablation of Table D.2."""
     predict_reasons: bool = True
@@ -76,7 +72,6 @@ class TrainingConfig(ImitationSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_word(self, "model", MODELS)
-        require_word(self, "speakers", SPEAKERS)
         require_word(self, "ask_rule", tuple(sorted(RULES)))
         require(self, AT_LEAST_ONE, "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads")
         require(self, AT_LEAST_ONE, "training_steps")

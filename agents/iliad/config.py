@@ -62,11 +62,3 @@ def mixing_at(config: LearnerConfig, update: int) -> float:
     if not config.anneal_every:
         return config.mixing
     return max(config.least_mixing, config.mixing * 0.5 ** (update // config.anneal_every))
-
-
-def folder_name(learner: LearnerConfig) -> str:
-    """The folder of a learner: its name and what is not as usual."""
-    if learner.learner not in ("adel", "mixture"):
-        return learner.learner
-    annealed = f"_anneal_{learner.anneal_every}" if learner.anneal_every else ""
-    return f"{learner.learner}_{learner.mixing:g}{annealed}"

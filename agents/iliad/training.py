@@ -36,24 +36,18 @@ class IliadProblem:
     validation: Tasks
     identity: Identity
     """Parts of a run's identity besides the learner's settings."""
+    save: Callable[[Path, Identity], None]
+    """Writes the student's weights."""
 
 
 def train(
-    problem: IliadProblem,
-    config: LearnerConfig,
-    folder: Path,
-    keep: Callable[[Path, Identity], None],
-    *,
-    minutes: float | None = None,
-    note: Note = print,
+    problem: IliadProblem, config: LearnerConfig, folder: Path, *, minutes: float | None = None, note: Note = print
 ) -> list[dict[str, float]]:
-    """Learn, or go on learning, in a run folder; returns what each validation found.
+    """Learn, or go on learning, in a run folder; the student that is best in validation becomes best.safetensors.
 
-    Each entry has 'update', 'episodes' (with the teacher), 'success' (validation), 'training success'
-    (of all episodes so far), and since the last one 'loss' and 'described', the share of episodes with a description.
-
-    Args:
-      keep: writes the student's weights, with an identity, to a path; called when validation success is the best.
+    Returns what each validation found: 'update', 'episodes' (with the teacher), 'success' (validation), 'training
+    success' (of all episodes so far), and since the last one 'loss' and 'described', the share of episodes with a
+    description.
 
     Raises:
       CheckpointError, KeyboardInterrupt, DivergedError: see embodied.agents.common.
@@ -77,7 +71,7 @@ def train(
                 success = success_rate(problem.world, problem.student, problem.validation)
                 session.record(_found(session.done, success, config, session.sums))
                 if success > session.progress.best and session.improved(success):
-                    keep(session.folder / "best.safetensors", identity)
+                    problem.save(session.folder / "best.safetensors", identity)
                 session.sums = {k: v for k, v in session.sums.items() if k in ("episodes", "fulfilled", "reward")}
     return session.history
 

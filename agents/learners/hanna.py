@@ -52,7 +52,7 @@ class HannaStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded, With
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2, words or speakers."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2 or words."""
     seeds: Seeds = 1
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""

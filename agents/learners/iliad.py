@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.iliad.config import LearnerConfig, folder_name
+from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, NavConfig
-from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig, students_of
+from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from embodied.agents.iliad.show import ShowOptions, show
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import SMALL_SCALE, Nav, Repeated, StudyOptions, Tables, Threaded, Timed, study_of
-from embodied.options import InputFolder, InputPath, OutputFolder, Settings
+from embodied.options import InputFolder, OutputFolder, Settings
 
 if TYPE_CHECKING:
     from embodied.agents.common.session import Note
+    from embodied.agents.iliad.nav.run import NavSetup
+    from embodied.agents.iliad.regex.run import RegexSetup
     from embodied.agents.studies.engine import StudyLearner
 
 STUDENT, WORLD = "settings of the student's training", "settings of data and teacher"
@@ -31,15 +35,7 @@ class IliadTraining(Timed, Threaded):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegexFiles:
-    words: InputPath | None = None
-    """REGEX: a file with one word per line (default: made-up words)."""
-    templates: InputPath | None = None
-    """REGEX: a JSON file with your own requests: rule -> texts with BEFORE and AFTER (default: the grammar's)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RegexTraining(IliadTraining, RegexFiles):
+class RegexTraining(IliadTraining):
     """Change words as a request says, by regular expressions."""
 
     learner: Annotated[LearnerConfig, Settings(STUDENT, LEARNER_SCALES)]
@@ -58,13 +54,13 @@ class NavTraining(IliadTraining, Nav):
 @dataclass(frozen=True, kw_only=True)
 class IliadStudyOptions(StudyOptions, Repeated):
     tables: Tables
-    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms; in NAV also words and speakers."""
+    """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms; in NAV also words."""
     scale: Annotated[str, SMALL_SCALE] = "mini"
     """The settings to start from."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegexStudyOptions(IliadStudyOptions, RegexFiles):
+class RegexStudyOptions(IliadStudyOptions):
     """Students that learn to change words from descriptions."""
 
     config: Annotated[LearnerConfig, Settings(STUDENT, LEARNER_SCALES, skip=OF_ROWS)]
@@ -80,37 +76,32 @@ class NavStudyOptions(IliadStudyOptions, Nav):
     world: Annotated[NavConfig, Settings(WORLD, NAV_SCALES, skip=("blind",))]
 
 
-def regex(args: RegexTraining, *, note: Note) -> None:
-    from embodied.agents.iliad.regex.run import learn, prepare
+def regex_setup(args: RegexTraining | RegexStudyOptions) -> RegexSetup:
+    from embodied.agents.iliad.regex.run import RegexSetup
 
-    world, learner = args.world, args.learner
-    grounds = prepare(world, args.out / "shared", words=args.words, templates=args.templates, note=note)
-    home = args.out / "students" / students_of(world) / f"seed_{learner.seed}"
-    learn(grounds, learner, home / folder_name(learner), home / "pretraining", minutes=args.minutes, note=note)
+    return RegexSetup(args.world)
 
 
-def nav(args: NavTraining, *, note: Note) -> None:
-    from embodied.agents.iliad.nav.run import NavSource, learn, prepare
+def nav_setup(args: NavTraining | NavStudyOptions) -> NavSetup:
+    from embodied.agents.iliad.nav.run import NavSetup
 
-    world, learner = args.world, args.learner
-    source = NavSource(args.data, args.encoder_digest(), args.pictures, args.cache)
-    grounds = prepare(world, source, args.out / "shared", note=note)
-    home = args.out / "students" / world.teacher / f"seed_{learner.seed}" / folder_name(learner)
-    learn(grounds, learner, home, minutes=args.minutes, note=note)
+    return NavSetup(args.world, args.data, args.encoder_digest(), args.pictures, args.cache)
 
 
-def regex_study(args: RegexStudyOptions) -> StudyLearner:
-    from embodied.agents.iliad.study import IliadStudy, RegexStudyWorld
+def train(setup_of: Callable[..., Any], args: Any, *, note: Note) -> None:
+    """Make data and teacher in --out, and a student of them."""
+    from embodied.agents.iliad.training import train
 
-    return study_of(IliadStudy, args, world=RegexStudyWorld(args.world, args.words, args.templates))
+    learner, shared = args.learner, args.out / "shared"
+    problem = setup_of(args).prepare(shared, note).problem(learner.seed, shared / f"seed_{learner.seed}", note)
+    home = args.out / f"{learner.learner}_{learner.mixing:g}" / f"seed_{learner.seed}"
+    train(problem, learner, home, minutes=args.minutes, note=note)
 
 
-def nav_study(args: NavStudyOptions) -> StudyLearner:
-    from embodied.agents.iliad.nav.run import NavSource
-    from embodied.agents.iliad.study import IliadStudy, NavStudyWorld
+def study(setup_of: Callable[..., Any], args: Any) -> StudyLearner:
+    from embodied.agents.iliad.study import IliadStudy
 
-    source = NavSource(args.data, args.encoder_digest(), args.pictures, args.cache)
-    return study_of(IliadStudy, args, world=NavStudyWorld(args.world, source))
+    return study_of(IliadStudy, args, setup=setup_of(args))
 
 
 register_learner(
@@ -118,11 +109,14 @@ register_learner(
         name="iliad",
         train=(
             "A student that learns to do what a request says from descriptions (ADEL), demonstrations or rewards.",
-            {"regex": (RegexTraining, regex), "nav": (NavTraining, nav)},
+            {"regex": (RegexTraining, partial(train, regex_setup)), "nav": (NavTraining, partial(train, nav_setup))},
         ),
         study=(
             "Students that learn from descriptions of what they did.",
-            {"regex": (RegexStudyOptions, regex_study), "nav": (NavStudyOptions, nav_study)},
+            {
+                "regex": (RegexStudyOptions, partial(study, regex_setup)),
+                "nav": (NavStudyOptions, partial(study, nav_setup)),
+            },
         ),
         show=(ShowOptions, show),
     )

@@ -26,7 +26,7 @@ from embodied.agents.options import (
     training_data,
 )
 from embodied.agents.vln.config import FORCING, MEASURES, SPEAKER_SCALES, VLN_SCALES, FollowerSettings, SpeakerSettings
-from embodied.options import Count, InputPath, OutputFolder, Settings
+from embodied.options import Count, OutputFolder, Settings
 
 if TYPE_CHECKING:
     from embodied.agents.common.session import Note
@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 class FollowerTraining(Recorded, Run, Encoded, WithDevice):
     """An agent that follows route instructions, on a VLN or HANNA data set with features (imitation)."""
 
-    speaker: InputPath | None = None
-    """For --spoken-share: a file of `embodied train vln speaker`."""
     config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, words={"forcing": FORCING})]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
 
@@ -60,14 +58,12 @@ class VlnStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
     """Agents that follow route instructions, and a speaker."""
 
     tables: Tables
-    """Make these tables: followers, speaker, words or speakers."""
+    """Make these tables: followers, speaker or words."""
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
     others: Count = 1
     """Training seeds of all rows but the first."""
-    config: Annotated[
-        FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless", "spoken_share"))
-    ]
+    config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]
     evaluation: Annotated[EvaluationSettings, Settings(EVALUATION, EvaluationSettings(), skip=("ask_threshold",))]
 
 
@@ -75,8 +71,7 @@ def follower(args: FollowerTraining, **session: Any) -> None:
     from embodied.agents.vln.run import train_follower
 
     source = training_data(args, "vln", args.device)
-    session["minutes"] = args.minutes
-    train_follower(source, args.config, args.evaluation, args.out, speaker=args.speaker, **session)
+    train_follower(source, args.config, args.evaluation, args.out, minutes=args.minutes, **session)
 
 
 def speaker(args: SpeakerTraining, *, note: Note) -> None:

@@ -1,6 +1,5 @@
-"""The tables of every learner that reads instructions: as they were said, in synonyms, paraphrased, and of people never
-heard. Each judges three readers: words learned from instructions, pre-trained vectors, and these with varied words in
-training."""
+"""The table of every learner that reads instructions: as they were said, in synonyms, and paraphrased. It judges three
+readers: words learned from instructions, pre-trained vectors, and these with varied words in training."""
 
 from __future__ import annotations
 
@@ -11,17 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.common.paraphrases import UNHEARD, in_synonyms, paraphraser, reworded
-from embodied.agents.common.settings import EVERYBODY
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.interface import Agent
-from embodied.novelty import FAMILIAR, NOVEL
 
 WORDING, SYNONYMS, PARAPHRASED = "wording", "synonyms", "paraphrased"
 """In a row's `judge`: how instructions are said; as they are without."""
-SPEAKERS = "speakers"
-"""In a row's `judge`: the novelty of who describes routes; those of the data set without."""
 
 
 def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
@@ -36,25 +31,6 @@ def words_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Se
     title = "Instructions in unheard words and sentences"
     rows = tuple(itertools.chain(*readers))
     return StudyTable(title, rows, tuple(columns), tuple(splits), (*lost, *won))
-
-
-def speakers_table(row: Callable[..., StudyRow], columns: Sequence[str], splits: Sequence[str]) -> StudyTable:
-    """Learned from familiar people alone, judged by them and by the others, beside one that learned from everybody:
-    the others may be harder to follow, heard or not. `row` as in words_table."""
-
-    def heard(reader: StudyRow, novelty: str, who: str) -> StudyRow:
-        return dataclasses.replace(reader, label=f"{reader.label}, {who}", judge={**reader.judge, SPEAKERS: novelty})
-
-    def both(reader: StudyRow, former: str, latter: str) -> tuple[StudyRow, StudyRow]:
-        return heard(reader, FAMILIAR, former), heard(reader, NOVEL, latter)
-
-    readers = _readers(lambda label, **train: row(label, speakers=FAMILIAR, **train))
-    pairs = [both(r, "people heard in training", "people never heard") for r in readers]
-    everybody = both(row("learned words of everybody", speakers=EVERYBODY), "the former people", "the latter people")
-    rows, never = tuple(itertools.chain(*pairs, everybody)), [novel for _, novel in pairs]
-    compared = (*pairs, everybody, (everybody[1], never[0]), *_changes(never))
-    title = "Instructions of people who were never heard in training"
-    return StudyTable(title, rows, tuple(columns), tuple(splits), compared)
 
 
 def _readers(row: Callable[..., StudyRow]) -> tuple[StudyRow, ...]:
@@ -74,7 +50,7 @@ def _said(row: StudyRow, how: str) -> StudyRow:
 
 def code_of(judge: Mapping[str, Any]) -> dict[str, str]:
     """The code and texts that word what is said in a row, as a part of what was judged."""
-    return {"wording": code_digest(__name__)} if {WORDING, SPEAKERS} & set(judge) else {}
+    return {"wording": code_digest(__name__)} if WORDING in judge else {}
 
 
 def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:

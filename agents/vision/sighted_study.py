@@ -12,7 +12,7 @@ from embodied.agents.common.settings import EvaluationSettings, ImitationSetting
 from embodied.agents.common.sighted import SightedAgent
 from embodied.agents.studies.episodes import EpisodeStudy
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import SPEAKERS, code_of, hearing
+from embodied.agents.studies.wordings import code_of, hearing
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.training_data import TrainingData
@@ -76,7 +76,7 @@ class FeatureStudy(EpisodeStudy):
 
     def evaluation_data(self, judge: Mapping[str, Any]) -> TrainingData:
         """The data that they are judged in."""
-        return spoken(self.training_data(judge), judge)
+        return self.training_data(judge)
 
     def training_data_in(self, folder: Path) -> TrainingData:
         """A data set with features."""
@@ -116,8 +116,3 @@ class SightedStudy(FeatureStudy):
     def about(self) -> str:
         c, drawn = self.config, self.training_data().pictures("train")
         return f"{super().about()} Trained {c.iterations} updates of {c.batch} episodes on pictures {drawn}."
-
-
-def spoken(source: TrainingData, judge: Mapping[str, Any]) -> TrainingData:
-    """TrainingData in which those people describe routes whom a row says."""
-    return source.said_by(judge[SPEAKERS]) if SPEAKERS in judge else source

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from embodied.agents.common.more_paths import SaidBy
 from embodied.agents.common.paraphrases import varied
 from embodied.agents.common.playing import TaskSet
 from embodied.agents.common.settings import EvaluationSettings, ImitationSettings
@@ -68,10 +66,6 @@ class TrainingData:
         condition = CAPTURE_CONDITIONS[self.goal_image]
         bank = with_goal_images(bank, data, list(split.worlds), condition, encoder, self.cache, kind)
         return Split(split.worlds, tasks, split.make_env, bank)
-
-    def said_by(self, novelty: str) -> TrainingData:
-        """The same with routes as somebody of a novelty describes them."""
-        return dataclasses.replace(self, data=SaidBy(novelty, self.data, cache=self.cache))
 
     def rewording(self, config: ImitationSettings) -> Callable[[str], str] | None:
         """A function that says the texts of training in other words, if the settings want it."""

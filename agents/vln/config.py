@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 from embodied.agents.common.settings import (
     AT_LEAST_ONE,
-    EVERYBODY,
     NOT_ALL,
     NOT_NEGATIVE,
     SHARE,
-    SPEAKERS,
     ImitationSettings,
     RunSettings,
     require,
@@ -42,12 +40,8 @@ class FollowerSettings(ImitationSettings):
     """Weight of the progress monitor's loss: it predicts which share of the path is left (Ma et al. 2019)."""
     room_weight: float = 0.5
     """Weight of an auxiliary loss: predict the kinds of the current room and of the candidates' rooms."""
-    spoken_share: float = 0.0
-    """Share of training episodes on random paths with a speaker's instructions (back-translation)."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
-    speakers: str = EVERYBODY
-    """Speakers of the training instructions: 'everybody', or 'familiar', which holds some out for evaluation."""
     least_teacher: float = 0.0
     """Lowest share of steps taken by the teacher in 'dagger', reached halfway."""
     iterations: int = 20_000
@@ -60,12 +54,11 @@ class FollowerSettings(ImitationSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_word(self, "forcing", FORCING)
-        require_word(self, "speakers", SPEAKERS)
         require(self, AT_LEAST_ONE, "hidden_size")
         require(self, NOT_ALL, "dropout")
         require(self, NOT_NEGATIVE, "progress_weight", "room_weight")
         require(self, NOT_NEGATIVE, "more_paths")
-        require(self, SHARE, "spoken_share", "least_teacher")
+        require(self, SHARE, "least_teacher")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,11 +32,8 @@ from embodied.interface import (
     Stop,
     Thought,
 )
-from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_of
 
-SPOKEN = "_spoken_"
-"""In the ids of tasks that a speaker worded."""
 Guided = Callable[[Situation, np.random.Generator], bool]
 """True where the teacher acts in the follower's place."""
 
@@ -101,7 +98,7 @@ class VlnPolicy:
             assert memory is not None
             return actions, memory.keep(positions)
         with torch.set_grad_enabled(situations is not None and torch.is_grad_enabled()):
-            memory = self._begin(positions, seen, situations) if memory is None else memory.keep(positions)
+            memory = self._begin(positions, seen) if memory is None else memory.keep(positions)
             outputs, heard = self.network(memory.heard, self._look(seen, memory.channels))
             chances = outputs.moves.detach().softmax(-1).cpu().numpy()  # (k, A)
             numbers = [
@@ -122,20 +119,11 @@ class VlnPolicy:
             actions[position] = Stop(thought) if number == 0 else Move(number - 1, thought)
         return actions, dataclasses.replace(memory, heard=dataclasses.replace(heard, taken=taken))
 
-    def _begin(
-        self, positions: tuple[int, ...], seen: Sequence[Observation], situations: Situations | None
-    ) -> VlnMemory:
+    def _begin(self, positions: tuple[int, ...], seen: Sequence[Observation]) -> VlnMemory:
         device = self.network.left.weight.device
         texts = ["" if self.wordless else o.instruction for o in seen]
         words = torch.from_numpy(self.vocabulary.batch(texts, self.instruction_length)).to(device)
-        share = self.environment_dropout
-        channels = hidden_channels(len(seen), self.bank.size, share)
-        if channels is not None:
-            for row, position in enumerate(positions):
-                s = situations and situations[position]
-                if s and SPOKEN in s.task.id:
-                    channels[row] = channels_of(s.task.id, self.bank.size, share)
-            channels = channels.to(device)
+        channels = hidden_channels(len(seen), self.bank.size, self.environment_dropout, device)
         return VlnMemory(positions=positions, heard=self.network.begin(words), channels=channels)
 
     def _look(self, seen: Sequence[Observation], channels: Tensor | None) -> FollowerViews:
@@ -163,12 +151,6 @@ class SupervisedVln:
         self, observations: Observations, situations: Situations, memory: VlnMemory | None, *, rngs: Rngs
     ) -> tuple[Actions, VlnMemory]:
         return self.policy.play(observations, situations, memory, rngs=rngs, guided=self.guided)
-
-
-def channels_of(task: str, size: int, share: float) -> Tensor:
-    """(size,) what is seen of every feature channel in a task that a speaker worded: none of a `share` of them."""
-    kept = stream(0, "channels", task).random(size) >= share
-    return torch.from_numpy(kept / (1 - share)).float()
 
 
 def _directions(like: Tensor, yaws: np.ndarray, pitches: np.ndarray) -> Tensor:

@@ -1,5 +1,4 @@
-"""The speaker L0(d | e): it describes walks, chooses between a follower's walks (Eq 2.19), and words random paths for
-followers to learn from (back-translation with environment dropout, Tan et al. 2019).
+"""The speaker L0(d | e): it scores descriptions of walks, and so chooses between a follower's walks (Eq 2.19).
 
 The network is NAV's describer; a walk of more than agents.iliad.nav.world.HORIZON nodes is described by its first ones.
 """
@@ -15,31 +14,28 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from embodied.agents.common.choosing import choose_sampled, sampled_choice
+from embodied.agents.common.choosing import choose_sampled
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features, load_weights, seeded
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes
-from embodied.agents.iliad.nav.teacher import encoded_walks, texts_of
+from embodied.agents.iliad.nav.teacher import encoded_walks
 from embodied.agents.iliad.nav.world import HORIZON, Trip, walk_along
 from embodied.agents.iliad.stages import TeachingStage
 from embodied.agents.iliad.writing import log_likelihood
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.training_data import Split, TrainingData
+from embodied.agents.vision.training_data import TrainingData
 from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import SpeakerSettings
 from embodied.agents.vln.network import COPIES
-from embodied.agents.vln.policy import SPOKEN, channels_of
-from embodied.assistants.route_system import sampled_paths
 from embodied.datasets.store import SplitData
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity, identity_of
-from embodied.interface import TURNS, Episode, FollowRoute, Place, Route, Task
+from embodied.interface import Episode, FollowRoute, Place, Task
 from embodied.kinds.metrics import without_repeats
 from embodied.seeds import stream
-from embodied.tasks.vln import vln_task
 
 LONGEST_INSTRUCTION = 60
 """Words of a description."""
@@ -177,24 +173,3 @@ def reranked(
         scores.append(torch.cat(rows))
     best = torch.stack(scores).argmax(0).tolist()
     return [tries[k][i] for i, k in enumerate(best)]
-
-
-@torch.no_grad()
-def spoken_tasks(speaker: InstructionSpeaker, training: Split, dropout: float, *, seed: int) -> list[Task]:
-    """Every path of 4 to 6 edges between random nodes, as many in each house as it has tasks, in the speaker's words:
-    what it says of a house of which it sees only some channels, those that a follower will see (`channels_of`)."""
-    tasks: list[Task] = []
-    eyes = speaker.eyes(dict(training.worlds), training.bank)
-    for name, place in training.worlds.items():
-        count, rng = sum(t.world == name for t in training.tasks), stream(seed, "spoken", name)
-        paths = sampled_paths(place.graph, count, rng=rng)
-        routes = [Route(f"{name}{SPOKEN}{k}", p, int(rng.integers(TURNS)), 0, "") for k, p in enumerate(paths)]
-        unworded = [vln_task(name, r) for r in routes]
-        trips = [Trip(name, t.start, _path(t), ("",)) for t in unworded]
-        channels = torch.stack([channels_of(t.id, training.bank.size, dropout) for t in unworded])
-        choose = sampled_choice(rng.random((len(paths), LONGEST_INSTRUCTION)))
-        seen = encoded_walks(eyes, trips, [walk_along(p) for p in paths], channels)
-        numbers = speaker.network.write(*seen, choose, LONGEST_INSTRUCTION)
-        texts = texts_of(eyes.vocabulary, numbers)
-        tasks += [dataclasses.replace(t, request=text) for t, text in zip(unworded, texts, strict=True)]
-    return tasks

@@ -13,14 +13,13 @@ from embodied.agents.common.session import Note
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import speakers_table, words_table
+from embodied.agents.studies.wordings import words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
 from embodied.agents.vln.agent import VlnAgent
 from embodied.agents.vln.config import MEASURES, FollowerSettings, SpeakerSettings
 from embodied.agents.vln.run import train_follower
 from embodied.agents.vln.speaker import load_speaker, reranked, speaker_identity, train_speaker
 from embodied.evaluation.evaluate import spread
-from embodied.identity import Identity, key_of
 from embodied.records import save_lines
 
 LEARNED, RERANKED = "learned", "reranked"
@@ -37,7 +36,7 @@ def _without(name: str) -> StudyRow:
 
 
 FOLLOWER, BLIND_FOLLOWER = _row("DAgger"), _row("DAgger, blind", blind=True)
-CHOSEN, SPOKEN = _row("DAgger, reranked", RERANKED), _row("DAgger, back-translation", spoken_share=0.5)
+CHOSEN = _row("DAgger, reranked", RERANKED)
 VLN_TABLES: Mapping[str, StudyTable] = {
     "followers": StudyTable(
         "Followers of route instructions",
@@ -55,14 +54,13 @@ VLN_TABLES: Mapping[str, StudyTable] = {
         ((FOLLOWER, BLIND_FOLLOWER),),
     ),
     "speaker": StudyTable(
-        "A speaker that chooses between walks (Eq 2.19) and words further paths",
-        (FOLLOWER, CHOSEN, SPOKEN, _row("DAgger, back-translation, reranked", RERANKED, spoken_share=0.5)),
+        "A speaker that chooses between walks (Eq 2.19)",
+        (FOLLOWER, CHOSEN),
         MEASURES,
         TEST_SPLITS,
-        ((CHOSEN, FOLLOWER), (SPOKEN, FOLLOWER)),
+        ((CHOSEN, FOLLOWER),),
     ),
     "words": words_table(_row, MEASURES, TEST_SPLITS[1:]),
-    "speakers": speakers_table(_row, MEASURES, TEST_SPLITS[1:]),
 }
 
 
@@ -75,31 +73,28 @@ class VlnStudy(SightedStudy):
 
     name, agent_kind, all_tables = "vln", VlnAgent, VLN_TABLES
     makers = ("embodied.agents.vln.run",)
-    judges = (*JUDGES, "embodied.agents.vln.speaker", "embodied.agents.common.more_paths")
-
-    def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
-        spoken = train.get("spoken_share", self.config.spoken_share)
-        return {**super().depends(train), **({"speaker": key_of(self._speaker())} if spoken else {})}
+    judges = (*JUDGES, "embodied.agents.vln.speaker")
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """The speaker, if a row wants it."""
-        if any((r.train or {}).get("spoken_share") or r.judge["played"] == RERANKED for r in rows):
+        if any(r.judge["played"] == RERANKED for r in rows):
             train_speaker(
                 self.training_data(), self.speaker, folder / "speaker", note=lambda line: note(f"speaker: {line}")
             )
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        speaker = _file(folder) if train.get("spoken_share") else None
-        train_follower(
-            self.training_data(), self.settings(train, seed), self.evaluation, home, speaker=speaker, note=note
-        )
+        train_follower(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
         return home / "best.safetensors"
 
     @torch.inference_mode()
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
         if weights is None or row.judge["played"] != RERANKED:
             return super().judge(weights, row, split, seed, folder, keep)
-        source, speaker, agent = self.training_data(), load_speaker(_file(folder)), self.load(weights)
+        source, speaker, agent = (
+            self.training_data(),
+            load_speaker(folder / "speaker" / "speaker.safetensors"),
+            self.load(weights),
+        )
         whole, bank = source.data.split(split), source.split(split).bank
         tasks, played = spread(whole.tasks, self.tasks), []
         for k in self.eval_seeds:
@@ -110,11 +105,5 @@ class VlnStudy(SightedStudy):
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         about = super().judged(row, split)
-        return {**about, "speaker": self._speaker()} if row.judge["played"] == RERANKED else about
-
-    def _speaker(self) -> Identity:
-        return speaker_identity(self.training_data(), self.speaker)
-
-
-def _file(folder: Path) -> Path:
-    return folder / "speaker" / "speaker.safetensors"
+        speaker = {"speaker": speaker_identity(self.training_data(), self.speaker)}
+        return {**about, **speaker} if row.judge["played"] == RERANKED else about

@@ -8,15 +8,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from embodied.cli.common import note, show
 from embodied.cli.learners import learner_commands
-
-if TYPE_CHECKING:
-    from embodied.interface import Episode
-    from embodied.world import World
 
 
 def commands(words: Sequence[str]) -> Mapping[str, Any]:
@@ -26,13 +21,5 @@ def commands(words: Sequence[str]) -> Mapping[str, Any]:
 
 def printed(show_learner: Callable[..., Any], args: Any) -> None:
     """Print what a learner shows."""
-    body, text = show_learner(args, note=note, record=record)
+    body, text = show_learner(args, note=note)
     show(args, body, text)
-
-
-def record(world: World, episode: Episode, file: Path) -> None:
-    """Write a Rerun recording of an episode, with what was seen."""
-    from embodied.viz.recording import record_episode
-    from embodied.viz.sinks import Sinks
-
-    record_episode(world, episode, Sinks(file), eyes=world)

@@ -6,21 +6,18 @@ from dataclasses import dataclass, replace
 
 from embodied.agents.common.settings import (
     AT_LEAST_ONE,
-    EVERYBODY,
     LEARNED_WORDS,
     NOT_ALL,
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
-    SPEAKERS,
     WORD_VECTORS,
     require,
     require_word,
 )
 from embodied.agents.iliad.config import LearnerConfig
 
-TEACHERS = ("learned", "grammar", "people")
-PRAGMATICS = ("program", "text")
+TEACHERS = ("learned", "grammar")
 
 
 @dataclass(frozen=True)
@@ -44,13 +41,11 @@ class NavConfig:
     blind: bool = False
     """Ablation without vision: all features are zero to the student."""
     teacher: str = "learned"
-    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1); 'grammar', the templates
-    that word the routes of data sets; or 'people', the same with other words where a scripted listener gets lost."""
-    pragmatics: str = "program"
-    """How a candidate description is chosen: by Eq 3.15 and 3.16 ('text'), or the first that leads the executor to the
-    end of the walk ('program'; docs/sources.md, S93, S141)."""
+    """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
+    that word the routes of data sets."""
     candidates: int = 5
-    """Number of candidate descriptions: the likeliest and sampled ones (Table C.2)."""
+    """Number of candidate descriptions: the likeliest and sampled ones (Table C.2); the first that leads the executor
+    to the end of the walk is given (docs/sources.md, S93, S141)."""
     executor_iterations: int = 20_000
     """Updates of the teacher's executor."""
     describer_iterations: int = 20_000
@@ -61,8 +56,6 @@ class NavConfig:
     """Learning rate of the teacher's networks."""
     more_paths: int = 0
     """Additional paths per training house, each worded three times."""
-    speakers: str = EVERYBODY
-    """Speakers of the training requests: 'everybody', or 'familiar', which holds some out for evaluation."""
     word_vectors: str = LEARNED_WORDS
     """Word embeddings: 'learned', or 'minilm', pre-trained vectors in addition."""
     varied_words: bool = False
@@ -72,8 +65,6 @@ class NavConfig:
 
     def __post_init__(self) -> None:
         require_word(self, "teacher", TEACHERS)
-        require_word(self, "pragmatics", PRAGMATICS)
-        require_word(self, "speakers", SPEAKERS)
         require_word(self, "word_vectors", WORD_VECTORS)
         require(self, AT_LEAST_ONE, "hidden_size", "heads", "candidates")
         require(self, AT_LEAST_ONE, "executor_iterations", "describer_iterations", "teacher_batch")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from embodied.agents.common.more_paths import SaidBy, more_routes
+from embodied.agents.common.more_paths import more_routes
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.word_vectors import vocabulary_with
 from embodied.agents.iliad.nav.config import NavConfig
@@ -16,9 +17,7 @@ from embodied.agents.vision.config import drawing
 from embodied.agents.vision.drawn import pictures_of
 from embodied.agents.vision.features import feature_path, load_bank
 from embodied.assets.cache import digest
-from embodied.datasets.store import Dataset
-from embodied.novelty import FAMILIAR
-from embodied.tasks.vln import vln_task
+from embodied.datasets.store import Dataset, dataset_of
 
 NAV_SPLITS = {"train": "train", "validation": "val_unseen", "test": "test_unseen"}
 """NAV's splits and the data set's: other houses in each."""
@@ -43,31 +42,25 @@ class NavData:
         return digest([self.source.digest, trips, self.eyes.bank.digest, self.pictures])
 
 
-def nav_data(
-    source: Dataset, config: NavConfig, encoder: str, picture_kind: str | None = None, *, cache: Path | None = None
-) -> NavData:
+def nav_data(folder: Path, config: NavConfig, encoder: str, picture_kind: str | None, cache: Path) -> NavData:
     """A data set `vln` or `hanna` with features as the data of NAV.
 
     Args:
       encoder: digest of the encoder that made the features.
       picture_kind: of the pictures, as in embodied.agents.vision.run.pictures_of.
-      cache: where catalogue, sightings and more paths are kept; only they need it.
+      cache: where catalogue, sightings and more paths are kept.
 
     Raises:
-      FileNotFoundError, ValueError: no features of this encoder, or others.
+      FileNotFoundError, ValueError: a data set of another kind, or without such features.
     """
-    novelty = FAMILIAR if config.speakers == FAMILIAR else None
-    if cache is None and (config.more_paths or novelty):
-        raise ValueError("more_paths and speakers need the cache: people name what can be seen in the houses")
-    spoken = SaidBy(novelty, source, cache=cache) if cache and novelty else source
+    source = dataset_of(folder, "vln", "hanna")
     houses = {part: source.names(name) for part, name in NAV_SPLITS.items()}
-    splits = {part: [trip for name in names for trip in house_trips(spoken, name)] for part, names in houses.items()}
-    if cache is not None and config.more_paths:
-        for name in houses["train"]:
-            routes = more_routes(source, name, config.more_paths, seed=config.data_seed, cache=cache, novelty=novelty)
-            splits["train"] += trips_of([vln_task(name, route) for route in routes])
+    splits = {part: [t for n in names for t in trips_of(n, source.routes(n))] for part, names in houses.items()}
+    for name in houses["train"] if config.more_paths else ():
+        more = more_routes(source, name, config.more_paths, seed=config.data_seed, cache=cache)
+        splits["train"] += trips_of(name, more)
     for part in ("validation", "test"):
-        splits[part] = [one for trip in splits[part] for one in each_wording(trip)]
+        splits[part] = [dataclasses.replace(trip, requests=(r,)) for trip in splits[part] for r in trip.requests]
     names = tuple(name for many in houses.values() for name in many)
     places = {name: source.place(name) for name in names}
     pictures = {name: pictures_of(source, name, picture_kind) for name in names}
@@ -77,13 +70,3 @@ def nav_data(
     eyes = NavEyes(places, load_bank(paths, encoder, places, pictures), words)
     drawn = ", ".join(sorted({drawing(p) for p in pictures.values()}))
     return NavData(source, eyes, splits, drawn)
-
-
-def house_trips(source: Dataset, name: str) -> list[Trip]:
-    """The paths of a house with all of their wordings."""
-    return trips_of([vln_task(name, route) for route in source.routes(name)])
-
-
-def each_wording(trip: Trip) -> list[Trip]:
-    """Each wording of a trip as a trip of its own, as validation and test have them."""
-    return [Trip(trip.world, trip.start, trip.path, (request,)) for request in trip.requests]

@@ -1,40 +1,44 @@
-"""The steps of NAV's commands: a data set becomes eyes, teacher and student, and these a problem of ILIAD."""
+"""NAV as its commands run it: a data set becomes eyes, teacher and student, and these a problem of ILIAD."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from embodied.agents.common.more_paths import SaidBy
 from embodied.agents.common.paraphrases import varied
 from embodied.agents.common.session import Note
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.word_vectors import vocabulary_with
-from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NavConfig
-from embodied.agents.iliad.nav.data import NAV_SPLITS, NavData, each_wording, house_trips, nav_data
-from embodied.agents.iliad.nav.stages import new_follower, save_walker, teach_describer, teach_executor
+from embodied.agents.iliad.nav.data import NAV_SPLITS, NavData, nav_data
+from embodied.agents.iliad.nav.stages import load_follower, new_follower, save_walker, teach_describer, teach_executor
 from embodied.agents.iliad.nav.student import LoopFree, NavStudent
-from embodied.agents.iliad.nav.teacher import LearnedNavTeacher, OtherWords, PeopleNavTeacher
+from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, LearnedNavTeacher, OtherWords
 from embodied.agents.iliad.nav.world import NavMarginal, NavWorld
 from embodied.agents.iliad.protocol import DescribingTeacher
-from embodied.agents.iliad.training import IliadProblem, train
+from embodied.agents.iliad.training import IliadProblem, successes
+from embodied.agents.studies.wordings import WORDING, saying
 from embodied.assets.catalogue import load_catalogue
-from embodied.datasets.store import Dataset, dataset_of
+from embodied.datasets.store import Dataset
+from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.interface import SeenPlace
-from embodied.language.people_language import People, RouteDescriber
+from embodied.language.people_language import RouteDescriber
+from embodied.seeds import stream
 
 VALIDATION_TRIPS = 300
 """Trips of each validation, from all houses alike; judging takes all."""
 
 
 @dataclass(frozen=True)
-class NavSource:
-    """Sources of the houses and of what is seen of them."""
+class NavSetup:
+    """Settings, and the sources of the houses and of what is seen of them; small, so that it can be sent to other
+    processes."""
 
+    config: NavConfig
     folder: Path
     """A data set of `embodied dataset vln` (or hanna, whose assistants know such paths) with features."""
     encoder: str
@@ -42,14 +46,50 @@ class NavSource:
     picture_kind: str | None
     """Of the pictures, as in embodied.agents.vision.run.pictures_of."""
     cache: Path
+    """The cache with the catalogue."""
 
-    def data(self, config: NavConfig) -> NavData:
+    name = "nav"
+    updates = 25_000
+    """Of the dissertation: after how many of them lambda is annealed is scaled to other numbers of updates
+    (docs/sources.md, S99)."""
+
+    def source(self) -> Mapping[str, object]:
+        """The origin of data and teacher, as part of an identity."""
+        digest = Dataset(self.folder).digest
+        return {"teacher": self.config, "data": digest, "encoder": self.encoder, "pictures": self.picture_kind}
+
+    def data(self) -> NavData:
         """
         Raises:
-          FileNotFoundError, ValueError: a data set of another kind, or without such features.
+          FileNotFoundError, ValueError: as nav_data.
         """
-        return nav_data(
-            dataset_of(self.folder, "vln", "hanna"), config, self.encoder, self.picture_kind, cache=self.cache
+        return nav_data(self.folder, self.config, self.encoder, self.picture_kind, self.cache)
+
+    def prepare(self, folder: Path, note: Note) -> NavGrounds:
+        """Data and teacher, trained into `folder` unless it is there.
+
+        Raises:
+          FileNotFoundError, ValueError: as nav_data.
+        """
+        config, data = self.config, self.data()
+        counts = ", ".join(f"{len(v)} {part}" for part, v in data.splits.items())
+        words, world = len(data.eyes.vocabulary), NavWorld(data.eyes.places)
+        note(f"trips: {counts}; {len(data.eyes.places)} houses, {words} words, pictures {data.pictures}")
+        if config.teacher == "grammar":
+            places = seen_places(data.source, self.cache)
+            teacher: DescribingTeacher = GrammarNavTeacher(world, places, RouteDescriber().describe)
+        else:
+            executor = teach_executor(data, config, folder, note=note)
+            describer = teach_describer(data, config, executor, folder, note=note)
+            teacher = LearnedNavTeacher(world, describer, executor, config.candidates)
+        return NavGrounds(config, data, teacher, self.cache)
+
+    def about(self) -> str:
+        """Data, networks and teacher in words."""
+        c, data = self.config, Dataset(self.folder)
+        return (
+            f"Paths of {data.digest[:16]} and {c.more_paths} more a house, {len(data.names('train'))} training houses; "
+            f"hidden size {c.hidden_size}; teacher: {c.teacher}."
         )
 
 
@@ -61,30 +101,42 @@ class NavGrounds:
     data: NavData
     teacher: DescribingTeacher
     cache: Path
-    """The cache with the catalogue."""
 
+    def problem(self, seed: int, folder: Path, note: Note) -> IliadProblem:
+        """A student of this seed with everything around it; it begins with random weights, `folder` stays empty."""
+        c, eyes, splits, teacher = self.config, self.data.eyes, self.data.splits, self.teacher
+        if c.varied_words:
+            say = varied(load_catalogue(self.cache))
+            both = [dataclasses.replace(t, requests=(*t.requests, *map(say, t.requests))) for t in splits["train"]]
+            splits, teacher = {**splits, "train": both}, OtherWords(teacher, say)
+        words = build_vocabulary(request for trip in splits["train"] for request in trip.requests).words
+        eyes = dataclasses.replace(eyes.blind() if c.blind else eyes, vocabulary=vocabulary_with(words, c.word_vectors))
+        student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
+        explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
+        validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION_TRIPS)]
+        about = {"world": "nav", "data": self.data.digest, "pictures": self.data.pictures, "teacher": c}
+        identity = identity_of("embodied.agents.iliad.nav.run", **about)
+        save = lambda path, identity: save_walker(path, student.network, c, eyes, identity)
+        return IliadProblem(
+            NavWorld(eyes.places), teacher, NavMarginal(eyes.places), student, explorer,
+            splits["train"], validation, identity, save,
+        )  # fmt: skip
 
-def prepare(config: NavConfig, source: NavSource, folder: Path, *, note: Note = print) -> NavGrounds:
-    """Data and teacher, trained into `folder` unless it is there.
+    def judge(self, best: Path, split: str, how: Mapping[str, Any]) -> Samples:
+        """Which requests of a split a trained student fulfils, said to it as a row has them."""
+        trips, student = self.data.splits[split], load_follower(best, self.data.eyes)
+        if WORDING in how:
+            say = saying(how[WORDING], student.eyes.vocabulary.words, self.cache)
+            trips = [dataclasses.replace(t, requests=tuple(map(say, t.requests))) for t in trips]
+        good = successes(NavWorld(self.data.eyes.places), student, trips)
+        return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 
-    Raises:
-      FileNotFoundError, ValueError: as NavSource.data.
-    """
-    data = source.data(config)
-    counts = ", ".join(f"{len(v)} {part}" for part, v in data.splits.items())
-    words = len(data.eyes.vocabulary)
-    note(f"trips: {counts}; {len(data.eyes.places)} houses, {words} words, pictures {data.pictures}")
-    return NavGrounds(config, data, _teacher(config, data, source.cache, Path(folder), note), source.cache)
-
-
-def _teacher(config: NavConfig, data: NavData, cache: Path, folder: Path, note: Note) -> DescribingTeacher:
-    world = NavWorld(data.eyes.places)
-    if config.teacher != "learned":
-        wording = People().route if config.teacher == "people" else RouteDescriber().describe
-        return PeopleNavTeacher(world, seen_places(data.source, cache), wording)
-    executor = teach_executor(data, config, folder, note=note)
-    describer = teach_describer(data, config, executor, folder, note=note)
-    return LearnedNavTeacher(world, describer, executor, config.candidates, config.pragmatics)
+    def chance(self, split: str, seed: int) -> Samples:
+        """Which requests of a split are fulfilled by walks of the marginal, which knows nothing of requests."""
+        trips, places = self.data.splits[split], self.data.eyes.places
+        walks = NavMarginal(places).draw(trips, rng=stream(seed, "nav", "chance", split))
+        good = [NavWorld(places).success(t, w) for t, w in zip(trips, walks, strict=True)]
+        return Samples(tuple(map(float, good)), tuple(t.world for t in trips), share=True)
 
 
 def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
@@ -92,52 +144,3 @@ def seen_places(source: Dataset, cache: Path) -> dict[str, SeenPlace]:
     catalogue = load_catalogue(cache)
     names = [name for split in NAV_SPLITS.values() for name in source.names(split)]
     return {name: source.open_world(name, catalogue, cache) for name in names}
-
-
-def reworded(grounds: NavGrounds, say: Callable[[str], str]) -> NavGrounds:
-    """With the test requests in other words."""
-    data = grounds.data
-    test = [dataclasses.replace(t, requests=tuple(map(say, t.requests))) for t in data.splits["test"]]
-    return dataclasses.replace(grounds, data=dataclasses.replace(data, splits={**data.splits, "test": test}))
-
-
-def spoken(grounds: NavGrounds, novelty: str, cache: Path) -> NavGrounds:
-    """With the test requests of somebody of a novelty."""
-    data = grounds.data
-    people = SaidBy(novelty, data.source, cache=cache)
-    trips = [trip for name in data.source.names(NAV_SPLITS["test"]) for trip in house_trips(people, name)]
-    test = [one for trip in trips for one in each_wording(trip)]
-    return dataclasses.replace(grounds, data=dataclasses.replace(data, splits={**data.splits, "test": test}))
-
-
-def problem_of(grounds: NavGrounds, seed: int) -> IliadProblem:
-    """A student of this seed with everything around it."""
-    c, data = grounds.config, grounds.data
-    eyes, splits, teacher = data.eyes.blind() if c.blind else data.eyes, data.splits, grounds.teacher
-    if c.varied_words:
-        say = varied(load_catalogue(grounds.cache))
-        both = [dataclasses.replace(t, requests=(*t.requests, *map(say, t.requests))) for t in splits["train"]]
-        splits, teacher = {**splits, "train": both}, OtherWords(teacher, say)
-    words = build_vocabulary(request for trip in splits["train"] for request in trip.requests).words
-    eyes = dataclasses.replace(eyes, vocabulary=vocabulary_with(words, c.word_vectors))
-    student = NavStudent(new_follower(c, eyes, seed, "student"), eyes, c)
-    explorer = LoopFree(new_follower(c, eyes, seed, "student"), eyes, c)
-    validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION_TRIPS)]
-    identity = identity_of(
-        "embodied.agents.iliad.nav.run", world="nav", data=data.digest, pictures=data.pictures, teacher=c
-    )
-    return IliadProblem(
-        NavWorld(eyes.places), teacher, NavMarginal(eyes.places), student, explorer,
-        splits["train"], validation, identity,
-    )  # fmt: skip
-
-
-def learn(
-    grounds: NavGrounds, learner: LearnerConfig, folder: Path, *, minutes: float | None = None, note: Note = print
-) -> list[dict[str, float]]:
-    """Train, or go on training, the student of a run folder; keeps the best one as best.safetensors."""
-    problem = problem_of(grounds, learner.seed)
-    student = problem.student
-    assert isinstance(student, NavStudent)
-    keep = lambda path, identity: save_walker(path, student.network, grounds.config, student.eyes, identity)
-    return train(problem, learner, folder, keep, minutes=minutes, note=note)

@@ -19,7 +19,7 @@ from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.data import NavData
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent
-from embodied.agents.iliad.nav.teacher import LONGEST_DESCRIPTION, arrival, encoded_walks, texts_of
+from embodied.agents.iliad.nav.teacher import LONGEST_DESCRIPTION, arrives, encoded_walks, texts_of
 from embodied.agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
 from embodied.agents.iliad.stages import TeachingStage
 from embodied.agents.iliad.training import success_rate
@@ -102,7 +102,7 @@ def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, tr
     walks = [walk_along(t.path) for t in trips]
     numbers = describer.write(*encoded_walks(executor.eyes, trips, walks), greedy_choice, LONGEST_DESCRIPTION)
     done = executor.greedy(trips, texts_of(executor.eyes.vocabulary, numbers))
-    return float(np.mean([arrival(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
+    return float(np.mean([arrives(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
 
 
 def save_walker(path: Path, network: nn.Module, config: NavConfig, eyes: NavEyes, identity: Identity) -> None:
@@ -146,8 +146,7 @@ def _about(config: NavConfig, eyes: NavEyes) -> NavAbout:
 
 
 def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> TeachingStage:
-    students = {"teacher", "pragmatics", "candidates", "executor_iterations", "describer_iterations", "blind"}
-    students |= {"varied_words"}
+    students = {"teacher", "candidates", "executor_iterations", "describer_iterations", "blind", "varied_words"}
     settings = {k: v for k, v in dataclasses.asdict(config).items() if k not in students}
     parts = {"stage": name, "updates": updates, "seed": config.data_seed, "settings": settings, "data": data.digest}
     identity, rate = identity_of("embodied.agents.iliad.nav.stages", **parts), config.teacher_rate

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -13,7 +12,7 @@ from torch import Tensor
 
 from embodied.agents.common.choosing import greedy_choice, sampled_choice
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.iliad.describing import DescribingNetworks, EachDescribed
+from embodied.agents.iliad.describing import DescribingNetworks
 from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent, Track
 from embodied.agents.iliad.nav.world import RADIUS, NavWalk, NavWorld, Trip
@@ -32,24 +31,18 @@ def performance(world: NavWorld, trip: Trip, path: Sequence[int], wanted: Sequen
     return sdtw(tuple(path), tuple(wanted), world.graph(trip), RADIUS)
 
 
-def arrival(world: NavWorld, trip: Trip, path: Sequence[int], wanted: Sequence[int]) -> float:
-    """1 where a walk ends within RADIUS of where another one does, else 0 (docs/sources.md, S141)."""
-    return float(world.graph(trip).distance[path[-1], wanted[-1]] <= RADIUS + 1e-9)
+def arrives(world: NavWorld, trip: Trip, path: Sequence[int], wanted: Sequence[int]) -> bool:
+    """True where a walk ends within RADIUS of where another one does (docs/sources.md, S141)."""
+    return bool(world.graph(trip).distance[path[-1], wanted[-1]] <= RADIUS + 1e-9)
 
 
-def encoded_walks(
-    eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk], channels: Tensor | None = None
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Inputs of a describer: (B, T, 36, E) panoramas, (B, T, E) actions taken there, (B, T) which there are.
-
-    Args:
-      channels: (B, D) what is seen of every feature channel.
-    """
+def encoded_walks(eyes: NavEyes, trips: Sequence[Trip], walks: Sequence[NavWalk]) -> tuple[Tensor, Tensor, Tensor]:
+    """Inputs of a describer: (B, T, 36, E) panoramas, (B, T, E) actions taken there, (B, T) which there are."""
     tracks, views, actions = [Track(eyes, t) for t in trips], [], []
     longest = max(len(w.steps) for w in walks)
     mask = torch.tensor([[t < len(w.steps) for t in range(longest)] for w in walks])
     for t in range(longest):
-        seen = eyes.see(tracks, channels)
+        seen = eyes.see(tracks)
         numbers = [k.number(w.steps[t]) if t < len(w.steps) else 0 for k, w in zip(tracks, walks)]
         views.append(seen.views)
         actions.append(F.pad(seen.actions, (0, 0, 1, 0))[torch.arange(len(walks)), torch.tensor(numbers)])  # 0 to stop
@@ -66,12 +59,10 @@ def texts_of(vocabulary: Vocabulary, numbers: Tensor) -> list[str]:
 class LearnedNavTeacher(DescribingNetworks):
     """Eq 3.15 and 3.16 with two networks."""
 
-    threshold, longest = THRESHOLD, LONGEST_DESCRIPTION
+    longest = LONGEST_DESCRIPTION
 
-    def __init__(
-        self, world: NavWorld, describer: WalkDescriber, executor: NavStudent, candidates: int, pragmatics: str
-    ) -> None:
-        super().__init__(candidates, pragmatics)
+    def __init__(self, world: NavWorld, describer: WalkDescriber, executor: NavStudent, candidates: int) -> None:
+        super().__init__(candidates)
         self.world, self.describer, self.executor, self.eyes = world, describer.eval(), executor, executor.eyes
 
     def spoken_of(self, task: Trip, execution: NavWalk) -> bool:
@@ -91,25 +82,23 @@ class LearnedNavTeacher(DescribingNetworks):
         drawn = texts_of(self.eyes.vocabulary, numbers)
         return [list(dict.fromkeys(drawn[k * copies : (k + 1) * copies])) for k in range(len(tasks))]
 
-    def performances(self, cases: Sequence[tuple[Trip, NavWalk, str]]) -> list[float]:
+    def fits(self, cases: Sequence[tuple[Trip, NavWalk, str]]) -> list[bool]:
         done = self.executor.greedy([trip for trip, _, _ in cases], [d or NOTHING for _, _, d in cases])
-        perf = performance if self.pragmatics == "text" else arrival
-        return [perf(self.world, trip, e.nodes, walk.nodes) for (trip, walk, _), e in zip(cases, done)]
+        return [arrives(self.world, trip, e.nodes, walk.nodes) for (trip, walk, _), e in zip(cases, done)]
 
 
-class Wording(Protocol):
-    """embodied.language's RouteDescriber.describe, or People.route."""
+class GrammarNavTeacher:
+    """A second teacher: the grammar that words routes here describes every walk, truly."""
 
-    def __call__(self, world: SeenPlace, path: Sequence[int], yaw: float, *, rng: np.random.Generator) -> str: ...
-
-
-class PeopleNavTeacher(EachDescribed):
-    """A second teacher: whoever words routes here describes every walk, truly."""
-
-    def __init__(self, world: NavWorld, places: Mapping[str, SeenPlace], wording: Wording) -> None:
+    def __init__(self, world: NavWorld, places: Mapping[str, SeenPlace], wording: Callable[..., str]) -> None:
         self.world, self.places, self.wording = world, places, wording
 
-    def one(self, trip: Trip, walk: NavWalk, *, rng: np.random.Generator) -> str | None:
+    def describe(
+        self, tasks: Sequence[Trip], executions: Sequence[NavWalk], *, rng: np.random.Generator
+    ) -> list[str | None]:
+        return [self._one(trip, walk, rng=rng) for trip, walk in zip(tasks, executions, strict=True)]
+
+    def _one(self, trip: Trip, walk: NavWalk, *, rng: np.random.Generator) -> str | None:
         if performance(self.world, trip, walk.nodes, trip.path) >= THRESHOLD:
             return self.world.request(trip, rng=rng)
         if len(walk.nodes) < 2:

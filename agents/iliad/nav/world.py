@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from embodied.agents.iliad.protocol import one_request
-from embodied.interface import FollowRoute, Place, Pose, Task
+from embodied.interface import Place, Pose, Route
 from embodied.navigation.graph import NavGraph, count_hops
 from embodied.teachers.shortest import next_node
 
@@ -65,18 +65,12 @@ def share_left(graph: NavGraph, nodes: Sequence[int], end: int) -> float:
     return min(1.0, rest / max(whole, 1e-6))
 
 
-def trips_of(tasks: Sequence[Task]) -> list[Trip]:
-    """Tasks of following routes, those of one path together: their requests are its D*.
-
-    Raises:
-      ValueError: a task of another kind.
-    """
-    wordings: dict[tuple[str, Pose, tuple[int, ...]], list[str]] = {}
-    for task in tasks:
-        if not isinstance(task.goal, FollowRoute):
-            raise ValueError(f"task {task.id!r} is of kind {task.kind!r}; NAV learns from `embodied dataset vln`")
-        wordings.setdefault((task.world, task.start, task.goal.path), []).append(task.request)
-    return [Trip(world, start, path, tuple(requests)) for (world, start, path), requests in wordings.items()]
+def trips_of(world: str, routes: Iterable[Route]) -> list[Trip]:
+    """Routes of a house, those of one path together: their instructions are its D*."""
+    wordings: dict[tuple[Pose, tuple[int, ...]], list[str]] = {}
+    for r in routes:
+        wordings.setdefault((Pose(r.path[0], r.turn, r.tilt), r.path), []).append(r.instruction)
+    return [Trip(world, start, path, tuple(requests)) for (start, path), requests in wordings.items()]
 
 
 class NavWorld:

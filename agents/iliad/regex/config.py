@@ -8,8 +8,6 @@ from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE
 from embodied.agents.iliad.config import LearnerConfig
 
 TEACHERS = ("learned", "grammar")
-PRAGMATICS = ("program", "text")
-MARGINALS = ("asked", "narrow")
 
 
 @dataclass(frozen=True)
@@ -21,7 +19,7 @@ class RegexConfig:
     held_out_items: int = 6_429
     """Examples for validation, and for testing, each with one request."""
     vocabulary: int = 8_000
-    """Number of words that rules are applied to, where words are made up."""
+    """Number of made-up words that rules are applied to."""
     examples: int = 5
     """Word pairs per example; a description must fit all of them (J, tau)."""
     hidden_size: int = 512
@@ -33,16 +31,10 @@ class RegexConfig:
     teacher: str = "learned"
     """Who describes: 'learned', a describer and an executor trained on the data (3.2.4.1), or 'grammar', the templates
     that word the requests."""
-    pragmatics: str = "program"
-    """How a candidate description is chosen: by Eq 3.15 and 3.16 ('text'), or the best one ('program'; docs/sources.md,
-    S93)."""
     candidates: int = 10
     """Number of candidate descriptions: the likeliest and sampled ones (Table C.2)."""
-    marginal: str = "asked"
-    """Distribution of the unlabelled rules: that of requests ('asked'), or half of their shapes only ('narrow';
-    docs/sources.md, S140)."""
     unlabeled: int = 20_000
-    """Number of unlabelled rules."""
+    """Number of unlabelled rules, drawn as those of requests are (docs/sources.md, S140)."""
     executor_iterations: int = 30_000
     """Updates of the teacher's executor."""
     describer_iterations: int = 40_000
@@ -58,8 +50,6 @@ class RegexConfig:
 
     def __post_init__(self) -> None:
         require_word(self, "teacher", TEACHERS)
-        require_word(self, "marginal", MARGINALS)
-        require_word(self, "pragmatics", PRAGMATICS)
         require(self, POSITIVE, "teacher_rate")
         require(self, AT_LEAST_ONE, "items", "held_out_items", "examples", "hidden_size", "word_size")
         require(self, AT_LEAST_ONE, "character_size", "candidates", "unlabeled")
@@ -100,16 +90,3 @@ LEARNER_SCALES: dict[str, LearnerConfig] = {
     "paper": LearnerConfig(),
 }
 """'tiny': minutes of one core for a learner; 'mini': an hour; 'paper': Table C.2, for a GPU."""
-
-
-def students_of(config: RegexConfig) -> str:
-    """Folder of a teacher's students."""
-    few = "" if config.unlabeled == RegexConfig().unlabeled else f"_{config.unlabeled}"
-    marginal = "" if config.marginal == "asked" else f"_{config.marginal}"
-    return config.teacher + few + marginal
-
-
-def data_of(config: RegexConfig) -> dict[str, object]:
-    """The settings that decide the data."""
-    names = ("items", "held_out_items", "vocabulary", "examples", "data_seed")
-    return {name: getattr(config, name) for name in names}

@@ -30,6 +30,11 @@ from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
 REGEX_REMEDY = "delete it and train it again with `embodied train iliad regex`"
+_OF_OTHERS = (
+    *("teacher", "candidates", "unlabeled"),
+    *("executor_iterations", "describer_iterations", "pretraining_iterations"),
+)
+"""Settings on which what a stage gives does not depend, or that are its own number of updates."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,7 @@ def pretrain_student(
     network = new_network(Speller, config, requests, seed, "student")
 
     def loss_of(rng: np.random.Generator) -> Tensor:
-        words, rules = changing_rules(data, config, config.teacher_batch, rng=rng)
+        words, rules = changing_rules(data.words, config.teacher_batch, rng=rng)
         wanted = characters(rules)
         return _likelihood(network(characters(words), requests([NOTHING] * len(words)), wanted), wanted)
 
@@ -96,15 +101,13 @@ def pretrain_student(
     return stage.train(network, loss_of, dict, note)
 
 
-def changing_rules(
-    data: RegexData, config: RegexConfig, count: int, *, rng: np.random.Generator
-) -> tuple[list[str], list[str]]:
-    """Random rules, each with a random word that it changes; a rule is drawn again until it changes its word."""
+def changing_rules(known: Sequence[str], count: int, *, rng: np.random.Generator) -> tuple[list[str], list[str]]:
+    """Random words, and for each a random rule that changes it; both are drawn again until it does."""
     words: list[str] = []
     rules: list[str] = []
     while len(rules) < count:
-        for rule in rules_without_requests(data, config, count - len(rules), rng=rng):
-            word = data.words[int(rng.integers(len(data.words)))]
+        for rule in rules_without_requests(known, count - len(rules), rng=rng):
+            word = known[int(rng.integers(len(known)))]
             if outputs(rule, [word]) not in (None, (word,)):
                 words.append(word)
                 rules.append(rule)
@@ -138,35 +141,12 @@ def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Req
 
 
 def _stage(name: str, folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> TeachingStage:
-    settings = {k: v for k, v in vars(config).items() if k in _DECIDE}
-    if name == "student" and config.marginal != "asked":
-        settings["marginal"] = config.marginal
+    """How a network is trained, and all that it depends on."""
+    settings = {k: v for k, v in vars(config).items() if k not in _OF_OTHERS}
     words = requests.vocabulary.words
-    identity = identity_of(
-        "embodied.agents.iliad.regex.stages",
-        stage=name,
-        updates=updates,
-        seed=seed,
-        settings=settings,
-        words=digest(words),
-    )
-    about = RegexAbout(config, words)
-    return TeachingStage("regex", name, Path(folder), updates, config.teacher_rate, seed, identity, about)
-
-
-_DECIDE = (
-    "items",
-    "held_out_items",
-    "vocabulary",
-    "examples",
-    "hidden_size",
-    "word_size",
-    "character_size",
-    "teacher_batch",
-    "teacher_rate",
-    "data_seed",
-)
-"""Settings that decide what a stage gives."""
+    about = {"stage": name, "updates": updates, "seed": seed, "settings": settings, "words": digest(words)}
+    identity = identity_of("embodied.agents.iliad.regex.stages", **about)
+    return TeachingStage("regex", name, folder, updates, config.teacher_rate, seed, identity, RegexAbout(config, words))
 
 
 def _likelihood(logits: Tensor, wanted: Tensor) -> Tensor:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from embodied.agents.common.choosing import greedy_choice, sampled_choice
-from embodied.agents.iliad.describing import DescribingNetworks, EachDescribed
+from embodied.agents.iliad.describing import DescribingNetworks
 from embodied.agents.iliad.protocol import NOTHING, one_request
 from embodied.agents.iliad.regex.coding import LONGEST_REQUEST, Requests, changes, characters, texts
 from embodied.agents.iliad.regex.config import RegexConfig
@@ -35,12 +35,10 @@ def near_optimal(task: WordTask, execution: Written) -> bool:
 class LearnedTeacher(DescribingNetworks):
     """Eq 3.15 and 3.16 with two networks; it sees words before and after, never a rule."""
 
-    threshold, longest = 1.0, LONGEST_REQUEST
+    longest = LONGEST_REQUEST
 
-    def __init__(
-        self, describer: ChangeDescriber, executor: Speller, requests: Requests, candidates: int, pragmatics: str
-    ) -> None:
-        super().__init__(candidates, pragmatics)
+    def __init__(self, describer: ChangeDescriber, executor: Speller, requests: Requests, candidates: int) -> None:
+        super().__init__(candidates)
         self.describer, self.executor, self.requests = describer.eval(), executor.eval(), requests
 
     spoken_of = staticmethod(describable)
@@ -56,8 +54,8 @@ class LearnedTeacher(DescribingNetworks):
         several = [texts[k * copies : (k + 1) * copies] for k in range(len(tasks))]
         return [[d for d in dict.fromkeys(many) if d != NOTHING] or [NOTHING] for many in several]
 
-    def performances(self, cases: Sequence[Case]) -> list[float]:
-        """perf(e^d, e) over J: 1 where the executor, told d, makes all J words what they became, else 0.
+    def fits(self, cases: Sequence[Case]) -> list[bool]:
+        """True where the executor, told d, makes all J words what they became.
 
         The first word that was changed is tried first and the others only where that one fits.
         """
@@ -74,7 +72,7 @@ class LearnedTeacher(DescribingNetworks):
         passed = dict.fromkeys(left, True)
         for (i, _), fit in zip(others, self._reproduces([case for _, case in others])):
             passed[i] &= fit
-        return [float(passed.get(i, False)) for i in range(len(cases))]
+        return [passed.get(i, False) for i in range(len(cases))]
 
     def _reproduces(self, cases: Sequence[tuple[str, str, str]]) -> list[bool]:
         """True where the executor, given a word and a description, writes the expected word."""
@@ -86,7 +84,7 @@ class LearnedTeacher(DescribingNetworks):
         return [a == expected for a, (_, expected, _) in zip(written, cases)]
 
 
-class GrammarTeacher(EachDescribed):
+class GrammarTeacher:
     """Whoever made the requests of the data: it can read rules of our shapes and says what they do.
 
     A second, consistent teacher (docs/sources.md, S101): P_T(d | e) is P*(d | e).
@@ -95,7 +93,12 @@ class GrammarTeacher(EachDescribed):
     def __init__(self, config: RegexConfig) -> None:
         self.grammar = Grammar(config.data_seed)
 
-    def one(self, task: WordTask, execution: Written, *, rng: np.random.Generator) -> str | None:
+    def describe(
+        self, tasks: Sequence[WordTask], executions: Sequence[Written], *, rng: np.random.Generator
+    ) -> list[str | None]:
+        return [self._one(q, e, rng=rng) for q, e in zip(tasks, executions, strict=True)]
+
+    def _one(self, task: WordTask, execution: Written, *, rng: np.random.Generator) -> str | None:
         if not describable(task, execution):
             return None
         if near_optimal(task, execution):

@@ -1,13 +1,9 @@
-"""The words that rules are carried out on: made up by the seed, or read from a list of the user's own."""
+"""The words that rules are carried out on, made up by the seed."""
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import numpy as np
 
-from embodied.assets.json_file import read_text
 from embodied.seeds import stream
 
 _PARTS = {
@@ -20,8 +16,8 @@ _PARTS = {
 }
 PARTS = {name: text.split() for name, text in _PARTS.items()}
 """Parts of made-up words; '-' is none."""
-SHORTEST, LONGEST_WORD, LONGEST_MADE_UP = 3, 14, 10
-_WORD = re.compile(f"[a-z]{{{SHORTEST},{LONGEST_WORD}}}")
+SHORTEST, LONGEST_MADE_UP = 3, 10
+"""Letters of a word."""
 
 
 def made_up(count: int, *, seed: int) -> tuple[str, ...]:
@@ -37,22 +33,6 @@ def made_up(count: int, *, seed: int) -> tuple[str, ...]:
         if SHORTEST <= len(word) <= LONGEST_MADE_UP:
             words[word] = None
     return tuple(words)
-
-
-def read_words(path: Path) -> tuple[str, ...]:
-    """Lower-case words of 3 to 14 letters of a file with one word a line, such as /usr/share/dict/words.
-
-    Raises:
-      ValueError: there are fewer than a thousand.
-    """
-    lines = read_text(path).split("\n")
-    words = tuple(dict.fromkeys(line for line in lines if _WORD.fullmatch(line)))
-    if len(words) < 1000:
-        raise ValueError(
-            f"{path}: {len(words)} lower-case words of {SHORTEST} to {LONGEST_WORD} letters, at least 1000 are needed; "
-            "give one word a line, or leave the option out"
-        )
-    return words
 
 
 def _word(*, rng: np.random.Generator) -> str:
