@@ -11,13 +11,14 @@ from hand_light import TINY
 from handmade import HandCatalogue, furnished
 
 from embodied.house.house import Light, Sky
-from embodied.house.shapes import inward
+from embodied.house.shapes import inward, room_at
 from embodied.light import LightError, StaleBake, backend, bake, bake_all, lightings_of, open_bake
-from embodied.light.backend import floats
+from embodied.light.backend import array, floats
 from embodied.light.baking import check, solve
 from embodied.light.baking import house as baking
 from embodied.light.pages import files
-from embodied.light.tracing import luxels, radiosity
+from embodied.light.probes import harmonics
+from embodied.light.tracing import emitters, luxels, radiosity
 from embodied.scene.house_meshes import house_parts
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
@@ -170,6 +171,9 @@ def test_lit_at_several_hours_every_lighting_is_what_it_is_alone(lit, tmp_path, 
     shared = bake_all(lightings, catalogue, tmp_path, TINY)
     assert [b.manifest["house"] for b in shared] == [h.digest for h in lightings]
     alone = bake(lightings[1], catalogue, cache, TINY)
+    first, second, own = (b.probes.coefficients.astype(float) for b in (*shared[:2], alone))
+    np.testing.assert_allclose(second, own, rtol=0.01, atol=0.01 * np.abs(own).mean())
+    assert np.abs(first - second).mean() > 0.1 * np.abs(first).mean()
     assert alone.manifest["total_seconds"] > 0
     for a, b in zip(shared[1].lit.pages, alone.lit.pages):
         assert np.abs(a.astype(int) - b).mean() < 0.5
@@ -238,6 +242,7 @@ def test_an_interrupted_bake_resumes_and_a_damaged_one_is_repaired(lit, tmp_path
         done = bake(house, catalogue, tmp_path, TINY)
     own = baked.manifest["own_pages"]
     assert all(np.abs(a.astype(int) - b).max() <= 1 for a, b in zip(done.lit.pages[:own], baked.lit.pages[:own]))
+    np.testing.assert_allclose(done.probes.coefficients, baked.probes.coefficients, rtol=0.01, atol=0.01)
     (done.folder / "page_000.jpg").write_bytes(b"cut")
     with pytest.raises(StaleBake, match="damaged"):
         open_bake(done.folder, house)
@@ -304,7 +309,6 @@ def test_lucky_rays_are_spread_over_their_surface_and_not_lost():
 def test_a_mirror_shows_what_stands_before_it_however_few_rays_there_are(lit):
     """Noise in a mirror is smoothed over what is seen in it, not over its glass: as sharp as baked light, which has
     none."""
-    from embodied.light.backend import floats
     from embodied.light.tracing.reference import Tracer
     from embodied.render.camera import camera_at
 
@@ -325,6 +329,64 @@ def test_a_mirror_shows_what_stands_before_it_however_few_rays_there_are(lit):
     edges = lambda rgb: np.abs(np.diff(rgb.mean(2), axis=1)).mean()
     assert mirror.all() and edges(traced) > 0.7 * edges(baked_light), "a smoothed glass has 0.36 of it"
     assert np.corrcoef(baked_light.ravel(), traced.ravel())[0, 1] > 0.99
+
+
+def light_at(solution, p: radiosity.Points) -> np.ndarray:
+    """(n, 3) e but the sun's own at points, by the functions that light luxels and many rays."""
+    lights = dataclasses.replace(TINY, sky_rays=256, lamp_rays=256)
+    s = solution
+    inputs = solve.BakeInput(s.house, s.atlas, s.lux, s.space, s.outdoors, s.lamps, lights, None, s.without)
+    table, met = (
+        floats(solve.clamp_fireflies(s.lux, solve.leaving(s.lux, s.light.soft))),
+        radiosity.meet(s.space, p, 1024),
+    )
+    e = radiosity.gather(met, table)[0] / met.rays + luxels.AMBIENT
+    for source in solve.sources_of(inputs):
+        if isinstance(source, emitters.Portal):
+            e += array(radiosity.sky_light(s.space, p, source, lights.sky_rays))
+        else:
+            e += array(
+                radiosity.lamp_light(s.without.get(source.owner or "", s.space.scene), p, source, lights.lamp_rays)
+            )
+    return e
+
+
+def test_probes_at_a_window_know_the_light_of_every_normal_to_six_percent(lit, solution):
+    probes, n = lit[3].probes, 40
+    at = np.argsort(np.linalg.norm(probes.position - [2.5, 0.7, 1.5], axis=1))[:6]
+    assert probes.valid[at].all()
+    normals = np.random.default_rng(0).normal(size=(n, 3)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    around = np.tile(normals, (len(at), 1))
+    p = radiosity.points_of(np.repeat(probes.position[at], n, axis=0), around, around, np.zeros(len(around), bool))
+    true = light_at(solution, p).mean(1)
+    own = (harmonics(normals) @ probes.coefficients[at].astype(float)).mean(2).ravel()
+    assert np.sqrt(np.mean((own - true) ** 2)) < 0.06 * np.sqrt(np.mean(true**2))
+    assert true.max() > 5 * true.min()
+
+
+def test_floors_walls_and_ceilings_take_the_same_light_from_probes_as_from_the_bake(lit, solution):
+    """To an eighth, by the median of luxels: away from things, whose shadows lie between probes."""
+    lux, probes = solution.lux, lit[3].probes
+    for name in probes.rooms:
+        room = [r == name for r in solution.atlas.rooms]
+        shell = np.flatnonzero(lux.shell & np.array(room)[lux.owner] & solution.light.good)[::7]
+        e = np.einsum("nk,nkc->nc", harmonics(lux.normal[shell]), probes.at(lux.position[shell], name))
+        baked = (solution.light.soft[shell] + luxels.AMBIENT).mean(1)
+        assert np.median(np.abs(e.mean(1) - baked) / baked) < 0.125
+
+
+def test_probes_fill_every_room_and_none_is_inside_furniture(lit):
+    house, _, _, baked = lit
+    probes = baked.probes
+    assert probes.rooms.tolist() == [r.id for r in house.rooms] and np.bincount(probes.room, probes.valid).min() > 100
+    assert {room_at(house, x) for x in probes.position[probes.room == 1]} == {"bedroom_1"}
+    box = house.placement_by_id["red_box_1"]
+    away = np.abs(probes.position - box.position - [0, 0, box.size[2] / 2]) - np.array(box.size) / 2
+    within = (away < 0).all(1)
+    assert within.sum() > 1 and not probes.valid[within].any() and not probes.coefficients[within].any()
+    assert probes.valid[(away > 0.05).any(1)].mean() > 0.95
+    assert (probes.sight[(away[:, :2] < 0).all(1) & (away[:, 2] > 0), 1, 2] < 255).any()  # down to the box
 
 
 def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):

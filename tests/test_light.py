@@ -155,7 +155,7 @@ def test_bright_spots_are_tamed_without_loss_of_light():
     lux, _ = closed_box(2.0, Finish((SRGB_HALF,) * 3 + (1.0,)))
     seen = np.ones((len(lux.area), 3), np.float32)
     seen[:40] = np.geomspace(1.1, 60.0, 40)[:, None]
-    tamed = solve._clamp_fireflies(lux, seen)
+    tamed = solve.clamp_fireflies(lux, seen)
     assert tamed.max() < 55.0
     assert (tamed * lux.area[:, None]).sum() == pytest.approx((seen * lux.area[:, None]).sum(), rel=1e-4)
 

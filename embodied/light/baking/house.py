@@ -25,6 +25,7 @@ from embodied.assets.catalogue import Catalogue
 from embodied.house.house import WEATHERS, House, Sky
 from embodied.light.backend import device, free_memory, warn
 from embodied.light.baking.compose import Composer, LightSolution, page_of
+from embodied.light.baking.probes import probes_of
 from embodied.light.baking.solve import BakeInput, Radiosity, solve
 from embodied.light.baking.stages import facts_of, kept_light, mark_of, same_atlas
 from embodied.light.baking.surroundings import Outside, daylit, dome_mesh, outside_of
@@ -32,8 +33,18 @@ from embodied.light.lighting_cache import LightingCache, get_or_compute
 from embodied.light.pages import tone
 from embodied.light.pages.atlas import Atlas, atlas_of, coarsened, things_of
 from embodied.light.pages.colours import ColourMaps
-from embodied.light.pages.files import Bake, StaleBake, open_bake, packed_meshes, page_files, reopened, write_pages
+from embodied.light.pages.files import (
+    PROBES,
+    Bake,
+    StaleBake,
+    open_bake,
+    packed_meshes,
+    page_files,
+    reopened,
+    write_pages,
+)
 from embodied.light.pages.meshes import meshes_of
+from embodied.light.pages.records import save_record
 from embodied.light.pages.tone import expose
 from embodied.light.settings import QUALITIES, LightSettings, light_code, settings_of
 from embodied.light.tracing.emitters import in_the_open, lamps_of, write_lamps
@@ -307,6 +318,9 @@ def _make(house: House, context: BakeContext, folder: Path, settings: LightSetti
     clock = _Clock(took)
     error = check(s, settings.tolerance)
     clock("check")
+    if not (folder / PROBES).exists():
+        save_record(probes_of(s, settings, context.memory), folder / PROBES)
+    clock("probes")
     composer = Composer(s, settings, context.maps, context.memory)
     every = range(len(s.atlas.pages))
     for i in every[::TOGETHER]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -193,14 +193,21 @@ def sun_light(inputs: BakeInput) -> tuple[np.ndarray, np.ndarray]:
     facing = facing[lux.thin[facing] | (lux.face_normal[facing] @ towards.astype(np.float32) > 0)]
     if len(facing):
         share[facing] = seen(facing, 4)
-    flux = lux.albedo * (share * lux.area)[:, None] * (outdoors.sun * radiosity.GLAZING)
-    for u in np.unique(lux.unit[share > 0]):
-        patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], inputs.settings.patches)
-        if patches is not None:
-            lit = functools.partial(_lit_by, inputs, patches)
-            which = inputs.reached(lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
-            e[which] += lit(which)
+    for patches in sunlit(inputs, share, inputs.settings.patches):
+        lit = functools.partial(_lit_by, inputs, patches)
+        which = inputs.reached(lambda i, lit=lit: lit(i).sum(1) > 0)  # type: ignore[misc]
+        e[which] += lit(which)
     return share, e
+
+
+def sunlit(inputs: BakeInput, share: np.ndarray, most: int) -> Iterator[Patches]:
+    """At most so many small lights for each room and opening where luxels have a share (n,) of the sun."""
+    lux = inputs.lux
+    flux = lux.albedo * (share * lux.area)[:, None] * (inputs.outdoors.sun * radiosity.GLAZING)
+    for u in np.unique(lux.unit[share > 0]):
+        patches = _patches(lux, flux, np.nonzero((lux.unit == u) & (share > 0))[0], most)
+        if patches is not None:
+            yield patches
 
 
 def _patches(lux: Luxels, flux: np.ndarray, sunlit: np.ndarray, most: int) -> Patches | None:
@@ -233,27 +240,25 @@ class Bounced:
 def bounce(inputs: BakeInput, soft: np.ndarray, tell: Callable[[float], None]) -> Bounced:
     """All further bounces, by Jacobi rounds of gathering along the same few rays, and more of them for what is seen.
 
-    In the last round and in what is seen no spot sparkles (`_clamp_fireflies`).
+    In the last round and in what is seen no spot sparkles (`clamp_fireflies`).
 
     Args:
       soft: (n, 3) first light, without the sun's own.
     """
     lux, near, free = inputs.lux, inputs.near, inputs.free
-    seen = lux.albedo * (soft + AMBIENT.astype(np.float32)) + np.where(lux.sampled[:, None], 0.0, lux.glow).astype(
-        np.float32
-    )
+    seen = leaving(lux, soft)
     e = np.zeros_like(soft)
     for k in range(BOUNCE_ROUNDS):
         tell(k / (BOUNCE_ROUNDS + 1))
         table = seen + lux.albedo * e
         e = (
-            radiosity.gather(near, floats(table if k < BOUNCE_ROUNDS - 1 else _clamp_fireflies(lux, table)))[0]
+            radiosity.gather(near, floats(table if k < BOUNCE_ROUNDS - 1 else clamp_fireflies(lux, table)))[0]
             / near.rays
         )
         if k == 0:
             e += _infinite_bounces(lux, e, near.bad < 0.5 * near.rays)
     tell(BOUNCE_ROUNDS / (BOUNCE_ROUNDS + 1))
-    last = floats(_clamp_fireflies(lux, seen + lux.albedo * e))
+    last = floats(clamp_fireflies(lux, seen + lux.albedo * e))
     total, square = radiosity.gather(near, last)
     bad, rays = near.bad.copy(), np.full(len(e), near.rays, np.float32)
     if len(free) and inputs.settings.seen_rays > near.rays:
@@ -265,7 +270,13 @@ def bounce(inputs: BakeInput, soft: np.ndarray, tell: Callable[[float], None]) -
     return Bounced(e, bad < 0.5 * rays, variance)
 
 
-def _clamp_fireflies(lux: Luxels, seen: np.ndarray) -> np.ndarray:
+def leaving(lux: Luxels, soft: np.ndarray) -> np.ndarray:
+    """(n, 3) radiosity of luxels in light (n, 3), without the glow that lamps account for."""
+    glow = np.where(lux.sampled[:, None], 0.0, lux.glow).astype(np.float32)
+    return lux.albedo * (soft + AMBIENT.astype(np.float32)) + glow
+
+
+def clamp_fireflies(lux: Luxels, seen: np.ndarray) -> np.ndarray:
     """Radiosity cut, room by room, where at most `SPARKS` of the room's light is lost by it: what is smaller
     than a hand beside a bulb would show as sparks on far walls, one ray in hundreds. What was cut is shared out
     over the room, or every bounce would lose it anew."""

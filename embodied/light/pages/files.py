@@ -22,11 +22,15 @@ from embodied.assets.json_file import read_json
 from embodied.house.house import House
 from embodied.light.backend import LightError, warn
 from embodied.light.lighting_cache import LightingCache, get_or_compute
-from embodied.light.pages.records import packed
+from embodied.light.pages.records import load_record, packed
 from embodied.light.pages.tone import Exposure
+from embodied.light.probes import Probes
 from embodied.light.settings import light_code
 from embodied.render.jpeg import jpeg
 from embodied.scene.lit_pages import LitMesh, LitPages
+
+PROBES = "probes.npz"
+"""Name of the file of light probes."""
 
 
 class StaleBake(LightError):
@@ -81,6 +85,14 @@ class Bake:
         with open_arrays(self.folder / "meshes.npz") as z:
             known = np.split(z["gloss"], z["face_ends"][: int(z["glossy"]) - 1])
         return (*known, *[None] * (len(self.manifest["meshes"]) - len(known)))
+
+    @functools.cached_property
+    def probes(self) -> Probes:
+        """Light at places in the rooms' air; raises StaleBake where the file is damaged."""
+        probes = load_record(Probes, self.folder / PROBES)
+        if probes is None:
+            raise StaleBake(f"{self.folder / PROBES} is missing or damaged; run `embodied light` again")
+        return probes
 
     def glow(self, page: int) -> np.ndarray | None:
         """(h, w, 3) float16 radiance of what shines itself on a page; None where nothing does."""
