@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -39,7 +40,7 @@ def probes_of(s: LightSolution, settings: LightSettings, memory: LightingCache |
       memory: keeps what does not depend on sky and lamps.
     """
     inputs = BakeInput(s.house, s.atlas, s.lux, s.space, s.outdoors, s.lamps, settings, None, s.without)
-    own = None if memory is None else get_or_compute(memory, "probes", dict)
+    own: LightingCache | None = None if memory is None else get_or_compute(memory, "probes", dict)
     probes = get_or_compute(own, "grids", lambda: seeing(grids(s.house), s.space.scene))
     asked = np.flatnonzero(probes.valid)
     places = get_or_compute(own, "places", lambda: places_of(probes.position[asked]))
@@ -54,15 +55,15 @@ def probes_of(s: LightSolution, settings: LightSettings, memory: LightingCache |
         return reached, light(radiosity.only(places, reached), PROBE_RAYS) if len(reached) else np.zeros((0, 9, 3))
 
     for portal in portals_of(s.house):
-        which, its = shone(lambda p, rays, portal=portal: air.sky_at(s.space, p, portal, rays))
+        which, its = shone(functools.partial(air.sky_at, s.space, portal))
         c[which] += its
     for lamp in s.lamps:
         scene = s.without.get(lamp.owner or "", s.space.scene)
-        lit = lambda lamp=lamp, scene=scene: shone(lambda p, rays: air.lamp_at(scene, p, lamp, rays))
+        lit = functools.partial(shone, functools.partial(air.lamp_at, scene, lamp))
         which, its = get_or_compute(own, ("lamp", lamp.id), lit)
         c[which] += its * lamp.radiance.astype(np.float32)
     for patches in sunlit(inputs, s.light.sun, settings.patches):
-        c += air.patches_at(s.space.scene, places, patches)
+        c += air.patches_at(s.space.scene, patches, places)
     coefficients, valid = probes.coefficients.copy(), probes.valid.copy()
     valid[asked] = open_air(met.bad / met.rays, rooms)
     coefficients[asked] = np.clip(c, -6e4, 6e4)
@@ -122,6 +123,6 @@ def seeing(probes: Probes, scene: RayScene) -> Probes:
 
 def places_of(positions: np.ndarray) -> Points:
     """Places (k, 3) in the air on the device; one R2 sequence runs through them all."""
-    up = np.tile(np.float32([0, 0, 1]), (len(positions), 1))
+    up = np.tile(np.array([0, 0, 1], np.float32), (len(positions), 1))
     turn = np.stack([x % 1.0 for x in r2(np.arange(len(positions), dtype=float) * AROUND_RAYS)]).astype(np.float32)
     return radiosity.points_of(positions, up, up, np.zeros(len(positions), bool), turn)

@@ -19,7 +19,7 @@ BARE = 0.06
 """Metres around a bare bulb, and square metres of the least squared distance from it, that are no nearer to it."""
 
 
-def sky_at(space: Space, p: Points, portal: Portal, samples: int) -> np.ndarray:
+def sky_at(space: Space, portal: Portal, p: Points, samples: int) -> np.ndarray:
     """(n, 9, 3) coefficients of e from the outdoors through one portal, by area sampling."""
     sides = portal.corner, portal.along, portal.up, portal.normal
     corner, along, up, n = (mi.Vector3f(*(opaque_float(x) for x in a)) for a in sides)
@@ -33,7 +33,7 @@ def sky_at(space: Space, p: Points, portal: Portal, samples: int) -> np.ndarray:
     return _arriving(space.scene, p, samples, place, 4 * LIFT) / samples
 
 
-def lamp_at(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> np.ndarray:
+def lamp_at(scene: RayScene, lamp: Lamp, p: Points, samples: int) -> np.ndarray:
     """(n, 9, 1) coefficients of e from one lamp of radiance 1."""
     bare, count = not lamp.normals.any(), opaque_uint(len(lamp.points))
     at, out, weights, area = floats(lamp.points), floats(lamp.normals), floats(lamp.weights), opaque_float(lamp.area)
@@ -48,7 +48,7 @@ def lamp_at(scene: RayScene, p: Points, lamp: Lamp, samples: int) -> np.ndarray:
     return _arriving(scene, p, samples, place, BARE if bare else 4 * LIFT)[..., :1] / samples
 
 
-def patches_at(scene: RayScene, p: Points, patches: Patches) -> np.ndarray:
+def patches_at(scene: RayScene, patches: Patches, p: Points) -> np.ndarray:
     """(n, 9, 3) coefficients of e from sunlit patches."""
     lift = np.where(patches.thin[:, None], 0.0, LIFT)
     places, normals = floats(patches.position + patches.normal * lift), floats(patches.normal)
