@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 
 import gymnasium as gym
 import numpy as np
@@ -29,7 +28,7 @@ from embodied.gym.sensors import (
     checked_observations,
 )
 from embodied.gym.spaces import SpaceLayout, number
-from embodied.gym.vector_env import SharedSyncVectorEnv, free_memory, refuse_too_many
+from embodied.gym.vector_env import SharedSyncVectorEnv
 from embodied.interface import Move, Sight, Stop
 
 pytestmark = pytest.mark.gl
@@ -161,15 +160,6 @@ def test_views_without_pixels_and_unknown_frames_are_refused():
 def test_pixels_of_a_place_that_nobody_can_draw_are_refused(tmp_path):
     with pytest.raises(ValueError, match="no pictures of .*grid.*observations='oracle'"):
         embodied.gym.env.make("find", cache=str(tmp_path), worlds={"grid": grid_world()}, observations=("rgb",))
-
-
-def test_more_environments_than_memory_allows_are_refused_with_the_estimate(monkeypatch):
-    space = gym.spaces.Dict({"rgb": gym.spaces.Box(0, 255, (1024, 1024, 3), np.uint8)})
-    assert 0 < free_memory() < os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    monkeypatch.setattr("embodied.gym.vector_env.free_memory", lambda: 2**30)
-    refuse_too_many(8, space)
-    with pytest.raises(ValueError, match=r"1000 environments hold about 5\.9 GiB .* 1\.0 GiB are free"):
-        refuse_too_many(1000, space)
 
 
 @pytest.mark.slow

@@ -18,9 +18,9 @@ from embodied.render.pictures import PictureSettings
 from embodied.world import World, open_world
 
 
-def houses_of(data: Dataset, splits: Sequence[str], first: int | None = None) -> list[str]:
-    """Names of the houses of several splits, or of the first so many of each; each once."""
-    return list(dict.fromkeys(n for s in splits for n in data.names(s)[:first]))
+def houses_of(data: Dataset, splits: Sequence[str]) -> list[str]:
+    """Names of the houses of several splits, each once."""
+    return list(dict.fromkeys(n for s in splits for n in data.names(s)))
 
 
 def pictures_of(data: Dataset, name: str, picture_kind: str | None = None) -> PictureSettings:

@@ -67,8 +67,6 @@ class DatasetOptions(Furnished, Printed):
     none)."""
     size: CubeFace | None = None
     """Side of a panorama's cube face (default: as are there, else 256)."""
-    export: OutputFolder | None = None
-    """Also write the files that the published programs read."""
     workers: Count = 2
     """Build with N processes."""
     ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
@@ -105,14 +103,10 @@ def run(args: DatasetOptions) -> None:
     from tqdm import tqdm
 
     from embodied.datasets.build import DatasetConfig, build_dataset, draw_panoramas
-    from embodied.datasets.folders import PROGRAMS, export_folder
     from embodied.datasets.store import Dataset
     from embodied.generate import HouseConfig
 
     HouseConfig(area=args.area)  # refuses what no house can have, before a folder is made
-    programs = [name for name, p in PROGRAMS.items() if p.kind == args.kind and not p.needs]
-    if args.export and not programs:
-        raise ValueError(f"no published program reads {args.kind!r} tasks; leave --export out")
     config = DatasetConfig(
         args.kind,
         chosen_scale(args),
@@ -135,9 +129,6 @@ def run(args: DatasetOptions) -> None:
     if pictures is not None:
         note(f"drawing panoramas: {pictures.word}, faces of {pictures.size} pixels; what is drawn already is kept")
         draw_panoramas(config, args.out, args.cache, pictures=pictures, **how)
-    if args.export:
-        files = [f for name in programs for f in export_folder(name, data, args.export / name)]
-        note(f"{len(files)} files for {' and '.join(programs)} in {args.export}; `embodied export` adds features")
     splits = {name: dataclasses.asdict(counts) for name, counts in data.index.splits.items()}
     facts: dict[str, Any] = {"folder": str(args.out), "digest": data.digest, "splits": splits}
     facts["pictures"] = None if pictures is None else in_words(pictures)

@@ -22,11 +22,12 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.language_models.options import client_of
-from embodied.cli.common import bar, catalogue_of, note, show
-from embodied.cli.evaluate_options import TEMPLATE, EvaluateOptions
+from embodied.agents.language_models.options import WithModel, client_of
+from embodied.agents.options import GOAL_IMAGES, Encoded, Threaded
+from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
+from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
 if TYPE_CHECKING:
     from embodied.agents.learner import Learner
@@ -36,19 +37,82 @@ if TYPE_CHECKING:
     from embodied.interface import Agent, Assistant, Episode, Place, SeenPlace
     from embodied.kinds.task_kind import TaskKind
 
-LLM = "llm"
+LLM, TEMPLATE = "llm", "template"
 FEW_TASKS = 20
 """How many tasks a language model plays, or anybody in a generated house, unless --tasks says otherwise."""
 SEEDED_AREA = (90.0, 140.0)
 """Size of the houses of --seed-file, square metres."""
-Keep = Callable[[str, str, Sequence["Episode"]], None]
-"""Is given split, agent and episodes, to save them."""
+MODEL_SEES = ("names", "strip", "panorama", "nothing")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskOptions:
+    """Tasks."""
+
+    data: InputFolder | None = None
+    """The data set, a folder that `embodied dataset` built (default: one generated flat)."""
+    split: tuple[Annotated[str, Option(metavar="SPLIT")], ...] = ()
+    """Splits of the data set (default: test_unseen; hari: its three test splits)."""
+    tasks: Count | None = None
+    """Evaluate on at most N tasks of a split, spread over its houses (default: all, or 20 for a language model or
+    without --data)."""
+    steps: Count | None = None
+    """Longest episode in steps (default: its task's)."""
+    seed: int = 0
+    """Random seed."""
+    assistant: Annotated[str, Option(metavar="WHO")] = TEMPLATE
+    """Who answers requests: template (the kind's own assistant), llm, person, or MODULE:CLASS of your own."""
+    batch: Count | None = None
+    """Play N episodes at a time, which does not change results (default: 32 for trained agents, else 8)."""
+    rules: Annotated[str | None, Option(metavar="WORD")] = None
+    """Rules of play of the kind of task. vnla: help in words (indirect, the default), the advisor acts and says it
+    (direct) or does not (direct-mute), Algorithm 6 as printed (algorithm-6)."""
+    seed_file: InputPath | None = None
+    """Without --data: seeds of the houses to play in, one per line."""
+    part: Annotated[str | None, Option(metavar="NAME")] = None
+    """With --seed-file: the part of each house's tasks (ask: unseen_classes, those held out from training)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results(Printed):
+    """Results."""
+
+    out: OutputFolder | None = None
+    """Folder for the table and the episodes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfTrained:
+    """Trained agents."""
+
+    rows: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
+    """Rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' where
+    other agents are named)."""
+    goal_image: Annotated[str, Option(words=GOAL_IMAGES)] = "same"
+    """How goal images differ from what the agent sees there; same: not at all; camera: taken by a robot's camera; hour:
+    at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
+    another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateOptions(TaskOptions, Results, OfTrained, WithModel, Encoded, Threaded, Furnished):
+    kind: Annotated[str, Option(metavar="KIND", name="kind")]
+    """The kind of task: find, vln, vnla, hanna, hari, ask, or MODULE:NAME of your own."""
+    agent: tuple[Annotated[str, Option(metavar="NAME")], ...] = ()
+    """Agents to evaluate: baselines by name, 'shipped', a file or run folder of `embodied train`, 'llm', MODULE:CLASS
+    of your own policy, MODULE:LEARNER=RUN of your own learner, a folder with an agent.py, or the http:// address
+    of an agent (default: shipped, else all baselines)."""
+    threads: Count = 2
+    sees: Annotated[str, Option(words=MODEL_SEES)] = "names"
+    """Input of a language model: the true names of what is visible (an oracle), the candidate views as one strip,
+    the panorama with markers, or nothing."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Everything that one command evaluates."""
+    """Everything that one command evaluates, and what comes out, split by split."""
 
+    args: EvaluateOptions
     kind: TaskKind
     data: Dataset | None
     splits: Sequence[str]
@@ -56,55 +120,57 @@ class Evaluation:
     """Row of the table to an agent without training: a baseline, 'llm', 'module:Policy', a folder, or an address."""
     trained: tuple[Learner, Path] | None
     """A trained agent: its learner, and its weights or run folder."""
-    assistant: Assistant | None
-    """A user's own."""
-    reword: Callable[[Assistant], Assistant] | None
+    reword: Callable[[Assistant], Assistant]
     """Puts an assistant in the place of the kind's own."""
     client: Callable[[], Any]
     """The client of the language model; made once."""
     limit: int | None
     """Tasks of a split."""
     rules: Any
-    steps: int | None
-
-    def changed(self, split: SplitData) -> SplitData:
-        """The split with this assistant and with episodes of at most `steps`."""
-        if self.steps:
-            tasks = tuple(dataclasses.replace(t, horizon=min(t.horizon, self.steps)) for t in split.tasks)
-            split = dataclasses.replace(split, tasks=tasks)
-
-        def make_env() -> HelpEnv:
-            env = split.make_env()
-            if env.assistant is not None:
-                env.assistant = self.assistant or (self.reword(env.assistant) if self.reword else env.assistant)
-            return env
-
-        return dataclasses.replace(split, make_env=make_env) if self.assistant or self.reword else split
-
-
-@dataclass(eq=False)
-class EvaluationResults:
-    """Results, split by split."""
-
     rows: list[Row] = field(default_factory=list)
     facts: dict[str, object] = field(default_factory=dict)
     """For run.json."""
     listener: dict[str, dict[str, tuple[int, int]]] = field(default_factory=dict)
     """Split and agent to how many of the routes that it was told a scripted listener arrives with, and how many."""
 
+    def changed(self, split: SplitData) -> SplitData:
+        """The split with this assistant and with episodes of at most --steps."""
+        if steps := self.args.steps:
+            tasks = tuple(dataclasses.replace(t, horizon=min(t.horizon, steps)) for t in split.tasks)
+            split = dataclasses.replace(split, tasks=tasks)
+
+        def make_env() -> HelpEnv:
+            env = split.make_env()
+            if env.assistant is not None:
+                env.assistant = self.reword(env.assistant)
+            return env
+
+        return split if self.args.assistant == TEMPLATE else dataclasses.replace(split, make_env=make_env)
+
+    def keep(self, split: str, name: str, episodes: Sequence[Episode]) -> None:
+        """Save episodes into --out."""
+        from embodied.records import episodes_file, save_lines
+
+        if self.args.out:
+            save_lines(self.args.out / episodes_file(split, name), episodes)
+
+    @property
+    def looks(self) -> bool:
+        """True where somebody looks around, so that houses are opened as worlds; generated ones are anyway."""
+        looking = {LLM, *self.kind.looking} & {*self.agents.values()}
+        return self.data is None or bool(looking) or self.args.assistant != TEMPLATE
+
 
 def run(args: EvaluateOptions) -> None:
     from embodied.locks import locked
-    from embodied.records import episodes_file, save_lines
-
-    def keep(split: str, name: str, episodes: Sequence[Episode]) -> None:
-        if args.out:
-            save_lines(args.out / episodes_file(split, name), episodes)
 
     evaluation = parsed(args)
     with locked(args.out) if args.out else contextlib.nullcontext():
-        results = play_all(args, evaluation, keep)
-        write(args, evaluation, results)
+        for split in opened_splits(evaluation) if evaluation.agents else ():
+            play_split(evaluation, split)
+        if evaluation.trained and evaluation.data is not None:
+            play_trained(evaluation, evaluation.data, *evaluation.trained)
+        write(evaluation)
 
 
 # What is evaluated -------------------------------------------------------------------------------
@@ -117,7 +183,6 @@ def parsed(args: EvaluateOptions) -> Evaluation:
     """
     from embodied.agents.language_models.assistant import assistant_maker
     from embodied.datasets.store import dataset_of
-    from embodied.kinds.plugins import assistant_of
     from embodied.kinds.task_kind import kind_named
 
     kind = kind_named(args.kind)
@@ -125,25 +190,24 @@ def parsed(args: EvaluateOptions) -> Evaluation:
     agents, trained = agents_of(args, kind)
     if trained and data is None:
         raise ValueError(f"trained agents need --data, a folder that `embodied dataset {args.kind}` built")
+    if args.assistant != TEMPLATE and kind.help == "none":
+        raise ValueError(f"nobody is asked in tasks of kind {kind.name!r}; leave --assistant out")
     splits = args.split or kind.test_splits
     if data is not None:
         for split in splits:
             data.names(split)  # refuses unknown ones
     client = functools.cache(lambda: client_of(args))
-    own = assistant_of(args.assistant) if ":" in args.assistant else None
-    other = own is None and args.assistant != TEMPLATE
     return Evaluation(
+        args=args,
         kind=kind,
         data=data,
         splits=splits,
         agents=agents,
         trained=trained,
-        assistant=own,
-        reword=assistant_maker(args.assistant, client, args.prompts) if other else None,
+        reword=assistant_maker(args.assistant, client, args.prompts),
         client=client,
         limit=args.tasks or (FEW_TASKS if LLM in agents.values() or data is None else None),
         rules=kind.checked_rules(args.rules),
-        steps=args.steps,
     )
 
 
@@ -196,112 +260,121 @@ def rows_of(names: Iterable[str]) -> dict[str, str]:
 # Playing -----------------------------------------------------------------------------------------
 
 
-def play_all(args: EvaluateOptions, evaluation: Evaluation, keep: Keep) -> EvaluationResults:
-    """Play everything; a trained agent last, with the agents of its paper's tables beside it."""
-    results, data = EvaluationResults(), evaluation.data
-    if evaluation.agents:
-        for split in opened_splits(args, evaluation):
-            results.rows += play_split(args, evaluation, split, keep, results.listener.setdefault(split.name, {}))
-    if evaluation.trained and data is not None:
-        from embodied.cli.evaluate_trained import evaluate_trained
-
-        wanted = args.rows or (["learned"] if evaluation.agents else ())
-        rows, results.facts = evaluate_trained(
-            args, data, *evaluation.trained, evaluation.splits, wanted, keep, evaluation.changed
-        )
-        results.rows += rows
-    return results
-
-
-def play_split(
-    args: EvaluateOptions, evaluation: Evaluation, split: SplitData, keep: Keep, listener: dict[str, tuple[int, int]]
-) -> list[Row]:
-    """The rows of agents without training; `listener` gets what a scripted one makes of the routes that each heard."""
+def play_split(evaluation: Evaluation, split: SplitData) -> None:
+    """Play with the agents without training, and see what a scripted listener makes of the routes that each heard."""
     from embodied.agents.language_models.routes import followed_replies
     from embodied.evaluation.evaluate import evaluate
 
-    worlds = seen_places(split.worlds) if looks(args, evaluation) else None
+    args, worlds = evaluation.args, seen_places(split.worlds) if evaluation.looks else None
 
     def kept(name: str, episodes: Sequence[Episode]) -> None:
-        keep(split.name, name, episodes)
+        evaluation.keep(split.name, name, episodes)
         if worlds is not None and (routes := followed_replies(episodes, worlds))[1]:
-            listener[name] = routes
+            evaluation.listener.setdefault(split.name, {})[name] = routes
 
-    agents = {row: agent_of(args, evaluation, name, split, worlds) for row, name in evaluation.agents.items()}
+    agents = {row: agent_of(evaluation, name, split, worlds) for row, name in evaluation.agents.items()}
     watch = functools.partial(bar, name="agents", unit="agent")
     how: dict[str, Any] = {"seed": args.seed, "limit": evaluation.limit, "batch": args.batch or 8}
-    return evaluate(evaluation.changed(split), agents, keep=kept, watch=watch, **how)
+    evaluation.rows.extend(evaluate(evaluation.changed(split), agents, keep=kept, watch=watch, **how))
 
 
-def looks(args: EvaluateOptions, evaluation: Evaluation) -> bool:
-    """True where somebody looks around, so that houses are opened as worlds; generated ones are anyway."""
-    looking = {LLM, *evaluation.kind.looking} & {*evaluation.agents.values()}
-    return evaluation.data is None or bool(looking) or args.assistant != TEMPLATE
+def play_trained(evaluation: Evaluation, data: Dataset, learner: Learner, file: Path) -> None:
+    """Play with a trained agent, and with the agents of its paper's tables over the same tasks; loads PyTorch.
+
+    Raises:
+      ValueError: an unknown row.
+    """
+    from embodied.agents.common.parallel import use_threads
+    from embodied.agents.common.weights import weights_digest
+    from embodied.agents.learner import PlaySettings
+    from embodied.agents.studies.episodes import JUDGES, evaluate_frozen
+    from embodied.agents.vision.config import CAPTURE_CONDITIONS
+    from embodied.agents.vision.drawn import pictures_of
+    from embodied.identity import identity_of
+    from embodied.render.pictures import in_words
+
+    args, blind = evaluation.args, set[str]()
+    rows: list[Row] = []
+    use_threads(args.threads)
+    assert learner.players is not None, "others were refused"
+    how = PlaySettings(**{f.name: getattr(args, f.name) for f in dataclasses.fields(PlaySettings)})
+    players_of = learner.players(file, data, how)
+    wanted = args.rows or (["learned"] if evaluation.agents else ())
+    for split in evaluation.splits:
+        players, keep = players_of(split), functools.partial(evaluation.keep, split)
+        if players.about and split == evaluation.splits[0]:
+            note(players.about)
+        if unknown := sorted(set(wanted) - set(players.agents)):
+            raise ValueError(f"unknown rows {unknown}; there are {list(players.agents)}")
+        for name in bar(wanted or players.usual or [*players.agents], "agents", "agent"):
+            whole, agent = players.agents[name]
+            playing: dict[str, Any] = {"seed": args.seed, "limit": args.tasks, "batch": args.batch or 32, "keep": keep}
+            rows += evaluate_frozen(evaluation.changed(whole), {name: agent}, **playing)
+        blind |= set(players.blind)
+    looking = sorted({r.agent for r in rows} - blind)
+    names = [n for split in evaluation.splits for n in data.names(split)] if looking else []
+    facts: dict[str, object] = {"agent": weights_digest(file) if file.is_file() else str(file), "looking": looking}
+    facts["pictures"] = {n: in_words(pictures_of(data, n, args.pictures)) for n in names}
+    facts["goal_image"] = dataclasses.asdict(CAPTURE_CONDITIONS[args.goal_image])
+    evaluation.rows.extend(rows)
+    evaluation.facts.update(facts | {"identity": identity_of(*JUDGES)})
 
 
-def opened_splits(args: EvaluateOptions, evaluation: Evaluation) -> Iterable[SplitData]:
+def opened_splits(evaluation: Evaluation) -> Iterable[SplitData]:
     """The splits of a data set, the houses of a list of seeds, or a generated flat."""
-    data, assistant = evaluation.data, evaluation.assistant
+    args, data = evaluation.args, evaluation.data
     if data is None:
-        yield generated(args, evaluation)
+        yield generated(evaluation)
         return
-    catalogue = catalogue_of(args) if looks(args, evaluation) else None
+    catalogue = catalogue_of(args) if evaluation.looks else None
     for split in evaluation.splits:
         worlds = None
         if catalogue is not None:
             worlds = {name: data.open_world(name, catalogue, args.cache) for name in data.names(split)}
-        yield data.split(split, worlds=worlds, rules=evaluation.rules, assistant=assistant)
+        yield data.split(split, worlds=worlds, rules=evaluation.rules)
 
 
-def generated(args: EvaluateOptions, evaluation: Evaluation) -> SplitData:
+def generated(evaluation: Evaluation) -> SplitData:
     """A flat, or the houses of a list of seeds, which what is written down names by their place in the list alone."""
     from embodied.datasets.store import SplitData
     from embodied.evaluation.own_agents import read_seeds
     from embodied.gym.playground import PlaygroundSettings, flat_playground, houses_playground
 
-    kind = evaluation.kind
+    args = evaluation.args
     seen = ("rgb",) if args.sees in ("strip", "panorama") else ()
-    how = PlaygroundSettings(args.cache, observations=seen, rules=evaluation.rules, assistant=evaluation.assistant)
+    how = PlaygroundSettings(args.cache, observations=seen, rules=evaluation.rules)
     if args.seed_file is None:
         flat = flat_playground(args.kind, args.seed, how)
         return SplitData(f"flat_{args.seed}", flat.worlds, flat.tasks, flat.make_env)
     seeds = read_seeds(args.seed_file)
-    named = [(f"{kind.title.lower()}_{k}", seed) for k, seed in enumerate(seeds)]
+    named = [(f"{evaluation.kind.title.lower()}_{k}", seed) for k, seed in enumerate(seeds)]
     houses, each = bar(named, "houses", "house"), -(-(evaluation.limit or FEW_TASKS) // len(seeds))
     play = houses_playground(args.kind, houses, seeds[0], how, catalogue_of(args), SEEDED_AREA, each, args.part)
     return SplitData(args.part.replace("_", " ") if args.part else "hidden", play.worlds, play.tasks, play.make_env)
 
 
-# Agents ------------------------------------------------------------------------------------------
-
-
-def agent_of(
-    args: EvaluateOptions, evaluation: Evaluation, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None
-) -> Agent:
-    """An agent without training."""
+def agent_of(evaluation: Evaluation, name: str, split: SplitData, worlds: Mapping[str, SeenPlace] | None) -> Agent:
+    """An agent without training; a language model is shown what --sees says."""
     from embodied.evaluation.own_agents import submitted
 
-    if name == LLM:
-        return model_agent(args, split, evaluation.client())
-    kind = evaluation.kind
-    return kind.agent(name, worlds) if name in kind.agent_names else submitted(name)
-
-
-def model_agent(args: EvaluateOptions, split: SplitData, client: Any) -> Agent:
-    """A language model that is shown what --sees says."""
+    if name != LLM:
+        kind = evaluation.kind
+        return kind.agent(name, worlds) if name in kind.agent_names else submitted(name)
     from embodied.agents.language_models.agent import LanguageModelAgent
     from embodied.agents.language_models.observations import OracleNames
     from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt
     from embodied.gym.sensors import PanoramaStore
     from embodied.world import World
 
-    prompt = agent_prompt(args.prompts)
-    if args.sees == "names":
-        return LanguageModelAgent(client, PromptBuilder(OracleNames(seen_places(split.worlds)), prompt=prompt))
-    if args.sees == "nothing":
-        return LanguageModelAgent(client, PromptBuilder(prompt=prompt))
-    drawn = {n: w for n, w in split.worlds.items() if isinstance(w, World)}
-    return LanguageModelAgent(client, PromptBuilder(None, PanoramaStore(drawn), args.sees, prompt))
+    prompt, sees = agent_prompt(evaluation.args.prompts), evaluation.args.sees
+    if sees == "names":
+        builder = PromptBuilder(OracleNames(seen_places(split.worlds)), prompt=prompt)
+    elif sees == "nothing":
+        builder = PromptBuilder(prompt=prompt)
+    else:
+        drawn = {n: w for n, w in split.worlds.items() if isinstance(w, World)}
+        builder = PromptBuilder(None, PanoramaStore(drawn), sees, prompt)
+    return LanguageModelAgent(evaluation.client(), builder)
 
 
 def seen_places(worlds: Mapping[str, Place]) -> Mapping[str, SeenPlace]:
@@ -311,38 +384,28 @@ def seen_places(worlds: Mapping[str, Place]) -> Mapping[str, SeenPlace]:
 # Results -----------------------------------------------------------------------------------------
 
 
-def write(args: EvaluateOptions, evaluation: Evaluation, results: EvaluationResults) -> None:
+def write(evaluation: Evaluation) -> None:
     """Print the table, and write what goes into --out."""
     from embodied.assets.cache import write_json
     from embodied.evaluation import tables
+    from embodied.kinds import metrics
     from embodied.records import fingerprint
 
-    data, rows, client = evaluation.data, results.rows, evaluation.client
-    digest = data and data.digest
+    args, rows, client = evaluation.args, evaluation.rows, evaluation.client
+    digest, agents = evaluation.data and evaluation.data.digest, [*evaluation.agents.values()]
     if args.out:
-        about: dict[str, object] = {
-            "data": digest,
-            "seed": args.seed,
-            "tasks": args.tasks,
-            "agents": [*evaluation.agents.values()],
-        }
+        about: dict[str, object] = {"data": digest, "seed": args.seed, "tasks": args.tasks, "agents": agents}
         about |= {"splits": evaluation.splits, "rules": args.rules, "assistant": args.assistant}
         tables.save(rows, args.out, "table")
-        write_json(args.out / "run.json", fingerprint(**{**about, **results.facts}), indent=1)
+        write_json(args.out / "run.json", fingerprint(**{**about, **evaluation.facts}), indent=1)
         note(f"table and episodes in {args.out}")
-    text = tables.markdown(rows, [c for c in columns_of(evaluation) if any(c in r.values for r in rows)])
-    result = {"data": digest, "rows": json.loads(tables.as_json(rows)), "listener": results.listener}
-    for split, heard in results.listener.items():
+    learned = evaluation.trained[0].columns if evaluation.trained else ()
+    columns = learned or [*evaluation.kind.columns, *metrics.USAGE]
+    text = tables.markdown(rows, [c for c in columns if any(c in r.values for r in rows)])
+    result = {"data": digest, "rows": json.loads(tables.as_json(rows)), "listener": evaluation.listener}
+    for split, heard in evaluation.listener.items():
         for name, (right, total) in heard.items():
             text += f"\n{name}, {split}: a scripted listener arrives with {right} of the {total} routes that it heard"
     if client.cache_info().currsize:  # type: ignore[attr-defined]
         text += f"\n{client().sent} requests were sent; all other answers were in {args.answers}"
     show(args, result, text)
-
-
-def columns_of(evaluation: Evaluation) -> Sequence[str]:
-    """The columns of the table: the learner's where a trained agent was evaluated and it names some."""
-    from embodied.kinds import metrics
-
-    learned = evaluation.trained[0].columns if evaluation.trained else ()
-    return learned or [*evaluation.kind.columns, *metrics.USAGE]

@@ -21,8 +21,6 @@ class FeatureOptions(WithData, Encoded, WithDevice):
     """Process N houses in parallel."""
     split: tuple[Annotated[str, Option(metavar="SPLIT")], ...] = ()
     """Use the houses of these splits (default: all)."""
-    first: Count | None = None
-    """Use the first N houses of each split (default: all)."""
     goal_image: tuple[Annotated[str, Option(words=GOAL_IMAGES)], ...] = ()
     """Also make features of goal images that differ from what the agent sees there: camera: taken by a robot's camera;
     hour: at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
@@ -44,5 +42,5 @@ def run(args: FeatureOptions) -> None:
     data, encoder = Dataset(args.data), load_encoder(args.encoder).to(args.device)
     conditions = tuple(CAPTURE_CONDITIONS[word] for word in ("same", *args.goal_image))
     extract = Extractor(data.folder.resolve(), encoder, args.cache, args.pictures, conditions, args.threads)
-    names = houses_of(data, args.split or data.splits, args.first)
+    names = houses_of(data, args.split or data.splits)
     make_features(extract, names, workers=args.workers, ray=args.ray, note=note)

@@ -33,8 +33,6 @@ class GenerateOptions(Furnished, Printed):
     """JSON file with the rooms of your own floor plan (docs/houses.md)."""
     no_mjcf: bool = False
     """Leave out house.xml and its files."""
-    glb: bool = False
-    """Also write house.glb, for Blender and the web."""
     config: Annotated[HouseConfig, Settings(KIND, HouseConfig(), words=HOUSE_WORDS)]
 
 
@@ -43,9 +41,6 @@ def run(args: GenerateOptions) -> None:
     from embodied.navigation.connectivity import to_matterport
     from embodied.navigation.graph import build_graph
     from embodied.scene.export import export_mjcf
-
-    if args.glb:
-        from embodied.scene.glb import export_glb
 
     catalogue, config = catalogue_of(args), args.config
     if args.plan:
@@ -57,12 +52,9 @@ def run(args: GenerateOptions) -> None:
     house.save(args.out / "house.json")
     to_matterport(graph, house, args.out / "connectivity.json")
     save_plan(house, args.out / "plan.png", graph=graph)
-    if args.glb or not args.no_mjcf:
-        fetch(catalogue, house)
     if not args.no_mjcf:
+        fetch(catalogue, house)
         export_mjcf(house, catalogue, args.out)
-    if args.glb:
-        export_glb(house, catalogue, args.out / "house.glb")
     facts = {
         "seed": args.seed,
         "digest": house.digest,

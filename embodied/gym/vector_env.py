@@ -9,7 +9,6 @@ write straight into the batch. For several processes, use Gymnasium's AsyncVecto
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
@@ -21,15 +20,11 @@ from gymnasium.vector.utils import batch_space
 
 from embodied.gym.env import OWN, HelpGymEnv, check_options, open_resources
 from embodied.gym.sensors import Arrays, Sensor, SensorSuite
-from embodied.gym.spaces import observation_space
 from embodied.seeds import checked_seed
 from embodied.threads import processors
 
 if TYPE_CHECKING:
     from embodied.world import World
-
-COPIES = 2
-"""Of an observation that a batch holds per slot: what was handed out last, and what is being filled."""
 
 
 def make_vec(
@@ -51,7 +46,7 @@ def make_vec(
       options: as of `make`, and `threads` that look (default: one per core).
 
     Raises:
-      ValueError: fewer than one, more than memory has room for, or no such limit.
+      ValueError: fewer than one, or no such limit.
     """
     if not isinstance(num_envs, (int, np.integer)) or num_envs < 1:
         raise ValueError(f"num_envs should be a whole number of at least 1, got {num_envs!r}")
@@ -66,7 +61,6 @@ def make_vec(
             shared.make_env, shared.tasks, SensorSuite(), layout=shared.layout, render_mode=render_mode, **own
         )
 
-    refuse_too_many(num_envs, observation_space(shared.layout, shared.sensor))
     return SharedSyncVectorEnv(one, int(num_envs), shared.sensor, threads=threads, opened=shared.opened, limit=limit)
 
 
@@ -250,24 +244,3 @@ def mask_of(options: dict[str, Any], num_envs: int) -> np.ndarray:
     if mask.shape != (num_envs,) or mask.dtype != bool or not mask.any():
         raise ValueError(f"reset_mask should be {num_envs} booleans, some of them true, got {mask!r}")
     return mask
-
-
-def free_memory() -> int:
-    """Bytes that can be had without swapping."""
-    if sys.platform == "linux":
-        with open("/proc/meminfo") as lines:
-            return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable:"))
-    import psutil  # which is installed there only
-
-    return int(psutil.virtual_memory().available)
-
-
-def refuse_too_many(num_envs: int, space: gym.spaces.Dict) -> None:
-    """Raises ValueError where the observations of a batch do not fit into memory."""
-    each = sum(int(np.prod(s.shape)) * np.dtype(s.dtype).itemsize for s in space.values() if s.shape is not None)
-    wanted, free = COPIES * num_envs * each, free_memory()
-    if wanted > 0.8 * free:
-        raise ValueError(
-            f"{num_envs} environments hold about {wanted / 2**30:.1f} GiB of observations, {free / 2**30:.1f} GiB "
-            "are free; use fewer, or smaller views"
-        )
