@@ -18,6 +18,7 @@ from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.house.house import House
 from embodied.house.lighting import load_lit_house
+from embodied.house.moment import Moment, Pose
 from embodied.interface import Sighting
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
@@ -32,6 +33,7 @@ from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
     from embodied.light import Bake
+    from embodied.light.moving import MovingHouse
     from embodied.light.tracing.reference import Tracer
     from embodied.render.gloss import Gloss
 
@@ -78,7 +80,101 @@ class World:
         self._file: PanoramaFile | None = None
         self._bake: Bake | None = None
         self._refused = False
+        self._moments = [Moment()]
+        self._moving: MovingHouse | None = None
+        self._bodies: dict[str, tuple[Part, ...]] = {}
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
+
+    @property
+    def moment(self) -> Moment:
+        """What differs from the house at rest now."""
+        return self._moments[-1]
+
+    def move(self, thing: str, position: Sequence[float] | np.ndarray, yaw: float | None = None) -> None:
+        """Put a thing and all that stands on it elsewhere; `undo` takes it back.
+
+        Args:
+          thing: placement id, 'chair_2'.
+          position: (x, y, z) of the middle of its base, metres, world.
+          yaw: radians; as it is without.
+
+        Raises:
+          ValueError: the house has no such thing.
+        """
+        known = self.moment.moved.get(thing)
+        if known is None and thing in self.house.placement_by_id:
+            p = self.house.placement_by_id[thing]
+            known = Pose.upright(p.position, p.yaw)
+        x, y, z = (float(c) for c in position)
+        pose = Pose.upright((x, y, z), known.yaw if yaw is None and known is not None else float(yaw or 0.0))
+        self.show(dataclasses.replace(self.moment, moved={**self.moment.moved, thing: pose}))
+
+    def open(self, opening: str, openness: float = 1.0) -> None:
+        """Open a door so far, 0 (closed) to 1 (a right angle); `undo` takes it back.
+
+        Raises:
+          ValueError: the house has no such door, or it cannot be open so far.
+        """
+        self.show(dataclasses.replace(self.moment, openness={**self.moment.openness, opening: float(openness)}))
+
+    def undo(self) -> None:
+        """Go back to the moment before the last `move`, `open` or `show`; nothing at rest."""
+        if len(self._moments) > 1:
+            self._moments.pop()
+            self._bring_up_to_date()
+
+    def add(self, name: str, parts: Sequence[Part]) -> None:
+        """Tell of a body that is no part of the house, such as a link of a robot: its parts, in its own frame. It is
+        drawn where `Moment.bodies` has it."""
+        self._bodies[name] = tuple(dataclasses.replace(p, owner=name) for p in parts)
+
+    def show(self, moment: Moment) -> None:
+        """Bring the house to a moment, in all that is drawn from now on; `undo` takes it back.
+
+        Raises:
+          ValueError: the moment is not of this house, or it is drawn by tracing rays, which knows the house at rest.
+        """
+        moment.check(self.house)
+        if unknown := sorted(set(moment.bodies) - set(self._bodies)):
+            raise ValueError(f"bodies {unknown} are unknown; tell of them by World.add first")
+        if isinstance(self.pictures, Traced):
+            raise ValueError("ray-traced pictures show a house at rest: open a world of moment.applied(house)")
+        self._moments.append(moment)
+        self._bring_up_to_date()
+
+    def at(self, hour: float) -> World:
+        """The same house at rest at another hour: a world of its own, with light of its own.
+
+        Args:
+          hour: local solar time, in [0, 24).
+        """
+        house = dataclasses.replace(self.house, sky=dataclasses.replace(self.house.sky, hour=hour))
+        return World(house, self.catalogue, self.graph, self.cache, self.pictures)
+
+    def _bring_up_to_date(self) -> None:
+        """Draw the moment from now on."""
+        self._recent.cache_clear()
+        self.__dict__.pop("_poses", None)
+        if self.pictures.quality is None or self.moment.is_rest:
+            if self._renderer is not None:
+                self._renderer.close()
+            self._renderer = self._moving = None
+            return
+        renderer = self.renderer
+        if self._moving is None:
+            from embodied.light.moving import MovingHouse  # late: loads the path tracer
+
+            self._moving = MovingHouse(self.baked(), self.house, self.catalogue, self.cache)
+        moving = self._moving
+        for name, parts in self._bodies.items():
+            moving.add(name, parts)
+        anew = moving.needs(self.moment)
+        drawn = moving.show(self.moment)
+        patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
+        if anew:
+            overlay = gloss_of(self.baked(), moving=moving) if _reflects(self.pictures) else None
+            renderer.replace(moving.lit, moving.moving, (*self.owners, *self._bodies), overlay)
+        renderer.change(drawn.corners, patches)
 
     def __reduce__(self) -> tuple[Callable[[], World], tuple[()]]:
         """Pickled as what it was made of; nothing is open in the process that reads it."""
@@ -110,7 +206,7 @@ class World:
 
     @functools.cached_property
     def _poses(self) -> FreePoses:
-        return FreePoses(self.house, self.graph)
+        return FreePoses(self.moment.applied(self.house), self.graph)
 
     def is_free(self, position: Sequence[float] | np.ndarray) -> bool:
         """True where the agent can stand at (x, y) of the ground floor, or at (x, y, z) of the storey that z is in."""
@@ -169,9 +265,8 @@ class World:
         """The renderer of this world, for pictures from anywhere; opened on first use."""
         if self._renderer is None:
             overlay = gloss_of(self.baked()) if _reflects(self.pictures) else None
-            self._renderer = Renderer(
-                self.house, self.catalogue, size=self.pictures.size, lit=self.lit, overlay=overlay
-            )
+            house = self.house if self.pictures.quality else self.moment.applied(self.house)
+            self._renderer = Renderer(house, self.catalogue, size=self.pictures.size, lit=self.lit, overlay=overlay)
         return self._renderer
 
     def baked(self, progress: bool = False) -> Bake:
@@ -239,6 +334,9 @@ class World:
 
     def sightings(self, node: int) -> tuple[Sighting, ...]:
         """The objects that can be seen from a node, the largest in view first. Needs no panoramas."""
+        if not self.moment.is_rest:
+            seen = self.renderer.seen(self.graph.positions[node], FACE)
+            return sightings_table([seen], len(self.house.placements)).at(0, self.house)
         return self._sightings.at(node, self.house)
 
     def render_all(self, progress: bool = False) -> Path:
@@ -259,7 +357,8 @@ class World:
         """Free the renderer and the file; a later use opens them again."""
         if self._renderer is not None:
             self._renderer.close()
-        self._renderer = self._tracer = None
+        self._renderer = self._tracer = self._moving = None
+        self._moments = [Moment()]
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -272,7 +371,7 @@ class World:
         self.close()
 
     def _load(self, node: int) -> Panorama:
-        file = self._open_file()
+        file = self._open_file() if self.moment.is_rest else None
         return self._source().panorama(self.graph.positions[node]) if file is None else file.read(node)
 
     def _draw_all(self, progress: bool) -> Iterator[Panorama]:
@@ -386,13 +485,19 @@ def differing(held: Mapping[str, object], wanted: Mapping[str, object], ignore_f
     return ", ".join(f"{n} {a!r} instead of {b!r}" for n, a, b in facts)
 
 
-def gloss_of(bake: Bake, *, detail: bool = True) -> Gloss:
+def gloss_of(bake: Bake, *, detail: bool = True, moving: MovingHouse | None = None) -> Gloss:
     """Overlay of a baked house's reflections over its pictures, and, unless told otherwise, what matter shows from
-    nearby."""
+    nearby.
+
+    Args:
+      moving: the house as it is with what moves in it.
+    """
     from embodied.light.pages.gloss_data import gloss_data_of  # late: loads the path tracer
     from embodied.light.tracing.rays import rays_among
     from embodied.render.gloss import Gloss
 
+    if moving is not None:
+        return Gloss(moving.lit, moving.gloss, rays_among, moving.moving)
     data = gloss_data_of(bake)
     return Gloss(bake.lit, data if detail else dataclasses.replace(data, detail=()), rays_among)
 

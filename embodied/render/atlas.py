@@ -46,3 +46,33 @@ def packed(pages: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         picture[row : row + len(image), width : width + image.shape[1]] = image
         row += len(image)
     return picture, corners + GUTTER
+
+
+def repaint(
+    picture: np.ndarray, place: np.ndarray, shape: tuple[int, int], at: tuple[int, int], part: np.ndarray
+) -> None:
+    """Change part of a page in what `packed` returned, and its copies.
+
+    Args:
+      picture: (h, w + w / 2, 4) uint8, changed.
+      place: column and row of the page.
+      shape: height and width of the page.
+      at: row and column in the page where `part` (h, w, 3) uint8 goes.
+    """
+    ends = at[0] + part.shape[0], at[1] + part.shape[1]
+    edges = [GUTTER * side for side in (at[0] == 0, ends[0] == shape[0], at[1] == 0, ends[1] == shape[1])]
+    image = cv2.copyMakeBorder(np.ascontiguousarray(part), *edges, cv2.BORDER_REPLICATE)
+    row, column = int(place[1]) + at[0] - edges[0], int(place[0]) + at[1] - edges[2]
+    bottom, right = row + image.shape[0], column + image.shape[1]
+    picture[row:bottom, column:right, :3] = image
+    height, width = picture.shape[0], picture.shape[1] * 2 // 3
+    above, beside = 0, 0
+    for level in range(1, LEVELS + 1):
+        row, column, bottom, right = row >> 1, column >> 1, (bottom + 1) >> 1, (right + 1) >> 1
+        larger = picture[above + 2 * row : above + 2 * bottom, beside + 2 * column : beside + 2 * right]
+        above = 0 if level == 1 else above + (height >> (level - 1))
+        beside = width
+        size = right - column, bottom - row
+        picture[above + row : above + bottom, beside + column : beside + right] = cv2.resize(
+            larger, size, interpolation=cv2.INTER_AREA
+        )

@@ -7,7 +7,7 @@ the list of geoms to draw. MuJoCo draws them; where the CPU draws a lit house, e
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, Self
 
 from embodied import gl
@@ -25,7 +25,7 @@ from embodied.render.panorama import Panorama
 from embodied.render.pictures import check_size
 from embodied.render.supersampling import averaged, drawn_size
 from embodied.scene.house_meshes import house_parts, owners
-from embodied.scene.lit_pages import LitMesh, LitPages
+from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
 from embodied.scene.model import compile_scene, drawn_meshes, give_memory_back
 from embodied.scene.part import Part
 
@@ -91,25 +91,67 @@ class Renderer:
         self._drawing: Geoms | Raster | None = None
         self._overlay = overlay
         self._software = gl.info().software
+        self.owners = owners(house)
+        self._portals = visibility.portals_of(house)
         if (lit is not None or not colours) and self._software and raster.able():
             if lit is None:
-                meshes, pages = _bare_meshes(house_parts(house, catalogue)), BARE
+                self._rasterise(_bare_meshes(house_parts(house, catalogue)), BARE, copied=False)
             else:
-                meshes, pages = [m for _, m in drawn_meshes(lit, house)], lit.pages
-            self.owners = owners(house)
-            number = {name: i + 1 for i, name in enumerate(self.owners)}
-            ids = np.array([number.get(m.owner, 0) for m in meshes], np.int32)
-            kinds, rooms = [m.kind for m in meshes], [m.room for m in meshes]
-            self._drawing = raster.Raster(meshes, ids, pages, copied=lit is not None)
+                self._rasterise([m for _, m in drawn_meshes(lit, house)], lit.pages)
         else:
             scene = compile_scene(house, catalogue, collisions=False, lit=lit)
-            self.owners, ids = scene.owners, scene.owner_of_geom
-            kinds, rooms = list(scene.kind_of_geom), list(scene.room_of_geom)
             samples = 0 if self._software else MULTISAMPLES
             self._drawing = Geoms(scene, self._drawn_size((size, size)), samples)
+            self._list(scene.owner_of_geom, scene.kind_of_geom, scene.room_of_geom)
+
+    def _rasterise(
+        self, meshes: Sequence[LitMesh], pages: Sequence[np.ndarray], *, copied: bool = True, moving: Sequence[int] = ()
+    ) -> None:
+        from embodied.render import raster  # late: loads OpenGL
+
+        number = {name: i + 1 for i, name in enumerate(self.owners)}
+        ids = np.array([number.get(m.owner, 0) for m in meshes], np.int32)
+        self._drawing = raster.Raster(meshes, ids, pages, copied=copied, moving=moving)
+        self._list(ids, [m.kind for m in meshes], [m.room for m in meshes])
+
+    def _list(self, ids: np.ndarray, kinds: Sequence[str], rooms: Sequence[str]) -> None:
+        """Note whose each of the geoms is, and from where it is seen."""
         self._is_visual = np.array([k != "collision" for k in kinds])
-        self._portals = visibility.portals_of(house)
-        self._geoms_of_room = _geoms_by_room(house, [self.owners[i - 1] if i else "" for i in ids], kinds, rooms)
+        self._geoms_of_room = _geoms_by_room(
+            self.house, [self.owners[i - 1] if i else "" for i in ids], list(kinds), list(rooms)
+        )
+
+    @gl.drawing()
+    def replace(self, lit: LitPages, moving: Sequence[int], owners: Sequence[str], overlay: Overlay | None) -> None:
+        """Draw other meshes and pages of the same lit house, some of which `move` moves.
+
+        Args:
+          moving: numbers of meshes in `lit`.
+          owners: as the attribute, with those of what is no part of the house behind the others.
+        """
+        from embodied.render import raster  # late: loads OpenGL
+
+        if not raster.able():
+            raise gl.GLError("what moves in a lit house is drawn by OpenGL 4.5 or later, and this one is older")
+        self._open().close()
+        self.owners, self._overlay = tuple(owners), overlay
+        drawn = list(drawn_meshes(lit, self.house))
+        self._numbers = {i: k for k, (i, _) in enumerate(drawn) if i in set(moving)}
+        self._rasterise([m for _, m in drawn], lit.pages, moving=list(self._numbers.values()))
+
+    @gl.drawing()
+    def change(self, corners: Mapping[int, np.ndarray], patches: Sequence[tuple[int, int, int, np.ndarray]]) -> None:
+        """Move meshes that `replace` named, and repaint parts of pages.
+
+        Args:
+          corners: (n, 3) float32 vertices by number of mesh in the lit house, metres.
+          patches: page, row, column and (h, w, 3) uint8 of each part.
+        """
+        drawing = self._open()
+        for number, vertices in corners.items():
+            drawing.move(self._numbers[number], vertices)  # type: ignore[union-attr]
+        for page, row, column, picture in patches:
+            drawing.repaint(page, (row, column), picture)  # type: ignore[union-attr]
 
     def view(
         self,
@@ -251,9 +293,11 @@ def _geoms_by_room(
     """Room id to the geoms seen when that room is seen; joinery and stairs belong to both their rooms."""
     sides = {o.id: tuple(r or visibility.OUTDOORS for r in o.rooms) for o in house.openings}
     sides |= {s.id: s.rooms for s in house.stairs}
+    everywhere = [*(r.id for r in house.rooms), visibility.OUTDOORS]
     geoms: dict[str, list[int]] = {}
     for g, (owner, kind) in enumerate(zip(owner_of_geom, kinds, strict=True)):
         if kind != "collision":
-            for room in sides.get(owner.partition("/")[0], (rooms[g],)):
+            here = tuple(everywhere) if rooms[g] == ANYWHERE else (rooms[g],)
+            for room in sides.get(owner.partition("/")[0], here):
                 geoms.setdefault(room, []).append(g)
     return {room: np.array(list_of, int) for room, list_of in geoms.items()}

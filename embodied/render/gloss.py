@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -125,17 +125,22 @@ class _Panes:
 class Gloss:
     """Owns the faces of a lit house, arranged for rays, and its light, coarser than the pages."""
 
-    def __init__(self, lit: LitPages, data: GlossData, rays_among: Callable[[np.ndarray], Rays]) -> None:
+    def __init__(
+        self, lit: LitPages, data: GlossData, rays_among: Callable[[np.ndarray], Rays], moving: Sequence[int] = ()
+    ) -> None:
         """
         Args:
           rays_among: from triangles (m, 3, 3) to rays among them.
+          moving: numbers of the last meshes, which `change` may move.
         """
         self._faces = _faces_of(lit, data)
-        self._pages = lit.pages
+        self._pages, self._own = list(lit.pages), set[int]()
         gloss = self._faces.gloss
         self._mirrors = np.append((gloss[:, 0] < MATTE) & (gloss[:, 1] > 0), False)  # nothing that is met is face -1
-        self._first = rays_among(self._faces.corners)
-        self._panes = _panes_of(lit, rays_among)
+        self._moving, self._rays_among = {i: lit.meshes[i].faces for i in moving}, rays_among
+        self._fixed = int(np.searchsorted(self._faces.owner, moving[0])) if moving else len(self._faces.owner)
+        self._first = self._first_fixed = rays_among(self._faces.corners[: self._fixed])
+        self._panes = _panes_of(lit.meshes[: moving[0]] if moving else lit.meshes, rays_among)
         self._gain_at, self._beyond = data.gain_at, data.outdoors / DOUBLE_GLAZING
         some_of_page = {m.page: m.vertices.mean(0)[None] for m in lit.meshes if len(m.vertices)}
         gains = [data.gain_at(some_of_page[i])[0] if i in some_of_page else None for i in range(len(lit.pages))]
@@ -147,6 +152,37 @@ class Gloss:
         self._light = np.concatenate([s.reshape(-1, 3) for s in small])
         self._middle = data.middle
         self._detail = Detail(self._faces.corners, self._faces.normal, self._faces.detail)
+
+    def change(self, corners: Mapping[int, np.ndarray], patches: Sequence[tuple[int, int, int, np.ndarray]]) -> None:
+        """Move meshes, and repaint parts of pages, as Renderer.change does."""
+        faces = self._faces
+        for number, vertices in corners.items():
+            rows = np.flatnonzero(faces.owner == number)
+            if len(rows):
+                faces.corners[rows] = vertices[self._moving[number]]
+        rows = slice(self._fixed, None)
+        if corners and self._fixed < len(faces.owner):
+            sides = faces.corners[rows, 1:] - faces.corners[rows, :1]
+            normal = np.cross(sides[:, 0], sides[:, 1])
+            faces.normal[rows] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+            self._first = _nearer(self._first_fixed, self._rays_among(faces.corners[rows]), self._fixed)
+        for page, row, column, part in patches:
+            self._repaint(page, row, column, part)
+
+    def _repaint(self, page: int, row: int, column: int, part: np.ndarray) -> None:
+        if page not in self._own:
+            self._pages[page] = self._pages[page].copy()
+            self._own.add(page)
+        picture = self._pages[page]
+        picture[row : row + part.shape[0], column : column + part.shape[1]] = part
+        h, w = self._height[page], self._width[page]
+        light = self._light[self._base[page] : self._base[page] + h * w].reshape(h, w, 3)
+        top, left = row // COARSER, column // COARSER
+        bottom, right = min(-(-(row + part.shape[0]) // COARSER), h), min(-(-(column + part.shape[1]) // COARSER), w)
+        if bottom > top and right > left:
+            some = picture[top * COARSER : bottom * COARSER, left * COARSER : right * COARSER]
+            size = (int(right - left), int(bottom - top))
+            light[top:bottom, left:right] = cv2.resize(light_of(some), size, interpolation=cv2.INTER_AREA)
 
     def over(self, rgb: np.ndarray, camera: Camera) -> np.ndarray:
         """The picture (h, w, 3) uint8 that `camera` drew, with what its surfaces mirror; matte pixels stay."""
@@ -530,8 +566,20 @@ def _glowing(mesh: LitMesh, glow: np.ndarray | None) -> np.ndarray:
     return glow[y, x].max((1, 2)) > 0
 
 
-def _panes_of(lit: LitPages, rays_among: Callable[[np.ndarray], Rays]) -> _Panes | None:
-    clear = [m for m in lit.meshes if glass_surfaces(m) and len(m.faces)]
+def _nearer(first: Rays, second: Rays, count: int) -> Rays:
+    """Rays among two sets of triangles, the second of which are numbered from `count` on."""
+
+    def nearer(start: np.ndarray, onward: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        one, two = first(start, onward), second(start, onward)
+        other = (two[0] >= 0) & ((one[0] < 0) | (two[1] < one[1]))
+        face = np.where(other, two[0] + count, one[0])
+        return face, *(np.where(other, b, a) for a, b in zip(one[1:], two[1:], strict=True))  # type: ignore[return-value]
+
+    return nearer
+
+
+def _panes_of(meshes: Sequence[LitMesh], rays_among: Callable[[np.ndarray], Rays]) -> _Panes | None:
+    clear = [m for m in meshes if glass_surfaces(m) and len(m.faces)]
     if not clear:
         return None
     corners = np.concatenate([m.vertices[m.faces] for m in clear]).astype(np.float32)

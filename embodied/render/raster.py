@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from embodied import gl
 
@@ -54,13 +54,20 @@ class Raster:
     pictures have fewer triangles where that cannot be seen."""
 
     def __init__(
-        self, meshes: Sequence[LitMesh], ids: np.ndarray, pages: Sequence[np.ndarray], *, copied: bool = True
+        self,
+        meshes: Sequence[LitMesh],
+        ids: np.ndarray,
+        pages: Sequence[np.ndarray],
+        *,
+        copied: bool = True,
+        moving: Collection[int] = (),
     ) -> None:
         """
         Args:
           ids: (meshes,) of their owners, below 65536.
           pages: (h, w, 3) uint8 each.
           copied: whether things get coarser copies; without, all is drawn whole.
+          moving: numbers of the meshes that `move` may move; they have no copies.
         """
         self._is_clear = np.array([m.alpha < 1 for m in meshes])
         lows, highs = (np.array([f(m.vertices, axis=0) for m in meshes], float) for f in (np.min, np.max))
@@ -68,11 +75,16 @@ class Raster:
         """(meshes, 3) metres, of the boxes that hold them and half their sizes."""
         used = [sorted({m.page for m in meshes if (m.alpha < 1) == clear}) for clear in (False, True)]
         pictures, places = zip(*(atlas.packed([pages[i] for i in some]) for some in used), strict=True)
-        self._atlas = pictures[0]
+        self._atlas, self._clear_pages = pictures[0], pictures[1] if moving else None
         place_of = [dict(zip(some, p, strict=True)) for some, p in zip(used, places, strict=True)]
+        self._place_of, self._shapes = place_of, [p.shape[:2] for p in pages]
         self._buffers = [int(b) for b in GL.glGenBuffers(2)]
         self._array = int(GL.glGenVertexArrays(1))
-        corners, triangles, self._starts, self._counts = _arranged(meshes, ids, pages, place_of, copied)
+        corners, triangles, self._starts, self._counts = _arranged(
+            meshes, ids, pages, place_of, copied, frozenset(moving)
+        )
+        ends = np.cumsum([0, *(len(m.vertices) for m in meshes)])
+        self._moving = {i: (int(ends[i]), corners[ends[i] : ends[i + 1]].copy()) for i in moving}
         _upload_corners(self._array, self._buffers, corners)
         self._triangles = triangles.astype(np.uint32)
         self._facing = _facing(corners["xyz"], triangles)
@@ -128,6 +140,27 @@ class Raster:
         ids, near = (nearest(_read("all", name, drawn), size) for name in FRAME_BUFFERS["numbers"])
         self._end()
         return picture, _metres(near), ids
+
+    def move(self, mesh: int, vertices: np.ndarray) -> None:
+        """Put the vertices (n, 3) float32 of a moving mesh elsewhere, metres."""
+        first, corners = self._moving[mesh]
+        corners["xyz"] = vertices
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._buffers[0])
+        GL.glBufferSubData(GL.GL_ARRAY_BUFFER, first * CORNER.itemsize, corners.nbytes, corners.view(np.uint8))
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, 0)
+        start, count = int(self._starts[0, mesh]), int(self._counts[0, mesh])
+        own = self._triangles[start : start + count].astype(np.int64) - first
+        self._facing[start : start + count] = _facing(corners["xyz"], own)
+        low, high = vertices.min(0), vertices.max(0)
+        self.middles[mesh], self.reaches[mesh] = (low + high) / 2, (high - low) / 2
+
+    def repaint(self, page: int, at: tuple[int, int], part: np.ndarray) -> None:
+        """Show `part` (h, w, 3) uint8 from row and column `at` of a page on."""
+        for picture, places in zip((self._atlas, self._clear_pages), self._place_of, strict=True):
+            if picture is not None and page in places:
+                atlas.repaint(picture, places[page], self._shapes[page], at, part)
+                if picture is self._clear_pages:
+                    _make_texture(self._through, picture.shape[:2], picture)
 
     def close(self) -> None:
         """Free what lies on the graphics side."""
@@ -313,6 +346,7 @@ def _arranged(
     pages: Sequence[np.ndarray],
     place_of: Sequence[Mapping[int, np.ndarray]],
     copied: bool,
+    moving: frozenset[int],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(n,) CORNER and (m, 3) triangles of all meshes and of coarser copies of the things among them; and where those
     of each mesh begin and how many they are, (MESH_CELLS, meshes) each."""
@@ -326,7 +360,7 @@ def _arranged(
         part["opacity"] = round(255 * (1 - (1 - m.alpha) ** 2))  # MuJoCo draws what shines through twice
     triangles = np.concatenate([m.faces + at for m, at in zip(meshes, first, strict=True)])
     whole = coarser.Corners(corners["xyz"], corners["at"], number, triangles)
-    things = np.array([m.kind == "object" for m in meshes])
+    things = np.array([m.kind == "object" and i not in moving for i, m in enumerate(meshes)])
     copies = coarser.copies(whole, len(meshes), things) if copied else []
     more = [corners[first[c.mesh]] for c in copies]
     for copy, part in zip(copies, more, strict=True):

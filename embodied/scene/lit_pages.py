@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+ANYWHERE = "*"
+"""Room of what moves and may be in any."""
 CLEAR = 0.1
 """Roughness up to which what is seen through is glass; curtains are rougher."""
 

@@ -161,3 +161,20 @@ def display(radiance: np.ndarray, gain: np.ndarray) -> np.ndarray:
 
 def _curve(x: Array) -> Array:
     return x * (1 + x / WHITE**2) / (1 + x)
+
+
+def displayed(x: np.ndarray) -> np.ndarray:
+    """Exposed radiance (..., 3) as uint8: `developed` on the thread that asks, from a table."""
+    y = np.maximum(x @ np.array([0.2126, 0.7152, 0.0722], np.float32), 1e-9)[..., None]
+    curve = lambda v: v * (1 + v / WHITE**2) / (1 + v)
+    mixed = 0.5 * (np.minimum(x * (curve(y) / y), 1.0) + curve(x))
+    return _shown_table()[(np.clip(mixed, 0, 1) * (len(_shown_table()) - 1) + 0.5).astype(np.int32)]
+
+
+@functools.cache
+def _shown_table() -> np.ndarray:
+    """(n,) uint8 of values from 0 to 1, evenly."""
+    t = np.linspace(0, 1, 1 << 14)
+    lifted = np.where(t <= 0.0031308, 12.92 * t, 1.055 * t ** (1 / 2.4) - 0.055) * LIFT
+    lifted = lifted - np.square(np.maximum(lifted - SHOULDER, 0)) * ((LIFT - 1) / (LIFT - SHOULDER) ** 2)
+    return (np.clip(lifted, 0, 1) * 255 + 0.5).astype(np.uint8)

@@ -83,7 +83,7 @@ def paint(sky: Sky, seed: int, place: Scenery, height: int = HEIGHT) -> Outdoors
         ],
         axis=-1,
     ).astype(np.float32)
-    sun = _sun_strength(sky, up)
+    sun = sun_strength(sky, up)
     above = _sky(sky, up, directions, towards, seed)
     air = cv2.resize(above[-max(height // 256, 1) :].mean(0)[None], (4 * height, 1), interpolation=cv2.INTER_LINEAR)[0]
     lamps = float(np.clip((2.0 - np.degrees(up)) / 5.0, 0, 1))
@@ -116,7 +116,7 @@ def _evenly(fine: np.ndarray) -> np.ndarray:
     return half[low] * (1 - t) + half[low + 1] * t
 
 
-def _sun_strength(sky: Sky, up: float) -> np.ndarray:
+def sun_strength(sky: Sky, up: float) -> np.ndarray:
     """e of a surface facing the sun: 128 klx outside the air, dimmed and reddened by it (Bouguer, Kasten air mass)."""
     if up <= 0.0 or sky.weather == "overcast":
         return np.zeros(3)

@@ -1,0 +1,152 @@
+"""The moment: what differs now from a house at rest. An empty one is the house itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from embodied.geometry import rotation
+from embodied.house.house import House, HouseError, Placement
+from embodied.house.shapes import room_at
+
+Triple: TypeAlias = tuple[float, float, float]
+WIDEST = math.pi / 2
+"""Angle of a leaf of openness 1, radians."""
+UPRIGHT = 1e-3
+"""The most that the z axis of a thing may lean that a House can hold: the sine of the angle."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position and orientation of a thing's own frame, world."""
+
+    position: Triple
+    """Metres."""
+    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    """w x y z, unit."""
+
+    @staticmethod
+    def upright(position: Triple, yaw: float) -> Pose:
+        """A pose turned about z alone, radians counter-clockwise."""
+        return Pose(position, (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
+
+    @functools.cached_property
+    def rotation(self) -> np.ndarray:
+        """(3, 3) from the thing's frame to the world's."""
+        w, x, y, z = np.asarray(self.quat) / np.linalg.norm(self.quat)
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    @property
+    def yaw(self) -> float:
+        """Turn about z, radians."""
+        return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
+
+    def points(self, local: np.ndarray) -> np.ndarray:
+        """(n, 3) world metres of points (n, 3) of the thing's frame."""
+        return local @ self.rotation.T.astype(local.dtype) + np.asarray(self.position, local.dtype)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Poses and openness that are not those of the house at rest.
+
+    Examples:
+      >>> Moment() == Moment(moved={})
+      True
+    """
+
+    moved: Mapping[str, Pose] = field(default_factory=dict)
+    """By placement id. What stands on a moved thing and is not named goes with it."""
+    openness: Mapping[str, float] = field(default_factory=dict)
+    """By opening id: 0 is closed, 1 is open by WIDEST."""
+    bodies: Mapping[str, Pose] = field(default_factory=dict)
+    """By name: things that are no part of the house, such as the links of a robot."""
+
+    @property
+    def is_rest(self) -> bool:
+        """True where nothing differs."""
+        return not (self.moved or self.openness or self.bodies)
+
+    def check(self, house: House) -> None:
+        """Refuse a moment of another house.
+
+        Raises:
+          ValueError: it names what the house does not have, or an openness outside 0 to 1.
+        """
+        doors = {o.id for o in house.openings if o.leaf_finish is not None}
+        for kind, names, known in (
+            ("things", self.moved, house.placement_by_id),
+            ("doors or windows", self.openness, doors),
+        ):
+            if unknown := sorted(set(names) - set(known)):
+                raise ValueError(f"house {house.name!r} has no {kind} {unknown}; it has {sorted(known)[:8]} ...")
+        if wrong := {o: x for o, x in self.openness.items() if not 0 <= x <= 1}:
+            raise ValueError(f"openness should lie between 0 (closed) and 1 (open), got {wrong}")
+
+    def poses(self, house: House) -> dict[str, Pose]:
+        """Pose of every placement that is not where the house has it: the moved ones and what stands on them."""
+        out: dict[str, Pose] = {}
+        for p in house.placements:
+            if (root := self.carrier(house, p)) is not None:
+                out[p.id] = carried(house.placement_by_id[root], self.moved[root], p)
+        return out
+
+    def carrier(self, house: House, p: Placement) -> str | None:
+        """Id of the moved placement that carries `p`: itself, or the nearest below it; None where it rests."""
+        above: Placement | None = p
+        while above is not None and above.id not in self.moved:
+            above = house.placement_by_id.get(above.parent or "")
+        return None if above is None else above.id
+
+    def applied(self, house: House) -> House:
+        """The house as it is at this moment, which can be lit, saved and played.
+
+        Raises:
+          ValueError: as `check` does, or a thing leans, which a house cannot hold.
+          HouseError: something stands outside of every room.
+        """
+        self.check(house)
+        poses = self.poses(house)
+        if leaning := sorted(i for i, pose in poses.items() if pose.rotation[2, 2] < 1 - UPRIGHT):
+            raise ValueError(f"{leaning} lean; a house holds upright things only: give poses turned about z alone")
+        placements = [_placed(house, p, poses[p.id]) if p.id in poses else p for p in house.placements]
+        openings = [
+            dataclasses.replace(o, angle=self.openness[o.id] * WIDEST) if o.id in self.openness else o
+            for o in house.openings
+        ]
+        return dataclasses.replace(house, placements=tuple(placements), openings=tuple(openings))
+
+
+def carried(root: Placement, pose: Pose, p: Placement) -> Pose:
+    """Pose of `p` when `root`, which carries it, has moved to `pose`."""
+    if root is p:
+        return pose
+    x, y, z = np.subtract(p.position, root.position)
+    local = np.array([*(rotation(-root.yaw) @ (x, y)), z])
+    half = (p.yaw - root.yaw) / 2
+    w, a, b, c = pose.quat
+    cos, sin = math.cos(half), math.sin(half)
+    quat = (w * cos - c * sin, a * cos + b * sin, b * cos - a * sin, c * cos + w * sin)
+    at_x, at_y, at_z = pose.points(local[None])[0].tolist()
+    return Pose((at_x, at_y, at_z), quat)
+
+
+def _placed(house: House, p: Placement, pose: Pose) -> Placement:
+    room = room_at(house, np.add(pose.position, (0, 0, 0.05)))
+    if room is None:
+        raise HouseError(f"{p.id!r} at {pose.position} is outside of every room; move it to a place indoors")
+    keeps = p.parent is not None and house.placement_by_id[p.parent].room == p.room
+    apart = {} if keeps else {"parent": None, "surface": None}
+    return dataclasses.replace(p, position=pose.position, yaw=pose.yaw, room=room, **apart)  # type: ignore[arg-type]

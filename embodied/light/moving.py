@@ -1,0 +1,685 @@
+"""A baked house in which things move: what is drawn of it at a moment, and how its pages change.
+
+What has moved away from where it was baked is left out of the house and drawn as a thing of its own, with light from
+the probes. Pages near where it was get the light back that it hid, pages near where it is lose light, in the tiles
+concerned. The sun is asked for by rays.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import cv2
+import numpy as np
+
+from embodied.assets.catalogue import Catalogue
+from embodied.house.house import House
+from embodied.house.moment import WIDEST, Moment, Pose
+from embodied.house.shapes import room_at
+from embodied.light.movers import Placed, Surface, SurfacePage, hidden_share, hiding, shading, surface_of, unhidden
+from embodied.light.pages.colours import linear
+from embodied.light.pages.cover import sources
+from embodied.light.pages.files import Bake, Ingredients
+from embodied.light.pages.gloss_data import gloss_data_of
+from embodied.light.pages.tone import displayed
+from embodied.light.probes import CORNERS, harmonics, radiance, turned
+from embodied.light.settings import LightSettings
+from embodied.light.tracing.emitters import GLAZING, portals_of, read_lamps
+from embodied.light.tracing.rays import rays_among
+from embodied.light.tracing.sky import sun_direction, sun_height, sun_strength
+from embodied.render.gloss import GlossData
+from embodied.scene.house_meshes import object_parts
+from embodied.scene.joinery import opening_parts
+from embodied.scene.lit_pages import ANYWHERE, LitMesh, LitPages
+from embodied.scene.part import Part
+
+TILE = 16
+"""Luxels along the sides of the tiles in which pages change."""
+SAMPLES = TILE * TILE // 4
+FAINT = 0.015
+"""Share of what a place sees, hidden by a thing, below which that is not shown."""
+NEARBY = 0.05
+"""Share hidden by the discs of a thing from which on rays are asked what it hid where it was baked."""
+REACH = 0.8
+"""Metres from a thing up to which it is asked what light it hides."""
+HIDDEN, OPEN = 0.12, 0.45
+"""Share of its light that a place gets past a thing, below which its baked light says nothing of it once the thing is
+gone, and above which it says all."""
+BRIGHT = (0.3, 2.0)
+"""Bounds of how bright what a thing hides is, beside the rest: nine harmonics are no more sure of one direction."""
+METALLIC = 77
+"""Metallic share, times 255, from which on a page wears what the face mirrors, which does not change."""
+
+
+Tile: TypeAlias = tuple[int, int, int]
+"""Page, row and column of a tile."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Part of a page that is shown anew."""
+
+    page: int
+    row: int
+    column: int
+    picture: np.ndarray
+    """(h, w, 3) uint8."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What a moment changes in drawing."""
+
+    corners: Mapping[int, np.ndarray]
+    """By number of mesh in `MovingHouse.lit`: (n, 3) float32 where its vertices are."""
+    patches: tuple[Patch, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Receiver:
+    """A page of the house as something that things hide light from; in luxels."""
+
+    position: np.ndarray
+    """(h, w, 3) float32, of the nearest covered luxel where none is."""
+    normal: np.ndarray
+    takes: np.ndarray
+    """(h, w) bool: its light may change."""
+    mesh: np.ndarray
+    """(h, w) int32: which of the page's meshes a luxel is of; -1 where it is of none."""
+    low: np.ndarray
+    high: np.ndarray
+    """(rows, columns, 3) boxes of its tiles; empty ones are far away."""
+    samples: np.ndarray
+    sample_normals: np.ndarray
+    """(rows, columns, SAMPLES, 3) float32 of every second luxel of its tiles, row by row."""
+    gain: np.ndarray
+    """(h, w, 3)."""
+    held: Ingredients
+    fineness: int
+
+    def near(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """(k, 2) row and column of the tiles that meet a box."""
+        return np.argwhere(((self.low <= high) & (self.high >= low)).all(-1))
+
+
+class MovingHouse:
+    """Owns what has moved so far, its surfaces, and the light of the pages that changed."""
+
+    def __init__(self, bake: Bake, house: House, catalogue: Catalogue, cache: Path) -> None:
+        """
+        Args:
+          cache: the folder that everything expensive is kept in.
+        """
+        self.bake, self.house, self.catalogue = bake, house, catalogue
+        self._cache = Path(cache) / "light"
+        self._settings = LightSettings(**bake.manifest["settings"])
+        self._things: dict[str, _Thing] = {}
+        self._placed: dict[str, Placed] = {}
+        self._receivers: dict[int, _Receiver] = {}
+        self._base: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._touched: set[Tile] = set()
+        self._shown: dict[Tile, list[_Hides]] = {}
+        self._hiding: dict[str, _Hides] = {}
+        self._opens: dict[Tile, tuple[np.ndarray, np.ndarray]] = {}
+        self._shown_things: dict[str, Placed] = {}
+        self._extra: dict[str, tuple[Part, ...]] = {}
+        self._lamps = read_lamps(bake.folder / "lamps.npz", bake.manifest["lamps"])
+        towards = sun_direction(house.sky)
+        self._sun = (sun_strength(house.sky, sun_height(house.sky.hour)) * GLAZING).astype(np.float32)
+        self._towards = towards.astype(np.float32)
+        self._portals = portals_of(house) if self._sun.any() else ()
+
+    def add(self, name: str, parts: Sequence[Part]) -> None:
+        """Tell of a body that is no part of the house, in its own frame; it is drawn where `Moment.bodies` says."""
+        self._extra[name] = tuple(dataclasses.replace(p, owner=p.owner or name) for p in parts)
+
+    def needs(self, moment: Moment) -> bool:
+        """True where `show` will change which meshes there are, and with them `lit`."""
+        return any(name not in self._things for name in self._wanted(moment))
+
+    def _wanted(self, moment: Moment) -> dict[str, Pose]:
+        """Pose of every thing by name: what moved, as a whole with what it carries; leaves of doors; bodies."""
+        out = dict(moment.moved)
+        for o in self.house.openings:
+            if o.id in moment.openness:
+                turned_ = dataclasses.replace(o, angle=moment.openness[o.id] * WIDEST)
+                for p in opening_parts(self.house, turned_, self.catalogue.finish):
+                    if p.mesh_key.startswith("leaf/"):
+                        name = f"{o.id}@{'+' if '/+1' in p.mesh_key else '-'}"
+                        out[name] = Pose.upright(p.position, p.yaw)
+        return out | dict(moment.bodies)
+
+    def show(self, moment: Moment) -> Drawn:
+        """Bring everything to a moment.
+
+        Raises:
+          ValueError: the moment is none of this house.
+        """
+        moment.check(self.house)
+        wanted = self._wanted(moment)
+        new = [name for name in wanted if name not in self._things]
+        for name in new:
+            self._things[name] = self._thing(name, moment)
+        if new:
+            self.__dict__.pop("_static", None)
+            self.__dict__.pop("lit", None)
+            self._shown, self._shown_things = {}, {}
+            self._take_out(new)
+        for name, thing in self._things.items():
+            pose = wanted.get(name, thing.rest)
+            if thing.surface is not None and pose is not None:
+                known = self._placed.get(name)
+                if known is None or known.pose != pose:
+                    self._placed[name] = self._lit_at(name, thing.surface, pose)
+        return Drawn(self._corners(), (*self._own_patches(), *self._house_patches()))
+
+    # ------------------------------------------------------------------ things
+
+    def _thing(self, name: str, moment: Moment) -> _Thing:
+        if name in self._extra:
+            return _Thing(self._surface(self._extra[name]), None, frozenset())
+        if "@" in name:
+            return self._leaf(*name.rsplit("@", 1))
+        root = self.house.placement_by_id[name]
+        carried = [p for p in self.house.placements if moment.carrier(self.house, p) == name]
+        rest = Pose.upright(root.position, root.yaw)
+        some = dataclasses.replace(self.house, placements=tuple(carried))
+        parts = [_in_frame(p, rest) for p in object_parts(some, self.catalogue)]
+        return _Thing(self._surface(parts), rest, frozenset(p.id for p in carried))
+
+    def _surface(self, parts: Sequence[Part]) -> Surface | None:
+        return surface_of(parts, self._settings, self._cache, self.house, self._lamps)
+
+    def _leaf(self, opening: str, side: str) -> _Thing:
+        o = next(x for x in self.house.openings if x.id == opening)
+        parts = [
+            p
+            for p in opening_parts(self.house, o, self.catalogue.finish)
+            if p.mesh_key.startswith("leaf/") and ("/+1" in p.mesh_key) == (side == "+")
+        ]
+        rest = Pose.upright(parts[0].position, parts[0].yaw)
+        owners = frozenset(p.owner for p in parts)
+        return _Thing(self._surface([_in_frame(p, rest) for p in parts]), rest, owners)
+
+    def _lit_at(self, name: str, s: Surface, pose: Pose) -> Placed:
+        corners = pose.points(s.box_corners)
+        middle = corners.mean(0)
+        home = room_at(self.house, middle) or self._nearest_room(middle)
+        coefficients = np.concatenate([self._radiance(c[None], room_at(self.house, c) or home) for c in corners])
+        e = shading(s, turned(coefficients, pose.rotation.T).astype(np.float32))
+        placed = Placed(s, pose, coefficients, e)
+        if len(self._portals):
+            normal = s.normal @ pose.rotation.T.astype(np.float32)
+            share = self._sun_share(pose.points(s.position), normal, s.thin, name, (placed,))
+            placed = dataclasses.replace(placed, e=e + share[:, None] * self._sun)
+        return placed
+
+    def _radiance(self, points: np.ndarray, room: str) -> np.ndarray:
+        """(n, 9, 3) float32 coefficients of the light that arrives at points of a room."""
+        return radiance(self.bake.probes.at(points, room)).astype(np.float32)
+
+    def _nearest_room(self, point: np.ndarray) -> str:
+        apart = [np.linalg.norm(np.mean(r.polygon, axis=0) - point[:2]) for r in self.house.rooms]
+        return self.house.rooms[int(np.argmin(apart))].id
+
+    # ------------------------------------------------------------------ what is drawn
+
+    @functools.cached_property
+    def lit(self) -> LitPages:
+        """The house without what moved, and all that moved: as it is drawn."""
+        gone = self._gone
+        meshes = [m if m.owner not in gone else _nothing(m) for m in self.bake.lit.meshes]
+        pages = list(self.bake.lit.pages)
+        for thing in self._things.values():
+            if thing.surface is None:
+                continue
+            for m in thing.surface.meshes:
+                meshes.append(dataclasses.replace(m, page=m.page + len(pages), room=ANYWHERE))
+            pages += [np.zeros((*p.albedo.shape[:2], 3), np.uint8) for p in thing.surface.pages]
+        return LitPages(tuple(meshes), tuple(pages), self.bake.lit.digest, ())
+
+    @property
+    def moving(self) -> range:
+        """Numbers in `lit` of the meshes that move."""
+        return range(len(self.bake.lit.meshes), len(self.lit.meshes))
+
+    @functools.cached_property
+    def _gloss_at_rest(self) -> GlossData:
+        return gloss_data_of(self.bake)
+
+    @property
+    def gloss(self) -> GlossData:
+        """Gloss of `lit`."""
+        still, meshes = self._gloss_at_rest, self.bake.lit.meshes
+        kept = [bool(len(m.faces)) for m in self.lit.meshes[: len(meshes)]]
+        cut = lambda known: [a if a is None or keep else a[:0] for a, keep in zip(known, kept)]
+        surfaces = [t.surface for t in self._things.values() if t.surface is not None]
+        own = [(s, m, g) for s in surfaces for m, g in zip(s.meshes, s.gloss, strict=True)]
+        return dataclasses.replace(
+            still,
+            gloss=[*cut(still.gloss), *(g[:, :3] for _, _, g in own)],
+            tint=[*cut(still.tint), *(_tint(s, m, g) for s, m, g in own)],
+            glow=[*still.glow, *(None for s in surfaces for _ in s.pages)],
+            detail=[*cut(still.detail), *(np.zeros(len(g), np.uint8) for _, _, g in own)],
+        )
+
+    @property
+    def _gone(self) -> frozenset[str]:
+        return frozenset().union(*(t.owners for t in self._things.values()))
+
+    def _corners(self) -> dict[int, np.ndarray]:
+        out, number = {}, len(self.bake.lit.meshes)
+        for name, thing in self._things.items():
+            for m in thing.surface.meshes if thing.surface is not None else ():
+                if name in self._placed:
+                    out[number] = self._placed[name].pose.points(m.vertices)
+                number += 1
+        return out
+
+    def _own_patches(self) -> Iterator[Patch]:
+        """Pages of things that are not where they were shown last."""
+        number = len(self.bake.lit.pages)
+        for name, thing in self._things.items():
+            placed = self._placed.get(name)
+            pages = thing.surface.pages if thing.surface is not None else ()
+            if placed is not None and self._shown_things.get(name) is not placed:
+                self._shown_things[name] = placed
+                for k, page in enumerate(pages):
+                    yield Patch(number + k, 0, 0, self._own_picture(placed, page))
+            number += len(pages)
+
+    def _own_picture(self, placed: Placed, page: SurfacePage) -> np.ndarray:
+        gain = self.bake.exposure.near(placed.pose.points(placed.surface.position[page.luxels]))
+        size = page.albedo.shape[1::-1]
+        e, glow = (cv2.resize((a[page.luxels] * gain)[page.shown_by], size) for a in (placed.e, placed.surface.glow))
+        return displayed(page.albedo * e + glow)
+
+    # ------------------------------------------------------------------ the house's pages
+
+    @functools.cached_property
+    def _static(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """From starts and directions, (n, 3) each, whether the house without what moved is met, (n,) bool."""
+        gone = self._gone
+        solid = [
+            m.vertices[m.faces]
+            for m in self.bake.lit.meshes
+            if m.page in self._room_of_page and m.alpha >= 0.9 and m.owner not in gone
+        ]
+        first = rays_among(np.concatenate(solid))
+        return lambda start, ahead: first(start, ahead)[0] >= 0
+
+    def _sun_share(
+        self, position: np.ndarray, normal: np.ndarray, thin: np.ndarray, without: str, own: Sequence[Placed] = ()
+    ) -> np.ndarray:
+        """(n,) float32 cosine-weighted share of the sun that points see, past all that stands or moves.
+
+        Args:
+          without: name of the thing that is not asked for.
+          own: things that are asked for besides.
+        """
+        cos = normal @ self._towards
+        cos = np.where(thin, np.abs(cos) * 0.5, np.maximum(cos, 0)).astype(np.float32)
+        which = np.flatnonzero(cos > 0)
+        which = which[self._through_windows(position[which])]
+        if len(which):
+            side = np.sign(normal[which] @ self._towards)[:, None] * normal[which]
+            start = (position[which] + side * 4e-3).astype(np.float32)
+            met = self._static(start, np.broadcast_to(self._towards, start.shape))
+            for placed in (*(p for name, p in self._placed.items() if name != without), *own):
+                met |= _hidden_by(placed, start, self._towards)
+            which = which[~met]
+        share = np.zeros(len(position), np.float32)
+        share[which] = cos[which]
+        return share
+
+    def _through_windows(self, position: np.ndarray) -> np.ndarray:
+        """(n,) bool: the way from a point to the sun leads through a window's rectangle."""
+        out = np.zeros(len(position), bool)
+        for p in self._portals:
+            facing = self._towards @ p.normal
+            if abs(facing) > 1e-6:
+                t = ((p.corner - position) @ p.normal) / facing
+                on = position + t[:, None] * self._towards - p.corner
+                u, v = on @ p.along / (p.along @ p.along), on @ p.up / (p.up @ p.up)
+                out |= (t > 0) & (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1)
+        return out
+
+    def _pages_near(self, low: np.ndarray, high: np.ndarray) -> Iterator[tuple[int, _Receiver, np.ndarray]]:
+        """Pages, and tiles of them, (k, 2), that meet a box."""
+        corners = np.where(CORNERS > 0, high, low)
+        rooms = {room_at(self.house, c) for c in (*corners, (low + high) / 2)}
+        for page, room in self._room_of_page.items():
+            if room in rooms:
+                receiver = self._receiver(page)
+                tiles = receiver.near(low, high)
+                if len(tiles):
+                    yield page, receiver, tiles
+
+    @functools.cached_property
+    def _room_of_page(self) -> dict[int, str]:
+        own = self.bake.manifest["own_pages"]
+        return {m.page: m.room for m in self.bake.lit.meshes if m.page < own and m.alpha >= 0.9 and len(m.faces)}
+
+    def _receiver(self, page: int) -> _Receiver:
+        if page not in self._receivers:
+            self._receivers[page] = self._read_receiver(page)
+        return self._receivers[page]
+
+    def _read_receiver(self, page: int) -> _Receiver:
+        held = self.bake.ingredients(page)
+        h, w = held.soft.shape[:2]
+        whole = [(m, g) for m, g in zip(self.bake.lit.meshes, self.bake.gloss) if m.page == page and len(m.faces)]
+        corners = np.concatenate([m.vertices[m.faces] for m, _ in whole])
+        flat = np.concatenate([m.uv[m.faces] for m, _ in whole]) * np.array([w, h], np.float32)
+        dull = np.concatenate([g[:, 2] < METALLIC if g is not None else np.zeros(len(m.faces), bool) for m, g in whole])
+        layout = np.concatenate([flat, np.zeros((*flat.shape[:2], 1), np.float32)], axis=-1)
+        row, column = np.divmod(np.arange(h * w), w)
+        above = np.stack([column + 0.5, row + 0.5, np.ones(h * w)], axis=1).astype(np.float32)
+        face, _, u, v = rays_among(layout)(above, np.tile(np.array([0, 0, -1], np.float32), (h * w, 1)))
+        index = np.flatnonzero(face >= 0)
+        face, weights = face[index], np.stack([1 - u - v, u, v], axis=1)[index]
+        position = np.einsum("nk,nkc->nc", weights, corners[face])
+        sides = corners[:, 1:] - corners[:, :1]
+        normal = np.cross(sides[:, 0], sides[:, 1])
+        normal = (normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12))[face]
+        shown_by = sources(index, (h, w))
+        takes = np.zeros(h * w, bool)
+        takes[index] = dull[face]
+        if held.glow.size:
+            takes &= held.glow.reshape(-1, 3).max(1) == 0
+        mesh = np.full(h * w, -1, np.int32)
+        mesh[index] = np.repeat(np.arange(len(whole)), [len(m.faces) for m, _ in whole])[face]
+        where, gain = position[shown_by], self.bake.exposure.near(position)[shown_by]
+        low, high = _tiles_of(where.reshape(h, w, 3), takes.reshape(h, w))
+        shape = lambda a: a.reshape(h, w, 3).astype(np.float32)
+        fineness = held.albedo.shape[0] // h
+        return _Receiver(
+            shape(where),
+            shape(normal[shown_by]),
+            takes.reshape(h, w),
+            mesh.reshape(h, w),
+            low,
+            high,
+            _sampled(shape(where)),
+            _sampled(shape(normal[shown_by])),
+            shape(gain),
+            held,
+            fineness,
+        )
+
+    def _light(self, page: int) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w, 3) float32 light in luxels, and (h, w) float32 share of the sun in texels, of a page without what
+        moved."""
+        if page not in self._base:
+            held = self._receiver(page).held
+            self._base[page] = held.soft.astype(np.float32), held.sun.astype(np.float32) / 255
+        return self._base[page]
+
+    def _take_out(self, names: Sequence[str]) -> None:
+        """Give pages the light back that things hid where they were baked."""
+        for name in names:
+            thing = self._things[name]
+            if thing.surface is None or thing.rest is None:
+                continue
+            placed = self._lit_at(name, thing.surface, thing.rest)
+            low, high = placed.box
+            for page, receiver, tiles in self._pages_near(low - REACH, high + REACH):
+                soft, _ = self._light(page)
+                known = np.ones(soft.shape[:2], np.float32)
+                for tile in tiles.tolist():
+                    at = _luxels(tile)
+                    soft[at], known[at] = self._without(placed, receiver, soft[at], at)
+                    self._touched.add((page, tile[0], tile[1]))
+                for k in np.unique(receiver.mesh[(known < 1) & (receiver.mesh >= 0)]):
+                    own = receiver.mesh == k
+                    rows, columns = (slice(i.min(), i.max() + 1) for i in np.nonzero(own))
+                    part, sure = soft[rows, columns], (known * own)[rows, columns]
+                    around = filled(part, sure)
+                    sure, own = sure[..., None], own[rows, columns, None]
+                    soft[rows, columns] = np.where(own, sure * part + (1 - sure) * around, part)
+            if len(self._portals):
+                self._give_sun_back(name, placed)
+
+    def _without(
+        self, placed: Placed, r: _Receiver, e: np.ndarray, at: tuple[slice, slice]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(h, w, 3) light of a tile as it would be without a thing, and (h, w) how far that is known, 0 to 1."""
+        position, normal = r.position[at].reshape(-1, 3), r.normal[at].reshape(-1, 3)
+        share, towards, sent = hiding(placed, position, normal)
+        close = np.flatnonzero(share > NEARBY)
+        share[close] = hidden_share(placed, position[close], normal[close])
+        passed = _passed(share, towards, *self._in_the_open(position, normal))
+        without = np.maximum(e.reshape(-1, 3) - sent, 0) / np.maximum(passed, HIDDEN)
+        known = np.clip((passed - HIDDEN) / (OPEN - HIDDEN), 0, 1)
+        return without.reshape(e.shape).astype(np.float32), known.reshape(e.shape[:2])
+
+    def _in_the_open(self, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) light of places near each other in an empty room, and (n, 9, 3) coefficients of what arrives there."""
+        middle = position[len(position) // 2] + 0.05 * normal[len(position) // 2]
+        around = self._radiance(position, room_at(self.house, middle) or self._nearest_room(middle))
+        e = np.einsum("nk,nkc->nc", unhidden(normal, np.zeros(len(normal), bool)), around)
+        return np.maximum(e, 1e-5), around
+
+    def _give_sun_back(self, name: str, placed: Placed) -> None:
+        low, high = _shadow_box(placed, self._towards)
+        for page, receiver, tiles in self._pages_near(low, high):
+            sun = self._light(page)[1]
+            for tile in tiles.tolist():
+                position, normal, at = self._texels(receiver, tile)
+                which = np.flatnonzero(_hidden_by(placed, position + normal * 2e-3, self._towards))
+                if len(which):
+                    none = np.zeros(len(which), bool)
+                    share = self._sun_share(position[which], normal[which], none, name)
+                    part = sun[at].ravel()
+                    part[which] = np.maximum(part[which], share)
+                    sun[at] = part.reshape(sun[at].shape)
+                    self._touched.add((page, tile[0], tile[1]))
+
+    def _texels(self, r: _Receiver, tile: Sequence[int]) -> tuple[np.ndarray, np.ndarray, tuple[slice, slice]]:
+        """(n, 3) positions and normals of the texels of a tile, and where on the page they are."""
+        at = _luxels(tile)
+        position = r.position[at]
+        h, w = position.shape[:2]
+        size = (w * r.fineness, h * r.fineness)
+        fine = cv2.resize(position, size, interpolation=cv2.INTER_LINEAR)
+        normal = cv2.resize(r.normal[at], size, interpolation=cv2.INTER_NEAREST)
+        rows, columns = (slice(s.start * r.fineness, s.start * r.fineness + n) for s, n in zip(at, size[::-1]))
+        return fine.reshape(-1, 3), normal.reshape(-1, 3), (rows, columns)
+
+    def _house_patches(self) -> Iterator[Patch]:
+        """Tiles whose light is not what was shown last."""
+        now: dict[Tile, list[_Hides]] = {tile: [] for tile in (*self._touched, *self._shown)}
+        for name, placed in self._placed.items():
+            if (known := self._hiding.get(name)) is None or known.placed is not placed:
+                known = self._hiding[name] = self._hides(placed)
+            for tile in (*known.tiles, *known.sunlit):
+                if known not in now.setdefault(tile, []):
+                    now[tile].append(known)
+        for tile, things in sorted(now.items(), key=lambda item: item[0]):
+            if self._shown.get(tile) != things:
+                self._shown[tile] = things
+                yield self._patch(tile, things)
+
+    def _hides(self, placed: Placed) -> _Hides:
+        """The tiles from which a thing hides light."""
+        low, high = placed.box
+        near = list(self._pages_near(low - REACH, high + REACH))
+        sunlit: list[Tile] = []
+        if len(self._portals):
+            for page, r, tiles in self._pages_near(*_shadow_box(placed, self._towards)):
+                sun = self._light(page)[1]
+                cut = lambda k, r=r: slice(k * TILE * r.fineness, (k + 1) * TILE * r.fineness)  # type: ignore[misc]
+                sunlit += [(page, i, k) for i, k in tiles.tolist() if sun[cut(i), cut(k)].any()]
+        if not near:
+            return _Hides(placed, {}, tuple(sunlit))
+        names = [(page, i, k) for page, _, tiles in near for i, k in tiles.tolist()]
+        take = lambda what: np.concatenate([getattr(r, what)[tuple(t.T)] for _, r, t in near]).reshape(-1, 3)
+        position, normal = take("samples"), take("sample_normals")
+        share, towards, sent = hiding(placed, position, normal)
+        share, towards, sent = (a.reshape(len(names), SAMPLES, *a.shape[1:]) for a in (share, towards, sent))
+        out, side = {}, TILE // 2
+        for k in np.flatnonzero(share.max(1) > FAINT):
+            where = slice(k * SAMPLES, (k + 1) * SAMPLES)
+            open_, around = self._open(names[k], position[where], normal[where])
+            passed = _passed(share[k], towards[k], open_, around)
+            both = np.concatenate([passed, sent[k]], axis=1).reshape(side, side, 4)
+            out[names[k]] = cv2.resize(both, (TILE, TILE), interpolation=cv2.INTER_LINEAR)
+        return _Hides(placed, out, tuple(sunlit))
+
+    def _open(self, tile: Tile, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3) light that samples of a tile have in an empty room, and (n, 9, 3) what arrives there; remembered."""
+        if tile not in self._opens:
+            self._opens[tile] = self._in_the_open(position, normal)
+        return self._opens[tile]
+
+    def _patch(self, named: Tile, things: Sequence[_Hides]) -> Patch:
+        page, *tile = named
+        r, at = self._receiver(page), _luxels(tile)
+        soft, sun = self._light(page)
+        e = soft[at]
+        for thing in things:
+            if (both := thing.tiles.get(named)) is not None:
+                both = both[: e.shape[0], : e.shape[1]]
+                e = e * both[..., :1] + both[..., 1:]
+        fine, fine_normal, texels = self._texels(r, tile)
+        h, w = sun[texels].shape
+        share = sun[texels].ravel()
+        if len(self._portals) and share.any():
+            lit = np.flatnonzero(share)
+            for thing in things:
+                lit = lit[~_hidden_by(thing.placed, fine[lit] + fine_normal[lit] * 2e-3, self._towards)]
+            left = np.zeros_like(share)
+            left[lit] = share[lit]
+            share = left
+        exposed = cv2.resize(e * r.gain[at], (w, h), interpolation=cv2.INTER_LINEAR)
+        if share.any():
+            gain = cv2.resize(r.gain[at], (w, h), interpolation=cv2.INTER_LINEAR)
+            exposed = exposed + share.reshape(h, w, 1) * self._sun * gain
+        picture = displayed(LINEAR[r.held.albedo[texels]] * exposed)
+        keeps = ~cv2.resize(r.takes[at].astype(np.uint8), (w, h), interpolation=cv2.INTER_NEAREST).astype(bool)
+        picture[keeps] = r.held.picture[texels][keeps]
+        return Patch(page, texels[0].start, texels[1].start, picture)
+
+
+LINEAR = linear(np.arange(256, dtype=np.float32) / 255)
+
+
+@dataclass(frozen=True, eq=False)
+class _Hides:
+    """What a thing hides where it is."""
+
+    placed: Placed
+    tiles: Mapping[Tile, np.ndarray]
+    """(TILE, TILE, 4) float32: the share of its light that every luxel gets past the thing, and what the thing
+    sends."""
+    sunlit: tuple[Tile, ...]
+    """Tiles from which it may hide the sun."""
+
+
+def _passed(share: np.ndarray, towards: np.ndarray, open_: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """(n, 1) float32 share of the light that gets past a thing which hides a share of what is seen, `towards` it."""
+    there = np.einsum("nk,nk->n", harmonics(towards), around.mean(2))
+    bright = np.clip(there / open_.mean(1), *BRIGHT)
+    return ((1 - share) / (1 - share + share * bright))[:, None].astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class _Thing:
+    surface: Surface | None
+    rest: Pose | None
+    """Where it was baked; None for what was not."""
+    owners: frozenset[str]
+    """Of what is drawn no longer in the house."""
+
+
+def _in_frame(p: Part, frame: Pose) -> Part:
+    """A part of the house placed in the frame of an upright pose."""
+    x, y, z = (np.subtract(p.position, frame.position) @ frame.rotation).tolist()
+    return dataclasses.replace(p, position=(x, y, z), yaw=p.yaw - frame.yaw)
+
+
+def _tint(s: Surface, m: LitMesh, gloss: np.ndarray) -> np.ndarray | None:
+    """(m, 3) float32 colour of the middle of each face; None where none is of metal."""
+    if not gloss[:, 2].any():
+        return None
+    picture = s.pages[m.page].albedo
+    h, w = picture.shape[:2]
+    at = m.uv[m.faces].mean(1)
+    x, y = (np.clip(at[:, k] * n, 0, n - 1).astype(int) for k, n in ((0, w), (1, h)))
+    tint: np.ndarray = picture[y, x]
+    return tint
+
+
+def _hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray) -> np.ndarray:
+    """(n,) bool: a thing stands between points and the sun."""
+    turn = placed.pose.rotation.astype(np.float32)
+    local, ahead = (start - np.asarray(placed.pose.position, np.float32)) @ turn, towards @ turn
+    low, high = placed.surface.box
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([(low - local) / ahead, (high - local) / ahead])
+    near, far = ends.min(0).max(1), ends.max(0).min(1)
+    out: np.ndarray = (near <= far) & (far > 0)
+    which = np.flatnonzero(out)
+    if len(which) and len(placed.surface.corners):
+        along = np.broadcast_to(ahead, (len(which), 3)).astype(np.float32)
+        out[which] = placed.surface.first_hit(local[which], along)[0] >= 0
+    return out
+
+
+def _sampled(a: np.ndarray) -> np.ndarray:
+    """(rows, columns, SAMPLES, 3) means of two by two luxels of a page (h, w, 3), tile by tile."""
+    h, w = a.shape[:2]
+    rows, columns, half = -(-h // TILE), -(-w // TILE), TILE // 2
+    whole = cv2.copyMakeBorder(a, 0, rows * TILE - h, 0, columns * TILE - w, cv2.BORDER_REPLICATE)
+    small = cv2.resize(whole, (columns * half, rows * half), interpolation=cv2.INTER_AREA)
+    return small.reshape(rows, half, columns, half, 3).swapaxes(1, 2).reshape(rows, columns, SAMPLES, 3)
+
+
+def filled(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """(h, w, 3) float32 of the pixels that weigh something, spread over those that do not.
+
+    Source: push and pull: S. Gortler and others, The lumigraph (1996), section 3.4.
+    """
+    both = np.dstack([picture * weight[..., None], weight]).astype(np.float32)
+    levels = [both]
+    while min(levels[-1].shape[:2]) > 1:
+        h, w = ((n + 1) // 2 for n in levels[-1].shape[:2])
+        small = cv2.resize(levels[-1], (w, h), interpolation=cv2.INTER_AREA)
+        weighs = small[..., 3:].copy()
+        levels.append(small * (np.minimum(weighs * 4, 1) / np.maximum(weighs, 1e-6)))
+    out = levels[-1]
+    for level in levels[-2::-1]:
+        larger = cv2.resize(out, level.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+        larger /= np.maximum(larger[..., 3:], 1e-6)
+        out = level + (1 - np.minimum(level[..., 3:], 1)) * larger
+    return out[..., :3]
+
+
+def _nothing(m: LitMesh) -> LitMesh:
+    return dataclasses.replace(m, faces=m.faces[:0])
+
+
+def _luxels(tile: Sequence[int]) -> tuple[slice, slice]:
+    return slice(tile[0] * TILE, (tile[0] + 1) * TILE), slice(tile[1] * TILE, (tile[1] + 1) * TILE)
+
+
+def _tiles_of(position: np.ndarray, takes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes of the tiles of a page (h, w, 3)."""
+    h, w = takes.shape
+    rows, columns = -(-h // TILE), -(-w // TILE)
+    low, high = np.full((rows * TILE, columns * TILE, 3), 1e9), np.full((rows * TILE, columns * TILE, 3), -1e9)
+    low[:h, :w][takes], high[:h, :w][takes] = position[takes], position[takes]
+    cut = lambda a: a.reshape(rows, TILE, columns, TILE, 3)
+    return cut(low).min((1, 3)).astype(np.float32), cut(high).max((1, 3)).astype(np.float32)
+
+
+def _shadow_box(placed: Placed, towards: np.ndarray, floor: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
+    """A box that holds the shadow of a thing, as far as `floor` metres below it."""
+    low, high = placed.box
+    along = -towards * (min(high[2] - low[2] + floor, 8.0) / max(float(towards[2]), 0.15))
+    return np.minimum(low, low + along), np.maximum(high, high + along)
