@@ -107,6 +107,7 @@ class World:
             known = Pose.upright(p.position, p.yaw)
         x, y, z = (float(c) for c in position)
         pose = Pose.upright((x, y, z), known.yaw if yaw is None and known is not None else float(yaw or 0.0))
+        self._moments.append(self.moment)
         self.show(dataclasses.replace(self.moment, moved={**self.moment.moved, thing: pose}))
 
     def open(self, opening: str, openness: float = 1.0) -> None:
@@ -115,10 +116,11 @@ class World:
         Raises:
           ValueError: the house has no such door, or it cannot be open so far.
         """
+        self._moments.append(self.moment)
         self.show(dataclasses.replace(self.moment, openness={**self.moment.openness, opening: float(openness)}))
 
     def undo(self) -> None:
-        """Go back to the moment before the last `move`, `open` or `show`; nothing at rest."""
+        """Go back to the moment before the last `move` or `open`; nothing where there was none."""
         if len(self._moments) > 1:
             self._moments.pop()
             self._bring_up_to_date()
@@ -129,7 +131,7 @@ class World:
         self._bodies[name] = tuple(dataclasses.replace(p, owner=name) for p in parts)
 
     def show(self, moment: Moment) -> None:
-        """Bring the house to a moment, in all that is drawn from now on; `undo` takes it back.
+        """Bring the house to a moment, in all that is drawn from now on.
 
         Raises:
           ValueError: the moment is not of this house, or it is drawn by tracing rays, which knows the house at rest.
@@ -139,7 +141,7 @@ class World:
             raise ValueError(f"bodies {unknown} are unknown; tell of them by World.add first")
         if isinstance(self.pictures, Traced):
             raise ValueError("ray-traced pictures show a house at rest: open a world of moment.applied(house)")
-        self._moments.append(moment)
+        self._moments[-1] = moment
         self._bring_up_to_date()
 
     def at(self, hour: float) -> World:

@@ -39,7 +39,7 @@ TRANSFER_RAYS = 48
 """Rays of a luxel that find where the thing hides the light from itself."""
 HIDING_RAYS = 32
 """Rays of a place that find what a thing hid from it where it was baked."""
-DISCS = 64
+DISCS = 48
 """Discs that stand for the whole of a thing's surface."""
 LIFT = 2e-3
 """Metres by which rays start above their surface."""

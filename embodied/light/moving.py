@@ -41,13 +41,15 @@ from embodied.scene.part import Part
 TILE = 16
 """Luxels along the sides of the tiles in which pages change."""
 SAMPLES = TILE * TILE // 4
-FAINT = 0.015
+FAINT = 0.025
 """Share of what a place sees, hidden by a thing, below which that is not shown."""
+SLIGHT = 0.01
+"""Change of the share of its light that a place gets which goes unnoticed."""
 NEARBY = 0.05
 """Share hidden by the discs of a thing from which on rays are asked what it hid where it was baked."""
 REACH = 0.8
 """Metres from a thing up to which it is asked what light it hides."""
-HIDDEN, OPEN = 0.12, 0.45
+HIDDEN, OPEN = 0.3, 0.65
 """Share of its light that a place gets past a thing, below which its baked light says nothing of it once the thing is
 gone, and above which it says all."""
 BRIGHT = (0.3, 2.0)
@@ -123,7 +125,7 @@ class MovingHouse:
         self._receivers: dict[int, _Receiver] = {}
         self._base: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._touched: set[Tile] = set()
-        self._shown: dict[Tile, list[_Hides]] = {}
+        self._shown: dict[Tile, _Shown] = {}
         self._hiding: dict[str, _Hides] = {}
         self._opens: dict[Tile, tuple[np.ndarray, np.ndarray]] = {}
         self._shown_things: dict[str, Placed] = {}
@@ -459,10 +461,11 @@ class MovingHouse:
         return without.reshape(e.shape).astype(np.float32), known.reshape(e.shape[:2])
 
     def _in_the_open(self, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 3) light of places near each other in an empty room, and (n, 9, 3) coefficients of what arrives there."""
+        """(n,) light of places near each other in an empty room, and (n, 9) coefficients of what arrives there, both as
+        means of the colours."""
         middle = position[len(position) // 2] + 0.05 * normal[len(position) // 2]
-        around = self._radiance(position, room_at(self.house, middle) or self._nearest_room(middle))
-        e = np.einsum("nk,nkc->nc", unhidden(normal, np.zeros(len(normal), bool)), around)
+        around = self._radiance(position, room_at(self.house, middle) or self._nearest_room(middle)).mean(2)
+        e = np.einsum("nk,nk->n", unhidden(normal, np.zeros(len(normal), bool)), around)
         return np.maximum(e, 1e-5), around
 
     def _give_sun_back(self, name: str, placed: Placed) -> None:
@@ -501,9 +504,13 @@ class MovingHouse:
                 if known not in now.setdefault(tile, []):
                     now[tile].append(known)
         for tile, things in sorted(now.items(), key=lambda item: item[0]):
-            if self._shown.get(tile) != things:
-                self._shown[tile] = things
-                yield self._patch(tile, things)
+            shown = self._shown.get(tile)
+            if shown is not None and shown.things == things:
+                continue
+            new = _Shown(things, _together([t.tiles[tile] for t in things if tile in t.tiles]))
+            if shown is None or shown.differs(new, tile):
+                self._shown[tile] = new
+                yield self._patch(tile, new)
 
     def _hides(self, placed: Placed) -> _Hides:
         """The tiles from which a thing hides light."""
@@ -521,37 +528,40 @@ class MovingHouse:
         take = lambda what: np.concatenate([getattr(r, what)[tuple(t.T)] for _, r, t in near]).reshape(-1, 3)
         position, normal = take("samples"), take("sample_normals")
         share, towards, sent = hiding(placed, position, normal)
-        share, towards, sent = (a.reshape(len(names), SAMPLES, *a.shape[1:]) for a in (share, towards, sent))
-        out, side = {}, TILE // 2
-        for k in np.flatnonzero(share.max(1) > FAINT):
-            where = slice(k * SAMPLES, (k + 1) * SAMPLES)
-            open_, around = self._open(names[k], position[where], normal[where])
-            passed = _passed(share[k], towards[k], open_, around)
-            both = np.concatenate([passed, sent[k]], axis=1).reshape(side, side, 4)
-            out[names[k]] = cv2.resize(both, (TILE, TILE), interpolation=cv2.INTER_LINEAR)
-        return _Hides(placed, out, tuple(sunlit))
+        by_tile = lambda a: a.reshape(len(names), SAMPLES, *a.shape[1:])
+        which = np.flatnonzero(by_tile(share).max(1) > FAINT)
+        if not len(which):
+            return _Hides(placed, {}, tuple(sunlit))
+        position, normal = by_tile(position), by_tile(normal)
+        opens = [self._open(names[k], position[k], normal[k]) for k in which]
+        some = lambda a: by_tile(a)[which].reshape(-1, *a.shape[1:])
+        open_, around = (np.concatenate([o[i] for o in opens]) for i in (0, 1))
+        passed = _passed(some(share), some(towards), open_, around)
+        side = TILE // 2
+        light = np.concatenate([passed, some(sent)], axis=1).reshape(-1, side, side, 4)
+        tiles = {names[k]: cv2.resize(one, (TILE, TILE)) for k, one in zip(which, light, strict=True)}
+        return _Hides(placed, tiles, tuple(sunlit))
 
     def _open(self, tile: Tile, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 3) light that samples of a tile have in an empty room, and (n, 9, 3) what arrives there; remembered."""
+        """(n,) light that samples of a tile have in an empty room, and (n, 9) what arrives there, both as means of the
+        colours; remembered."""
         if tile not in self._opens:
             self._opens[tile] = self._in_the_open(position, normal)
         return self._opens[tile]
 
-    def _patch(self, named: Tile, things: Sequence[_Hides]) -> Patch:
+    def _patch(self, named: Tile, shown: _Shown) -> Patch:
         page, *tile = named
         r, at = self._receiver(page), _luxels(tile)
         soft, sun = self._light(page)
         e = soft[at]
-        for thing in things:
-            if (both := thing.tiles.get(named)) is not None:
-                both = both[: e.shape[0], : e.shape[1]]
-                e = e * both[..., :1] + both[..., 1:]
+        both = shown.light[: e.shape[0], : e.shape[1]]
+        e = e * both[..., :1] + both[..., 1:]
         fine, fine_normal, texels = self._texels(r, tile)
         h, w = sun[texels].shape
         share = sun[texels].ravel()
         if len(self._portals) and share.any():
             lit = np.flatnonzero(share)
-            for thing in things:
+            for thing in shown.things:
                 lit = lit[~_hidden_by(thing.placed, fine[lit] + fine_normal[lit] * 2e-3, self._towards)]
             left = np.zeros_like(share)
             left[lit] = share[lit]
@@ -581,10 +591,34 @@ class _Hides:
     """Tiles from which it may hide the sun."""
 
 
+def _together(tiles: Sequence[np.ndarray]) -> np.ndarray:
+    """(TILE, TILE, 4) as `_Hides.tiles` of several things."""
+    out = np.zeros((TILE, TILE, 4), np.float32)
+    out[..., 0] = 1
+    for both in tiles:
+        out[..., :1] *= both[..., :1]
+        out[..., 1:] += both[..., 1:]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What a tile was shown by."""
+
+    things: list[_Hides]
+    light: np.ndarray
+    """As `_together`."""
+
+    def differs(self, new: _Shown, tile: Tile) -> bool:
+        """True where `new` looks another way."""
+        sunny = any(tile in t.sunlit for t in (*self.things, *new.things))
+        return sunny or bool(np.abs(self.light[..., 0] - new.light[..., 0]).max() > SLIGHT)
+
+
 def _passed(share: np.ndarray, towards: np.ndarray, open_: np.ndarray, around: np.ndarray) -> np.ndarray:
     """(n, 1) float32 share of the light that gets past a thing which hides a share of what is seen, `towards` it."""
-    there = np.einsum("nk,nk->n", harmonics(towards), around.mean(2))
-    bright = np.clip(there / open_.mean(1), *BRIGHT)
+    there = np.einsum("nk,nk->n", harmonics(towards), around)
+    bright = np.clip(there / open_, *BRIGHT)
     return ((1 - share) / (1 - share + share * bright))[:, None].astype(np.float32)
 
 

@@ -1,0 +1,149 @@
+"""Things that move: a moment of a house, what is drawn of it, and the light on it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from conftest import two_rooms
+from hand_light import TINY
+from handmade import HandCatalogue, box_mesh, decibels, furnished
+
+from embodied.house.house import HouseError, Light, Sky
+from embodied.house.moment import Moment, Pose
+from embodied.light import bake
+from embodied.light.moving import filled
+from embodied.navigation.graph import build_graph
+from embodied.scene.part import Part
+from embodied.world import World
+
+HOUSE = furnished(two_rooms())
+SUNNY = dataclasses.replace(
+    HOUSE,
+    lights=(Light("l1", "living_room_1", None, (2.5, 2.0, 2.2), (1.0, 0.8, 0.6), 1100.0),),
+    sky=Sky(11.0, "clear", north=-math.pi / 2),
+)
+CAMERA = ((4.2, 3.4, 1.5), math.radians(-140), -0.45, 1.2, (120, 160))
+TURN = (math.cos(0.4), 0.0, 0.0, math.sin(0.4))
+
+
+def thing() -> str:
+    """The id of something that carries another thing."""
+    return next(p.parent for p in HOUSE.placements if p.parent is not None)
+
+
+def test_a_moved_thing_takes_along_what_stands_on_it():
+    root = HOUSE.placement_by_id[thing()]
+    child = next(p for p in HOUSE.placements if p.parent == root.id)
+    moved = Moment(moved={root.id: Pose.upright((1.0, 3.0, 0.0), root.yaw + math.pi / 2)}).applied(HOUSE)
+    there, above = moved.placement_by_id[root.id], moved.placement_by_id[child.id]
+    x, y = np.subtract(child.position, root.position)[:2]
+    np.testing.assert_allclose(np.subtract(above.position, there.position)[:2], [-y, x], atol=1e-9)
+    assert math.isclose(above.yaw - child.yaw, math.pi / 2) and above.parent == root.id
+
+
+def test_an_empty_moment_is_the_house_at_rest_and_a_door_opens_to_a_right_angle():
+    assert Moment().is_rest and Moment().applied(HOUSE) == HOUSE
+    opened = Moment(openness={"door_1": 1.0}).applied(HOUSE)
+    assert {o.id: o.angle for o in opened.openings}["door_1"] == math.pi / 2
+
+
+@pytest.mark.parametrize(
+    ("moment", "error", "words"),
+    [
+        (Moment(moved={"ghost_1": Pose((1.0, 1.0, 0.0))}), ValueError, "ghost_1"),
+        (Moment(openness={"window_9": 0.5}), ValueError, "window_9"),
+        (Moment(openness={"door_1": 1.5}), ValueError, "between 0"),
+        (Moment(moved={"rug_1": Pose((1.0, 1.0, 0.0), (0.9, 0.4, 0.0, 0.0))}), ValueError, "lean"),
+        (Moment(moved={"rug_1": Pose((50.0, 1.0, 0.0))}), HouseError, "outside"),
+    ],
+)
+def test_a_moment_that_a_house_cannot_have_is_refused_by_name(moment, error, words):
+    with pytest.raises(error, match=words):
+        moment.applied(HOUSE)
+
+
+def test_a_pose_turns_points_as_its_quaternion_says():
+    pose = Pose((1.0, 2.0, 3.0), TURN)
+    np.testing.assert_allclose(pose.points(np.eye(3))[0], [1 + math.cos(0.8), 2 + math.sin(0.8), 3.0])
+    assert math.isclose(pose.yaw, 0.8)
+
+
+def test_what_is_unknown_in_a_picture_is_filled_from_around_and_what_is_known_stays():
+    picture = np.linspace(0, 1, 32, dtype=np.float32)[None, :, None] * np.ones((32, 1, 3), np.float32)
+    weight = np.ones((32, 32), np.float32)
+    weight[8:24, 8:24] = 0
+    out = filled(np.where(weight[..., None] > 0, picture, 9.0).astype(np.float32), weight)
+    np.testing.assert_array_equal(out[weight > 0], picture[weight > 0])
+    assert np.abs(out - picture).max() < 0.15
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    """The furnished two-room house on a sunny morning, baked tinily."""
+    cache = tmp_path_factory.mktemp("moving")
+    with World(SUNNY, HandCatalogue(), build_graph(SUNNY), cache, _tiny()) as w:
+        w._bake = bake(SUNNY, HandCatalogue(), cache, TINY)
+        yield w
+
+
+def _tiny():
+    from embodied.render.pictures import Baked
+
+    return Baked("fast", gloss=False)
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_thing_that_moves_to_where_it_stands_looks_as_baked_and_undo_gives_the_same_bytes(world):
+    rest = world.camera(*CAMERA)
+    root = SUNNY.placement_by_id[thing()]
+    world.move(root.id, root.position)
+    here = world.camera(*CAMERA)
+    np.testing.assert_array_equal(here.ids, rest.ids)
+    assert decibels(here.rgb, rest.rgb) > 24
+    world.undo()
+    np.testing.assert_array_equal(world.camera(*CAMERA).rgb, rest.rgb)
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_body_is_drawn_where_it_is_and_is_brighter_by_the_window_than_in_the_corner(world):
+    side = 0.4
+    white = box_mesh((-side / 2, -side / 2, 0.0), (side / 2, side / 2, side), (0.8, 0.8, 0.8, 1.0))
+    world.add("crate", [Part("", "object", "", white, "crate")])
+    number = len(world.owners) + 1
+    seen = {}
+    for name, place in (("window", (2.5, 0.8, 0.6)), ("far", (4.5, 3.4, 0.6)), ("other room", (8.5, 0.5, 0.6))):
+        world.show(Moment(bodies={"crate": Pose(place, TURN)}))
+        eye = (place[0] - 1.0, place[1] + 0.3, 1.2)
+        view = world.camera(eye, math.atan2(-0.3, 1.0), -0.35, 1.2, (96, 96))
+        on_it = view.ids == number
+        assert on_it.sum() > 200 and abs(float(np.median(view.depth[on_it])) - 0.95) < 0.35
+        seen[name] = world.baked().probes.at(np.array([place]), world_room(place)).mean()
+        shown = view.rgb[on_it].mean(1)
+        assert np.ptp(shown) > 15  # it is no silhouette
+    assert seen["window"] > seen["far"]
+    world.show(Moment())
+
+
+def world_room(place) -> str:
+    return "living_room_1" if place[0] < 5 else "bedroom_1"
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_floors_darken_under_a_thing_and_only_near_it(world):
+    flat = box_mesh((-0.5, -0.5, 0.0), (0.5, 0.5, 0.05), (0.1, 0.1, 0.1, 1.0))
+    world.add("lid", [Part("", "object", "", flat, "lid")])
+    eye = ((1.5, 3.6, 0.2), -math.pi / 2, -0.1, 1.4, (96, 128))
+    before = world.camera(*eye)
+    world.show(Moment(bodies={"lid": Pose((1.5, 2.4, 0.25))}))
+    after = world.camera(*eye)
+    world.show(Moment())
+    floor = world.owners.index("living_room_1/floor") + 1
+    same = (before.ids == floor) & (after.ids == floor)
+    change = after.rgb.astype(float).mean(2) - before.rgb.astype(float).mean(2)
+    assert np.percentile(change[same], 2) < -25 and np.abs(np.percentile(change[same], 60)) < 8
