@@ -32,6 +32,8 @@ from embodied.scene.house_meshes import Part, house_parts, instance_classes, own
 from embodied.scene.lit_pages import LitPages
 
 if TYPE_CHECKING:
+    import mujoco
+
     from embodied.light import Bake
     from embodied.light.moving import MovingHouse
     from embodied.light.tracing.reference import Tracer
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
 
 PANORAMAS_KEPT = 8
 """Decoded panoramas held in memory; one of 512 pixels takes 18 MB."""
+SLACK = 0.05
+"""Metres (and three times as many radians) that a body goes until its light is computed anew."""
 log = logging.getLogger(__name__)
 
 
@@ -83,6 +87,7 @@ class World:
         self._moments = [Moment()]
         self._moving: MovingHouse | None = None
         self._bodies: dict[str, tuple[Part, ...]] = {}
+        self._followed: mujoco.MjModel | None = None
         self._recent = functools.lru_cache(maxsize=PANORAMAS_KEPT)(self._load)
 
     @property
@@ -130,6 +135,24 @@ class World:
         drawn where `Moment.bodies` has it."""
         self._bodies[name] = tuple(dataclasses.replace(p, owner=name) for p in parts)
 
+    def follow(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Show the bodies of a MuJoCo model as they are now: a robot that was attached to the house's own model, or one
+        alone. Call it again after the physics; bodies named as placements of the house move these."""
+        if self._followed is not model:
+            from embodied.scene.bodies import body_parts  # late: it reads meshes by trimesh
+
+            own = self.house.placement_by_id
+            for name, parts in body_parts(model, self.cache / "bodies", without=own).items():
+                self.add(name, parts)
+            self._followed = model
+        from embodied.scene.bodies import body_poses
+
+        poses = body_poses(model, data, (*self._bodies, *self.house.placement_by_id))
+        bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
+        moved = {name: pose for name, pose in poses.items() if name not in self._bodies}
+        self._moments[-1] = Moment({**self.moment.moved, **moved}, self.moment.openness, bodies)
+        self._bring_up_to_date(slack=SLACK)
+
     def show(self, moment: Moment) -> None:
         """Bring the house to a moment, in all that is drawn from now on.
 
@@ -153,7 +176,7 @@ class World:
         house = dataclasses.replace(self.house, sky=dataclasses.replace(self.house.sky, hour=hour))
         return World(house, self.catalogue, self.graph, self.cache, self.pictures)
 
-    def _bring_up_to_date(self) -> None:
+    def _bring_up_to_date(self, slack: float = 0.0) -> None:
         """Draw the moment from now on."""
         self._recent.cache_clear()
         self.__dict__.pop("_poses", None)
@@ -171,7 +194,7 @@ class World:
         for name, parts in self._bodies.items():
             moving.add(name, parts)
         anew = moving.needs(self.moment)
-        drawn = moving.show(self.moment)
+        drawn = moving.show(self.moment, slack=slack)
         patches = [(p.page, p.row, p.column, p.picture) for p in drawn.patches]
         if anew:
             overlay = gloss_of(self.baked(), moving=moving) if _reflects(self.pictures) else None

@@ -53,6 +53,12 @@ class Pose:
         """Turn about z, radians."""
         return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
+    def apart(self, other: Pose) -> float:
+        """Metres between two poses, or a third of the radians between their orientations where that is more."""
+        cos = abs(float(np.dot(self.quat, other.quat)))
+        angle = 2 * math.acos(min(cos, 1.0)) if cos < 1 - 1e-12 else 0.0
+        return max(math.dist(self.position, other.position), angle / 3)
+
     def points(self, local: np.ndarray) -> np.ndarray:
         """(n, 3) world metres of points (n, 3) of the thing's frame."""
         return local @ self.rotation.T.astype(local.dtype) + np.asarray(self.position, local.dtype)

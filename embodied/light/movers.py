@@ -57,8 +57,12 @@ class Discs:
     """(k,) bool: seen from both sides."""
     area: np.ndarray
     """(k,) square metres."""
-    luxel: np.ndarray
-    """(k,) number of the luxel of `Surface` at its middle."""
+    luxels: np.ndarray
+    """(n,) numbers of the luxels of `Surface`, those of one disc after those of another."""
+    weight: np.ndarray
+    """(n,) square metres of these."""
+    first: np.ndarray
+    """(k,) where each disc's begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,10 +257,13 @@ def _discs(position: np.ndarray, normal: np.ndarray, thin: np.ndarray, area: np.
             code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
     way = np.abs(normal).argmax(1) * 2 + (normal[np.arange(len(normal)), np.abs(normal).argmax(1)] > 0)
     order = np.lexsort((code, way))
-    cut = np.cumsum(area[order])
+    weight = area[order]
+    cut = np.cumsum(weight)
     k = min(DISCS, len(position))
-    pick = order[np.minimum(np.searchsorted(cut, (np.arange(k) + 0.5) / k * cut[-1]), len(order) - 1)]
-    return Discs(position[pick], normal[pick], thin[pick], np.full(k, float(cut[-1]) / k, np.float32), pick)
+    first = np.unique(np.minimum(np.searchsorted(cut, np.arange(k) / k * cut[-1]), len(order) - 1))
+    pick = order[(first + np.append(first[1:], len(order)) - 1) // 2]
+    areas = np.add.reduceat(weight, first).astype(np.float32)
+    return Discs(position[pick], normal[pick], thin[pick], areas, order, weight, first)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,8 +272,8 @@ class Placed:
 
     surface: Surface
     pose: Pose
-    coefficients: np.ndarray
-    """(8, 9, 3) of the incoming radiance at the corners of its box, in the world's frame."""
+    lit_at: Pose
+    """Where its light was computed."""
     e: np.ndarray
     """(n, 3) light of its luxels."""
 
@@ -276,11 +283,34 @@ class Placed:
         corners = self.pose.points(self.surface.box_corners)
         return corners.min(0), corners.max(0)
 
-    @functools.cached_property
-    def discs(self) -> tuple[np.ndarray, np.ndarray]:
-        """(k, 3) positions and (k, 3) normals of its discs, world."""
-        d = self.surface.discs
-        return self.pose.points(d.position), d.normal @ self.pose.rotation.T.astype(np.float32)
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """Discs of things where they are, and the light that they send; k of them."""
+
+    position: np.ndarray
+    normal: np.ndarray
+    """(k, 3) float32 each, world."""
+    thin: np.ndarray
+    area: np.ndarray
+    sent: np.ndarray
+    """(k, 3) radiosity."""
+
+
+def cloud_of(things: Sequence[Placed], most: int) -> Cloud:
+    """The discs of things, at most so many of all together, but one of each."""
+    step = max(1, -(-sum(len(t.surface.discs.area) for t in things) // most))
+    rows = []
+    for t in things:
+        d, s = t.surface.discs, t.surface
+        starts = d.first[::step]
+        some = np.minimum(np.arange(len(starts)) * step + min(step, len(d.area)) // 2, len(d.area) - 1)
+        area = np.add.reduceat(d.area, np.arange(0, len(d.area), step)).astype(np.float32)
+        normal = d.normal[some] @ t.pose.rotation.T.astype(np.float32)
+        radiosity = (s.albedo * t.e + s.glow)[d.luxels] * d.weight[:, None]
+        sent = np.add.reduceat(radiosity, starts) / np.add.reduceat(d.weight, starts)[:, None]
+        rows.append((t.pose.points(d.position[some]), normal, d.thin[some], area, sent))
+    return Cloud(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
 def shading(s: Surface, turned: np.ndarray) -> np.ndarray:
@@ -289,28 +319,27 @@ def shading(s: Surface, turned: np.ndarray) -> np.ndarray:
     return np.maximum(np.einsum("nkc,nk->nc", by_corner, s.weights), 0.0)
 
 
-def hiding(thing: Placed, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Part of what points could see that a thing hides, by their cosine.
+def hiding(cloud: Cloud, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Part of what points could see that things hide, by their cosine.
 
     Args:
       position, normal: (n, 3) float32, world.
 
     Returns:
-      (n,) share hidden, (n, 3) the mean direction of it, and (n, 3) e that the thing sends from there.
+      (n,) share hidden, (n, 3) the mean direction of it, and (n, 3) e that they send from there.
     """
-    d, (at, out) = thing.surface.discs, thing.discs
+    at, out = cloud.position, cloud.normal
     far2 = (position**2).sum(1)[:, None] + (at**2).sum(1) - 2 * position @ at.T
     far2 = np.maximum(far2, 1e-6)
     here = normal @ at.T - np.einsum("nc,nc->n", position, normal)[:, None]
     there = position @ out.T - np.einsum("kc,kc->k", at, out)
-    there = np.where(d.thin, np.abs(there), there)
-    share = np.maximum(here, 0) * np.maximum(there, 0) * d.area / (far2 * (np.pi * far2 + d.area))
+    there = np.where(cloud.thin, np.abs(there), there)
+    share = np.maximum(here, 0) * np.maximum(there, 0) * cloud.area / (far2 * (np.pi * far2 + cloud.area))
     total = share.sum(1)
     share *= (np.minimum(total, 1) / np.maximum(total, 1e-9))[:, None]
     mean = share @ at - share.sum(1)[:, None] * position
     mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
-    sent = thing.surface.albedo[d.luxel] * thing.e[d.luxel] + thing.surface.glow[d.luxel]
-    return np.minimum(total, 1), mean, (share @ sent).astype(np.float32)
+    return np.minimum(total, 1), mean, (share @ cloud.sent).astype(np.float32)
 
 
 def hidden_share(thing: Placed, position: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -21,7 +21,18 @@ from embodied.assets.catalogue import Catalogue
 from embodied.house.house import House
 from embodied.house.moment import WIDEST, Moment, Pose
 from embodied.house.shapes import room_at
-from embodied.light.movers import Placed, Surface, SurfacePage, hidden_share, hiding, shading, surface_of, unhidden
+from embodied.light.movers import (
+    DISCS,
+    Placed,
+    Surface,
+    SurfacePage,
+    cloud_of,
+    hidden_share,
+    hiding,
+    shading,
+    surface_of,
+    unhidden,
+)
 from embodied.light.pages.colours import linear
 from embodied.light.pages.cover import sources
 from embodied.light.pages.files import Bake, Ingredients
@@ -47,6 +58,10 @@ SLIGHT = 0.01
 """Change of the share of its light that a place gets which goes unnoticed."""
 NEARBY = 0.05
 """Share hidden by the discs of a thing from which on rays are asked what it hid where it was baked."""
+BODIES = "*"
+"""Name of the group of all that is no part of the house."""
+BODY_LUXELS = 0.25
+"""Luxels of a body, of those of a piece of furniture: robots have many."""
 REACH = 0.8
 """Metres from a thing up to which it is asked what light it hides."""
 HIDDEN, OPEN = 0.3, 0.65
@@ -128,7 +143,7 @@ class MovingHouse:
         self._shown: dict[Tile, _Shown] = {}
         self._hiding: dict[str, _Hides] = {}
         self._opens: dict[Tile, tuple[np.ndarray, np.ndarray]] = {}
-        self._shown_things: dict[str, Placed] = {}
+        self._shown_things: dict[str, np.ndarray] = {}
         self._extra: dict[str, tuple[Part, ...]] = {}
         self._lamps = read_lamps(bake.folder / "lamps.npz", bake.manifest["lamps"])
         towards = sun_direction(house.sky)
@@ -156,8 +171,12 @@ class MovingHouse:
                         out[name] = Pose.upright(p.position, p.yaw)
         return out | dict(moment.bodies)
 
-    def show(self, moment: Moment) -> Drawn:
+    def show(self, moment: Moment, *, slack: float = 0.0) -> Drawn:
         """Bring everything to a moment.
+
+        Args:
+          slack: metres, and thrice as many radians, that a thing may have moved since its light was computed, to keep
+            it.
 
         Raises:
           ValueError: the moment is none of this house.
@@ -176,9 +195,11 @@ class MovingHouse:
             pose = wanted.get(name, thing.rest)
             if thing.surface is not None and pose is not None:
                 known = self._placed.get(name)
-                if known is None or known.pose != pose:
+                if known is None or known.lit_at.apart(pose) > slack:
                     self._placed[name] = self._lit_at(name, thing.surface, pose)
-        return Drawn(self._corners(), (*self._own_patches(), *self._house_patches()))
+                elif known.pose != pose:
+                    self._placed[name] = dataclasses.replace(known, pose=pose)
+        return Drawn(self._corners(), (*self._own_patches(), *self._house_patches(slack)))
 
     # ------------------------------------------------------------------ things
 
@@ -195,7 +216,10 @@ class MovingHouse:
         return _Thing(self._surface(parts), rest, frozenset(p.id for p in carried))
 
     def _surface(self, parts: Sequence[Part]) -> Surface | None:
-        return surface_of(parts, self._settings, self._cache, self.house, self._lamps)
+        settings = self._settings
+        if parts and parts[0].room == "":
+            settings = dataclasses.replace(settings, budget=settings.budget * BODY_LUXELS)
+        return surface_of(parts, settings, self._cache, self.house, self._lamps)
 
     def _leaf(self, opening: str, side: str) -> _Thing:
         o = next(x for x in self.house.openings if x.id == opening)
@@ -214,7 +238,7 @@ class MovingHouse:
         home = room_at(self.house, middle) or self._nearest_room(middle)
         coefficients = np.concatenate([self._radiance(c[None], room_at(self.house, c) or home) for c in corners])
         e = shading(s, turned(coefficients, pose.rotation.T).astype(np.float32))
-        placed = Placed(s, pose, coefficients, e)
+        placed = Placed(s, pose, pose, e)
         if len(self._portals):
             normal = s.normal @ pose.rotation.T.astype(np.float32)
             share = self._sun_share(pose.points(s.position), normal, s.thin, name, (placed,))
@@ -289,8 +313,8 @@ class MovingHouse:
         for name, thing in self._things.items():
             placed = self._placed.get(name)
             pages = thing.surface.pages if thing.surface is not None else ()
-            if placed is not None and self._shown_things.get(name) is not placed:
-                self._shown_things[name] = placed
+            if placed is not None and self._shown_things.get(name) is not placed.e:
+                self._shown_things[name] = placed.e
                 for k, page in enumerate(pages):
                     yield Patch(number + k, 0, 0, self._own_picture(placed, page))
             number += len(pages)
@@ -452,7 +476,7 @@ class MovingHouse:
     ) -> tuple[np.ndarray, np.ndarray]:
         """(h, w, 3) light of a tile as it would be without a thing, and (h, w) how far that is known, 0 to 1."""
         position, normal = r.position[at].reshape(-1, 3), r.normal[at].reshape(-1, 3)
-        share, towards, sent = hiding(placed, position, normal)
+        share, towards, sent = hiding(cloud_of((placed,), DISCS), position, normal)
         close = np.flatnonzero(share > NEARBY)
         share[close] = hidden_share(placed, position[close], normal[close])
         passed = _passed(share, towards, *self._in_the_open(position, normal))
@@ -469,7 +493,7 @@ class MovingHouse:
         return np.maximum(e, 1e-5), around
 
     def _give_sun_back(self, name: str, placed: Placed) -> None:
-        low, high = _shadow_box(placed, self._towards)
+        low, high = _shadow_box(*placed.box, self._towards)
         for page, receiver, tiles in self._pages_near(low, high):
             sun = self._light(page)[1]
             for tile in tiles.tolist():
@@ -494,12 +518,16 @@ class MovingHouse:
         rows, columns = (slice(s.start * r.fineness, s.start * r.fineness + n) for s, n in zip(at, size[::-1]))
         return fine.reshape(-1, 3), normal.reshape(-1, 3), (rows, columns)
 
-    def _house_patches(self) -> Iterator[Patch]:
+    def _house_patches(self, slack: float) -> Iterator[Patch]:
         """Tiles whose light is not what was shown last."""
         now: dict[Tile, list[_Hides]] = {tile: [] for tile in (*self._touched, *self._shown)}
+        groups: dict[str, list[Placed]] = {}
         for name, placed in self._placed.items():
-            if (known := self._hiding.get(name)) is None or known.placed is not placed:
-                known = self._hiding[name] = self._hides(placed)
+            groups.setdefault(BODIES if self._things[name].rest is None else name, []).append(placed)
+        for name, group in groups.items():
+            known = self._hiding.get(name)
+            if known is None or not known.holds(group, slack):
+                known = self._hiding[name] = self._hides(group)
             for tile in (*known.tiles, *known.sunlit):
                 if known not in now.setdefault(tile, []):
                     now[tile].append(known)
@@ -512,26 +540,26 @@ class MovingHouse:
                 self._shown[tile] = new
                 yield self._patch(tile, new)
 
-    def _hides(self, placed: Placed) -> _Hides:
-        """The tiles from which a thing hides light."""
-        low, high = placed.box
+    def _hides(self, things: Sequence[Placed]) -> _Hides:
+        """The tiles from which things hide light."""
+        low, high = np.min([t.box[0] for t in things], axis=0), np.max([t.box[1] for t in things], axis=0)
         near = list(self._pages_near(low - REACH, high + REACH))
         sunlit: list[Tile] = []
         if len(self._portals):
-            for page, r, tiles in self._pages_near(*_shadow_box(placed, self._towards)):
+            for page, r, tiles in self._pages_near(*_shadow_box(low, high, self._towards)):
                 sun = self._light(page)[1]
                 cut = lambda k, r=r: slice(k * TILE * r.fineness, (k + 1) * TILE * r.fineness)  # type: ignore[misc]
                 sunlit += [(page, i, k) for i, k in tiles.tolist() if sun[cut(i), cut(k)].any()]
         if not near:
-            return _Hides(placed, {}, tuple(sunlit))
+            return _Hides(tuple(things), {}, tuple(sunlit))
         names = [(page, i, k) for page, _, tiles in near for i, k in tiles.tolist()]
         take = lambda what: np.concatenate([getattr(r, what)[tuple(t.T)] for _, r, t in near]).reshape(-1, 3)
         position, normal = take("samples"), take("sample_normals")
-        share, towards, sent = hiding(placed, position, normal)
+        share, towards, sent = hiding(cloud_of(things, DISCS), position, normal)
         by_tile = lambda a: a.reshape(len(names), SAMPLES, *a.shape[1:])
         which = np.flatnonzero(by_tile(share).max(1) > FAINT)
         if not len(which):
-            return _Hides(placed, {}, tuple(sunlit))
+            return _Hides(tuple(things), {}, tuple(sunlit))
         position, normal = by_tile(position), by_tile(normal)
         opens = [self._open(names[k], position[k], normal[k]) for k in which]
         some = lambda a: by_tile(a)[which].reshape(-1, *a.shape[1:])
@@ -540,7 +568,7 @@ class MovingHouse:
         side = TILE // 2
         light = np.concatenate([passed, some(sent)], axis=1).reshape(-1, side, side, 4)
         tiles = {names[k]: cv2.resize(one, (TILE, TILE)) for k, one in zip(which, light, strict=True)}
-        return _Hides(placed, tiles, tuple(sunlit))
+        return _Hides(tuple(things), tiles, tuple(sunlit))
 
     def _open(self, tile: Tile, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n,) light that samples of a tile have in an empty room, and (n, 9) what arrives there, both as means of the
@@ -562,7 +590,8 @@ class MovingHouse:
         if len(self._portals) and share.any():
             lit = np.flatnonzero(share)
             for thing in shown.things:
-                lit = lit[~_hidden_by(thing.placed, fine[lit] + fine_normal[lit] * 2e-3, self._towards)]
+                for placed in thing.things:
+                    lit = lit[~_hidden_by(placed, fine[lit] + fine_normal[lit] * 2e-3, self._towards)]
             left = np.zeros_like(share)
             left[lit] = share[lit]
             share = left
@@ -581,14 +610,21 @@ LINEAR = linear(np.arange(256, dtype=np.float32) / 255)
 
 @dataclass(frozen=True, eq=False)
 class _Hides:
-    """What a thing hides where it is."""
+    """What things that belong together hide where they are."""
 
-    placed: Placed
+    things: tuple[Placed, ...]
     tiles: Mapping[Tile, np.ndarray]
     """(TILE, TILE, 4) float32: the share of its light that every luxel gets past the thing, and what the thing
     sends."""
     sunlit: tuple[Tile, ...]
-    """Tiles from which it may hide the sun."""
+    """Tiles from which they may hide the sun."""
+
+    def holds(self, things: Sequence[Placed], slack: float) -> bool:
+        """True for the same things in about the same places."""
+        return len(things) == len(self.things) and all(
+            new.surface is old.surface and new.pose.apart(old.pose) <= slack
+            for new, old in zip(things, self.things, strict=True)
+        )
 
 
 def _together(tiles: Sequence[np.ndarray]) -> np.ndarray:
@@ -712,8 +748,9 @@ def _tiles_of(position: np.ndarray, takes: np.ndarray) -> tuple[np.ndarray, np.n
     return cut(low).min((1, 3)).astype(np.float32), cut(high).max((1, 3)).astype(np.float32)
 
 
-def _shadow_box(placed: Placed, towards: np.ndarray, floor: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
-    """A box that holds the shadow of a thing, as far as `floor` metres below it."""
-    low, high = placed.box
+def _shadow_box(
+    low: np.ndarray, high: np.ndarray, towards: np.ndarray, floor: float = 3.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """A box that holds the shadow of what is in a box, as far as `floor` metres below it."""
     along = -towards * (min(high[2] - low[2] + floor, 8.0) / max(float(towards[2]), 0.15))
     return np.minimum(low, low + along), np.maximum(high, high + along)

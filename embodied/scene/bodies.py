@@ -1,0 +1,157 @@
+"""Bodies of any MuJoCo model as parts: robots and things that users add, to be drawn in the light of a house."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import cv2
+import mujoco
+import numpy as np
+import trimesh
+
+from embodied.assets.cache import digest, write_bytes
+from embodied.assets.records import Finish, MeshPart
+from embodied.house.moment import Pose
+from embodied.scene.part import Part
+
+VISIBLE = (0, 1, 2)
+"""Geom groups that MuJoCo's own viewer shows at first."""
+ROUND = 24
+"""Sides of cylinders and capsules."""
+
+
+def body_parts(
+    model: mujoco.MjModel, textures: Path, *, groups: Collection[int] = VISIBLE, without: Collection[str] = ()
+) -> dict[str, tuple[Part, ...]]:
+    """The visible geoms of every body but the world's, by the body's name, in the body's frame.
+
+    Planes, height fields, flexes and skins are left out. Where a body has visual geoms (those that touch nothing), its
+    other geoms are taken for collision shapes and left out.
+
+    Args:
+      textures: a folder for the pictures of its materials.
+      groups: of the geoms to draw.
+      without: names of bodies to leave out, such as the house's own.
+    """
+    out: dict[str, tuple[Part, ...]] = {}
+    for body in range(1, model.nbody):
+        name = body_name(model, body)
+        first, count = model.body_geomadr[body], model.body_geomnum[body]
+        geoms = [g for g in range(first, first + count) if model.geom_group[g] in groups and _alpha(model, g) > 0]
+        free = [g for g in geoms if not (model.geom_contype[g] or model.geom_conaffinity[g])]
+        parts = [p for g in free or geoms if (p := _part(model, g, name, textures)) is not None]
+        if parts and name not in without:
+            out[name] = tuple(parts)
+    return out
+
+
+def body_name(model: mujoco.MjModel, body: int) -> str:
+    """The body's name, or one made of its number."""
+    return str(model.body(body).name) or f"body_{body}"
+
+
+def body_poses(model: mujoco.MjModel, data: mujoco.MjData, names: Collection[str]) -> dict[str, Pose]:
+    """Poses of bodies as they are now."""
+    wanted, poses = set(names), {}
+    for body in range(1, model.nbody):
+        if (name := body_name(model, body)) in wanted:
+            poses[name] = Pose(tuple(data.xpos[body].tolist()), tuple(data.xquat[body].tolist()))  # type: ignore[arg-type]
+    return poses
+
+
+def _alpha(model: mujoco.MjModel, geom: int) -> float:
+    return float(_color(model, geom)[3])
+
+
+def _color(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """(4,) as MuJoCo draws it: the geom's own unless that is the default, else the material's."""
+    material, own = model.geom_matid[geom], model.geom_rgba[geom]
+    if material < 0 or not np.allclose(own, 0.5 * np.array([1, 1, 1, 2])):
+        return np.asarray(own)
+    return np.asarray(model.mat_rgba[material])
+
+
+def _part(model: mujoco.MjModel, geom: int, owner: str, textures: Path) -> Part | None:
+    shape = _shape(model, geom)
+    if shape is None or not len(shape[1]):
+        return None
+    vertices, faces, normals, uv = shape
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
+    turn = turn.reshape(3, 3)
+    placed = (vertices @ turn.T + model.geom_pos[geom]).astype(np.float32)
+    mesh = MeshPart(
+        placed, faces.astype(np.int32), (normals @ turn.T).astype(np.float32), uv, _finish(model, geom, textures)
+    )
+    return Part(owner, "object", "", mesh, f"body/{digest(placed.tobytes(), faces.tobytes())[:16]}")
+
+
+def _shape(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Vertices, faces, normals and texture coordinates of a geom, in its own frame; None of what has no triangles."""
+    kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), model.geom_size[geom]
+    kinds = mujoco.mjtGeom
+    if kind == kinds.mjGEOM_MESH:
+        return _mesh(model, int(model.geom_dataid[geom]))
+    if kind == kinds.mjGEOM_BOX:
+        solid = trimesh.creation.box(2 * size)
+        solid.unmerge_vertices()
+    elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_ELLIPSOID):
+        solid = trimesh.creation.icosphere(subdivisions=2)
+        solid.apply_scale(size if kind == kinds.mjGEOM_ELLIPSOID else size[0])
+    elif kind == kinds.mjGEOM_CAPSULE:
+        solid = trimesh.creation.capsule(2 * size[1], size[0], count=[ROUND, ROUND])
+        solid.apply_translation([0, 0, -solid.bounds.mean(0)[2]])
+    elif kind == kinds.mjGEOM_CYLINDER:
+        solid = trimesh.creation.cylinder(size[0], 2 * size[1], sections=ROUND)
+        solid = trimesh.graph.smooth_shade(solid, angle=0.8)
+    else:
+        return None
+    vertices = np.asarray(solid.vertices, np.float32)
+    return vertices, np.asarray(solid.faces), np.asarray(solid.vertex_normals), np.zeros((len(vertices), 2), np.float32)
+
+
+def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """As `_shape`, with a vertex for every corner of a face, as corners have normals and coordinates of their own."""
+    part = lambda values, first, count: values[first : first + count]
+    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    vertices = part(model.mesh_vert, model.mesh_vertadr[mesh], model.mesh_vertnum[mesh])
+    corners = vertices[part(model.mesh_face, first, count)].reshape(-1, 3)
+    normals = part(model.mesh_normal, model.mesh_normaladr[mesh], model.mesh_normalnum[mesh])
+    normals = normals[part(model.mesh_facenormal, first, count)].reshape(-1, 3)
+    uv = np.zeros((len(corners), 2), np.float32)
+    if model.mesh_texcoordnum[mesh] > 0:
+        known = part(model.mesh_texcoord, model.mesh_texcoordadr[mesh], model.mesh_texcoordnum[mesh])
+        uv = known[part(model.mesh_facetexcoord, first, count)].reshape(-1, 2) * [1, -1] + [0, 1]
+    return corners, np.arange(len(corners)).reshape(-1, 3), normals, uv.astype(np.float32)
+
+
+def _finish(model: mujoco.MjModel, geom: int, textures: Path) -> Finish:
+    material, (red, green, blue, alpha) = int(model.geom_matid[geom]), _color(model, geom).tolist()
+    if material < 0:
+        return Finish(color=(red, green, blue, alpha), roughness=0.6)
+    shine = float(model.mat_shininess[material])
+    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
+    flat = texture >= 0 and model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D
+    return Finish(
+        color=(red, green, blue, alpha),
+        texture=_texture(model, texture, textures) if flat and _has_coordinates(model, geom) else None,
+        roughness=float(np.clip(1 - shine, 0.2, 1.0)),
+        specular=float(model.mat_specular[material]) * 0.5,
+    )
+
+
+def _has_coordinates(model: mujoco.MjModel, geom: int) -> bool:
+    mesh = int(model.geom_dataid[geom])
+    return bool(model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH and model.mesh_texcoordnum[mesh] > 0)
+
+
+def _texture(model: mujoco.MjModel, texture: int, folder: Path) -> str:
+    """Path of a texture as a PNG file."""
+    h, w, channels = model.tex_height[texture], model.tex_width[texture], model.tex_nchannel[texture]
+    first = model.tex_adr[texture]
+    image = model.tex_data[first : first + h * w * channels].reshape(h, w, channels)[..., :3]
+    path = Path(folder) / f"{digest(image.tobytes(), image.shape)[:24]}.png"
+    if not path.exists():
+        write_bytes(path, cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))[1].tobytes())
+    return str(path)
