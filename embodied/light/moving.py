@@ -556,8 +556,10 @@ class MovingHouse:
         take = lambda what: np.concatenate([getattr(r, what)[tuple(t.T)] for _, r, t in near]).reshape(-1, 3)
         position, normal = take("samples"), take("sample_normals")
         share, towards, sent = hiding(cloud_of(things, DISCS), position, normal)
+        fade = np.clip(share / FAINT - 0.5, 0, 1)  # tiles must not end with a step
+        share, sent = share * fade, sent * fade[:, None]
         by_tile = lambda a: a.reshape(len(names), SAMPLES, *a.shape[1:])
-        which = np.flatnonzero(by_tile(share).max(1) > FAINT)
+        which = np.flatnonzero(by_tile(share).any(1))
         if not len(which):
             return _Hides(tuple(things), {}, tuple(sunlit))
         position, normal = by_tile(position), by_tile(normal)
