@@ -23,7 +23,7 @@ UPRIGHT = 1e-3
 
 
 @dataclass(frozen=True)
-class Pose:
+class RigidPose:
     """Position and orientation of a thing's own frame, world."""
 
     position: Triple
@@ -32,9 +32,9 @@ class Pose:
     """w x y z, unit."""
 
     @staticmethod
-    def upright(position: Triple, yaw: float) -> Pose:
+    def upright(position: Triple, yaw: float) -> RigidPose:
         """A pose turned about z alone, radians counter-clockwise."""
-        return Pose(position, (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
+        return RigidPose(position, (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
 
     @functools.cached_property
     def rotation(self) -> np.ndarray:
@@ -53,7 +53,7 @@ class Pose:
         """Turn about z, radians."""
         return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
 
-    def apart(self, other: Pose) -> float:
+    def apart(self, other: RigidPose) -> float:
         """Metres between two poses, or a third of the radians between their orientations where that is more."""
         cos = abs(float(np.dot(self.quat, other.quat)))
         angle = 2 * math.acos(min(cos, 1.0)) if cos < 1 - 1e-12 else 0.0
@@ -73,11 +73,11 @@ class Moment:
       True
     """
 
-    moved: Mapping[str, Pose] = field(default_factory=dict)
+    moved: Mapping[str, RigidPose] = field(default_factory=dict)
     """By placement id. What stands on a moved thing and is not named goes with it."""
     openness: Mapping[str, float] = field(default_factory=dict)
     """By opening id: 0 is closed, 1 is open by WIDEST."""
-    bodies: Mapping[str, Pose] = field(default_factory=dict)
+    bodies: Mapping[str, RigidPose] = field(default_factory=dict)
     """By name: things that are no part of the house, such as the links of a robot."""
 
     @property
@@ -101,9 +101,9 @@ class Moment:
         if wrong := {o: x for o, x in self.openness.items() if not 0 <= x <= 1}:
             raise ValueError(f"openness should lie between 0 (closed) and 1 (open), got {wrong}")
 
-    def poses(self, house: House) -> dict[str, Pose]:
-        """Pose of every placement that is not where the house has it: the moved ones and what stands on them."""
-        out: dict[str, Pose] = {}
+    def poses(self, house: House) -> dict[str, RigidPose]:
+        """RigidPose of every placement that is not where the house has it: the moved ones and what stands on them."""
+        out: dict[str, RigidPose] = {}
         for p in house.placements:
             if (root := self.carrier(house, p)) is not None:
                 out[p.id] = carried(house.placement_by_id[root], self.moved[root], p)
@@ -135,8 +135,8 @@ class Moment:
         return dataclasses.replace(house, placements=tuple(placements), openings=tuple(openings))
 
 
-def carried(root: Placement, pose: Pose, p: Placement) -> Pose:
-    """Pose of `p` when `root`, which carries it, has moved to `pose`."""
+def carried(root: Placement, pose: RigidPose, p: Placement) -> RigidPose:
+    """RigidPose of `p` when `root`, which carries it, has moved to `pose`."""
     if root is p:
         return pose
     x, y, z = np.subtract(p.position, root.position)
@@ -146,10 +146,10 @@ def carried(root: Placement, pose: Pose, p: Placement) -> Pose:
     cos, sin = math.cos(half), math.sin(half)
     quat = (w * cos - c * sin, a * cos + b * sin, b * cos - a * sin, c * cos + w * sin)
     at_x, at_y, at_z = pose.points(local[None])[0].tolist()
-    return Pose((at_x, at_y, at_z), quat)
+    return RigidPose((at_x, at_y, at_z), quat)
 
 
-def _placed(house: House, p: Placement, pose: Pose) -> Placement:
+def _placed(house: House, p: Placement, pose: RigidPose) -> Placement:
     room = room_at(house, np.add(pose.position, (0, 0, 0.05)))
     if room is None:
         raise HouseError(f"{p.id!r} at {pose.position} is outside of every room; move it to a place indoors")

@@ -21,7 +21,7 @@ import numpy as np
 
 from embodied.geometry import r2
 from embodied.house.house import House
-from embodied.house.moment import Pose
+from embodied.house.moment import RigidPose
 from embodied.light.pages.atlas import atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps, albedo
 from embodied.light.pages.cover import cover, sources
@@ -41,7 +41,7 @@ HIDING_RAYS = 32
 """Rays of a place that find what a thing hid from it where it was baked."""
 DISCS = 48
 """Discs that stand for the whole of a thing's surface."""
-LIFT = 2e-3
+RAY_LIFT = 2e-3
 """Metres by which rays start above their surface."""
 
 
@@ -217,7 +217,7 @@ def _transfer(s: Surface, face_normal: np.ndarray, face: np.ndarray) -> tuple[np
         out = face_normal * side
         rise = np.einsum("ij,ij->i", ahead, out)[:, None]
         ahead = np.where(rise < 0.01, ahead - out * (rise - 0.02), ahead).astype(np.float32)
-        hit, far, _, _ = s.first_hit((s.position + out * LIFT).astype(np.float32), ahead)
+        hit, far, _, _ = s.first_hit((s.position + out * RAY_LIFT).astype(np.float32), ahead)
         which = np.flatnonzero((hit >= 0) & (far > 0))
         hidden.append(harmonics(ahead[which]))
         met.append(hit[which])
@@ -271,9 +271,9 @@ class Placed:
     """A thing where it is now, and the light on it."""
 
     surface: Surface
-    pose: Pose
-    lit_at: Pose
-    """Where its light was computed."""
+    pose: RigidPose
+    lit_at: RigidPose
+    """Pose at which its light was computed."""
     e: np.ndarray
     """(n, 3) light of its luxels."""
 
@@ -350,7 +350,7 @@ def hidden_share(thing: Placed, position: np.ndarray, normal: np.ndarray) -> np.
       position, normal: (n, 3) float32, world.
     """
     turn = thing.pose.rotation.astype(np.float32)
-    local = (position + normal * LIFT - np.asarray(thing.pose.position, np.float32)) @ turn
+    local = (position + normal * RAY_LIFT - np.asarray(thing.pose.position, np.float32)) @ turn
     met, around = np.zeros(len(position), np.float32), normal @ turn
     start = np.stack(r2(np.arange(len(position)) * 7.0), axis=1)
     for k in range(HIDING_RAYS):
