@@ -18,7 +18,7 @@ from embodied.assets.catalogue import Catalogue, load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.house.house import House
 from embodied.house.lighting import load_lit_house
-from embodied.house.moment import Moment, Pose
+from embodied.house.moment import Moment, RigidPose
 from embodied.interface import Sighting
 from embodied.navigation.graph import NavGraph, build_graph
 from embodied.navigation.poses import FreePoses
@@ -92,7 +92,7 @@ class World:
 
     @property
     def moment(self) -> Moment:
-        """What differs from the house at rest now."""
+        """Differences from the house at rest, as of now."""
         return self._moments[-1]
 
     def move(self, thing: str, position: Sequence[float] | np.ndarray, yaw: float | None = None) -> None:
@@ -109,9 +109,9 @@ class World:
         known = self.moment.moved.get(thing)
         if known is None and thing in self.house.placement_by_id:
             p = self.house.placement_by_id[thing]
-            known = Pose.upright(p.position, p.yaw)
+            known = RigidPose.upright(p.position, p.yaw)
         x, y, z = (float(c) for c in position)
-        pose = Pose.upright((x, y, z), known.yaw if yaw is None and known is not None else float(yaw or 0.0))
+        pose = RigidPose.upright((x, y, z), known.yaw if yaw is None and known is not None else float(yaw or 0.0))
         self._moments.append(self.moment)
         self.show(dataclasses.replace(self.moment, moved={**self.moment.moved, thing: pose}))
 

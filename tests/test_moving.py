@@ -12,7 +12,7 @@ from hand_light import TINY
 from handmade import HandCatalogue, box_mesh, decibels, furnished
 
 from embodied.house.house import HouseError, Light, Sky
-from embodied.house.moment import Moment, Pose
+from embodied.house.moment import Moment, RigidPose
 from embodied.light import bake
 from embodied.light.moving import filled
 from embodied.navigation.graph import build_graph
@@ -37,7 +37,7 @@ def thing() -> str:
 def test_a_moved_thing_takes_along_what_stands_on_it():
     root = HOUSE.placement_by_id[thing()]
     child = next(p for p in HOUSE.placements if p.parent == root.id)
-    moved = Moment(moved={root.id: Pose.upright((1.0, 3.0, 0.0), root.yaw + math.pi / 2)}).applied(HOUSE)
+    moved = Moment(moved={root.id: RigidPose.upright((1.0, 3.0, 0.0), root.yaw + math.pi / 2)}).applied(HOUSE)
     there, above = moved.placement_by_id[root.id], moved.placement_by_id[child.id]
     x, y = np.subtract(child.position, root.position)[:2]
     np.testing.assert_allclose(np.subtract(above.position, there.position)[:2], [-y, x], atol=1e-9)
@@ -53,11 +53,11 @@ def test_an_empty_moment_is_the_house_at_rest_and_a_door_opens_to_a_right_angle(
 @pytest.mark.parametrize(
     ("moment", "error", "words"),
     [
-        (Moment(moved={"ghost_1": Pose((1.0, 1.0, 0.0))}), ValueError, "ghost_1"),
+        (Moment(moved={"ghost_1": RigidPose((1.0, 1.0, 0.0))}), ValueError, "ghost_1"),
         (Moment(openness={"window_9": 0.5}), ValueError, "window_9"),
         (Moment(openness={"door_1": 1.5}), ValueError, "between 0"),
-        (Moment(moved={"rug_1": Pose((1.0, 1.0, 0.0), (0.9, 0.4, 0.0, 0.0))}), ValueError, "lean"),
-        (Moment(moved={"rug_1": Pose((50.0, 1.0, 0.0))}), HouseError, "outside"),
+        (Moment(moved={"rug_1": RigidPose((1.0, 1.0, 0.0), (0.9, 0.4, 0.0, 0.0))}), ValueError, "lean"),
+        (Moment(moved={"rug_1": RigidPose((50.0, 1.0, 0.0))}), HouseError, "outside"),
     ],
 )
 def test_a_moment_that_a_house_cannot_have_is_refused_by_name(moment, error, words):
@@ -66,7 +66,7 @@ def test_a_moment_that_a_house_cannot_have_is_refused_by_name(moment, error, wor
 
 
 def test_a_pose_turns_points_as_its_quaternion_says():
-    pose = Pose((1.0, 2.0, 3.0), TURN)
+    pose = RigidPose((1.0, 2.0, 3.0), TURN)
     np.testing.assert_allclose(pose.points(np.eye(3))[0], [1 + math.cos(0.8), 2 + math.sin(0.8), 3.0])
     assert math.isclose(pose.yaw, 0.8)
 
@@ -117,7 +117,7 @@ def test_a_body_is_drawn_where_it_is_and_is_brighter_by_the_window_than_in_the_c
     number = len(world.owners) + 1
     seen = {}
     for name, place in (("window", (2.5, 0.8, 0.6)), ("far", (4.5, 3.4, 0.6)), ("other room", (8.5, 0.5, 0.6))):
-        world.show(Moment(bodies={"crate": Pose(place, TURN)}))
+        world.show(Moment(bodies={"crate": RigidPose(place, TURN)}))
         eye = (place[0] - 1.0, place[1] + 0.3, 1.2)
         view = world.camera(eye, math.atan2(-0.3, 1.0), -0.35, 1.2, (96, 96))
         on_it = view.ids == number
@@ -140,7 +140,7 @@ def test_floors_darken_under_a_thing_and_only_near_it(world):
     world.add("lid", [Part("", "object", "", flat, "lid")])
     eye = ((1.5, 3.6, 0.2), -math.pi / 2, -0.1, 1.4, (96, 128))
     before = world.camera(*eye)
-    world.show(Moment(bodies={"lid": Pose((1.5, 2.4, 0.25))}))
+    world.show(Moment(bodies={"lid": RigidPose((1.5, 2.4, 0.25))}))
     after = world.camera(*eye)
     world.show(Moment())
     floor = world.owners.index("living_room_1/floor") + 1

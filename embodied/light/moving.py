@@ -19,7 +19,7 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.house.house import House
-from embodied.house.moment import WIDEST, Moment, Pose
+from embodied.house.moment import WIDEST, Moment, RigidPose
 from embodied.house.shapes import room_at
 from embodied.light.movers import (
     DISCS,
@@ -62,9 +62,9 @@ BODIES = "*"
 """Name of the group of all that is no part of the house."""
 BODY_LUXELS = 0.25
 """Luxels of a body, of those of a piece of furniture: robots have many."""
-REACH = 0.8
+SHADOW_REACH = 0.8
 """Metres from a thing up to which it is asked what light it hides."""
-HIDDEN, OPEN = 0.3, 0.65
+UNKNOWN_BELOW, KNOWN_FROM = 0.3, 0.65
 """Share of its light that a place gets past a thing, below which its baked light says nothing of it once the thing is
 gone, and above which it says all."""
 BRIGHT = (0.3, 2.0)
@@ -89,8 +89,8 @@ class Patch:
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
-    """What a moment changes in drawing."""
+class SceneChange:
+    """Changes of what is drawn, by a moment."""
 
     corners: Mapping[int, np.ndarray]
     """By number of mesh in `MovingHouse.lit`: (n, 3) float32 where its vertices are."""
@@ -159,8 +159,8 @@ class MovingHouse:
         """True where `show` will change which meshes there are, and with them `lit`."""
         return any(name not in self._things for name in self._wanted(moment))
 
-    def _wanted(self, moment: Moment) -> dict[str, Pose]:
-        """Pose of every thing by name: what moved, as a whole with what it carries; leaves of doors; bodies."""
+    def _wanted(self, moment: Moment) -> dict[str, RigidPose]:
+        """RigidPose of every thing by name: what moved, as a whole with what it carries; leaves of doors; bodies."""
         out = dict(moment.moved)
         for o in self.house.openings:
             if o.id in moment.openness:
@@ -168,10 +168,10 @@ class MovingHouse:
                 for p in opening_parts(self.house, turned_, self.catalogue.finish):
                     if p.mesh_key.startswith("leaf/"):
                         name = f"{o.id}@{'+' if '/+1' in p.mesh_key else '-'}"
-                        out[name] = Pose.upright(p.position, p.yaw)
+                        out[name] = RigidPose.upright(p.position, p.yaw)
         return out | dict(moment.bodies)
 
-    def show(self, moment: Moment, *, slack: float = 0.0) -> Drawn:
+    def show(self, moment: Moment, *, slack: float = 0.0) -> SceneChange:
         """Bring everything to a moment.
 
         Args:
@@ -199,7 +199,7 @@ class MovingHouse:
                     self._placed[name] = self._lit_at(name, thing.surface, pose)
                 elif known.pose != pose:
                     self._placed[name] = dataclasses.replace(known, pose=pose)
-        return Drawn(self._corners(), (*self._own_patches(), *self._house_patches(slack)))
+        return SceneChange(self._corners(), (*self._own_patches(), *self._house_patches(slack)))
 
     # ------------------------------------------------------------------ things
 
@@ -210,7 +210,7 @@ class MovingHouse:
             return self._leaf(*name.rsplit("@", 1))
         root = self.house.placement_by_id[name]
         carried = [p for p in self.house.placements if moment.carrier(self.house, p) == name]
-        rest = Pose.upright(root.position, root.yaw)
+        rest = RigidPose.upright(root.position, root.yaw)
         some = dataclasses.replace(self.house, placements=tuple(carried))
         parts = [_in_frame(p, rest) for p in object_parts(some, self.catalogue)]
         return _Thing(self._surface(parts), rest, frozenset(p.id for p in carried))
@@ -228,11 +228,11 @@ class MovingHouse:
             for p in opening_parts(self.house, o, self.catalogue.finish)
             if p.mesh_key.startswith("leaf/") and ("/+1" in p.mesh_key) == (side == "+")
         ]
-        rest = Pose.upright(parts[0].position, parts[0].yaw)
+        rest = RigidPose.upright(parts[0].position, parts[0].yaw)
         owners = frozenset(p.owner for p in parts)
         return _Thing(self._surface([_in_frame(p, rest) for p in parts]), rest, owners)
 
-    def _lit_at(self, name: str, s: Surface, pose: Pose) -> Placed:
+    def _lit_at(self, name: str, s: Surface, pose: RigidPose) -> Placed:
         corners = pose.points(s.box_corners)
         middle = corners.mean(0)
         home = room_at(self.house, middle) or self._nearest_room(middle)
@@ -258,8 +258,8 @@ class MovingHouse:
     @functools.cached_property
     def lit(self) -> LitPages:
         """The house without what moved, and all that moved: as it is drawn."""
-        gone = self._gone
-        meshes = [m if m.owner not in gone else _nothing(m) for m in self.bake.lit.meshes]
+        away = self._away
+        meshes = [m if m.owner not in away else _nothing(m) for m in self.bake.lit.meshes]
         pages = list(self.bake.lit.pages)
         for thing in self._things.values():
             if thing.surface is None:
@@ -295,7 +295,7 @@ class MovingHouse:
         )
 
     @property
-    def _gone(self) -> frozenset[str]:
+    def _away(self) -> frozenset[str]:
         return frozenset().union(*(t.owners for t in self._things.values()))
 
     def _corners(self) -> dict[int, np.ndarray]:
@@ -330,11 +330,11 @@ class MovingHouse:
     @functools.cached_property
     def _static(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         """From starts and directions, (n, 3) each, whether the house without what moved is met, (n,) bool."""
-        gone = self._gone
+        away = self._away
         solid = [
             m.vertices[m.faces]
             for m in self.bake.lit.meshes
-            if m.page in self._room_of_page and m.alpha >= 0.9 and m.owner not in gone
+            if m.page in self._room_of_page and m.alpha >= 0.9 and m.owner not in away
         ]
         first = rays_among(np.concatenate(solid))
         return lambda start, ahead: first(start, ahead)[0] >= 0
@@ -454,7 +454,7 @@ class MovingHouse:
                 continue
             placed = self._lit_at(name, thing.surface, thing.rest)
             low, high = placed.box
-            for page, receiver, tiles in self._pages_near(low - REACH, high + REACH):
+            for page, receiver, tiles in self._pages_near(low - SHADOW_REACH, high + SHADOW_REACH):
                 soft, _ = self._light(page)
                 known = np.ones(soft.shape[:2], np.float32)
                 for tile in tiles.tolist():
@@ -480,8 +480,8 @@ class MovingHouse:
         close = np.flatnonzero(share > NEARBY)
         share[close] = hidden_share(placed, position[close], normal[close])
         passed = _passed(share, towards, *self._in_the_open(position, normal))
-        without = np.maximum(e.reshape(-1, 3) - sent, 0) / np.maximum(passed, HIDDEN)
-        known = np.clip((passed - HIDDEN) / (OPEN - HIDDEN), 0, 1)
+        without = np.maximum(e.reshape(-1, 3) - sent, 0) / np.maximum(passed, UNKNOWN_BELOW)
+        known = np.clip((passed - UNKNOWN_BELOW) / (KNOWN_FROM - UNKNOWN_BELOW), 0, 1)
         return without.reshape(e.shape).astype(np.float32), known.reshape(e.shape[:2])
 
     def _in_the_open(self, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -543,12 +543,12 @@ class MovingHouse:
     def _hides(self, things: Sequence[Placed]) -> _Hides:
         """The tiles from which things hide light."""
         low, high = np.min([t.box[0] for t in things], axis=0), np.max([t.box[1] for t in things], axis=0)
-        near = list(self._pages_near(low - REACH, high + REACH))
+        near = list(self._pages_near(low - SHADOW_REACH, high + SHADOW_REACH))
         sunlit: list[Tile] = []
         if len(self._portals):
             for page, r, tiles in self._pages_near(*_shadow_box(low, high, self._towards)):
                 sun = self._light(page)[1]
-                cut = lambda k, r=r: slice(k * TILE * r.fineness, (k + 1) * TILE * r.fineness)  # type: ignore[misc]
+                cut = lambda k, r=r: slice(k * TILE * r.fineness, (k + 1) * TILE * r.fineness)
                 sunlit += [(page, i, k) for i, k in tiles.tolist() if sun[cut(i), cut(k)].any()]
         if not near:
             return _Hides(tuple(things), {}, tuple(sunlit))
@@ -569,8 +569,8 @@ class MovingHouse:
         passed = _passed(some(share), some(towards), open_, around)
         side = TILE // 2
         light = np.concatenate([passed, some(sent)], axis=1).reshape(-1, side, side, 4)
-        tiles = {names[k]: cv2.resize(one, (TILE, TILE)) for k, one in zip(which, light, strict=True)}
-        return _Hides(tuple(things), tiles, tuple(sunlit))
+        hidden = {names[k]: cv2.resize(one, (TILE, TILE)) for k, one in zip(which, light, strict=True)}
+        return _Hides(tuple(things), hidden, tuple(sunlit))
 
     def _open(self, tile: Tile, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n,) light that samples of a tile have in an empty room, and (n, 9) what arrives there, both as means of the
@@ -612,7 +612,7 @@ LINEAR = linear(np.arange(256, dtype=np.float32) / 255)
 
 @dataclass(frozen=True, eq=False)
 class _Hides:
-    """What things that belong together hide where they are."""
+    """Light that things which belong together hide where they are."""
 
     things: tuple[Placed, ...]
     tiles: Mapping[Tile, np.ndarray]
@@ -641,7 +641,7 @@ def _together(tiles: Sequence[np.ndarray]) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What a tile was shown by."""
+    """Things and light by which a tile was shown."""
 
     things: list[_Hides]
     light: np.ndarray
@@ -663,13 +663,13 @@ def _passed(share: np.ndarray, towards: np.ndarray, open_: np.ndarray, around: n
 @dataclass(frozen=True, eq=False)
 class _Thing:
     surface: Surface | None
-    rest: Pose | None
-    """Where it was baked; None for what was not."""
+    rest: RigidPose | None
+    """Pose in which it was baked; None for what was not."""
     owners: frozenset[str]
     """Of what is drawn no longer in the house."""
 
 
-def _in_frame(p: Part, frame: Pose) -> Part:
+def _in_frame(p: Part, frame: RigidPose) -> Part:
     """A part of the house placed in the frame of an upright pose."""
     x, y, z = (np.subtract(p.position, frame.position) @ frame.rotation).tolist()
     return dataclasses.replace(p, position=(x, y, z), yaw=p.yaw - frame.yaw)

@@ -61,7 +61,7 @@ def repaint(
     """
     ends = at[0] + part.shape[0], at[1] + part.shape[1]
     edges = [GUTTER * side for side in (at[0] == 0, ends[0] == shape[0], at[1] == 0, ends[1] == shape[1])]
-    image = cv2.copyMakeBorder(np.ascontiguousarray(part), *edges, cv2.BORDER_REPLICATE)
+    image = cv2.copyMakeBorder(np.ascontiguousarray(part), edges[0], edges[1], edges[2], edges[3], cv2.BORDER_REPLICATE)
     row, column = int(place[1]) + at[0] - edges[0], int(place[0]) + at[1] - edges[2]
     bottom, right = row + image.shape[0], column + image.shape[1]
     picture[row:bottom, column:right, :3] = image

@@ -160,12 +160,12 @@ class Gloss:
             rows = np.flatnonzero(faces.owner == number)
             if len(rows):
                 faces.corners[rows] = vertices[self._moving[number]]
-        rows = slice(self._fixed, None)
         if corners and self._fixed < len(faces.owner):
-            sides = faces.corners[rows, 1:] - faces.corners[rows, :1]
+            moved = faces.corners[self._fixed :]
+            sides = moved[:, 1:] - moved[:, :1]
             normal = np.cross(sides[:, 0], sides[:, 1])
-            faces.normal[rows] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-            self._first = _nearer(self._first_fixed, self._rays_among(faces.corners[rows]), self._fixed)
+            faces.normal[self._fixed :] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+            self._first = _nearer(self._first_fixed, self._rays_among(moved), self._fixed)
         for page, row, column, part in patches:
             self._repaint(page, row, column, part)
 

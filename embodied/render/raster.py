@@ -159,7 +159,7 @@ class Raster:
         for picture, places in zip((self._atlas, self._clear_pages), self._place_of, strict=True):
             if picture is not None and page in places:
                 atlas.repaint(picture, places[page], self._shapes[page], at, part)
-                if picture is self._clear_pages:
+                if picture is not self._atlas:
                     _make_texture(self._through, picture.shape[:2], picture)
 
     def close(self) -> None:

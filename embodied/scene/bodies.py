@@ -12,7 +12,7 @@ import trimesh
 
 from embodied.assets.cache import digest, write_bytes
 from embodied.assets.records import Finish, MeshPart
-from embodied.house.moment import Pose
+from embodied.house.moment import RigidPose
 from embodied.scene.part import Part
 
 VISIBLE = (0, 1, 2)
@@ -51,12 +51,12 @@ def body_name(model: mujoco.MjModel, body: int) -> str:
     return str(model.body(body).name) or f"body_{body}"
 
 
-def body_poses(model: mujoco.MjModel, data: mujoco.MjData, names: Collection[str]) -> dict[str, Pose]:
+def body_poses(model: mujoco.MjModel, data: mujoco.MjData, names: Collection[str]) -> dict[str, RigidPose]:
     """Poses of bodies as they are now."""
     wanted, poses = set(names), {}
     for body in range(1, model.nbody):
         if (name := body_name(model, body)) in wanted:
-            poses[name] = Pose(tuple(data.xpos[body].tolist()), tuple(data.xquat[body].tolist()))  # type: ignore[arg-type]
+            poses[name] = RigidPose(tuple(data.xpos[body].tolist()), tuple(data.xquat[body].tolist()))
     return poses
 
 
@@ -77,9 +77,9 @@ def _part(model: mujoco.MjModel, geom: int, owner: str, textures: Path) -> Part 
     if shape is None or not len(shape[1]):
         return None
     vertices, faces, normals, uv = shape
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[geom])
-    turn = turn.reshape(3, 3)
+    flat = np.zeros(9)
+    mujoco.mju_quat2Mat(flat, model.geom_quat[geom])
+    turn = flat.reshape(3, 3)
     placed = (vertices @ turn.T + model.geom_pos[geom]).astype(np.float32)
     mesh = MeshPart(
         placed, faces.astype(np.int32), (normals @ turn.T).astype(np.float32), uv, _finish(model, geom, textures)
