@@ -18,7 +18,7 @@ from torch import Tensor
 from embodied.agents.common.losses import IGNORE
 from embodied.agents.hanna.inputs import action_index
 from embodied.agents.hanna.losses import help_loss, navigation_loss
-from embodied.agents.hanna.policy import Moment
+from embodied.agents.hanna.policy import StepScores
 from embodied.interface import Episode, Place, Teacher
 
 
@@ -44,7 +44,7 @@ class Experience:
 
 
 def labelled(
-    episodes: Sequence[Episode], moments: Sequence[Moment], teacher: Teacher, worlds: Mapping[str, Place]
+    episodes: Sequence[Episode], moments: Sequence[StepScores], teacher: Teacher, worlds: Mapping[str, Place]
 ) -> Experience:
     """Outputs of the networks in some episodes, beside the teacher's labels; A is the most actions of any
     step."""

@@ -45,7 +45,7 @@ from embodied.interface import (
 
 
 @dataclass(frozen=True, eq=False)
-class Moment:
+class StepScores:
     """Outputs of the networks in one step, for the episodes that were still running."""
 
     positions: tuple[int, ...]
@@ -148,7 +148,7 @@ class HannaPolicy:
             previous_action=percept.actions[taken],
             previous_ask=torch.tensor([REQUEST if ask else DO_NOTHING for ask in asks], device=device),
             last_ask=tuple(o.time if ask else t for ask, o, t in zip(asks, seen, memory.last_ask, strict=True)),
-            moments=self.kept(memory.moments, Moment(positions, scores)),
+            moments=self.kept(memory.moments, StepScores(positions, scores)),
         )
 
     @torch.no_grad()
@@ -160,7 +160,7 @@ class HannaPolicy:
         """Who decides when to ask in one of the episodes of a batch."""
         return self.ask_rule
 
-    def kept(self, moments: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
+    def kept(self, moments: tuple[StepScores, ...], moment: StepScores) -> tuple[StepScores, ...]:
         """The outputs that are remembered."""
         return ()
 
@@ -258,7 +258,7 @@ class TrainingPolicy(HannaPolicy):
     def rule_of(self, position: int, episodes: int) -> HannaAskRule:
         return RULES["every5"][0] if position < round(self.guided_asking * episodes) else self.ask_rule
 
-    def kept(self, moments: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
+    def kept(self, moments: tuple[StepScores, ...], moment: StepScores) -> tuple[StepScores, ...]:
         return (*moments, moment)
 
     def start(self, positions: tuple[int, ...]) -> HannaMemory:
