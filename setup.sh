@@ -71,5 +71,8 @@ if [ "$(cat .venv/.ready 2>/dev/null)" != "$wanted" ]; then
     index=(--extra-index-url https://download.pytorch.org/whl/cpu)
   fi
   .venv/bin/python -m pip install -q --disable-pip-version-check ${index[@]+"${index[@]}"} -c constraints.txt -e '.[dev]'
+  # on Python 3.13 dm-control comes without labmaze, see pyproject.toml
+  .venv/bin/python -c 'import dm_control' 2>/dev/null \
+    || .venv/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-deps dm-control
   echo "$wanted" > .venv/.ready
 fi

@@ -32,6 +32,7 @@ HOMES = {
         "embodied/light/",
         "embodied/bench/",
     ),
+    "dm_control": ("embodied/envs/driven.py",),
     "OpenGL": ("embodied/gl.py", "embodied/render/"),
     "gymnasium": ("embodied/gym/", "agents/"),
     "starlette": ("embodied/serve/",),

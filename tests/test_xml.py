@@ -16,7 +16,7 @@ PARSERS = re.compile(
 )
 READERS = {
     "agents/bandit/libreoffice.py",  # pages of LibreOffice's help, as HTML: attacked below
-    "embodied/envs/driven.py",  # its own robot
+    "embodied/envs/driven.py",  # what dm_control has just written itself
 }
 
 

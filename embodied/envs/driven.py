@@ -1,4 +1,7 @@
-"""A body with wheels among the collision boxes of a house (embodied.scene.model), driven by velocities."""
+"""A body with wheels in the physics of a house, driven by velocities (dm_control's composer).
+
+The house is its arena: the collision boxes of embodied.scene.model.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +9,27 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 import mujoco
 import numpy as np
 
+try:
+    from dm_control import composer, mjcf
+except ImportError as e:
+    raise ImportError(f"a driven body needs dm-control ({e}); pip install --no-deps dm-control") from e
+
+from embodied.navigation.free_space import EYE
 from embodied.scene.model import build_spec, owner_of_name
 
 if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
     from embodied.house.house import House
 
-HEIGHT, WHEEL, TRACK = 1.4, 0.08, 0.28
-"""Of the body in wheels.xml, metres: its height, the wheels' radius, and how far apart they are."""
+RADIUS, HEIGHT = 0.19, 1.4
+"""Of the body, metres: the graph keeps 0.2 m free around every edge."""
+WHEEL, TRACK = 0.08, 0.28
+"""Wheel radius and distance between the wheels, metres."""
 FASTEST, TURNING = 1.0, 2.5
 """Metres per second and radians per second."""
 CONTROL = 0.02
@@ -28,7 +38,37 @@ APART = 0.5
 """Seconds without touch after which touching the same thing is another collision (Driver.roll): bodies rebound."""
 
 
-ROBOT = Path(__file__).with_name("wheels.xml")
+SLIPPERY = {"friction": [0.02, 0.001, 0.0001], "priority": 1}
+"""Priority makes the friction of casters and hull count, not the floor's."""
+TYRE = {"type": "cylinder", "size": [WHEEL, 0.02], "euler": [math.pi / 2, 0, 0], "friction": [1.4, 0.01, 0.0005]}
+MOTOR = {"kv": 6.0, "ctrlrange": [-40, 40], "forcerange": [-12, 12]}
+CASTER = {"type": "sphere", "size": [0.03], "mass": 0.3, **SLIPPERY}
+
+
+class RollingBody(composer.Entity):
+    """A slim cylinder on two driven wheels and two casters, with a camera at eye height."""
+
+    def _build(self) -> None:
+        root = mjcf.RootElement(model="robot")
+        root.default.geom.friction = [1.0, 0.005, 0.0001]
+        body = root.worldbody.add("body", name="chassis", pos=[0, 0, WHEEL])
+        body.add("geom", name="base", type="cylinder", size=[RADIUS, 0.04], pos=[0, 0, 0.04], mass=18, **SLIPPERY)
+        size = [RADIUS * 0.8, (HEIGHT - 0.3) / 2]
+        body.add("geom", name="mast", type="cylinder", size=size, pos=[0, 0, 0.2 + size[1]], mass=2, **SLIPPERY)
+        body.add("camera", name="eye", pos=[0, 0, EYE - WHEEL], xyaxes=[0, -1, 0, 0, 0, 1], fovy=60)
+        for side, y in (("left", TRACK / 2), ("right", -TRACK / 2)):
+            wheel = body.add("body", name=f"{side}_wheel", pos=[0, y, 0])
+            wheel.add("joint", name=f"{side}_axle", type="hinge", axis=[0, 1, 0], damping=0.02)
+            wheel.add("geom", name=f"{side}_tyre", mass=0.8, **TYRE)
+            root.actuator.add("velocity", name=side, joint=f"{side}_axle", **MOTOR)
+        for where, x in (("front", RADIUS * 0.8), ("back", -RADIUS * 0.8)):
+            body.add("geom", name=f"{where}_caster", pos=[x, 0, 0.032 - WHEEL], **CASTER)
+        root.compiler.angle = "radian"
+        self._root = root
+
+    @property
+    def mjcf_model(self) -> mjcf.RootElement:
+        return self._root
 
 
 @dataclass(frozen=True)
@@ -44,11 +84,18 @@ class Roll:
 
 
 class Driver:
-    """Owns the physics of one house with the body in it."""
+    """Owns the physics of one house with the body in it.
+
+    The model is put together with dm_control and stepped by MuJoCo itself: dm_control's own Physics
+    (1.0.50) asks MuJoCo 4.0 for fields it no longer has.
+    """
 
     def __init__(self, house: House, catalogue: Catalogue) -> None:
-        spec, self._owners = house_with_robot(house, catalogue)
-        self.model = spec.compile()
+        arena, self._owners = house_arena(house, catalogue)
+        robot = RollingBody()
+        arena.add_free_entity(robot)
+        root = arena.mjcf_model
+        self.model = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
         """For pictures through the camera 'robot/eye', together with `data`."""
         self.data = mujoco.MjData(self.model)
         joint = next(j for j in range(self.model.njnt) if self.model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE)
@@ -148,23 +195,29 @@ class Driver:
         return frozenset(touched)
 
 
-def house_with_robot(house: House, catalogue: Catalogue) -> tuple[mujoco.MjSpec, dict[str, str]]:
-    """The house's collision boxes with the body among them, and the owner of each box by the name of its geom."""
+def house_arena(house: House, catalogue: Catalogue) -> tuple[composer.Arena, dict[str, str]]:
+    """The house's collision boxes as a composer arena, and the owner of each geom by its name there."""
     model = build_spec(house, catalogue, parts=()).compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    spec = mujoco.MjSpec.from_file(str(ROBOT))
+    arena = composer.Arena(name="house")
+    root = arena.mjcf_model
+    root.option.timestep, root.option.integrator = 0.004, "implicitfast"
+    root.compiler.angle = "radian"
     owners, floors = {}, [s.elevation for s in house.storeys]
-    for g in np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_BOX):
+    for g in range(model.ngeom):
+        if model.geom_type[g] != mujoco.mjtGeom.mjGEOM_BOX:
+            continue
         middle, half = data.geom_xpos[g][2], float(np.abs(data.geom_xmat[g][6:]) @ model.geom_size[g])
         if is_overhead(middle - half, middle + half, floors):
             continue
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, data.geom_xmat[g])
-        box = {"name": f"box{g}", "type": mujoco.mjtGeom.mjGEOM_BOX, "size": model.geom_size[g], "quat": quat}
-        spec.worldbody.add_geom(pos=data.geom_xpos[g], **box)
-        owners[box["name"]] = owner_of_name(model.geom(g).name)
-    return spec, owners
+        root.worldbody.add(
+            "geom", name=f"box{g}", type="box", size=model.geom_size[g], pos=data.geom_xpos[g], quat=quat
+        )
+        owners[f"box{g}"] = owner_of_name(model.geom(g).name)
+    return arena, owners
 
 
 def is_overhead(low: float, high: float, floors: Sequence[float]) -> bool:
