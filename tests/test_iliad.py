@@ -135,16 +135,6 @@ def test_without_a_description_only_the_marginal_is_learned(mixing, moves):
     assert bool(of_explorer is not None and of_explorer[4].abs().any()) == moves, "with the empty description"
 
 
-def test_executions_from_the_marginal_teach_the_explorer_alone():
-    student, explorer = Presser(0), Presser(1)
-    adel_loss([Wish(0)], [1], ["1"], [2], explorer, student, mixing=1.0).backward()
-    gradient = student.table.weight.grad[1]
-    expected = student.table.weight[1].softmax(-1).detach()
-    expected[1] -= 1
-    assert torch.allclose(gradient, expected), "the gradient of cross-entropy, to the executed button only"
-    assert explorer.table.weight.grad[1].argmin() == 2, "lambda = 1: the explorer learns the marginal's button"
-
-
 def test_reinforce_by_hand():
     logs = torch.tensor([[-1.0, -2.0], [-0.5, 0.0]], requires_grad=True)
     mask = torch.tensor([[True, True], [True, False]])
@@ -210,20 +200,15 @@ def problem(teacher: Watcher | None = None) -> IliadProblem:
 QUICK = LearnerConfig(iterations=60, batch=8, learning_rate=0.1, validate_every=20)
 
 
-@pytest.mark.parametrize(
-    ("settings", "least"),
-    [
-        ({}, 1.0),
-        ({"learner": "mixture"}, 1.0),
-        ({"learner": "dagger"}, 1.0),
-        ({"learner": "binary", "learning_rate": 1.0}, 0.5),
-    ],
-)
-def test_each_learner_learns_the_buttons(tmp_path, settings, least):
+BINARY = {"learner": "binary", "learning_rate": 1.0}
+
+
+@pytest.mark.parametrize("settings", [{}, {"learner": "mixture"}, {"learner": "dagger"}, BINARY])
+def test_each_learner_learns_the_buttons(tmp_path, settings):
     config = LearnerConfig(**{**vars(QUICK), **settings})
     p = problem()
     found = train(p, config, tmp_path, note=silent)
-    assert found[-1]["success"] >= least
+    assert found[-1]["success"] >= (0.5 if settings == BINARY else 1)
     assert (tmp_path / "best.safetensors").exists()
     assert [h["episodes"] for h in found] == [160, 320, 480]
     assert success_rate(p.world, p.student, WISHES) == found[-1]["success"]
@@ -251,25 +236,14 @@ def test_adel_comes_to_the_true_marginal():
 
 
 def test_episodes_to_a_threshold_are_the_first_validation_above_it():
-    history = [
-        {"episodes": 10.0, "success": 0.2},
-        {"episodes": 20.0, "success": 0.9},
-        {"episodes": 30.0, "success": 0.8},
-    ]
+    history = [{"episodes": float(n), "success": share} for n, share in ((10, 0.2), (20, 0.9), (30, 0.8))]
     assert episodes_to(history, 0.85) == 20 and math.isinf(episodes_to(history, 0.95))
 
 
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("learner", "ppo"),
-        ("mixing", 1.5),
-        ("batch", 0),
-        ("learning_rate", 0.0),
-        ("anneal_every", -1),
-        ("entropy", math.nan),
-    ],
-)
-def test_settings_out_of_range_are_refused(field, value):
+WRONG = {"learner": "ppo", "mixing": 1.5, "batch": 0, "learning_rate": 0.0, "anneal_every": -1, "entropy": math.nan}
+
+
+@pytest.mark.parametrize("field", WRONG)
+def test_settings_out_of_range_are_refused(field):
     with pytest.raises(ValueError, match=field):
-        LearnerConfig(**{field: value})
+        LearnerConfig(**{field: WRONG[field]})

@@ -22,7 +22,6 @@ from embodied.agents.iliad.nav.world import (
     NavWalk,
     NavWorld,
     Trip,
-    share_left,
     trips_of,
     walk_along,
     without_loops,
@@ -86,12 +85,6 @@ def eyes(place, name: str, texts) -> NavEyes:
 def student(look: NavEyes, seed: int = 0, kind=NavStudent, **settings) -> NavStudent:
     config = NavConfig(hidden_size=32, heads=2, **settings)
     return kind(new_follower(config, look, seed, "student"), look, config)
-
-
-def test_the_share_that_is_left_by_hand():
-    assert share_left(LINE.graph, [0], 2) == 1 and share_left(LINE.graph, [0, 1], 2) == pytest.approx(0.5)
-    assert share_left(LINE.graph, [0, 1, 2], 2) == 0
-    assert share_left(LINE.graph, [1, 0], 2) == 1, "who goes away has all of it left, not more"
 
 
 def test_what_is_learned_besides_is_by_hand_the_way_that_is_left_and_the_rooms():

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 import torch
 from hand_data import COMPACT, built, noise_features, small_house
@@ -17,7 +15,7 @@ from embodied.agents.iliad.config import LearnerConfig
 from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.run import NavSetup
 from embodied.agents.iliad.nav.stages import config_of, load_follower
-from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, OtherWords
+from embodied.agents.iliad.nav.teacher import GrammarNavTeacher
 from embodied.agents.iliad.study import IliadStudy
 from embodied.agents.iliad.training import train
 from embodied.agents.studies.engine import run_study
@@ -136,18 +134,9 @@ def test_a_study_has_readers_with_pre_trained_vectors_who_hear_other_words(sourc
     assert said < heard
 
 
-def test_descriptions_are_reworded_and_requests_stay():
-    told = ["Turn left.", None, "Go on."]
-    teacher = SimpleNamespace(describe=lambda tasks, executions, *, rng: told)
-    trips = [SimpleNamespace(requests=("Go on.",)) for _ in told]
-    found = OtherWords(teacher, str.upper).describe(trips, [None] * 3, rng=np.random.default_rng(0))
-    assert found == ["TURN LEFT.", None, "Go on."]
-
-
 def test_commands_train_and_show(source, tmp_path, capsys):
-    sizes = [
-        f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in ("teacher", "blind", "varied_words")
-    ]
+    fixed = ("teacher", "blind", "varied_words")
+    sizes = [f"--{k.replace('_', '-')}={v}" for k, v in vars(SMALL).items() if k not in fixed]
     where = ["--data", str(source.folder), "--cache", str(source.cache), "--encoder", str(COMPACT)]
     out = ["--out", str(tmp_path), "--iterations=2", "--batch=4"]
     assert main(["train", "iliad", "nav", *where, *out, *sizes]) == 0

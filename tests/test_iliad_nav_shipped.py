@@ -50,13 +50,7 @@ def test_left_is_not_right(student):
             if abs(aside) < 0.5:
                 continue
             walk, trip = walk_along((node, there.node)), Trip("grid", pose, (node,), ("",))
-            log = [
-                float(
-                    student.scores([trip], [f"turn {way} and walk straight ahead ."], [walk])
-                    .log_probabilities[0, 0]
-                    .detach()
-                )
-                for way in ("left", "right")
-            ]
+            told = [f"turn {way} and walk straight ahead ." for way in ("left", "right")]
+            log = [float(student.scores([trip], [t], [walk]).log_probabilities[0, 0].detach()) for t in told]
             gained.append(aside * (log[0] - log[1]))
     assert len(gained) > 20 and np.mean(gained) > 0

@@ -19,7 +19,7 @@ from embodied.language.lexicon import ROOM_NOUNS, UNFIT, lexicon_of
 from embodied.language.listener import count_cost, follow
 from embodied.language.people_language import People, RouteDescriber
 from embodied.language.plain_language import with_article
-from embodied.language.route_clauses import legs_of, shortened
+from embodied.language.route_clauses import legs_of
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.surroundings import Lookout, doorway
 from embodied.language.templates import SPOKEN, TEMPLATES
@@ -95,11 +95,6 @@ def test_slips_hedges_and_openings_change_nothing(lexicon):
 def test_text_without_an_instruction_is_refused(lexicon):
     with pytest.raises(ValueError, match="no part of 'lorem ipsum'"):
         parse("lorem ipsum", lexicon)
-
-
-def test_a_turn_before_a_doorway_is_left_out_before_the_doorway():
-    phrases = [Phrase(Exit("study")), Phrase(Turn("left")), Phrase(Enter("kitchen")), Phrase(StopHere())]
-    assert [kind_of(p.clause) for p in shortened(phrases, 3)] == ["exit", "enter", "stop_here"]
 
 
 def test_legs_cover_the_path_and_end_at_doorways(world, spoken):

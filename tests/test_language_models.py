@@ -7,10 +7,7 @@ import dataclasses
 import io
 import json
 import sqlite3
-import ssl
 import threading
-import urllib.error
-import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -305,16 +302,6 @@ def test_certificates_that_are_gone_are_named_and_do_not_matter_without_tls(answ
         with pytest.raises(UnableError, match="does not speak TLS; write http://"):
             client_of(server, answers, temperature=1.0).ask(ASKED, ONE)
 
-    def unverified(*_: object, **__: object) -> None:
-        error = ssl.SSLCertVerificationError()
-        error.verify_message = "unable to get local issuer certificate"
-        raise urllib.error.URLError(error)
-
-    monkeypatch.setattr(urllib.request.OpenerDirector, "open", unverified)
-    client = Client(ServerSettings("m", "https://127.0.0.1:9/v1", **FAST), AnswerCache(answers))
-    with pytest.raises(UnableError, match=r"local issuer.*SSL_CERT_FILE \(now: SSL_CERT_FILE=/gone/cacert.pem"):
-        client.ask([{"role": "user", "content": "safely"}], ONE)
-
 
 # Failures that pass, and those that do not ------------------------------------------------------
 
@@ -443,7 +430,7 @@ def test_template_model_and_person_answer_through_one_interface(answers):
         assistant_maker("nobody", lambda: None, None)
 
 
-def test_an_assistants_model_that_fails_leaves_the_template_and_is_counted(answers):
+def test_a_model_words_free_answers_by_true_facts_only_and_one_that_fails_leaves_the_template(answers):
     _, tasks, make_env = ask_stage()
     with ChatServer(lambda r: said("<html>")) as server:
         env = make_env()
@@ -451,19 +438,12 @@ def test_an_assistants_model_that_fails_leaves_the_template_and_is_counted(answe
         env.assistant = ModelAssistant(template, client_of(server, answers))
         env.reset(tasks[0])
         env.step(Ask(Intention.REGION))
-    reply = env.last_step.reply
-    assert reply.usage.invalid == 1
-    assert reply.text == template.answer(env.situation, Intention.REGION, rng=np.random.default_rng(0)).text
-
-
-def test_a_free_question_reaches_the_model_with_true_facts_only(answers):
-    _, tasks, make_env = ask_stage()
-    with ChatServer(lambda r: said('{"answer": "I do not know."}')) as server:
-        env = make_env()
-        env.assistant = ModelAssistant(env.assistant, client_of(server, answers))
-        env.reset(tasks[0])
+        reply = env.last_step.reply
+        assert reply.usage.invalid == 1
+        assert reply.text == template.answer(env.situation, Intention.REGION, rng=np.random.default_rng(0)).text
+        server.behaviour = lambda r: said('{"answer": "I do not know."}')
         env.step(Ask(Intention.FREE, question="Is there a cat in the house?"))
-        content = server.requests[0]["messages"][1]["content"]
+        content = server.requests[-1]["messages"][1]["content"]
     assert "Is there a cat in the house?" in content and content.count("\n- ") == 3
     assert env.last_step.action.question == "Is there a cat in the house?"
 

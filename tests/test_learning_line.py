@@ -93,13 +93,9 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     policies = hanna_policies(agent, bank)
     rarely = PerfectInterpretation(policies["learned, ask every 5"])
     episodes = {"always": [], "rarely": []}
-    evaluate(
-        data.split("test_unseen"),
-        {"always": policies["learned, perfect interpretation"], "rarely": rarely},
-        seed=0,
-        batch=4,
-        keep=lambda name, played: episodes[name].extend(played),
-    )
+    players = {"always": policies["learned, perfect interpretation"], "rarely": rarely}
+    keep = lambda name, played: episodes[name].extend(played)
+    evaluate(data.split("test_unseen"), players, seed=0, batch=4, keep=keep)
     worlds = data.places("test_unseen")
     pieces = [(worlds[e.task.world].graph, p) for e in sum(episodes.values(), []) for p in segments(e.steps)]
     left = [(g, p) for g, p in pieces if p[0].mode is Mode.SUB and isinstance(p[-1].action, Stop)]
@@ -136,10 +132,8 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     value = body["rows"][1]["values"]["success_test_unseen"]
     assert value["n"] == 3 and body["rows"][1]["printed"]["success_test_unseen"] == 45.43
     assert "success_test_ood" in body["rows"][0]["values"] and body["paper"] == "the dissertation, Table 4.4"
-    assert any(
-        note.startswith("+ language instruction minus Target image only, success, test unseen")
-        for note in body["notes"]
-    )
+    change = "+ language instruction minus Target image only, success, test unseen"
+    assert any(note.startswith(change) for note in body["notes"])
     assert "(45.43)" in (out / "hanna-4.4.md").read_text()
     assert "success_test_unseen_as_shipped" in body["rows"][0]["values"]
     assert "success_test_unseen_as_shipped" not in body["rows"][0]["printed"]
@@ -201,15 +195,6 @@ def test_an_agent_that_knows_no_varied_words_cannot_go_on_with_them(study, tmp_p
     train_agent(source, varied, learner.evaluation, tmp_path / "new", note=print)
     words, plain = (HannaAgent.load(f).about.words for f in ((tmp_path / "new" / "best.safetensors"), begin))
     assert set(plain) < set(words), "it heard the words as they are and others"
-
-
-def test_processor_time_is_counted_over_sessions(study, tmp_path):
-    learner, _ = study
-    source = TrainingData(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
-    short = dataclasses.replace(learner.config, iterations=1)
-    go = lambda config: train_agent(source, config, learner.evaluation, tmp_path, note=print).processor
-    used = [go(config) for config in (short, learner.config, learner.config)]
-    assert 0 < used[0] < used[1] == used[2], "sessions add up, and what is done is not forgotten"
 
 
 def test_missing_features_are_told_before_anything_is_trained(study, data, tmp_path):

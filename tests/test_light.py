@@ -16,7 +16,6 @@ from handmade import box_mesh
 
 from embodied.assets.records import Finish
 from embodied.bench.light import psnr, ssim
-from embodied.geometry import r2
 from embodied.house.house import House, Light, Room, Sky, Storey
 from embodied.light import LightError, settings_of
 from embodied.light.backend import array, drjit, find_llvm, floats, variant_of
@@ -26,14 +25,13 @@ from embodied.light.baking.house import brightest
 from embodied.light.pages.atlas import atlas_of, things_of
 from embodied.light.pages.colours import ColourMaps
 from embodied.light.pages.cover import rasterise
-from embodied.light.pages.meshes import welded
 from embodied.light.pages.tone import Exposure, develop
 from embodied.light.tracing import luxels, radiosity
 from embodied.light.tracing.emitters import lamps_of, portals_of
 from embodied.light.tracing.sky import Outdoors, paint, sun_direction, sun_height
 from embodied.scene.landscapes import Scenery
 from embodied.scene.part import Part
-from embodied.threads import keep_drawing_to_threads, processors, threads_allowed
+from embodied.threads import keep_drawing_to_threads, threads_allowed
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
@@ -111,31 +109,10 @@ def test_hidden_luxels_take_their_neighbours_light_nearby_and_their_own_shadow_f
     assert compose.filled(how, 1.1 - own)[0, :, 0] == pytest.approx(0.1)  # never brighter than beside it
 
 
-def flat_luxels(z: float, owner: int, up: float = 1.0, n: int = 40, step: float = 0.025):
-    """An n x n sheet of luxels: positions, normals and owners."""
-    x, y = np.meshgrid(np.arange(n) * step, np.arange(n) * step)
-    position = np.stack([x.ravel(), y.ravel(), np.full(n * n, z)], 1).astype(np.float32)
-    return position, np.tile(np.float32([0, 0, up]), (n * n, 1)), np.full(n * n, owner)
-
-
 def test_a_glint_that_reaches_no_luxel_adds_nothing():
     """Dr.Jit refuses loops over no points: a flat of 56 (seed 0) could not be lit."""
     inputs = SimpleNamespace(space=None, lux=SimpleNamespace())
     assert solve._lit_by(inputs, None, np.zeros(0, np.int64)).shape == (0, 3)
-
-
-def test_a_sunlit_floor_has_as_many_small_lights_whatever_the_luxels_are():
-    """Counted by luxels they were too few for coarse ones: a wardrobe beside a sunlit floor came out too bright."""
-    found = []
-    for per_metre in (20, 40):
-        n = per_metre * 3 // 2
-        position, normal, owner = flat_luxels(0.0, 0, n=n, step=1 / per_metre)
-        area, thin = np.full(n * n, per_metre**-2.0, np.float32), np.zeros(n * n, bool)
-        lux = SimpleNamespace(position=position, normal=normal, area=area, thin=thin)
-        found.append(solve._patches(lux, area[:, None] * np.float32([3.0, 2.0, 1.0]), np.arange(n * n), 48))
-    coarse, fine = found
-    assert len(coarse.flux) == len(fine.flux) == 48
-    np.testing.assert_allclose(coarse.flux.sum(0), fine.flux.sum(0), rtol=1e-4)
 
 
 def test_noise_goes_and_an_edge_stays():
@@ -149,24 +126,6 @@ def test_noise_goes_and_an_edge_stays():
     out = smooth_pages(clean * (1 + noise), Grid(atlas, lux.texels), all_, **options)
     assert np.abs(out / clean - 1).mean() < 0.4 * np.abs(noise).mean()
     assert out[left].max() < 1.6 and out[~left].min() > 3.0
-
-
-def test_bright_spots_are_tamed_without_loss_of_light():
-    lux, _ = closed_box(2.0, Finish((SRGB_HALF,) * 3 + (1.0,)))
-    seen = np.ones((len(lux.area), 3), np.float32)
-    seen[:40] = np.geomspace(1.1, 60.0, 40)[:, None]
-    tamed = solve.clamp_fireflies(lux, seen)
-    assert tamed.max() < 55.0
-    assert (tamed * lux.area[:, None]).sum() == pytest.approx((seen * lux.area[:, None]).sum(), rel=1e-4)
-
-
-@pytest.mark.parametrize("corner", [0, 3 * 128 + 100, 71 * 128 + 55])
-def test_samples_of_five_by_five_luxels_lie_evenly(corner):
-    window = corner + (np.arange(5)[:, None] * 128 + np.arange(5)).ravel()
-    turn = radiosity.woven(window, 128, 16)
-    x, y = ((t[:, None] + a % 1.0).ravel() % 1.0 for t, a in zip(turn, r2(np.arange(16) + 1), strict=True))
-    found = np.histogram2d(x, y, 5, ((0, 1), (0, 1)))[0]
-    assert found.sum() == 400 and found.min() >= 12 and found.max() <= 19
 
 
 def test_pixels_left_out_do_not_count_in_the_bench():
@@ -204,14 +163,6 @@ def test_exposure_is_smooth_through_a_door_and_brightens_dark_rooms():
     np.testing.assert_allclose(exposure.many(many), exposure.at(many), rtol=2e-3)
 
 
-def test_welding_finds_the_rows_that_are_alike():
-    rows = np.random.default_rng(0).integers(-2, 3, (4000, 5)).astype(np.float32) * 0.1
-    rows[::7] = -rows[::7]  # where zeros are negative
-    first, which = welded(rows)
-    np.testing.assert_array_equal(rows[first][which], rows)
-    assert len(first) == len(np.unique(rows + 0.0, axis=0))
-
-
 def test_the_film_curve_rises_and_keeps_black_black():
     grey = np.repeat(np.linspace(0, 6, 200)[:, None], 3, 1)
     shown = develop(grey, np.ones(3))
@@ -240,14 +191,6 @@ def test_a_process_takes_no_more_threads_than_it_is_given(monkeypatch):
         assert threads_allowed() == threads, text
     monkeypatch.delenv("OMP_NUM_THREADS")
     assert threads_allowed() is None
-
-
-def test_processors_are_those_of_this_process_and_all_where_the_system_does_not_tell(monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {1, 5}, raising=False)
-    assert processors() == 2
-    monkeypatch.delattr(os, "sched_getaffinity")
-    monkeypatch.setattr(os, "cpu_count", lambda: 3)
-    assert processors() == 3
 
 
 def test_drawing_keeps_to_the_threads_of_a_process(monkeypatch):
@@ -279,19 +222,6 @@ def test_where_numpy_puts_its_arrays_no_kernel_is_compiled_for():
             np.testing.assert_array_equal(np.asarray(out), np.arange(1024) * 3.0 + 1.0)
         made = [k["hash"] for k in dr.kernel_history() if "hash" in k]
     assert len(made) == len(spots) and len(set(made)) == 1
-
-
-def test_grain_is_evened_without_loss_and_not_across_charts():
-    index = np.array([y * 20 + x for y in range(8) for x in (*range(8), *range(12, 20))])
-    left = index % 20 < 8
-    values = np.where(left, 1.0, 5.0).astype(np.float32)[:, None] + np.random.default_rng(0).normal(
-        0, 0.2, (len(index), 3)
-    ).astype(np.float32)
-    out = compose.evened(values, index, (8, 20))
-    assert out[left].std() < 0.45 * values[left].std() and out[left].mean() == pytest.approx(
-        values[left].mean(), abs=0.05
-    )
-    assert out[left].max() < 1.5 and out[~left].min() > 4.5
 
 
 def test_the_verdict_counts_luxels_beyond_a_tenth_and_its_noise():

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import json
-import shutil
 import socket
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,7 +38,6 @@ from embodied.world import open_world
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
-ROOT = Path(__file__).resolve().parent.parent
 SMALL, README_SEED = HouseConfig(area=(38.0, 46.0)), 7
 """The flat of the README, whose furniture other tests have imported."""
 
@@ -84,15 +80,6 @@ def test_the_expert_finds_everything_and_a_random_walker_little(world):
 def jpeg(image: rr.EncodedImage) -> str:
     """Digest of a logged picture's bytes."""
     return digest(bytes(image.blob.as_arrow_array().to_pylist()[0]))
-
-
-def test_the_line_to_copy_starts_the_program_as_the_user_did(tmp_path, monkeypatch):
-    typed = tmp_path / "embodied"
-    monkeypatch.setattr(shutil, "which", lambda name: None)
-    assert demo.as_typed(typed) == str(typed)
-    monkeypatch.setattr(shutil, "which", lambda name: str(typed))
-    assert demo.as_typed(typed) == "embodied"
-    assert demo.as_typed(tmp_path / "__main__.py") == f"{sys.executable} -m embodied"
 
 
 def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_shown(

@@ -20,7 +20,7 @@ import pytest
 
 from embodied import mattersim
 from embodied.mattersim.__main__ import main as launch
-from embodied.mattersim.pictures import WHERE, tile_of, tiles_of, write_face
+from embodied.mattersim.pictures import tiles_of
 
 RECORD = json.loads((Path(__file__).parent / "data" / "mattersim.json").read_text())
 SCANS = sorted(RECORD["graphs"])
@@ -37,18 +37,10 @@ def folder(tmp_path_factory) -> Path:
         for i, j in graph["edges"]:
             open_[i, j] = open_[j, i] = True
         items = []
-        for k, (x, y, z) in enumerate(graph["positions"]):
+        for name, included, near, (x, y, z) in zip(graph["ids"], graph["included"], open_, graph["positions"]):
             pose = [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, y, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0]
-            items.append(
-                {
-                    "image_id": graph["ids"][k],
-                    "pose": pose,
-                    "included": bool(graph["included"][k]),
-                    "visible": open_[k].tolist(),
-                    "unobstructed": open_[k].tolist(),
-                    "height": 1.5,
-                }
-            )
+            ways = {"visible": near.tolist(), "unobstructed": near.tolist()}
+            items.append({"image_id": name, "pose": pose, "included": bool(included), "height": 1.5, **ways})
         (folder / f"{scan}_connectivity.json").write_text(json.dumps(items))
     (folder / "scans.txt").write_text("\n".join(SCANS) + "\n")
     return folder
@@ -145,9 +137,8 @@ def test_the_errors_are_those_of_the_module(folder, tmp_path):
         sim.newEpisode(["elsewhere"], ["v001"], [0], [0])
     with pytest.raises(ValueError, match="Could not find viewpointId"):
         sim.newEpisode([SCANS[0]], ["nowhere"], [0], [0])
-    shut = next(
-        i for i, open_ in zip(*(RECORD["graphs"][SCANS[0]][k] for k in ("ids", "included")), strict=True) if not open_
-    )
+    graph = RECORD["graphs"][SCANS[0]]
+    shut = graph["ids"][graph["included"].index(0)]
     with pytest.raises(ValueError, match="excluded"):
         sim.newEpisode([SCANS[0]], [shut], [0], [0])
     with pytest.raises(ValueError, match="Invalid action index"):
@@ -184,17 +175,6 @@ def test_settings_are_ignored_after_initialize_but_for_the_camera(folder):
     sim.close()
     with pytest.raises(RuntimeError):
         sim.makeAction([0, 0], [0, 0], [0, 0])
-
-
-def test_a_face_survives_the_way_into_a_skybox_and_back():
-    faces = np.random.default_rng(0).integers(0, 255, (6, 8, 8, 3), np.uint8)
-    strip = np.concatenate(tiles_of(faces), axis=1)
-    back = np.empty_like(faces)
-    for k in range(6):
-        write_face(k, tile_of(strip, WHERE[k][0]), back[k])
-    np.testing.assert_array_equal(back, faces)
-    with pytest.raises(ValueError, match="six squares"):
-        tile_of(strip[:, :-6], 0)
 
 
 def box(folder: Path, scan: str, viewpoint: str, *, apart: bool = False) -> None:

@@ -71,18 +71,11 @@ def test_its_tasks_are_evaluated_by_name_with_its_own_columns(data, tmp_path, ca
     assert (
         COLUMNS in said and "| shortest | test_unseen | 100.0" in said and "| random walk | test_unseen | 0.0" in said
     )
-    order = [
-        "evaluate",
-        NAME,
-        "--data",
-        str(data.folder),
-        "--agent",
-        "embodied.policies.baselines:RandomWalk",
-        "--json",
-    ]
+    walk = "embodied.policies.baselines:RandomWalk"
+    order = ["evaluate", NAME, "--data", str(data.folder), "--agent", walk, "--json"]
     assert main(order) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
-    assert row["agent"] == "embodied.policies.baselines:RandomWalk"
+    assert row["agent"] == walk
     assert main(["view", str(tmp_path)]) == 0 and main(["view", str(tmp_path), "--page"]) == 0
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+import re
 import subprocess
 from pathlib import Path
 
@@ -28,13 +29,8 @@ from embodied.world import open_world
 pytestmark = pytest.mark.gl
 
 MUG = {"class": "mug", "size": [0.1, 0.1, 0.1]}
-PAINTED = "\n".join(
-    ["mtllib a.mtl", "vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1", "usemtl paint"]
-    + [
-        " ".join(["f", *(f"{v}/{k + 1}" for k, v in enumerate(line.split()[1:]))]) if line.startswith("f") else line
-        for line in CUBE.splitlines()
-    ]
-)
+FACE = re.compile(r"f (\d) (\d) (\d) (\d)")
+PAINTED = "mtllib a.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl paint\n" + FACE.sub(r"f \1/1 \2/2 \3/3 \4/4", CUBE)
 
 
 def painted(folder: Path, colour: str = "red") -> Path:
@@ -49,15 +45,9 @@ def painted(folder: Path, colour: str = "red") -> Path:
 @pytest.mark.slow
 def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
     row = {"class": "garden gnome", "size": [0.4, 0.3, 0.2]}
-    own = write_own(
-        tmp_path / "own",
-        {
-            "a": {"file": "a.obj", **row},
-            "b": {"file": "b.glb", **row},
-            "c": {"file": "c.sh3f", "model": "mine/box", "class": "garden gnome"},
-        },
-        {"garden gnome": {"support": "floor", "rooms": {"sun_room": 1.0}}},
-    )
+    models = {"a": {"file": "a.obj", **row}, "b": {"file": "b.glb", **row}}
+    models["c"] = {"file": "c.sh3f", "model": "mine/box", "class": "garden gnome"}
+    own = write_own(tmp_path / "own", models, {"garden gnome": {"support": "floor", "rooms": {"sun_room": 1.0}}})
     (own / "a.obj").write_text(CUBE)
     trimesh.creation.box((2, 2, 2)).export(own / "b.glb")
     write_pack(own / "c.sh3f", {"mine/box/box.obj": CUBE})
@@ -70,12 +60,8 @@ def test_own_models_of_all_three_kinds_come_out_at_their_size(tmp_path):
 
 
 def test_a_variant_has_another_colour_and_size_of_the_same_mesh(tmp_path):
-    base = {
-        "file": "a.obj",
-        "class": "side table",
-        "size": [0.4, 0.3, 0.2],
-        "surfaces": [["top", 0.2, -0.2, -0.15, 0.2, 0.15, 9]],
-    }
+    base = {"file": "a.obj", "class": "side table", "size": [0.4, 0.3, 0.2]}
+    base["surfaces"] = [["top", 0.2, -0.2, -0.15, 0.2, 0.15, 9]]
     red = {"of": "a", "class": "coffee table", "size": [0.8, 0.3, 0.1], "looks": {"": "#ff0000"}}
     own = write_own(tmp_path / "own", {"a": base, "red": red})
     (own / "a.obj").write_text(CUBE)

@@ -132,7 +132,7 @@ def all_normals(parts) -> np.ndarray:
 
 def looks_like(parts, colours) -> bool:
     """Whether every face has one of the colours, and each colour is that of a face."""
-    apart = np.linalg.norm(np.concatenate([seen(p) for p in parts])[:, None] - np.array(colours), axis=-1)
+    apart = np.linalg.norm(np.concatenate([seen(p) for p in parts])[:, None] - np.atleast_2d(colours), axis=-1)
     return bool((apart.min(0) < 0.02).all() and (apart.min(1) < 0.02).all())
 
 
@@ -260,7 +260,6 @@ DRAWN = {
     "a mirrored node": (model(nodes=[{"mesh": 0, "scale": [-1, 1, 1]}]), 1, [PLAIN]),
     "numbers that are none": (beginning(b'{"extras": {"a": NaN, "b": 1e999}, '), 1, [PLAIN]),
     "nested extras": (beginning(b'{"extras": ' + b"[" * 60 + b"]" * 60 + b", "), 1, [PLAIN]),
-    "a field twice": (beginning(b'{"scene": 1, '), 1, [PLAIN]),
     "a mark of byte order": (beginning(b"\xef\xbb\xbf{"), 1, [PLAIN]),
 }
 """Binary glTF, the area drawn of it in a cube of one metre, and its colours; all of it faces the front."""
@@ -474,6 +473,7 @@ HALF = PAINTED.replace("vt 1", "vt 0.45")
 RED_CORNERS = SQUARE.replace(" 0\nv", " 0 0.9 0 0\nv").replace("v 0 1 0\n", "v 0 1 0 0.9 0 0\n") + "f 1 2 3 4\n"
 BACKWARDS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\nv 0 0 0\nv 1 1 0\nf -1 -3 -2\n"
 TABBED = PAINTED.replace("v ", "v\t").replace("3/3", "\\\n 3/3").replace("4/4", "4/4 # a square").replace("\n", "\r\n")
+STRETCHED = f"mtllib a.mtl\n{SQUARE}v 2 0 0\nv 2 1 0\n{FACE}f 2 5 6 3\n"
 DRAWN_OBJ = {
     "a tinted texture": (PAINTED, "Kd 0.5 1 0\nmap_Kd grey.png", 1, (0.369, 0.737, 0)),
     "a texture under black": (PAINTED, "Kd 0 0 0\nmap_Kd grey.png", 1, (0.737,) * 3),
@@ -488,31 +488,22 @@ DRAWN_OBJ = {
     "colours of corners": (RED_CORNERS, "", 1, (0.9, 0, 0)),
     "colours in bytes": (RED_CORNERS.replace("0.9 0 0", "230 0 0"), "", 1, (0.902, 0, 0)),
     "indices from the end": (BACKWARDS, "", 1, PLAIN),
+    "a face without coordinates": (STRETCHED, "Kd 1 1 1\nmap_Kd red.png", 1, [RED, (0.92, 0, 0)]),
     "tabs, comments, continued lines": (TABBED, "Kd\t0.1 \\\r\n 0.2 0.3", 1, (0.1, 0.2, 0.3)),
 }
 
 
 @pytest.mark.parametrize(("text", "mtl", "size", "colour"), DRAWN_OBJ.values(), ids=DRAWN_OBJ)
 def test_obj_is_drawn_as_exporters_mean_it(tmp_path, text, mtl, size, colour):
-    mask = leaf().getchannel("A")
-    pictures = {"grey": GREY, "halves": halves(), "leaf": leaf(), "mask": mask, "clear": CLEAR}
+    red, mask = Image.new("RGB", (4, 4), "red"), leaf().getchannel("A")
+    pictures = {"grey": GREY, "halves": halves(), "leaf": leaf(), "mask": mask, "clear": CLEAR, "red": red}
     parts = obj(tmp_path, text, mtl, **{name: picture(image) for name, image in pictures.items()})
-    assert area(parts) == pytest.approx(size, abs=0.03) and looks_like(parts, [colour])
+    assert area(parts) == pytest.approx(size, abs=0.03) and looks_like(parts, colour)
 
 
 def test_roughness_and_metal_of_an_mtl_are_taken(tmp_path):
     (part,) = obj(tmp_path, PAINTED, "Pr 0.33\nPm 1")
     assert (part.finish.roughness, part.finish.metallic) == (0.33, 1.0)
-
-
-def test_one_face_without_texture_coordinates_leaves_the_others_theirs(tmp_path, caplog):
-    text = f"mtllib a.mtl\n{SQUARE}v 2 0 0\nv 2 1 0\n{FACE}f 2 5 6 3\n"
-    red = picture(Image.new("RGB", (4, 4), "red"))
-    plain, shown = sorted(
-        obj(tmp_path, text, "Kd 1 1 1\nmap_Kd a.png", a=red), key=lambda p: str(p.finish.texture or "")
-    )
-    assert shown.finish.texture and "no texture coordinates" in caplog.text
-    np.testing.assert_allclose(plain.finish.color[:3], (0.92, 0, 0), atol=0.01)
 
 
 ODD = "l 1 2\ncurv 0 1 1 2\nv 0 0 nan\nvt nan 0\nf 1 2 5\nf 1 2\nf 1 1 1\nusemtl point\nf 1 1 1\n"
@@ -549,10 +540,8 @@ def test_an_obj_file_without_faces_that_can_be_drawn_is_refused(tmp_path):
     [
         ("f 0 1 2", "a bad index in 'f 0 1 2' (index 0 of 5)"),
         ("f 1 2 9 # none", "a bad index in 'f 1 2 9 ' (index 9 of 5)"),
-        ("f -1 -2 -9", "a bad index in 'f -1 -2 -9' (index -9 of 5)"),
         ("f 1/0 2/1 3/2", "a bad index in 'f 1/0 2/1 3/2' (index 0 of 4)"),
         ("f 1 2 x", "a bad index in 'f 1 2 x'"),
-        ("v 1 2", "'v' should have 3 numbers, got '1 2'"),
         ("v 1 2 three", "'v' should have 3 numbers, got '1 2 three'"),
         ("vt a b", "'vt' should have 2 numbers, got 'a b'"),
     ],

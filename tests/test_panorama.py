@@ -187,12 +187,8 @@ def test_view_k_is_the_view_that_poses_and_candidates_call_k():
             pose = Pose(0, turn, tilt)
             centre = views[pose.view, 15:17, 15:17].reshape(-1, 3).mean(axis=0)
             assert np.abs(centre - colour_along(pose.yaw, pose.pitch)).max() < 3, pose
-    graph = graph_of(
-        np.array([[0, 0, 1.5], [0.2, 2.0, 1.5], [2.0, -0.1, 1.5]]),
-        np.array([[0, 1], [0, 2]]),
-        ("a", "b", "c"),
-        ("r",) * 3,
-    )
+    positions, edges = np.array([[0, 0, 1.5], [0.2, 2.0, 1.5], [2.0, -0.1, 1.5]]), np.array([[0, 1], [0, 2]])
+    graph = graph_of(positions, edges, ("a", "b", "c"), ("r",) * 3)
     candidates, _ = PanoramicMoves().at(SimpleNamespace(house=SimpleNamespace(name="h"), graph=graph), Pose(0, 2))
     assert candidates.view.tolist() == [12 + 3, 12 + 0], "+y, then +x, seen from turn 2"
     for view in candidates.view:

@@ -39,14 +39,8 @@ from embodied.tasks.goals import find_instances
 FIGURE = Asset("hand/figure", CLASS, "a person", (0.5, 0.3, 1.7), "floor")
 SLIM = Asset("hand/slim", CLASS, "a slim person", (0.3, 0.3, 1.7), "floor")
 SITTER = Asset("hand/sitter", CLASS, "somebody at rest", (0.5, 0.7, 1.3), "floor", tags=("sitting",))
-CHAIR = Asset(
-    "hand/chair",
-    "dining chair",
-    "a chair",
-    (0.4, 0.4, 0.9),
-    "floor",
-    surfaces=(SupportSurface("seat", LAP + 0.02, -0.15, -0.15, 0.15, 0.1, 9.0),),
-)
+SEAT = SupportSurface("seat", LAP + 0.02, -0.15, -0.15, 0.15, 0.1, 9.0)
+CHAIR = Asset("hand/chair", "dining chair", "a chair", (0.4, 0.4, 0.9), "floor", surfaces=(SEAT,))
 
 
 def catalogue(*figures: Asset) -> SimpleNamespace:
@@ -77,23 +71,14 @@ def seated(world, node: int, dx: float, dy: float, yaw: float = 0.0):
 
 def test_one_person_per_start_looking_at_it_or_at_a_start_nearby():
     house, world = populated()
-    people = people_of(house)
+    people, nodes = people_of(house), world.graph.positions[:, :2]
     assert 1 <= len(people) <= 3 and [p.id for p in people] == [f"person_{i + 1}" for i in range(len(people))]
     for node in (0, 14, 30):
-        here = [p for p in people if p.room == world.graph.room_of_node[node]]
-        assert any(
-            NEAREST_PERSON - 1e-3
-            <= math.dist(p.position[:2], world.graph.positions[node, :2])
-            <= FARTHEST_PERSON + 1e-3
-            for p in here
-        )
+        here = [math.dist(p.position[:2], nodes[node]) for p in people if p.room == world.graph.room_of_node[node]]
+        assert any(NEAREST_PERSON - 1e-3 <= far <= FARTHEST_PERSON + 1e-3 for far in here)
     for p in people:
-        offsets = world.graph.positions[:, :2] - p.position[:2]
-        assert any(
-            abs(wrap(facing_of(p.yaw) - math.atan2(y, x))) < 1e-3
-            for x, y in offsets
-            if math.hypot(x, y) <= FARTHEST_PERSON + 1e-3
-        )
+        near = [n - p.position[:2] for n in nodes if math.dist(n, p.position[:2]) <= FARTHEST_PERSON + 1e-3]
+        assert any(abs(wrap(facing_of(p.yaw) - math.atan2(y, x))) < 1e-3 for x, y in near)
 
 
 def test_nobody_blocks_an_edge_or_stands_in_furniture():
@@ -102,11 +87,8 @@ def test_nobody_blocks_an_edge_or_stands_in_furniture():
     people = [shapely.Point(p.position[:2]) for p in people_of(house)]
     assert len(people) > 12
     assert all(ways.distance(p) >= AGENT_RADIUS + max(FIGURE.size[:2]) / 2 - 0.02 for p in people)
-    assert all(
-        a.distance(b) >= PERSONAL_SPACE / 2 + max(FIGURE.size[:2]) / 2 - 0.02
-        for i, a in enumerate(people)
-        for b in people[:i]
-    )
+    apart = [a.distance(b) for a, b in itertools.combinations(people, 2)]
+    assert min(apart) >= PERSONAL_SPACE / 2 + max(FIGURE.size[:2]) / 2 - 0.02
     check(house)
 
 
@@ -147,23 +129,21 @@ def test_somebody_sits_on_a_chair_with_the_back_at_its_back():
     )
 
 
-@pytest.mark.parametrize("what", ["legs in the way of walkers", "something on the seat", "a bar stool"])
-def test_nobody_sits_where_one_cannot(what, monkeypatch):
+HIGH = dataclasses.replace(CHAIR, surfaces=(dataclasses.replace(SEAT, z=0.75),))
+
+
+@pytest.mark.parametrize(
+    ("place", "chair", "box"), [((0.0, 0.5), CHAIR, False), ((1.1, 1.1), CHAIR, True), ((1.1, 1.1), HIGH, False)]
+)
+def test_nobody_sits_in_the_way_of_walkers_or_on_something_or_on_a_bar_stool(place, chair, box, monkeypatch):
+    monkeypatch.setattr("test_people.CHAIR", chair)
     world = grid_world(6, spacing=2.2)
-    if what == "legs in the way of walkers":
-        chair, met = seated(world, 7, 0.0, 0.5)
-    elif what == "something on the seat":
-        chair, _ = seated(world, 7, 1.1, 1.1)
-        box = dataclasses.replace(
-            thing("box", 1, chair.room, *chair.position[:2]), position=(*chair.position[:2], 0.47), size=(0.3, 0.3, 0.3)
-        )
-        house = dataclasses.replace(world.house, placements=(chair, box))
+    seat, met = seated(world, 7, *place)
+    if box:
+        x, y, _ = seat.position
+        on = dataclasses.replace(thing("box", 1, seat.room, x, y), position=(x, y, 0.47), size=(0.3, 0.3, 0.3))
+        house = dataclasses.replace(world.house, placements=(seat, on))
         met = place_people(house, world.graph, catalogue(SITTER), seed=1)
-    else:
-        monkeypatch.setattr(
-            "test_people.CHAIR", dataclasses.replace(CHAIR, surfaces=(dataclasses.replace(CHAIR.surfaces[0], z=0.75),))
-        )
-        chair, met = seated(world, 7, 1.1, 1.1)
     assert not met
 
 

@@ -9,7 +9,7 @@ import pytest
 from conftest import two_rooms
 from handmade import HandCatalogue, decibels, furnished, of_panes, smooth_pages
 
-from embodied.render import atlas, coarser, raster
+from embodied.render import coarser, raster
 from embodied.render.camera import camera_at
 from embodied.render.classic import Renderer
 
@@ -85,26 +85,6 @@ def test_one_pass_shows_what_two_show(mine, eye, yaw, pitch, size):
 
 
 @gl_test
-def test_what_shines_through_is_laid_over_all_of_its_part_and_no_more(mine, monkeypatch):
-    """From before panes, beside them and between them, whole pictures are laid over to the same result."""
-    parts, known = [], raster.extent
-
-    def noted(*given):
-        parts.append(known(*given))
-        return parts[-1]
-
-    cameras = [camera_at(eye, yaw, pitch, LENS) for eye, yaw, pitch in VIEWS]
-    cameras += [camera_at(EYE, k * math.pi / 8, 0.1 * (k % 3), LENS) for k in range(16)]
-    monkeypatch.setattr(raster, "extent", noted)
-    some = [mine.rgb(camera, SIZE) for camera in cameras]
-    monkeypatch.setattr(raster, "extent", lambda middles, reaches, matrix, size: (0, 0, size[1], size[0]))
-    assert all(np.array_equal(one, mine.rgb(camera, SIZE)) for one, camera in zip(some, cameras, strict=True))
-    whole = math.ceil(1.5 * SIZE[0]) * math.ceil(1.5 * SIZE[1])
-    areas = [width * height for _, _, width, height in parts]
-    assert 0 in areas and any(0 < a < whole for a in areas), "some views show no pane, and some a part of one"
-
-
-@gl_test
 def test_mujoco_and_shaders_do_not_disturb_each_other(mine, mujocos):
     camera = camera_at(EYE, 0.4, -0.2, LENS)
     first = [r.through(camera, SIZE) for r in (mine, mujocos)]
@@ -128,20 +108,6 @@ def test_a_larger_picture_than_before_is_drawn_and_a_closed_renderer_says_so(hou
         r.view(EYE, 0.0)
 
 
-def test_each_page_lies_in_the_atlas_with_its_copies():
-    rng = np.random.default_rng(0)
-    pages = [np.full((h, w, 3), rng.integers(0, 255, 3), np.uint8) for h, w in ((70, 33), (5, 200), (64, 64))]
-    picture, corners = atlas.packed(pages)
-    width = picture.shape[1] * 2 // 3
-    for page, (column, row) in zip(pages, corners, strict=True):
-        place = picture[row : row + page.shape[0], column : column + page.shape[1], :3]
-        assert np.array_equal(place, page)
-        for k in range(1, atlas.LEVELS + 1):
-            above = picture.shape[0] - (picture.shape[0] >> (k - 1))
-            copy = picture[above + (row >> k), width + (column >> k), :3]
-            assert np.array_equal(copy, page[0, 0]), k
-
-
 def sphere(rings: int, radius: float) -> coarser.Corners:
     around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * rings + 1), np.linspace(0, np.pi, rings + 1))
     xyz = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], -1) * radius
@@ -155,19 +121,6 @@ def sphere(rings: int, radius: float) -> coarser.Corners:
 def corners_of(xyz: np.ndarray, faces: np.ndarray) -> coarser.Corners:
     uv = xyz[:, :2].astype(np.float32)
     return coarser.Corners(xyz.astype(np.float32), uv, np.zeros(len(xyz), int), faces)
-
-
-def test_copies_are_smaller_stay_within_a_cell_and_keep_their_texture():
-    whole, counts = sphere(60, 0.2), []
-    for cell, copy in zip(coarser.COPY_CELLS, coarser.copies(whole, 1, np.ones(1, bool)), strict=True):
-        if not len(copy.faces):
-            continue
-        counts.append(len(copy.faces))
-        assert np.abs(np.linalg.norm(copy.xyz, axis=1) - 0.2).max() < cell
-        assert np.abs(copy.uv - copy.xyz[:, :2]).max() < cell
-        a, b, c = copy.xyz[copy.faces].swapaxes(0, 1)
-        assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0).mean() > 0.99, "they face outwards"
-    assert len(counts) >= 2 and counts == sorted(counts, reverse=True) and counts[-1] < len(whole.faces) / 4
 
 
 def test_no_copy_loses_surface():

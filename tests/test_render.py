@@ -119,24 +119,15 @@ def test_a_large_picture_shrunk_is_the_small_one(renderer):
 
 def test_leaving_out_what_is_hidden_changes_no_pixel(renderer, monkeypatch):
     rng = np.random.default_rng(1)
-    for x, y in [
-        (0.4, 0.4),
-        (4.9, 1.0),
-        (5.0, 1.1),
-        (5.1, 0.9),
-        (6.0, 3.0),
-        (8.6, 0.4),
-        *rng.uniform([0.3, 0.3], [8.7, 3.7], (6, 2)),
-    ]:
+    by_the_door = [(0.4, 0.4), (4.9, 1.0), (5.0, 1.1), (5.1, 0.9), (6.0, 3.0), (8.6, 0.4)]
+    for x, y in [*by_the_door, *rng.uniform([0.3, 0.3], [8.7, 3.7], (6, 2))]:
         yaw, pitch = rng.uniform(-math.pi, math.pi), rng.uniform(-0.6, 0.6)
         some = renderer.view((x, y, 1.5), yaw, pitch, 1.2, (64, 64))
         with monkeypatch.context() as m:
             m.setattr(renderer, "_in_view", lambda *_: renderer._is_visual)
             everything = renderer.view((x, y, 1.5), yaw, pitch, 1.2, (64, 64))
         differ = (some.rgb != everything.rgb).any(axis=-1).sum()
-        assert differ <= 2, (
-            f"{differ} pixels at {x, y, yaw, pitch}; one or two may peep through a crack between two meshes"
-        )
+        assert differ <= 2, (x, y, yaw, pitch)  # one or two may peep through a crack between two meshes
         assert (some.ids != everything.ids).sum() <= 2
 
 
@@ -235,23 +226,6 @@ def test_pictures_are_known_again_from_what_files_record_of_them():
     assert from_words({"kind": "traced", "size": 192, "light": None, "rays": None}) == Traced(size=192)
     with pytest.raises(ValueError, match="unknown; draw them again"):
         from_recorded({"size": 8, "quality": "fast", "backend": "filament", "light": "fast"})
-
-
-def _draw(queue) -> None:
-    with Renderer(furnished(two_rooms()), HandCatalogue(), size=32) as r:
-        queue.put(int(r.panorama(EYE).rgb.astype(np.int64).sum()))
-
-
-@pytest.mark.slow
-def test_a_spawned_worker_draws_the_same(house):
-    context = multiprocessing.get_context("spawn")
-    queue = context.Queue()
-    worker = context.Process(target=_draw, args=(queue,))
-    worker.start()
-    with Renderer(house, HandCatalogue(), size=32) as r:
-        expected = int(r.panorama(EYE).rgb.astype(np.int64).sum())
-    assert queue.get(timeout=600) == expected
-    worker.join(timeout=600)
 
 
 def _try(queue) -> None:

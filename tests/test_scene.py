@@ -18,7 +18,7 @@ from embodied.house.house import Placement
 from embodied.scene import collision
 from embodied.scene import model as scene
 from embodied.scene.backdrop import DOME
-from embodied.scene.house_meshes import house_parts, instance_classes, owners
+from embodied.scene.house_meshes import house_parts, owners
 from embodied.scene.lit_pages import LitMesh, LitPages
 
 
@@ -41,14 +41,6 @@ def test_every_geom_is_traceable_to_its_owner(house, compiled):
     assert all(named[g].startswith(owner + "#") for g, owner in whose.items())
     drawn = {owner for g, owner in whose.items() if compiled.kind_of_geom[g] != "collision"}
     assert drawn == {p.owner for p in house_parts(house, HandCatalogue())}
-
-
-def test_every_instance_id_has_a_class(house):
-    classes = dict(zip(("nothing", *owners(house)), instance_classes(house), strict=True))
-    assert all(classes[p.id] == p.object_class for p in house.placements)
-    room, opening = house.rooms[0].id, house.openings[0]
-    assert (classes["nothing"], classes[f"{room}/floor"], classes[f"{room}/wall_0"]) == ("nothing", "floor", "wall")
-    assert classes[f"{opening.id}/frame"] == opening.kind and classes["outdoor/ground"] == "outdoors"
 
 
 def test_only_boxes_collide_and_only_meshes_are_drawn(compiled):
@@ -201,18 +193,6 @@ def test_collision_boxes_leave_support_surfaces_free():
     body, ornament = ((-0.5, -0.2, 0), (0.5, 0.2, 0.5)), ((-0.1, -0.1, 0.5), (0.1, 0.1, 0.6))
     boxes = collision.object_boxes(asset, [box_mesh(*ends, (1, 1, 1, 1)) for ends in (body, ornament)], asset.size)
     assert max(b.centre[2] + b.half[2] for b in boxes) == pytest.approx(0.5, abs=5e-3)
-
-
-def test_few_boxes_cover_a_complicated_thing():
-    rng = np.random.default_rng(0)
-    points = rng.uniform(0, 1, (3000, 3))
-    points = points[(np.linalg.norm(points - 0.5, axis=1) < 0.5) & (points[:, 0] + points[:, 1] > 0.6)]
-    for n in (4, 6):
-        boxes = collision.grid_boxes(points, n)
-        covered = np.zeros(len(points), bool)
-        for low, high in boxes:
-            covered |= np.all((points >= low - 1e-9) & (points <= high + 1e-9), axis=1)
-        assert covered.all()
 
 
 def lit_rug() -> LitPages:

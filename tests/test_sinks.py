@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import socket
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -27,12 +26,8 @@ def ports(monkeypatch) -> tuple[int, int]:
 
 def listening(port: int) -> set[str]:
     """Addresses at which somebody on this machine listens, as the kernel writes them."""
-    rows = [
-        line.split()
-        for name in ("/proc/net/tcp", "/proc/net/tcp6")
-        if Path(name).exists()
-        for line in Path(name).read_text().splitlines()[1:]
-    ]
+    files = [p for p in (Path("/proc/net/tcp"), Path("/proc/net/tcp6")) if p.exists()]
+    rows = [line.split() for p in files for line in p.read_text().splitlines()[1:]]
     return {r[1].split(":")[0] for r in rows if r[3] == "0A" and int(r[1].split(":")[1], 16) == port}
 
 
@@ -49,26 +44,6 @@ def test_serving_listens_on_the_loopback_address_only(ports, capsys):
     assert not any(map(listening, ports)), "it ends with the work"
     said = capsys.readouterr()
     assert f"http://127.0.0.1:{ports[1]}/" in said.out and not said.err
-
-
-SLOW_PAGE = """#!{python}
-import socket, sys, time
-ports = [int(sys.argv[sys.argv.index(name) + 1]) for name in ("--port", "--web-viewer-port")]
-servers = [socket.create_server(("127.0.0.1", ports[0]))]
-time.sleep(0.5)
-servers.append(socket.create_server(("127.0.0.1", ports[1])))
-time.sleep(60)
-"""
-
-
-def test_the_page_is_named_once_it_can_be_opened(ports, tmp_path, monkeypatch):
-    program = tmp_path / "rerun"
-    program.write_text(SLOW_PAGE.format(python=sys.executable))
-    program.chmod(0o755)
-    monkeypatch.setattr(sinks, "viewer_program", lambda: str(program))
-    with pytest.raises(Enough), sinks.open_viewers(serve=True):
-        assert all(sinks.listens("127.0.0.1", p) for p in ports)
-        raise Enough
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="asks the Linux kernel who listens")

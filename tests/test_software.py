@@ -31,11 +31,6 @@ def wheel(tmp_path, monkeypatch):
     software.load_triton_first.cache_clear()
 
 
-def test_a_wheel_with_a_library_that_does_not_load_is_not_used(wheel):
-    (wheel / "libOSMesa-1.so.8").write_bytes(b"no library")
-    assert software.bundled("OSMesa") is None and software.bundled("LLVM") is None
-
-
 def test_libraries_are_loaded_in_the_order_that_they_need_and_after_pytorchs_own_llvm(wheel, monkeypatch):
     for name in ("libLLVM-17.so", "libffi-1.so", "libzstd-1.so"):
         (wheel / name).write_bytes(b"")
@@ -75,12 +70,6 @@ def test_libatomic_comes_out_of_debians_package_without_root(tmp_path, monkeypat
     monkeypatch.setattr(software, "_try", lambda path: loaded.append(path) or path.exists())
     assert not software.load_atomic(tmp_path) and software.bring_atomic(tmp_path)
     assert loaded[-1].read_bytes() == b"the library" and not loaded[-1].is_symlink()
-
-
-def test_where_apt_is_not_nothing_is_brought(tmp_path, monkeypatch):
-    monkeypatch.setattr(software, "_try", lambda path: False)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert not software.bring_atomic(tmp_path)
 
 
 @pytest.mark.parametrize("apt", [True, False])

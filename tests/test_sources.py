@@ -41,10 +41,6 @@ def test_every_cited_difference_exists():
     assert not wrong, "\n".join(wrong)
 
 
-def test_a_number_that_is_not_there_is_noticed():
-    assert missing("as the program does (docs/sources.md, S3 and\n    # S999).", set(rows())) == [999]
-
-
 def documents(text: str) -> set[str]:
     """What `text` sends its reader to: below a folder of ours or in capitals; other names are what commands write."""
     found = DOCUMENT.findall(re.sub(r"https?://\S+", "", text))
@@ -61,10 +57,6 @@ def test_no_document_is_cited_that_the_repository_does_not_have():
         if not {cited, (Path(name).parent / cited).as_posix(), os.path.normpath(Path(name).parent / cited)} & here
     ]
     assert not wrong, "\n".join(wrong)
-
-
-def test_a_document_that_is_not_there_is_noticed():
-    assert documents("see docs/nothing.md, NOTES.md, not out/table.md") == {"docs/nothing.md", "NOTES.md"}
 
 
 MADE = ("details.md", "command_line.md")

@@ -5,10 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +16,6 @@ import torch
 from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.studies.engine import check, run_study
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
-from embodied.cli import main
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.locks import LockedError, locked
@@ -183,11 +178,6 @@ def test_what_other_code_judged_is_judged_again_and_the_check_tells_it(tmp_path)
     assert did(archer) == {"train": 0, "judge": 14}
 
 
-def test_the_command_that_checks_takes_its_folder_by_position(tmp_path, capsys):
-    assert main(["study", "check", str(tmp_path)]) == 0
-    assert capsys.readouterr().out == f"no stored tables in {tmp_path}\n"
-
-
 def test_some_rows_are_had_alone_and_missing_ones_are_named(tmp_path):
     archer, out = Archer(tmp_path / "log"), tmp_path / "out"
     body = table(archer, out, rows=["far"])
@@ -205,29 +195,23 @@ def test_two_studies_never_write_into_one_folder(tmp_path):
         run_study(Archer(tmp_path / "log"), ["1"], tmp_path, note=quiet)
 
 
-KILLED = """
-import dataclasses, os, signal, sys
-from pathlib import Path
-import embodied.agents.studies.engine as engine
-from test_studies import Archer, table
+@dataclass(frozen=True)
+class Interrupted(Archer):
+    """Is stopped when it does `last` for the so-manieth time."""
 
-class Mortal(Archer):
-    def _did(self, what):
+    last: tuple[int, str] = (2, "train")
+
+    def _did(self, what: str) -> None:
         super()._did(what)
-        if self.log.read_text().split().count(what) == int(sys.argv[2]) and what == sys.argv[3]:
-            os.kill(os.getpid(), signal.SIGKILL)
-
-table(Mortal(Path(sys.argv[1]) / "log"), Path(sys.argv[1]) / "out")
-"""
+        if (self.log.read_text().split().count(what), what) == self.last:
+            raise KeyboardInterrupt
 
 
-@pytest.mark.slow
-def test_a_study_that_is_killed_goes_on_and_does_nothing_twice(tmp_path):
+def test_a_study_that_is_stopped_goes_on_and_does_nothing_twice(tmp_path):
     whole = table(Archer(tmp_path / "other log"), tmp_path / "whole")
-    for number, what in ((2, "train"), (5, "judge")):
-        order = [sys.executable, "-c", KILLED, str(tmp_path), str(number), what]
-        paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
-        assert subprocess.run(order, env={**os.environ, "PYTHONPATH": paths}).returncode == -signal.SIGKILL
+    for last in ((2, "train"), (5, "judge")):
+        with pytest.raises(KeyboardInterrupt):
+            table(Interrupted(tmp_path / "log", last=last), tmp_path / "out")
     assert not list((tmp_path / "out").glob("*.json")), "no table is shown of half a study"
     archer = Archer(tmp_path / "log")
     before = did(archer)

@@ -1,4 +1,4 @@
-"""The code of the tutorials and of the README runs as it stands, in order, on one small data set."""
+"""The code of the tutorials, the README and the notebook runs as it stands, in order, on one small data set."""
 
 from __future__ import annotations
 
@@ -98,6 +98,17 @@ def test_the_readme_runs_as_it_stands(monkeypatch):
     """But for how finely the flat is lit, which tests/test_baking.py looks at."""
     monkeypatch.setitem(QUALITIES, "fast", COARSE)
     assert "viewpoints" in run(ROOT / "README.md")
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+def test_the_cells_of_the_notebook_run_in_order(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    notebook = json.loads((ROOT / "examples" / "first_steps.ipynb").read_text())
+    names: dict[str, object] = {}
+    for cell in [c for c in notebook["cells"] if c["cell_type"] == "code"][1:]:  # the first installs
+        exec(compile("".join(cell["source"]), "first_steps.ipynb", "exec"), names)
+    assert 36 < names["house"].area < 46 and 0 <= names["reward"] + 1 <= 2 and "rgb" in names["observation"]
 
 
 def test_readme_and_pages_show_what_the_stored_results_say():

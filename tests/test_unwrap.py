@@ -10,10 +10,18 @@ import pytest
 from handmade import box_mesh
 
 from embodied.assets.records import Finish, MeshPart
-from embodied.light.pages import cover, unwrap
-from embodied.light.pages.atlas import Page, UnwrappedThing, coarsened
-from embodied.light.pages.cover import rasterise
-from embodied.light.pages.unwrap import ONCE, areas_of, density_of, pack, unwrap_model, unwrap_planes, with_budget
+from embodied.light.pages import unwrap
+from embodied.light.pages.atlas import UnwrappedThing, coarsened
+from embodied.light.pages.unwrap import (
+    ONCE,
+    areas_of,
+    density_of,
+    face_normals,
+    pack,
+    unwrap_model,
+    unwrap_planes,
+    with_budget,
+)
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
@@ -27,50 +35,23 @@ def test_unwrapping_keeps_every_face_and_its_proportions():
         assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
 
 
-def test_an_atlas_is_freed_only_after_its_threads_had_time_to_fall_asleep(monkeypatch):
-    """xatlas waits for ever where it ends a thread that is about to sleep."""
-    clock, freed = [0.0], {}
-
-    class Atlas:
-        def __init__(self, number: int) -> None:
-            self.number = number
-
-        def __del__(self) -> None:
-            freed[self.number] = clock[0]
-
-    monkeypatch.setattr(unwrap, "_retired", [])
-    monkeypatch.setattr(unwrap.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(unwrap.time, "sleep", lambda seconds: clock.__setitem__(0, clock[0] + seconds))
-    for number in range(3):
-        unwrap._retire(Atlas(number))
-    assert freed == {0: unwrap.REST, 1: 2 * unwrap.REST}, "the last one rests"
-
-
-def test_inside_out_things_are_turned_and_sheets_are_seen_from_both_sides():
+def test_inside_out_things_are_turned_and_doubled_or_single_sheets_are_unwrapped_once():
     mesh = box_mesh((0, 0, 0), (1, 1, 1), (0.5, 0.5, 0.5, 1.0))
-    inside_out = dataclasses.replace(mesh, faces=mesh.faces[:, ::-1])
-    from embodied.light.pages.unwrap import face_normals
-
-    flat = unwrap_model([inside_out], 1000.0)
-    outward = flat.corners.mean(1) - 0.5
-    assert ((face_normals(flat.corners) * outward).sum(1) > 0).all()
-    sheet = dataclasses.replace(mesh, faces=mesh.faces[:2])
-    assert unwrap_model([sheet], 1000.0).thin.all()
+    inside_out, both = mesh.faces[:, ::-1], np.concatenate([mesh.faces, mesh.faces[:, ::-1]])
+    for faces in (inside_out, both):
+        flat = unwrap_model([dataclasses.replace(mesh, faces=faces)], 1000.0)
+        outward = (face_normals(flat.corners) * (flat.corners.mean(1) - 0.5)).sum(1)
+        assert len(flat.corners) == 12 and not flat.thin.any() and (outward > 0).all()
+    assert unwrap_model([dataclasses.replace(mesh, faces=mesh.faces[:2])], 1000.0).thin.all(), "seen from both sides"
 
 
-def test_sheets_listed_once_per_side_are_unwrapped_once():
-    mesh = box_mesh((0, 0, 0), (0.4, 0.4, 0.4), (0.5, 0.5, 0.5, 1.0))
-    doubled = dataclasses.replace(mesh, faces=np.concatenate([mesh.faces, mesh.faces[:, ::-1]]))
-    flat = unwrap_model([doubled], 1000.0)
-    assert len(flat.corners) == 12 and not flat.thin.any()
-    from embodied.light.pages.unwrap import face_normals
-
-    assert (
-        (face_normals(flat.corners) * (flat.corners.mean(1) - 0.2)).sum(1)[
-            np.abs(flat.corners.mean(1)[:, 2] - 0.2) < 0.19
-        ]
-        > 0
-    ).all()
+def test_packed_rectangles_do_not_overlap():
+    sizes = np.random.default_rng(3).integers(2, 40, (60, 2))
+    places, sheet = pack(sizes)
+    taken = np.zeros(sheet[::-1], int)
+    for (x, y), (w, h) in zip(places, sizes):
+        taken[y : y + h, x : x + w] += 1
+    assert taken.max() == 1 and taken.sum() == sizes.prod(1).sum()
 
 
 def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
@@ -137,37 +118,3 @@ def test_a_model_is_unwrapped_once_for_all_budgets(tmp_path, monkeypatch):
     assert len(asked) == 1
     assert flats[0].size.prod() > flats[1].size.prod()
     np.testing.assert_array_equal(flats[1].luxels, flats[3].luxels)
-
-
-def test_charts_of_a_model_fill_their_sheet_and_do_not_overlap(monkeypatch):
-    """Twelve laths side by side, of which xatlas alone covers 41 % of its sheet, with half the distance between
-    charts. Overlapping charts would cover less than their area."""
-    laths = [box_mesh((0.1 * k, 0, 0), (0.1 * k + 0.05, 0.05, 1.5), (0.5, 0.4, 0.3, 1.0)) for k in range(12)]
-    flat = unwrap_model(laths, 6000.0)
-    on_page = areas_of(np.pad(flat.luxels, ((0, 0), (0, 0), (0, 1)))).sum()
-    assert on_page > 0.43 * np.prod(flat.size)
-    assert flat.luxels.min() >= 0 and (flat.luxels.reshape(-1, 2).max(0) <= flat.size).all()
-    monkeypatch.setattr(cover, "OFFSETS", ())
-    width, height = (int(x) for x in flat.size)
-    page = Page(
-        width, height, 4, False, flat.corners, flat.normals, flat.luxels, flat.uv, flat.thin, flat.part, (), flat.part
-    )
-    assert len(rasterise(page, 4).index) == pytest.approx(4**2 * on_page, rel=0.01)
-
-
-def test_rectangles_are_put_where_they_lie_lowest_and_leftmost():
-    """`pack` against the same rule written out over every place."""
-    rng = np.random.default_rng(0)
-    for trial in range(60):
-        n, width = int(rng.integers(1, 120)), int(rng.integers(1, 90))
-        sizes = np.stack([rng.geometric(0.2, n), rng.geometric(0.1, n)], 1)
-        filled = np.zeros(max(width, sizes[:, 0].max()), int)
-        expected = np.zeros((n, 2), int)
-        for i in sorted(range(n), key=lambda i: (-sizes[i, 1], -sizes[i, 0])):
-            w, h = sizes[i]
-            lies = [filled[x : x + w].max() for x in range(len(filled) - w + 1)]
-            x = int(np.argmin(lies))
-            expected[i] = x, lies[x]
-            filled[x : x + w] = lies[x] + h
-        places, size = pack(sizes, width)
-        assert (places == expected).all() and (size == (expected + sizes).max(0)).all(), trial

@@ -18,15 +18,7 @@ from embodied.agents.common.tensor_file import read_weights, save_tensors
 from embodied.agents.vision import labels, strip
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing
-from embodied.agents.vision.encoder import (
-    Encoder,
-    load_encoder,
-    pool_views,
-    random_encoder,
-    save_encoder,
-    strip_map,
-    whitening,
-)
+from embodied.agents.vision.encoder import load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
 from embodied.agents.vision.features import feature_path, load_bank, load_features, save_features
 from embodied.agents.vision.lite import Lite, folded, load_imagenet
 from embodied.agents.vision.probe import LabelledFeatures, average_precision, place_auc, read
@@ -281,15 +273,6 @@ def test_features_of_two_encoders_do_not_mix(tmp_path):
         load_bank({"a": tmp_path / "1.safetensors", "b": tmp_path / "2.safetensors"})
     with pytest.raises(ValueError, match="must all be"):
         FeatureBank({"a": np.zeros((1, 35, 4))}, "digest")
-
-
-def test_encoder_moves_between_settings_without_changing_features():
-    encoder = random_encoder(seed=3)
-    views = np.random.default_rng(6).integers(0, 256, (2, 36, 32, 48, 3), dtype=np.uint8)
-    together, alone = encoder.encode_views(views), encoder.encode_views(views[1:])
-    assert np.allclose(together[1:], alone, atol=1e-4)
-    shifted = Encoder(encoder.network, encoder.name, torch.ones(encoder.size), 2 * torch.eye(encoder.size))
-    assert np.allclose(shifted.encode_views(views), 2 * (together - 1), atol=1e-3)
 
 
 def test_every_way_of_drawing_has_its_own_features():

@@ -94,9 +94,3 @@ def test_a_rule_of_play_is_chosen_on_the_command_line(data, capsys):
     assert run(*words) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
     assert row["values"]["success"]["mean"] == 1
-
-
-def test_another_kind_of_data_is_refused_with_what_to_build(tmp_path, capsys):
-    other = built(tmp_path / "data", "find")
-    assert run("train", "vnla", "--data", other.folder, "--out", tmp_path / "run", *SMALL) == 2
-    assert "embodied dataset vnla" in capsys.readouterr().err

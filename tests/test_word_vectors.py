@@ -64,10 +64,6 @@ def test_the_order_in_which_new_words_are_heard_changes_nothing():
     assert a[0] != b[0] and torch.allclose(one(a), two(b))
 
 
-def test_marks_that_are_no_words_stay_unknown():
-    assert PretrainedVocabulary(WORDS).number("%") == 1 and PretrainedVocabulary(WORDS).number("42") == 1
-
-
 @pytest.mark.parametrize("vectors", ["learned", "minilm"])
 def test_texts_of_training_can_be_said_in_other_words(vectors):
     say = lambda text: text.replace("walk", "amble")
@@ -151,32 +147,25 @@ def test_common_words_of_an_instruction_are_replaced_by_ones_that_are_not_known(
     assert everything("Walk to the Sofa") == "walk to the sofa"
 
 
-def test_a_policy_hears_other_words_and_all_else_as_it_is():
+@pytest.mark.parametrize("situations", [None, ["situation"]])
+def test_an_agent_hears_other_words_and_all_else_as_it_is(situations):
+    heard, none = [], np.zeros(0, np.float32)
+
     class Listening:
         def act(self, observations, memory, *, rngs):
-            heard.append(observations)
-            return [Stop() for _ in observations], memory
-
-    heard, none = [], np.zeros(0, np.float32)
-    nowhere = Candidates(none, none, np.zeros(0, int), np.zeros(0, bool))
-    o = Observation(Sight("house", 0), 0, 0, nowhere, "find a mug", None, Mode.MAIN, (), None, 0, 0)
-    actions, memory = reworded(Listening(), str.upper).act([o, None], "kept", rngs=[])
-    assert memory == "kept" and len(actions) == 2
-    (same, nothing), *_ = heard
-    assert nothing is None and same == dataclasses.replace(o, instruction="FIND A MUG") != o
-
-
-def test_an_agent_that_is_shown_the_situation_hears_other_words_too():
-    class Shown:
-        def act_privileged(self, observations, situations, memory, *, rngs):
-            heard.append((observations[0].instruction, situations))
+            heard.append((*observations, None))
             return [Stop()], memory
 
-    heard, none = [], np.zeros(0, np.float32)
+    class Shown:
+        def act_privileged(self, observations, situations, memory, *, rngs):
+            heard.append((*observations, situations))
+            return [Stop()], memory
+
     nowhere = Candidates(none, none, np.zeros(0, int), np.zeros(0, bool))
     o = Observation(Sight("house", 0), 0, 0, nowhere, "find a mug", None, Mode.MAIN, (), None, 0, 0)
-    assert act(reworded(Shown(), str.upper), [o], ["situation"], "kept", rngs=[]) == ([Stop()], "kept")
-    assert heard == [("FIND A MUG", ["situation"])]
+    agent = reworded(Shown() if situations else Listening(), str.upper)
+    assert act(agent, [o], situations, "kept", rngs=[]) == ([Stop()], "kept")
+    assert heard == [(dataclasses.replace(o, instruction="FIND A MUG"), situations)] and o.instruction == "find a mug"
 
 
 def test_an_agent_that_learned_words_alone_begins_with_vectors_and_acts_as_before():
