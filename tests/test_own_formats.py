@@ -131,7 +131,7 @@ def all_normals(parts) -> np.ndarray:
 
 
 def looks_like(parts, colours) -> bool:
-    """Whether every face has one of the colours, and each colour is that of a face."""
+    """True where every face has one of the colours, and each colour is that of a face."""
     apart = np.linalg.norm(np.concatenate([seen(p) for p in parts])[:, None] - np.atleast_2d(colours), axis=-1)
     return bool((apart.min(0) < 0.02).all() and (apart.min(1) < 0.02).all())
 

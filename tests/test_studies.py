@@ -16,6 +16,7 @@ import torch
 from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.studies.engine import check, run_study
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
+from embodied.cli import main
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.locks import LockedError, locked
@@ -178,6 +179,11 @@ def test_what_other_code_judged_is_judged_again_and_the_check_tells_it(tmp_path)
     assert did(archer) == {"train": 0, "judge": 14}
 
 
+def test_the_command_that_checks_takes_its_folder_by_position(tmp_path, capsys):
+    assert main(["study", "check", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f"no stored tables in {tmp_path}\n"
+
+
 def test_some_rows_are_had_alone_and_missing_ones_are_named(tmp_path):
     archer, out = Archer(tmp_path / "log"), tmp_path / "out"
     body = table(archer, out, rows=["far"])
@@ -197,7 +203,7 @@ def test_two_studies_never_write_into_one_folder(tmp_path):
 
 @dataclass(frozen=True)
 class Interrupted(Archer):
-    """Is stopped when it does `last` for the so-manieth time."""
+    """One who is stopped when it begins something for the last[0]-th time."""
 
     last: tuple[int, str] = (2, "train")
 
