@@ -20,7 +20,7 @@ from embodied.language.listener import count_cost, follow
 from embodied.language.people_language import People, RouteDescriber
 from embodied.language.plain_language import with_article
 from embodied.language.route_clauses import legs_of
-from embodied.language.speakers import SPEAKERS, draw_speaker
+from embodied.language.speakers import SPEAKERS
 from embodied.language.surroundings import Lookout, doorway
 from embodied.language.templates import SPOKEN, TEMPLATES
 from embodied.world import open_world
@@ -137,11 +137,6 @@ def test_any_execution_can_be_described_even_standing_still(world):
     rng = np.random.default_rng(2)
     assert RouteDescriber().describe(world, (0, 0), 0.0, rng=rng)
     assert RouteDescriber().describe(world, (0, *world.graph.path(0, len(world.graph.ids) - 1)), 0.0, rng=rng)
-
-
-def test_speakers_have_shares_that_sum_to_one():
-    assert sum(s.share for s in SPEAKERS) == pytest.approx(1.0)
-    assert draw_speaker(np.random.default_rng(0)) == draw_speaker(np.random.default_rng(0))
 
 
 ARTICLES = """a mug, an armchair, a row of books, some gloves, a stack of towels, a glass, a cactus, an umbrella, some

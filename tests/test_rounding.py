@@ -75,15 +75,6 @@ def hanging(side: float, cells: int) -> tuple[np.ndarray, np.ndarray]:
     return (vertices - [0, 0, 0.5])[:, [0, 2, 1]], faces
 
 
-def test_texture_coordinates_follow_their_points():
-    vertices, faces = hanging(1.0, 2)
-    points, triangles, uv = refined(vertices, faces, vertices[faces][..., [0, 2]], 0.1, 10_000)
-    assert np.allclose(uv, points[triangles][..., [0, 2]])
-    along = points[triangles] - points[np.roll(triangles, -1, axis=1)]
-    assert np.linalg.norm(along, axis=-1).max() <= 0.1
-    assert np.abs(face_normals(points, triangles)).sum() == pytest.approx(2.0), "twice the area of the square"
-
-
 def test_cloth_stays_as_it_lies_and_is_folded_outwards_where_it_hangs():
     vertices, faces = sheet(1.6, 4)
     assert is_coarse(vertices, faces) and not is_coarse(*sheet(1.0, round(2 / COARSE)))

@@ -19,16 +19,8 @@ from embodied.light.settings import QUALITIES
 
 ROOT = Path(__file__).resolve().parent.parent
 ORDER = ("your_agent", "your_assistant", "train_from_pixels", "imitation_lerobot", "your_furniture", "evaluate")
-QUICK = {
-    "density": 8,
-    "budget": 100,
-    "sky_rays": 2,
-    "lamp_rays": 2,
-    "bounce_rays": 4,
-    "seen_rays": 16,
-    "sharpness": 0.1,
-}
-COARSE = dataclasses.replace(QUALITIES["fast"], **QUICK, tolerance=9)
+FEW_RAYS = {"sky_rays": 2, "lamp_rays": 2, "bounce_rays": 4, "seen_rays": 16}
+COARSE = dataclasses.replace(QUALITIES["fast"], density=8, budget=100, sharpness=0.1, tolerance=9, **FEW_RAYS)
 BLOCK = re.compile(r"^```(python|sh)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 

@@ -59,13 +59,8 @@ def test_large_houses_are_drawn_coarser_floors_first_mirrors_never():
         flat = SimpleNamespace(size=np.array([side, side]))
         return UnwrappedThing(name, "room", "object", flat, (), fineness, False)
 
-    things = [
-        some("floor", 5, 10),
-        some("small floor", 5, 5),
-        some("rug", 4, 10),
-        some("mirror", 8, 4),
-        some("wall", 2, 20),
-    ]
+    rows = ("floor", 5, 10), ("small floor", 5, 5), ("rug", 4, 10), ("mirror", 8, 4), ("wall", 2, 20)
+    things = [some(*row) for row in rows]
     total = lambda ts: sum(int(t.flat.size.prod()) * t.fineness**2 for t in ts)
     fineness = lambda most: [t.fineness for t in coarsened(things, most)]
     assert fineness(total(things)) == [5, 5, 4, 8, 2]

@@ -103,7 +103,7 @@ def test_parameters_are_those_of_the_maker():
         catalogue().parameters("built/throne")
 
 
-TABLES = {
+TABLES_OF_ROOM_KINDS = {
     "generate/furnish/rooms.toml": tables().rooms,
     "language/words.toml": ROOM_NOUNS,
     "house/floor_plan.toml": ROOM_COLOURS,
@@ -111,7 +111,7 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
+@pytest.mark.parametrize("table", TABLES_OF_ROOM_KINDS.values(), ids=TABLES_OF_ROOM_KINDS)
 def test_every_kind_of_room_stands_in_every_table_of_kinds(table):
     """docs/houses.md, A new kind of room: what was forgotten is named."""
     assert set(table) >= set(ROOM_KINDS)
