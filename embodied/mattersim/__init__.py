@@ -21,7 +21,8 @@ and because an installed `MatterSim` would come before a real one that the progr
 Differs from the C++ module in: an action index out of range moves nobody (there, the agents before it have moved);
 the list of navigable locations that was read before a move keeps its angles (there, the chosen one's become zero);
 pictures are drawn when they are read; graphs are not shared by all simulators of a process but read for each path;
-there is no `cbf`, which fills holes in scanned depth: ours has none.
+there is no `cbf`, which fills holes in scanned depth: ours has none; angles are discretized, as all of these programs
+have them; random starts are drawn otherwise; nothing is read in advance, and there are no timers.
 """
 
 from __future__ import annotations

@@ -1,17 +1,11 @@
-"""How agents move and turn, in batches: in steps of 30 degrees (`DiscreteViews`), or freely (`Angles`).
-
-Both have the same methods: `start` puts every agent somewhere; `act` lets every agent move to one of its locations and
-then turn, and raises ValueError for an index that it does not have; the others tell the pose of one agent of the batch.
-"""
+"""How agents move and turn, in batches and in steps of 30 degrees."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
-from embodied.mattersim.sight import HEADINGS, STEP, TILT, VIEWS, Bearings, NavigableLocations, ViewPoint
+from embodied.mattersim.sight import HEADINGS, STEP, TILT, VIEWS, NavigableLocations, ViewPoint
 
 
 def heading_step(heading: float) -> int:
@@ -43,7 +37,11 @@ def counted_steps(change: float) -> float:
 
 
 class DiscreteViews:
-    """Discretized: a pose is row * 36 + viewIndex."""
+    """A batch of poses, each row * 36 + viewIndex.
+
+    `start` puts every agent somewhere; `act` lets every agent move to one of its locations and then turn, and raises
+    ValueError for an index that it does not have; the others tell the pose of one agent of the batch.
+    """
 
     def __init__(self, lookout: NavigableLocations, steps: Callable[[float], float]) -> None:
         """Args:
@@ -114,69 +112,3 @@ def _tilted(at: int, steps: float) -> int:
     if isinstance(steps, int):
         return max(-1, min(1, at + steps))
     return elevation_step(at * TILT + steps * TILT)
-
-
-class Angles:
-    """Continuous: any heading, elevations within limits. Vectorised over the batch; locations are found when wanted."""
-
-    def __init__(self, lookout: NavigableLocations, limits: tuple[float, float]) -> None:
-        """Args:
-        limits: lowest and highest elevation, radians.
-        """
-        self.lookout, self.limits = lookout, limits
-        self._rows, self._headings, self._elevations = np.zeros(0, int), np.zeros(0), np.zeros(0)
-        self._seen: Bearings | None = None
-
-    @property
-    def started(self) -> bool:
-        return bool(len(self._rows))
-
-    def start(self, rows: Sequence[int], headings: Sequence[float], elevations: Sequence[float]) -> None:
-        self._rows = np.array(rows, int)
-        self._look(np.array(headings, float), np.array(elevations, float))
-
-    def act(self, index: Sequence[int], heading: Sequence[float], elevation: Sequence[float]) -> None:
-        chosen = np.array(index, int)
-        if chosen.any():
-            seen, agents = self._bearings(), np.arange(len(chosen))
-            wrong = np.flatnonzero((chosen < 0) | (chosen > seen.count))
-            if len(wrong):
-                agent = int(wrong[0])
-                _chosen((0,) * (int(seen.count[agent]) + 1), int(chosen[agent]), agent, len(chosen))
-            there = seen.rows[agents, np.maximum(chosen - 1, 0)]
-            self._rows = np.where(chosen > 0, there, self._rows)
-        self._look(self._headings + np.array(heading, float), self._elevations + np.array(elevation, float))
-
-    def _look(self, headings: np.ndarray, elevations: np.ndarray) -> None:
-        turn = np.fmod(headings, 2 * math.pi)
-        turn = np.where(turn < 0, turn + 2 * math.pi, turn)
-        self._headings = np.where(turn < 2 * math.pi, turn, 0.0)
-        self._elevations = np.clip(elevations, *self.limits)
-        self._seen = None
-
-    def _bearings(self) -> Bearings:
-        if self._seen is None:
-            self._seen = self.lookout.bearings(self._rows, self._headings, self._elevations)
-        return self._seen
-
-    def row(self, agent: int) -> int:
-        return int(self._rows[agent])
-
-    def here(self, agent: int) -> ViewPoint:
-        return self.lookout.here(int(self._rows[agent]))
-
-    def locations(self, agent: int) -> tuple[ViewPoint, ...]:
-        return self.lookout.locations(int(self._rows[agent]), self._bearings(), agent)[1]
-
-    def heading(self, agent: int) -> float:
-        return float(self._headings[agent])
-
-    def elevation(self, agent: int) -> float:
-        return float(self._elevations[agent])
-
-    def view(self, agent: int) -> int:
-        return 0  # as there: set only when angles are discretized
-
-
-Motion = DiscreteViews | Angles
-"""A batch of poses."""

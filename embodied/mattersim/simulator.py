@@ -2,24 +2,23 @@
 
 Names, defaults and errors are those of the C++ module (Anderson et al. 2018). Angles are radians, headings clockwise
 from +y, elevations up; positions metres. Settings are ignored once `initialize` was called, but for the camera's
-resolution, its field of view and the limits of elevation, as there.
+resolution and its field of view, as there.
 """
 
 from __future__ import annotations
 
 import math
 import operator
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from embodied.mattersim.chance import Engine
 from embodied.mattersim.graphs import Graphs, listed_scans, load_graphs
-from embodied.mattersim.motion import Angles, DiscreteViews, Motion, counted_steps, sign_steps
+from embodied.mattersim.motion import DiscreteViews, counted_steps, sign_steps
 from embodied.mattersim.pictures import Skyboxes
 from embodied.mattersim.sight import ViewPoint, lookout
+from embodied.seeds import stream
 
 Draw = Callable[[str, str, float, float, float, tuple[int, int]], np.ndarray]
 """(scan, viewpoint, heading, elevation, vertical field of view, (height, width)) -> picture."""
@@ -30,7 +29,7 @@ class SimState:
 
     __slots__ = ("_agent", "_motion", "_simulator")
 
-    def __init__(self, simulator: Simulator, motion: Motion, agent: int) -> None:
+    def __init__(self, simulator: Simulator, motion: DiscreteViews, agent: int) -> None:
         self._simulator, self._motion, self._agent = simulator, motion, agent
 
     @property
@@ -85,9 +84,7 @@ class Simulator:
     def __init__(self) -> None:
         self._graph_path, self._dataset_path = "./connectivity", "./data/v1/scans/"
         self._width, self._height, self._vfov = 320, 240, 0.8
-        self._limits = (-0.94, 0.94)
         self._rendering, self._discrete, self._restricted, self._depth = True, False, True, False
-        self._preload = False
         self._batch, self._cache, self._seed = 1, 200, 1
         self._ready = False
         self._forget()
@@ -95,10 +92,9 @@ class Simulator:
     def _forget(self) -> None:
         self._states: list[SimState] = []
         self._scans: list[str] = []
-        self._step = self._frames = 0
-        self._motion: Motion | None = None  # until `initialize`
+        self._step = 0
+        self._motion: DiscreteViews | None = None  # until `initialize`
         self._drawn: dict[tuple[int, bool], np.ndarray] = {}
-        self._began = time.perf_counter()
 
     # Settings -----------------------------------------------------------------------------------
 
@@ -120,8 +116,7 @@ class Simulator:
         self._set("_restricted", bool(value))
 
     def setPreloadingEnabled(self, value: bool, /) -> None:
-        """Have `initialize` read all skyboxes, or not; no more than setCacheSize are kept."""
-        self._set("_preload", bool(value))
+        """Nothing: skyboxes are read when they are looked at; no more than setCacheSize are kept."""
 
     def setDepthEnabled(self, value: bool, /) -> None:
         self._set("_depth", bool(value))
@@ -134,7 +129,7 @@ class Simulator:
         self._set("_cache", operator.index(size))
 
     def setSeed(self, seed: int, /) -> None:
-        """Of the viewpoints of newRandomEpisode; its headings are the same at every call, as there."""
+        """Of newRandomEpisode, whose draws are our own."""
         self._set("_seed", operator.index(seed))
 
     def setCameraResolution(self, width: int, height: int, /) -> None:
@@ -149,14 +144,9 @@ class Simulator:
         self._watch()
 
     def setElevationLimits(self, low: float, high: float, /) -> bool:
-        """True where the limits were taken: they should lie within a right angle on either side of the horizon."""
-        low, high = float(low), float(high)
-        if not -math.pi / 2 < low < 0.0 < high < math.pi / 2:
-            return False
-        self._limits = (low, high)
-        if isinstance(self._motion, Angles):
-            self._motion.limits = self._limits
-        return True
+        """True where the limits lie within a right angle on either side of the horizon; discretized elevations have
+        their own."""
+        return -math.pi / 2 < float(low) < 0.0 < float(high) < math.pi / 2
 
     def _set(self, name: str, value: object) -> None:
         if not self._ready:
@@ -168,20 +158,15 @@ class Simulator:
         """Read the graphs.
 
         Raises:
-          ValueError: no scans.txt, or a scan of it has no graph.
+          ValueError: no scans.txt, a scan of it has no graph, or angles are not discretized.
         """
         self._graphs: Graphs = load_graphs(self._graph_path, listed_scans(self._graph_path))
-        self._engine = Engine(self._seed)
+        self._rng = stream(self._seed, "MatterSim")
         self._skyboxes = Skyboxes(self._dataset_path, self._cache)
         self._motion = self._new_motion()
         self._states = [SimState(self, self._motion, agent) for agent in range(self._batch)]
         self._scans = [""] * self._batch
         self._ready = True
-        if self._rendering and self._preload:
-            for row in np.flatnonzero(self._graphs.included)[: self._cache].tolist():
-                self._skyboxes.colours(self._graphs.scans[row], self._graphs.ids[row])
-                if self._depth:
-                    self._skyboxes.distances(self._graphs.scans[row], self._graphs.ids[row])
 
     def newEpisode(
         self,
@@ -210,9 +195,10 @@ class Simulator:
         """Put every agent at a random viewpoint of its scan, level, along a random heading."""
         if not self._ready:
             self.initialize()
-        scans, turn = self._each(scanIds, str), Engine()
+        scans = self._each(scanIds, str)
         viewpoints = [self._random_viewpoint(scan) for scan in scans]
-        self.newEpisode(scans, viewpoints, [turn.uniform() * 2 * math.pi for _ in scans], [0.0] * len(scans))
+        headings = self._rng.uniform(0, 2 * math.pi, len(scans)).tolist()
+        self.newEpisode(scans, viewpoints, headings, [0.0] * len(scans))
 
     def getState(self) -> list[SimState]:
         """One state per agent: the same objects every time, which show what is now."""
@@ -246,18 +232,10 @@ class Simulator:
         self._ready = False
         self._forget()
 
-    def resetTimers(self) -> None:
-        self._began, self._frames = time.perf_counter(), 0
-
-    def timingInfo(self) -> str:
-        """Pictures drawn since the timers were reset."""
-        wall = time.perf_counter() - self._began
-        return f"Rendered {self._frames} frames\nWall time: {wall * 1000:.1f} ms, ({self._frames / wall:.1f} fps)\n"
-
     # ---------------------------------------------------------------------------------------------
 
     @property
-    def _moving(self) -> Motion:
+    def _moving(self) -> DiscreteViews:
         """The poses of the batch, after `initialize`."""
         assert self._motion is not None, "initialize makes it"
         return self._motion
@@ -276,9 +254,11 @@ class Simulator:
     def _half_field(self) -> float | None:
         return self._vfov * self._width / self._height / 2 if self._restricted else None
 
-    def _new_motion(self) -> Motion:
+    def _new_motion(self) -> DiscreteViews:
         look = lookout(self._graphs, self._half_field())
-        return DiscreteViews(look, self._steps) if self._discrete else Angles(look, self._limits)
+        if not self._discrete:
+            raise ValueError("MatterSim: angles are discretized here; call setDiscretizedViewingAngles(True)")
+        return DiscreteViews(look, self._steps)
 
     def _watch(self) -> None:
         """Apply a changed camera from the next action on."""
@@ -289,20 +269,14 @@ class Simulator:
         graphs = self._graphs
         if scan not in graphs.first:
             raise IndexError(f"MatterSim: there is no scan {scan!r}; scans.txt names {len(graphs.first)} others")
-        first, size = graphs.first[scan], graphs.size[scan]
-        start = self._engine.below(size)
-        for k in range(size):
-            row = first + (start + k) % size
-            if graphs.included[row]:
-                return graphs.ids[row]
-        raise RuntimeError(f"MatterSim: ScanId: {scan} has no included viewpoints!")
+        rows = graphs.first[scan] + np.arange(graphs.size[scan])
+        return graphs.ids[int(self._rng.choice(rows[graphs.included[rows]]))]
 
     def _picture(self, agent: int, *, depth: bool) -> np.ndarray:
         if not self._rendering or not self._moving.started or (depth and not self._depth):
             return np.zeros((self._height, self._width, 1 if depth else 3), np.uint16 if depth else np.uint8)
         if (agent, depth) not in self._drawn:
             self._drawn[agent, depth] = self._draw(agent, self._skyboxes.metres if depth else self._skyboxes.rgb)
-            self._frames += not depth
         return self._drawn[agent, depth]
 
     def _draw(self, agent: int, draw: Draw) -> np.ndarray:

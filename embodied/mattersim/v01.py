@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from embodied.mattersim import simulator
-from embodied.mattersim.chance import Engine
 from embodied.mattersim.graphs import load_graphs
 from embodied.mattersim.pictures import Skyboxes
 from embodied.mattersim.sight import ViewPoint
+from embodied.seeds import stream
 
 KEPT = 200
 """Decoded skyboxes held in memory."""
@@ -56,7 +56,7 @@ class FirstSimulator(simulator.Simulator):
 
     def __init__(self) -> None:
         super().__init__()
-        self._engine = Engine()
+        self.setSeed(1)
         self.setDatasetPath("./data")
 
     def setDatasetPath(self, path: str, /) -> None:
@@ -68,7 +68,7 @@ class FirstSimulator(simulator.Simulator):
         self._graph_path = str(path)
 
     def setSeed(self, seed: int, /) -> None:
-        self._engine = Engine(operator.index(seed))
+        self._rng = stream(operator.index(seed), "MatterSim")
 
     def initialize(self) -> None:
         """Nothing is read: the graph of a scan is when an episode begins there."""
