@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import struct
 from pathlib import Path
 
@@ -35,7 +34,6 @@ from embodied.agents.common.weights import load_weights
 from embodied.agents.studies.engine import run_study
 from embodied.cli import main
 from embodied.errors import UnableError
-from embodied.identity import read_finished
 from embodied.locks import LockedError, locked
 from embodied.seeds import stream
 
@@ -390,30 +388,13 @@ def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):
     assert "(2.82)" in text and "| weakly pre-trained, Δ NED-A2C |" in text
     first = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")}
     assert len(first) == 2 * (1 + 2 + 6)
-    text = run_study(study, ["3.2", "held-out"], tmp_path, note=silent)["held-out"].read_text()
+    run_study(study, ["3.2"], tmp_path, note=silent)
     assert {p: p.stat().st_mtime_ns for p in tmp_path.rglob("checkpoint.pt")} == first
-    rows = {r["label"]: r["values"] for r in json.loads((tmp_path / "bandit-held-out.json").read_text())["rows"]}
-    assert (
-        0 < rows["reference"]["entropy"]["mean"] < np.log(TOY.target_words)
-        and rows["reference"]["perplexity"]["mean"] > 1
-    )
-    assert rows["Δ NED-A2C"]["entropy"]["half_width"] >= 0
     people = dataclasses.replace(study, repeats=(0,), rater=Rater(granularity=4, skew=2.0))
     assert "| as people rate |" in run_study(people, ["people"], tmp_path, note=silent)["people"].read_text()
     (home,) = tmp_path.glob("runs/*rater*")
     (rated,) = read_checkpoint(home / "checkpoint.pt")["history"]
     assert rated["rating"] < rated["per-sentence BLEU"], "a harsh rater"
-    text = run_study(study, ["rates"], tmp_path, rows=["0.0001, Δ NED-A2C"], note=silent)["rates"].read_text()
-    assert "| 0.0001, Δ NED-A2C |" in text
-    (of_text, _) = tmp_path.glob("runs/*bandit_rate_0.0001*/trained.json")
-    assert read_finished(of_text)[0]["settings"]["bandit_rate"] == 1e-4
-
-
-@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"digests": {"dev": 3}}', '{"digests": [1]}'])
-def test_a_damaged_corpus_file_is_named(tmp_path, text):
-    (tmp_path / "corpus.json").write_text(text)
-    with pytest.raises(CorpusError, match="corpus.json.*make the corpus again"):
-        corpus.refuse_mixed(tmp_path, ["dev"])
 
 
 def test_a_corpus_that_was_stopped_in_between_is_not_believed(tmp_path, monkeypatch):
@@ -429,13 +410,11 @@ def test_a_corpus_that_was_stopped_in_between_is_not_believed(tmp_path, monkeypa
         written.append(path)
         write(path, data)
 
-    before = (tmp_path / "corpus.json").read_bytes()
     monkeypatch.setattr(corpus, "write_bytes", stopped)
     with pytest.raises(KeyboardInterrupt):
         make(1)
     assert not (tmp_path / "corpus.json").exists(), "nothing vouches for the mix"
-    (tmp_path / "corpus.json").write_bytes(before)
-    with pytest.raises(CorpusError, match="supervised are not the splits that corpus.json tells of"):
+    with pytest.raises(CorpusError, match="is missing"):
         corpus.load(tmp_path, ["supervised", "test"])
     with locked(tmp_path), pytest.raises(LockedError):
         make(0)

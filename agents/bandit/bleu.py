@@ -5,23 +5,10 @@ from __future__ import annotations
 import collections
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import sacrebleu
 
 ORDERS = (1, 2, 3, 4)
-
-
-@dataclass(frozen=True)
-class CorpusBleu:
-    """BLEU of a test set and what it is made of."""
-
-    score: float
-    """0 to 100."""
-    brevity: float
-    """The penalty for being shorter than the references, at most 1."""
-    precisions: tuple[float, ...]
-    """Of n-grams of ORDERS, 0 to 100."""
 
 
 def sentence_bleu(words: Sequence[str], reference: Sequence[str]) -> float:
@@ -43,14 +30,8 @@ def sentence_bleu(words: Sequence[str], reference: Sequence[str]) -> float:
 
 def corpus_bleu(translations: Sequence[Sequence[str]], references: Sequence[Sequence[str]]) -> float:
     """BLEU of a test set, 0 to 100, by sacrebleu on the words as they were split."""
-    return corpus_parts(translations, references).score
-
-
-def corpus_parts(translations: Sequence[Sequence[str]], references: Sequence[Sequence[str]]) -> CorpusBleu:
-    """The same with its parts."""
     lines = [" ".join(t) for t in translations], [[" ".join(r) for r in references]]
-    score = sacrebleu.corpus_bleu(*lines, tokenize="none", force=True)
-    return CorpusBleu(score.score, score.bp, tuple(score.precisions))
+    return sacrebleu.corpus_bleu(*lines, tokenize="none", force=True).score
 
 
 def _ngrams(words: Sequence[str], n: int) -> collections.Counter:

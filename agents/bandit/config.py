@@ -74,16 +74,7 @@ BANDIT_SCALES: dict[str, BanditConfig] = {
         pretraining_rate=3e-3,
         bandit_rate=1e-3,
     ),
-    "tiny": BanditConfig(
-        hidden_size=48,
-        source_words=3000,
-        target_words=1500,
-        pretraining_passes=6,
-        critic_passes=2,
-        pretraining_rate=5e-3,
-        bandit_rate=1e-3,
-    ),
     "paper": BanditConfig(),
 }
-"""'tiny': a minute on a core, for 6,400 ratings; 'mini': minutes; 'paper': section 3.1.5.2, for a GPU and the
+"""'mini': minutes on a core; 'paper': section 3.1.5.2, for a GPU and the
 dissertation's corpora."""

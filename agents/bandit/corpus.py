@@ -15,7 +15,7 @@ from pathlib import Path
 from embodied.agents.bandit.config import Sizes
 from embodied.assets.cache import digest, write_bytes, write_json
 from embodied.locks import locked
-from embodied.records import RecordError, from_plain, read_json
+from embodied.records import read_json
 from embodied.seeds import stream
 
 SOURCE, TARGET = "de", "en"
@@ -103,8 +103,8 @@ def split(pairs: Sequence[Pair], sizes: Sizes, *, seed: int) -> dict[str, list[P
 
 
 def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) -> None:
-    """Write the splits in Moses format, and corpus.json last, so that a folder with it is whole: while splits are
-    written there is none, and it names what each split holds.
+    """Write the splits in Moses format, and corpus.json last, so that a folder with it is whole; the files of another
+    corpus are deleted first.
 
     Raises:
       LockedError: another process writes a corpus there.
@@ -112,7 +112,8 @@ def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) ->
     folder = Path(folder)
     counts = {}
     with locked(folder):
-        (folder / MADE).unlink(missing_ok=True)
+        for name in (MADE, *(f"{split}.{language}" for split in splits for language in (SOURCE, TARGET))):
+            (folder / name).unlink(missing_ok=True)
         for name, pairs in splits.items():
             for language, text in ((SOURCE, "source"), (TARGET, "target")):
                 write_bytes(folder / f"{name}.{language}", "".join(f"{getattr(p, text)}\n" for p in pairs).encode())
@@ -122,40 +123,16 @@ def save(splits: Mapping[str, Sequence[Pair]], folder: Path, **facts: object) ->
                 "documents": len({p.document for p in pairs}),
                 "target words per sentence": round(sum(words) / len(words), 2),
             }
-        digests = {name: corpus_digest(folder, (name,)) for name in splits}
-        write_json(folder / MADE, {"format": CORPUS_FORMAT, **facts, "splits": counts, "digests": digests}, indent=1)
-
-
-def refuse_mixed(folder: Path, names: Sequence[str]) -> None:
-    """Refuse a folder of `embodied corpus` whose files are not those that it made; own files need no corpus.json.
-
-    Raises:
-      CorpusError: corpus.json is damaged, or a split is another's.
-    """
-    path = Path(folder) / MADE
-    if not path.exists():
-        return
-    try:
-        digests = from_plain(dict[str, str], read_json(path).get("digests"), f"{path}: digests")
-    except RecordError as e:
-        raise CorpusError(f"{e}; make the corpus again with `embodied corpus`") from e
-    if mixed := [n for n in names if digests.get(n) != corpus_digest(folder, (n,))]:
-        raise CorpusError(
-            f"{folder}: {', '.join(mixed)} are not the splits that {path.name} tells of; make the corpus again with "
-            "`embodied corpus`, or delete that file if these are your own"
-        )
+        write_json(folder / MADE, {"format": CORPUS_FORMAT, **facts, "splits": counts}, indent=1)
 
 
 def load(folder: Path, names: Sequence[str], *, longest: int = 50) -> Corpus:
     """The splits in `names`; sentences of more than `longest` words on either side are left out (3.1.5).
 
     Raises:
-      CorpusError: the folder mixes two corpora; a file is missing, empty, not UTF-8, or its two sides differ in length;
-        or a side of a pair is empty.
+      CorpusError: a file is missing, empty, not UTF-8, or its two sides differ in length; or a side of a pair is empty.
     """
-    splits = {name: _load(Path(folder), name, longest) for name in names}
-    refuse_mixed(folder, names)
-    return splits
+    return {name: _load(Path(folder), name, longest) for name in names}
 
 
 def _load(folder: Path, name: str, longest: int) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
@@ -226,5 +203,5 @@ def make_corpus(
     kept = filtered(pairs)
     note(f"{len(pairs)} pairs, {len(kept)} after the filter, in {len({p.document for p in kept})} documents")
     save(split(kept, sizes, seed=seed), folder, seed=seed, sizes=vars(sizes), pairs=len(kept), **facts)
-    for name, counts in read_json(Path(folder) / "corpus.json")["splits"].items():
+    for name, counts in read_json(Path(folder) / MADE)["splits"].items():
         note(f"{name}: " + ", ".join(f"{v} {k}" for k, v in counts.items()))

@@ -1,5 +1,4 @@
-"""Table 3.2, Figures 3.4 and 3.5, and how learners behave on held-out sentences, as data; BANDIT as a learner of the
-engine.
+"""Table 3.2, Figures 3.4 and 3.5 as data; BANDIT as a learner of the engine.
 
 `pretrain_KEY/seed_N` holds reference models and critics that runs of a seed begin with.
 """
@@ -13,10 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from embodied.agents.bandit.behaviour import BEHAVIOUR_MEASURES, behaviour, translator_of_run
 from embodied.agents.bandit.config import BanditConfig
 from embodied.agents.bandit.corpus import corpus_digest
-from embodied.agents.bandit.ratings import CLEAN, Rater
+from embodied.agents.bandit.ratings import Rater
 from embodied.agents.bandit.training import RATED, TokenizedCorpora, bandit, load_corpus, pretrain, train_critic
 from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.session import Note
@@ -26,7 +24,6 @@ from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
 
 SENTENCE, HELD_OUT = "per-sentence BLEU", "held-out BLEU"
-RATE = "bandit_rate"
 PASSES = 5
 """Of Figure 3.4."""
 SWEEPS: Mapping[str, Sequence[float]] = {
@@ -35,8 +32,6 @@ SWEEPS: Mapping[str, Sequence[float]] = {
     "skew": (0.25, 0.5, 0.67, 1.5, 2, 4),
 }
 """Figure 3.5's settings; a skew of 1 is the clean rater."""
-RATES = (1e-4, 3e-4, 1e-3)
-LEARNER_ROWS = {"Δ supervised": "supervised", "Δ NED-A2C": "a2c"}
 REFERENCES = {"full": "fully", "weak": "weakly"}
 
 
@@ -53,9 +48,8 @@ def _sweep() -> tuple[StudyRow, ...]:
     rows = [_gain("clean", "a2c")]
     for name, values in SWEEPS.items():
         for value in values:
-            row = _gain(f"{name} {value:g}", "a2c")
-            swept = {**(row.train or {}), name: value}
-            rows.append(dataclasses.replace(row, train=swept, x=value, series=name))
+            row = _gain(f"{name} {value:g}", "a2c", rater={name: value})
+            rows.append(dataclasses.replace(row, x=value, series=name))
     return tuple(rows)
 
 
@@ -87,23 +81,6 @@ BANDIT_TABLES: Mapping[str, StudyTable] = {
         (SENTENCE, HELD_OUT),
         figure=Figure((SENTENCE.replace(" ", "_"),), "strength of the perturbation", f"Δ {SENTENCE}", log=True),
     ),
-    "rates": StudyTable(
-        "One round of ratings at other learning rates; 0.0001 is the text's (3.1.5.2)",
-        tuple(_gain(f"{rate:g}, {x}", k, bandit_rate=rate) for rate in RATES for x, k in LEARNER_ROWS.items()),
-        (SENTENCE, HELD_OUT),
-    ),
-    "held-out": StudyTable(
-        "Held-out sentences: how learners translate them after one round of ratings",
-        tuple(
-            dataclasses.replace(
-                row,
-                judge={"behaviour": True},
-                minus=row.minus and dataclasses.replace(row.minus, judge={"behaviour": True}),
-            )
-            for row in (_row("reference", "reference"), _gain("Δ supervised", "supervised"), _gain("Δ NED-A2C", "a2c"))
-        ),
-        BEHAVIOUR_MEASURES,
-    ),
 }
 
 
@@ -121,7 +98,7 @@ class BanditStudy(StudyLearner):
     """Who rates in the table 'people': the rater that people were found to resemble."""
 
     name = "bandit"
-    judges = ("embodied.agents.bandit.behaviour",)
+    judges = ("embodied.agents.bandit.training",)
 
     def tables(self) -> Mapping[str, StudyTable]:
         if self.rater is None:
@@ -141,29 +118,23 @@ class BanditStudy(StudyLearner):
             train_critic(m, home / "pretrain" / f"{reference}.safetensors", home / reference, note=note)
 
     def trained(self, train: Mapping[str, Any], seed: int, folder: Path) -> Mapping[str, Any]:
-        config, run = self._settings(train, seed), {k: v for k, v in train.items() if k != RATE}
-        return identity_of("embodied.agents.bandit.training", settings=config, corpus=self._corpus(), run=run)
+        config = dataclasses.replace(self.config, seed=seed)
+        return identity_of("embodied.agents.bandit.training", settings=config, corpus=_corpus(self.data), run=train)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        begun, m = self._begun(seed, folder), _corpus_of(self.data, self._settings(train, seed))
+        begun, m = self._begun(seed, folder), self._corpus_of(seed)
         reference = begun / "pretrain" / f"{train['reference']}.safetensors"
         critic = begun / train["reference"] / "critic.safetensors"
-        off = {k: type(getattr(CLEAN, k))(v) for k, v in train.items() if k in SWEEPS}
-        rater = Rater(**(off or train.get("rater", {})))
-        passes = train.get("passes", 1)
+        rater, passes = Rater(**train.get("rater", {})), train.get("passes", 1)
         bandit(m, reference, critic, home, train["learner"], rater=rater, passes=passes, note=note)
         return home / "best.safetensors"
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {"corpus": self._corpus(), **row.judge}
+        return {"corpus": _corpus(self.data), **row.judge}
 
     def judge(self, weights: Path | None, row: StudyRow, split: str, seed: int, folder: Path, keep: Path) -> Measured:
-        assert weights is not None and row.train is not None, "every row is a run"
-        home = weights.parent
-        if row.judge.get("behaviour"):
-            m = self._corpus_of(seed)
-            return {k: Samples((v,)) for k, v in behaviour(translator_of_run(m, home), m, "test").items()}
-        history = read_checkpoint(home / "checkpoint.pt")["history"]
+        assert weights is not None, "every row is a run"
+        history = read_checkpoint(weights.parent / "checkpoint.pt")["history"]
         if row.judge.get("curve"):
             return {f"{c} at {k + 1}": Samples((h[c],)) for c in (SENTENCE, HELD_OUT) for k, h in enumerate(history)}
         return {c: Samples((history[0][c],)) for c in (SENTENCE, HELD_OUT)}
@@ -177,18 +148,13 @@ class BanditStudy(StudyLearner):
             "differences are taken seed by seed."
         )
 
-    def _settings(self, train: Mapping[str, Any], seed: int) -> BanditConfig:
-        return dataclasses.replace(self.config, seed=seed, bandit_rate=train.get(RATE, self.config.bandit_rate))
-
-    def _corpus(self) -> str:
-        return _corpus(self.data)
-
     def _corpus_of(self, seed: int) -> TokenizedCorpora:
         return _corpus_of(self.data, dataclasses.replace(self.config, seed=seed))
 
     def _begun(self, seed: int, folder: Path) -> Path:
         """The folder of the references and critics of a seed."""
-        return folder / f"pretrain_{key_of(identity_of(settings=self.config, corpus=self._corpus()))}" / f"seed_{seed}"
+        key = key_of(identity_of(settings=self.config, corpus=_corpus(self.data)))
+        return folder / f"pretrain_{key}" / f"seed_{seed}"
 
 
 _corpus_of = functools.lru_cache(maxsize=8)(load_corpus)

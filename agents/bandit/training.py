@@ -46,18 +46,8 @@ RATED = "bandit_overlap"
 """The split that is rated, the dissertation's case."""
 DECAY_FROM = 5
 """Epoch from which the learning rate halves when the perplexity of the dev set rises."""
-_PRETRAINING = (
-    "hidden_size",
-    "source_words",
-    "target_words",
-    "longest",
-    "batch",
-    "pretraining_passes",
-    "pretraining_rate",
-    "clip",
-    "seed",
-)
-"""Settings that decide what pre-training gives."""
+_LATER = ("critic_passes", "bandit_rate", "checkpoint_minutes")
+"""Settings on which pre-training does not depend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +73,8 @@ class TokenizedCorpora:
         return begin(Critic(len(source), len(target), self.config.hidden_size), self._generator("critic"))
 
     def identity(self, stage: str, *fields: str, **more: object) -> dict[str, object]:
-        """The identity of a stage: settings by name, and the corpus."""
-        settings = {name: getattr(self.config, name) for name in (*_PRETRAINING, *fields)}
+        """The identity of a stage: settings of pre-training and those named, and the corpus."""
+        settings = {k: v for k, v in vars(self.config).items() if k not in _LATER or k in fields}
         return identity_of(
             "embodied.agents.bandit.training", stage=stage, settings=settings, corpus=self.digest, **more
         )
@@ -244,20 +234,14 @@ def supervised_loss(translator: Translator, source: Tensor, target: Tensor) -> T
     return -translator(source, target).sum() / len(source)
 
 
-def sampled(
-    translator: Translator, m: TokenizedCorpora, data: TokenizedCorpus, chosen: np.ndarray, purpose: str, turn: int
-) -> list[list[int]]:
-    """One sampled translation of each chosen sentence (line 3 of Algorithm 2); learners draw alike."""
-    longest = m.config.longest
-    uniforms = np.stack([stream(m.config.seed, purpose, "sample", turn, int(i)).random(longest) for i in chosen])
-    return decode(translator, rows(data.source, chosen), sampled_choice(uniforms), longest)
-
-
 def rated_samples(
     translator: Translator, m: TokenizedCorpora, data: TokenizedCorpus, chosen: np.ndarray, purpose: str, turn: int
 ) -> tuple[list[list[int]], list[float]]:
-    """Sampled translations, and what a perfect rater would say: smoothed sentence BLEU of the words."""
-    samples = sampled(translator, m, data, chosen, purpose, turn)
+    """One sampled translation of each chosen sentence (line 3 of Algorithm 2), and what a perfect rater would say:
+    smoothed sentence BLEU of the words. Learners draw alike."""
+    longest = m.config.longest
+    uniforms = np.stack([stream(m.config.seed, purpose, "sample", turn, int(i)).random(longest) for i in chosen])
+    samples = decode(translator, rows(data.source, chosen), sampled_choice(uniforms), longest)
     words = map(m.lexicons[1].decode, samples)
     return samples, [sentence_bleu(w, data.references[i]) for w, i in zip(words, chosen, strict=True)]
 
