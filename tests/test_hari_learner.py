@@ -17,18 +17,9 @@ from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.playing import TaskSet
 from embodied.agents.hari import pretraining
-from embodied.agents.hari.agent import (
-    HariAgent,
-    load_agent,
-    load_executor,
-    new_executor,
-    new_heads,
-    save_agent,
-    save_executor,
-)
+from embodied.agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.intention import IntentionRun, counts_of, train, train_step, values
-from embodied.agents.hari.judging import TEST
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from embodied.agents.hari.policy import (
     DO,
@@ -53,6 +44,7 @@ from embodied.agents.hari.pretraining import (
 )
 from embodied.agents.hari.pretraining import train_step as lesson
 from embodied.agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
+from embodied.agents.hari.run import TEST
 from embodied.agents.hari.study import HariStudy
 from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_words, move_rows, percept
 from embodied.agents.studies.engine import run_study
@@ -547,8 +539,8 @@ def test_both_runs_go_on_exactly_where_they_stopped(tmp_path):
 @pytest.mark.slow
 def test_weights_survive_the_disk_and_say_what_they_lack(tmp_path, fork_executor):
     agent = HariAgent(fork_executor, new_heads(QUICK, SMALL.hidden_size)[0], QUICK)
-    save_agent(agent, tmp_path / "agent.safetensors")
-    save_executor(fork_executor, tmp_path / "execution.safetensors")
+    save(agent, tmp_path / "agent.safetensors")
+    save(fork_executor, tmp_path / "execution.safetensors")
     again = load_agent(tmp_path / "agent.safetensors")
     tasks = [fork_task(1), fork_task(2)]
     assert play(fork_env, policy_of(again), tasks, seed=5) == play(fork_env, policy_of(agent), tasks, seed=5)

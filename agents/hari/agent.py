@@ -62,36 +62,17 @@ def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, Recu
         return actor, RecurrentHead(belief, config.hidden_size, 1, knows_stack=config.knows_stack)
 
 
-def initialised_from(config: ExecutionConfig, other: Executor) -> Executor:
-    """An execution policy with the words and weights of another.
-
-    Raises:
-      ValueError: the other has other sizes.
-    """
-    new = new_executor(config, other.words)
-    try:
-        new.network.load_state_dict(other.network.state_dict())
-    except RuntimeError as e:
-        raise ValueError(f"the weights of an execution policy of other sizes do not fit ({e})") from e
-    return new
-
-
-def save_executor(executor: Executor, path: Path, identity: Identity | None = None) -> None:
-    """Write an execution policy and what it was trained with, atomically."""
-    about = HariAbout(executor.words.names, executor.config)
-    save_weights(path, "hari", nn.ModuleDict({"execution": executor.network}).state_dict(), about, identity)
-
-
-def save_agent(agent: HariAgent, path: Path, identity: Identity | None = None) -> None:
-    """Write an agent with its execution policy and what it was trained with, atomically."""
-    executor = agent.executor
-    about = HariAbout(executor.words.names, executor.config, agent.config)
-    parts = nn.ModuleDict({"execution": executor.network, "actor": agent.actor})
-    save_weights(path, "hari", parts.state_dict(), about, identity)
+def save(made: Executor | HariAgent, path: Path, identity: Identity | None = None) -> None:
+    """Write an execution policy, or an agent with its own, and what it was trained with, atomically."""
+    executor, parts, config = made, nn.ModuleDict(), None
+    if isinstance(made, HariAgent):
+        executor, parts, config = made.executor, nn.ModuleDict({"actor": made.actor}), made.config
+    parts["execution"] = executor.network
+    save_weights(path, "hari", parts.state_dict(), HariAbout(executor.words.names, executor.config, config), identity)
 
 
 def load_executor(path: Path) -> Executor:
-    """The execution policy of a file of `save_executor` or `save_agent`.
+    """The execution policy of a file of `save`.
 
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
@@ -104,7 +85,7 @@ def load_executor(path: Path) -> Executor:
 
 
 def load_agent(path: Path) -> HariAgent:
-    """Load an agent that `save_agent` wrote.
+    """Load an agent that `save` wrote.
 
     Raises:
       FileNotFoundError, ValueError: missing, damaged, of another format, or an execution policy alone.

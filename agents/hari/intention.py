@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Unpack
@@ -22,13 +23,13 @@ from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.playing import TaskSet
 from embodied.agents.common.session import Options, Progress, Session, descend, episode_seed, run, tasks_of_update
-from embodied.agents.hari.agent import HariAgent, save_agent
+from embodied.agents.hari.agent import HariAgent, save
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead
 from embodied.agents.hari.policy import Choice, policy_of
 from embodied.envs.hari import shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.identity import Identity
-from embodied.interface import Ask, Episode, Move, Place
+from embodied.interface import Action, Ask, Episode, Move, Place
 from embodied.kinds import metrics
 
 MAY_CHANGE = ("iterations", "checkpoint_minutes", "validate_every", "validation_tasks")
@@ -58,7 +59,7 @@ def train(
         cost = math.fsum(s.cost for e in episodes for s in e.steps) / len(episodes)
         session.record({"episodes": len(episodes), "cost": cost, **numbers_of(episodes, validation.worlds)})
         if session.improved(-cost):  # what is optimised: the mean cost, task errors included
-            save_agent(agent, session.folder / "best.safetensors", identity)
+            save(agent, session.folder / "best.safetensors", identity)
         return episodes
 
     step = lambda update: train_step(learning, training, update)
@@ -144,13 +145,15 @@ def _spread(numbers: Tensor, rows: list[int], batch: int) -> Tensor:
 
 def counts_of(episodes: Sequence[Episode]) -> dict[str, float]:
     """Mean number of each intention per episode; DONE on sub-goals counts as 'done'."""
-    totals = dict.fromkeys(INTENTIONS, 0)
-    for s in (s for e in episodes for s in e.steps):
-        if isinstance(s.action, Ask):
-            totals[s.action.intention.value] += 1
-        else:
-            totals["do" if isinstance(s.action, Move) else "done"] += 1
-    return {name: n / len(episodes) for name, n in totals.items()}
+    chosen = Counter(intention_of(s.action) for e in episodes for s in e.steps)
+    return {name: chosen[name] / len(episodes) for name in INTENTIONS}
+
+
+def intention_of(action: Action) -> str:
+    """One of INTENTIONS."""
+    if isinstance(action, Ask):
+        return action.intention.value
+    return "do" if isinstance(action, Move) else "done"
 
 
 def numbers_of(episodes: Sequence[Episode], places: Mapping[str, Place]) -> dict[str, float]:

@@ -11,7 +11,7 @@ A simulator supplies dense descriptions here, so no assistant takes part (the pr
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Unpack
@@ -32,13 +32,14 @@ from embodied.agents.common.session import (
     set_learning_rate,
     tasks_of_update,
 )
-from embodied.agents.hari.agent import Executor, save_executor
+from embodied.agents.hari.agent import Executor, save
 from embodied.agents.hari.config import ExecutionConfig
-from embodied.agents.hari.words import Inputs, collate, padded, percept
+from embodied.agents.hari.networks import EncodedDescriptions
+from embodied.agents.hari.words import collate, padded, percept
 from embodied.assistants.descriptions import Describer, dropped
 from embodied.assistants.hari import LONGEST_SUBGOAL, described_subgoal
 from embodied.identity import Identity
-from embodied.interface import Candidates, Description, Episode, FindObject, Move, Place, Pose, Task
+from embodied.interface import Description, Episode, FindObject, Move, Place, Pose, Task
 from embodied.seeds import stream
 from embodied.teachers.shortest import shortest_action
 
@@ -67,6 +68,8 @@ class ExecutionWalk:
     goal: Description
     rng: np.random.Generator
     ended: bool = False
+    stands: bool = False
+    """True where it stands still in this step."""
 
 
 def pretrain(
@@ -84,7 +87,7 @@ def pretrain(
         success = pretraining_success(executor, source, tasks)
         session.record({"success": success, "episodes": len(tasks)})
         if session.improved(success):
-            save_executor(executor, session.folder / "best.safetensors", identity)
+            save(executor, session.folder / "best.safetensors", identity)
         return ()
 
     parts: dict[str, Stateful] = {"network": network, "optimizer": optimizer}
@@ -132,33 +135,53 @@ def _play(
     Args:
       beta: share of the steps that go where the shortest path goes instead.
     """
-    config, describer = executor.config, source.describer
-    beliefs = executor.network.begin(len(walks))  # (B, h)
+    stay, describer = executor.config.stay_fraction, source.describer
     goals = executor.network.encode(torch.from_numpy(padded([executor.words.rows(w.goal, "goal") for w in walks])))
     losses, right = [], []
+
+    def describe(walk: ExecutionWalk) -> Description:
+        walk.stands = stay > 0 and walk.rng.random() < stay
+        if walk.stands:
+            return describer.sparse(walk.place, walk.pose.node)
+        return dropped(describer.dense(walk.place, walk.pose.node), rng=walk.rng)
+
+    for going, reach, log_moves in _steps(executor, source, walks, horizon, describe, goals):
+        stop = log_moves.shape[1] - 1
+        wanted = torch.tensor([_right(walk, poses, stop) for walk, poses in zip(going, reach, strict=True)])
+        losses.append(-log_moves.gather(1, wanted[:, None])[:, 0])
+        right.append((log_moves.argmax(1) == wanted).detach())
+        p = log_moves.detach().exp().double().numpy()
+        for row, walk in enumerate(going):
+            if not walk.stands:
+                drawn = int(walk.rng.choice(stop + 1, p=p[row] / p[row].sum()))
+                _go(walk, int(wanted[row]) if walk.rng.random() < beta else drawn, reach[row], stop)
+    return losses, right
+
+
+def _steps(
+    executor: Executor,
+    source: PretrainingData,
+    walks: Sequence[ExecutionWalk],
+    horizon: int,
+    describe: Callable[[ExecutionWalk], Description],
+    goals: EncodedDescriptions | None = None,
+) -> Iterator[tuple[list[ExecutionWalk], list[Sequence[Pose]], Tensor]]:
+    """The steps of walks: b that have not ended, where their moves lead, and log-probabilities (b, C + 1) of these."""
+    beliefs = executor.network.begin(len(walks))  # (B, h)
     for _ in range(horizon):
         alive = [i for i, w in enumerate(walks) if not w.ended]
         if not alive:
-            break
-        standing = [config.stay_fraction > 0 and walks[i].rng.random() < config.stay_fraction for i in alive]
-        reach = [source.moves.at(walks[i].place, walks[i].pose) for i in alive]
-        descriptions = [
-            describer.sparse(walks[i].place, walks[i].pose.node) if still else _thinned(describer, walks[i])
-            for i, still in zip(alive, standing, strict=True)
+            return
+        going = [walks[i] for i in alive]
+        reach = [source.moves.at(w.place, w.pose) for w in going]
+        rows = [
+            percept(executor.words, describe(w), w.goal, candidates, w.pose.turn)
+            for w, (candidates, _) in zip(going, reach, strict=True)
         ]
-        batch = perceived(executor, [walks[i] for i in alive], descriptions, [candidates for candidates, _ in reach])
-        new, log_moves = executor.network(beliefs[alive], batch, goal=goals[alive])  # (b, h), (b, C + 1)
-        stop = log_moves.shape[1] - 1
-        wanted = torch.tensor([_right(walks[i], poses, stop) for i, (_, poses) in zip(alive, reach, strict=True)])
-        losses.append(-log_moves.gather(1, wanted[:, None])[:, 0])
-        right.append((log_moves.argmax(1) == wanted).detach())
+        goal = None if goals is None else goals[alive]
+        new, log_moves = executor.network(beliefs[alive], collate(rows), goal=goal)
         beliefs = beliefs.index_put((torch.tensor(alive),), new)
-        p = log_moves.detach().exp().double().numpy()
-        for row, i in enumerate(alive):
-            if not standing[row]:
-                drawn = int(walks[i].rng.choice(stop + 1, p=p[row] / p[row].sum()))
-                _go(walks[i], int(wanted[row]) if walks[i].rng.random() < beta else drawn, reach[row][1], stop)
-    return losses, right
+        yield going, [poses for _, poses in reach], log_moves
 
 
 def _begin(source: PretrainingData, task: Task, rng: np.random.Generator) -> ExecutionWalk:
@@ -174,21 +197,6 @@ def give_subgoal(walk: ExecutionWalk, describer: Describer, longest: int = LONGE
     """Let the walk go no farther than to the sub-goal that the assistant would name where it is."""
     way, walk.goal = described_subgoal(describer, walk.place, walk.pose.node, walk.task.goal_nodes[0], longest)
     walk.task = dataclasses.replace(walk.task, goal_nodes=(way[-1],))
-
-
-def perceived(
-    executor: Executor,
-    walks: Sequence[ExecutionWalk],
-    descriptions: Sequence[Description],
-    candidates: Sequence[Candidates],
-) -> Inputs:
-    """State descriptions that some walks are given."""
-    some = zip(walks, descriptions, candidates, strict=True)
-    return collate([percept(executor.words, d, w.goal, c, w.pose.turn) for w, d, c in some])
-
-
-def _thinned(describer: Describer, walk: ExecutionWalk) -> Description:
-    return dropped(describer.dense(walk.place, walk.pose.node), rng=walk.rng)
 
 
 def _right(walk: ExecutionWalk, poses: Sequence[Pose], stop: int) -> int:
@@ -209,22 +217,11 @@ def pretraining_success(executor: Executor, source: PretrainingData, tasks: Sequ
     config = executor.config
     executor.network.eval()
     walks = [_begin(source, t, stream(config.seed, "validation", t.id)) for t in tasks]
+    dense = lambda walk: source.describer.dense(walk.place, walk.pose.node)
     with torch.inference_mode():
         for k in range(0, len(walks), config.batch):
-            _play_greedily(executor, source, walks[k : k + config.batch], config.horizon)
+            some = walks[k : k + config.batch]
+            for going, reach, log_moves in _steps(executor, source, some, config.horizon, dense):
+                for walk, column, poses in zip(going, log_moves.argmax(1).tolist(), reach, strict=True):
+                    _go(walk, column, poses, log_moves.shape[1] - 1)
     return sum(w.ended and w.pose.node in w.task.goal_nodes for w in walks) / len(walks)
-
-
-def _play_greedily(executor: Executor, source: PretrainingData, walks: Sequence[ExecutionWalk], horizon: int) -> None:
-    beliefs = executor.network.begin(len(walks)).clone()
-    for _ in range(horizon):
-        alive = [i for i, w in enumerate(walks) if not w.ended]
-        if not alive:
-            return
-        reach = [source.moves.at(walks[i].place, walks[i].pose) for i in alive]
-        some = [walks[i] for i in alive]
-        descriptions = [source.describer.dense(w.place, w.pose.node) for w in some]
-        batch = perceived(executor, some, descriptions, [candidates for candidates, _ in reach])
-        beliefs[alive], log_moves = executor.network(beliefs[alive], batch)
-        for i, column, (_, poses) in zip(alive, log_moves.argmax(1).tolist(), reach, strict=True):
-            _go(walks[i], column, poses, log_moves.shape[1] - 1)

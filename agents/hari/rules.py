@@ -1,4 +1,5 @@
-"""Rules that choose intentions where nothing has learned to: the upper half of Table 4.7."""
+"""Rules that choose intentions where nothing has learned to, the upper half of Table 4.7, and all rows of the table
+for one trained agent."""
 
 from __future__ import annotations
 
@@ -7,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from embodied.agents.hari.agent import Executor
+from embodied.agents.hari.agent import Executor, HariAgent
 from embodied.agents.hari.networks import INTENTIONS
-from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider
-from embodied.interface import Actions, Observations, Rngs
+from embodied.agents.hari.policy import ASKS, DO, DONE, Belief, Reader, action_of, available, carry, consider, policy_of
+from embodied.interface import Actions, Agent, Observations, Rngs
 
 CUR, GOAL, SUB = ASKS["cur"], ASKS["goal"], ASKS["sub"]
+RANDOM, GREEDY = "random + rules", "learned, greedy"
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,3 +158,17 @@ class RuleAgent:
         shape = (len(rngs), len(INTENTIONS))
         budgets = np.stack([self.rule.budget(rng) for rng in rngs])
         return RuleMemory(belief, np.zeros(shape, dtype=np.int64), np.zeros(len(rngs), dtype=bool), budgets)
+
+
+def policies(agent: HariAgent, means: Mapping[str, float]) -> dict[str, Agent]:
+    """The rows of Table 4.7 that one agent gives.
+
+    Args:
+      means: X_a of "random + rules": the agent's mean number of each intention on validation tasks.
+    """
+    return {
+        **{name: RuleAgent(agent.executor, rule) for name, rule in RULES.items()},
+        RANDOM: RuleAgent(agent.executor, RandomWithBudgets(means)),
+        "learned": policy_of(agent),
+        GREEDY: policy_of(agent, sample=False),
+    }

@@ -6,13 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
+import torch
+
 from embodied.agents.common.playing import TaskSet
 from embodied.agents.common.session import Options, Progress
-from embodied.agents.common.tensor_file import checksum_of
+from embodied.agents.common.tensor_file import checksum_of, load_into
 from embodied.agents.common.weights import weights_digest
-from embodied.agents.hari.agent import Executor, HariAgent, initialised_from, load_executor, new_executor, new_heads
+from embodied.agents.hari.agent import Executor, HariAgent, load_executor, new_executor, new_heads
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.intention import train
+from embodied.agents.hari.intention import counts_of, train
+from embodied.agents.hari.policy import policy_of
 from embodied.agents.hari.pretraining import PretrainingData, pretrain
 from embodied.agents.hari.words import feature_words
 from embodied.assistants.descriptions import Describer, frequent_classes
@@ -20,11 +23,13 @@ from embodied.datasets.store import Dataset
 from embodied.envs.base import HelpEnv
 from embodied.envs.hari import Costs, HariRules
 from embodied.evaluation.evaluate import spread
+from embodied.evaluation.rollout import play
 from embodied.identity import identity_of
 from embodied.interface import Place
 
 CONDITIONS = ("unseen_start", "unseen_object", "unseen_env")
 """Names of validation and test splits, after 'val_' and 'test_' (4.3.5)."""
+VALIDATION_CONDITIONS, TEST = (tuple(f"{part}_{c}" for c in CONDITIONS) for part in ("val", "test"))
 
 
 def rules_of(config: IntentionConfig) -> HariRules:
@@ -42,6 +47,13 @@ def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig,
     tasks = [t for part in parts for t in spread(part.tasks, each)]
     places: Mapping[str, Place] = {name: place for part in parts for name, place in part.worlds.items()}
     return TaskSet(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
+
+
+def validation_means(data: Dataset, agent: HariAgent, *, seed: int) -> dict[str, float]:
+    """The agent's mean number of each intention on validation tasks of all three conditions."""
+    ground = task_split_of(data, VALIDATION_CONDITIONS, agent.config, agent.config.validation_tasks)
+    with torch.inference_mode():
+        return counts_of(play(ground.make_env, policy_of(agent), ground.tasks, seed=seed, batch=agent.config.batch))
 
 
 def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[[], HelpEnv]:
@@ -71,7 +83,10 @@ def train_execution(
     houses = {t.world for t in source.training}
     places = [source.places[name] for name in sorted(houses)]
     words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
-    executor = new_executor(config, words) if init_from is None else initialised_from(config, load_executor(init_from))
+    other = None if init_from is None else load_executor(init_from)
+    executor = new_executor(config, other.words if other else words)
+    if other is not None and init_from is not None:
+        load_into(executor.network, other.network.state_dict(), init_from)
     size = sum(p.numel() for p in executor.network.parameters())
     note = options.get("note", print)
     note(f"{len(source.training)} tasks in {len(houses)} houses, {len(executor.words)} names, {size:,} parameters")
@@ -86,7 +101,7 @@ def train_intention(
     """Train, or go on training, the intention policy of a run folder over a trained execution policy."""
     actor, critic = new_heads(config, executor.config.hidden_size)
     training = task_split_of(data, ["train"], config)
-    validation = task_split_of(data, [f"val_{c}" for c in CONDITIONS], config, config.validation_tasks)
+    validation = task_split_of(data, VALIDATION_CONDITIONS, config, config.validation_tasks)
     size = sum(p.numel() for p in actor.parameters())
     note = options.get("note", print)
     note(f"{len(training.tasks)} tasks in {len(training.worlds)} houses, {size:,} parameters of each head")

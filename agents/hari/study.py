@@ -12,18 +12,25 @@ from embodied.agents.common.session import Note
 from embodied.agents.common.weights import weights_digest
 from embodied.agents.hari.agent import HariAgent, load_agent, load_executor
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
-from embodied.agents.hari.judging import GREEDY, RANDOM, TEST, policies, validation_means
+from embodied.agents.hari.intention import intention_of
 from embodied.agents.hari.networks import INTENTIONS
-from embodied.agents.hari.run import CONDITIONS, rules_of, train_execution, train_intention
+from embodied.agents.hari.rules import GREEDY, RANDOM, policies
+from embodied.agents.hari.run import (
+    TEST,
+    VALIDATION_CONDITIONS,
+    rules_of,
+    train_execution,
+    train_intention,
+    validation_means,
+)
 from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES, EpisodeStudy
 from embodied.agents.studies.tables import Figure, StudyRow, StudyTable
 from embodied.datasets.store import Dataset, SplitData, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of, key_of
-from embodied.interface import Agent, Ask, Episode, Move
+from embodied.interface import Agent, Episode
 
-VALIDATION_CONDITIONS = tuple(f"val_{c}" for c in CONDITIONS)
 ACTIONS = ("CUR", "GOAL", "SUB", "DO")
 SUB_RULE = "SUB whenever possible"
 RULE_ROWS = ("no assistance", "dense goal", "dense state", "dense goal and state", SUB_RULE, RANDOM)
@@ -101,7 +108,7 @@ class HariStudy(EpisodeStudy):
 
     name = "hari"
     makers = ("embodied.agents.hari.run",)
-    judges = (*JUDGES, "embodied.agents.hari.judging")
+    judges = (*JUDGES, "embodied.agents.hari.rules", "embodied.agents.hari.run")
 
     def tables(self) -> Mapping[str, StudyTable]:
         """The splits out of distribution come beside those of the tests; elsewhere, houses may all be unknown."""
@@ -136,10 +143,10 @@ class HariStudy(EpisodeStudy):
         return load_agent(weights)
 
     def policies(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> Agent:
-        means = validation_means(
-            dataset_of(self.data, "hari"), agent, seed=self.eval_seeds[0], tasks=agent.config.validation_tasks
-        ) if judge["played"] == RANDOM else {"cur": 0.0, "goal": 0.0, "sub": 0.0, "do": 0.0}  # fmt: skip
-        return policies(agent, means)[judge["played"]]
+        played, data = judge["played"], dataset_of(self.data, "hari")
+        none = dict.fromkeys(INTENTIONS, 0.0)
+        means = validation_means(data, agent, seed=self.eval_seeds[0]) if played == RANDOM else none
+        return policies(agent, means)[played]
 
     def where(self, agent: HariAgent, judge: Mapping[str, Any], split: str) -> SplitData:
         return self.judged_in(judge).split(split, rules=rules_of(agent.config))
@@ -168,10 +175,7 @@ def intentions_by_time(episodes: Sequence[Episode], horizon: int) -> dict[str, S
     """'cur at 3': the share of the episodes that run at time step 3 that choose CUR; of each intention and step."""
     totals: dict[str, tuple[list[float], list[float]]] = {}
     for episode in episodes:
-        chosen = [
-            s.action.intention.value if isinstance(s.action, Ask) else "do" if isinstance(s.action, Move) else "done"
-            for s in episode.steps[:horizon]
-        ]
+        chosen = [intention_of(s.action) for s in episode.steps[:horizon]]
         for t in range(horizon):
             for name in INTENTIONS:
                 some, all_ = totals.setdefault(f"{name} at {t + 1}", ([], []))

@@ -95,11 +95,11 @@ def study(args: HariStudyOptions) -> StudyLearner:
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """Rows of Table 4.7 for one agent, in the environment that it was trained for."""
     from embodied.agents.hari.agent import load_agent
-    from embodied.agents.hari.judging import policies, validation_means
-    from embodied.agents.hari.run import rules_of
+    from embodied.agents.hari.rules import policies
+    from embodied.agents.hari.run import rules_of, validation_means
 
     agent = load_agent(file)
-    rows = policies(agent, validation_means(data, agent, seed=how.seed, tasks=agent.config.validation_tasks))
+    rows = policies(agent, validation_means(data, agent, seed=how.seed))
 
     def of_split(split: str) -> Players:
         whole = data.split(split, rules=rules_of(agent.config))
