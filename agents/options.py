@@ -74,15 +74,24 @@ class Timed:
 TRAINING, EVALUATION = "settings of training", "settings of evaluation"
 """Titles of groups of options."""
 SCALE = Option(words=("mini", "paper"))
-SMALL_SCALE = Option(words=("mini", "paper", "tiny"))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(WithData, Timed):
-    out: OutputFolder
-    """Run folder; rerun the command to resume an interrupted run."""
+class Scaled:
     scale: Annotated[str, SCALE] = "mini"
     """The settings to start from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaledDown(Scaled):
+    scale: Annotated[str, Option(words=("mini", "paper", "tiny"))] = "mini"
+    """The settings to start from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(WithData, Timed, Scaled):
+    out: OutputFolder
+    """Run folder; rerun the command to resume an interrupted run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +104,11 @@ class Nav(Cached, Encoded):
 class Recorded:
     rrd: bool = False
     """Record two validation episodes at each validation, into the run folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SightedRun(Recorded, Run, Encoded, WithDevice):
+    """Options of agents that see features and learn by imitation."""
 
 
 def training_data(args: Any, kind: str, device: str = "cpu") -> TrainingData:
@@ -142,6 +156,11 @@ class Repeated:
 class Limited:
     tasks: Count | None = None
     """Evaluate on at most N tasks of a split, spread over its houses (default: all)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeStudyOptions(StudyOptions, Repeated, Limited, WithData, Scaled):
+    """Options of studies whose agents play episodes."""
 
 
 def study_of(kind: Any, args: Any, **more: Any) -> Any:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents.bandit.config import BANDIT_SCALES, BanditConfig
 from embodied.agents.learner import Learner, register_learner
-from embodied.agents.options import SCALE, TRAINING, Repeated, StudyOptions, Tables, study_of
+from embodied.agents.options import TRAINING, Repeated, Scaled, StudyOptions, Tables, study_of
 from embodied.options import InputFolder, InputPath, Settings
 
 if TYPE_CHECKING:
@@ -15,15 +15,13 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BanditStudyOptions(StudyOptions, Repeated):
+class BanditStudyOptions(StudyOptions, Repeated, Scaled):
     """A translator that learns from ratings."""
 
     tables: Tables
     """Make these tables: 3.2, 3.4, 3.5 or, with --rater, people."""
     data: InputFolder
     """The corpus, a folder that `embodied corpus` made."""
-    scale: Annotated[str, SCALE] = "mini"
-    """The settings to start from."""
     rater: InputPath | None = None
     """Learn from ratings like people's, too: rater.json of `embodied dataset from-people`."""
     config: Annotated[BanditConfig, Settings(TRAINING, BANDIT_SCALES)]

@@ -11,17 +11,12 @@ from embodied.agents.hanna.training_config import EVALUATIONS, HANNA_SCALES, Han
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
-    SCALE,
     TRAINING,
     Encoded,
-    Limited,
-    Recorded,
-    Repeated,
-    Run,
+    EpisodeStudyOptions,
     Seeds,
-    StudyOptions,
+    SightedRun,
     Tables,
-    WithData,
     WithDevice,
     study_of,
     training_data,
@@ -34,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaTraining(Recorded, Run, Encoded, WithDevice):
+class HannaTraining(SightedRun):
     """An agent that asks people for help (HANNA), by imitation, on a HANNA data set with features.
 
     Trains an agent by imitation to navigate, to ask for help and to follow it, on data of `embodied features`.
@@ -48,14 +43,12 @@ class HannaTraining(Recorded, Run, Encoded, WithDevice):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HannaStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded, WithDevice):
+class HannaStudyOptions(EpisodeStudyOptions, Encoded, WithDevice):
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
     """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2 or words."""
     seeds: Seeds = 1
-    scale: Annotated[str, SCALE] = "mini"
-    """The settings to start from."""
     eval_data: InputFolder | None = None
     """Evaluate in the unseen houses of another data set that has features (default: of --data)."""
     config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES, skip=("training_houses",))]

@@ -9,20 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from embodied.agents.common.shipped import SHIPPED_HARI
 from embodied.agents.hari.config import EXECUTION_SCALES, INTENTION_SCALES, ExecutionConfig, IntentionConfig
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
-from embodied.agents.options import (
-    SCALE,
-    TRAINING,
-    Drawn,
-    Limited,
-    Recorded,
-    Repeated,
-    Run,
-    Seeds,
-    StudyOptions,
-    Tables,
-    WithData,
-    study_of,
-)
+from embodied.agents.options import TRAINING, Drawn, EpisodeStudyOptions, Recorded, Run, Seeds, Tables, study_of
 from embodied.options import InputFolder, InputPath, Settings
 
 if TYPE_CHECKING:
@@ -50,13 +37,11 @@ class IntentionTraining(Recorded, Run, Drawn):
 
 
 @dataclass(frozen=True, kw_only=True)
-class HariStudyOptions(StudyOptions, Repeated, Limited, WithData):
+class HariStudyOptions(EpisodeStudyOptions):
     """Agents that learn which question to ask."""
 
     tables: Tables
     """Make these tables: 4.7, 4.8, 'figure 4.5', 'figure 4.5b' or 'figure 4.6'."""
-    scale: Annotated[str, SCALE] = "mini"
-    """The settings to start from."""
     execution: InputPath | None = None
     """A trained execution policy (default: trained in --out first)."""
     eval_data: InputFolder | None = None

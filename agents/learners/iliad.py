@@ -12,7 +12,7 @@ from embodied.agents.iliad.nav.config import NAV_LEARNER_SCALES, NAV_SCALES, Nav
 from embodied.agents.iliad.regex.config import LEARNER_SCALES, REGEX_SCALES, RegexConfig
 from embodied.agents.iliad.show import ShowOptions, show
 from embodied.agents.learner import Learner, register_learner
-from embodied.agents.options import SMALL_SCALE, Nav, Repeated, StudyOptions, Tables, Threaded, Timed, study_of
+from embodied.agents.options import Nav, Repeated, ScaledDown, StudyOptions, Tables, Threaded, Timed, study_of
 from embodied.options import InputFolder, OutputFolder, Settings
 
 if TYPE_CHECKING:
@@ -27,11 +27,9 @@ OF_ROWS = ("learner", "mixing", "anneal_every")
 
 
 @dataclass(frozen=True, kw_only=True)
-class IliadTraining(Timed, Threaded):
+class IliadTraining(Timed, Threaded, ScaledDown):
     out: OutputFolder
     """Folder for data, teacher and students; rerun the command to resume."""
-    scale: Annotated[str, SMALL_SCALE] = "mini"
-    """The settings to start from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +50,9 @@ class NavTraining(IliadTraining, Nav):
 
 
 @dataclass(frozen=True, kw_only=True)
-class IliadStudyOptions(StudyOptions, Repeated):
+class IliadStudyOptions(StudyOptions, Repeated, ScaledDown):
     tables: Tables
     """Make these tables: 3.4, 3.5, C.1, 'figure 3.7' or algorithms; in NAV also words."""
-    scale: Annotated[str, SMALL_SCALE] = "mini"
-    """The settings to start from."""
 
 
 @dataclass(frozen=True, kw_only=True)

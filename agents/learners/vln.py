@@ -11,17 +11,13 @@ from embodied.agents.common.shipped import SHIPPED_VLN
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
-    SCALE,
     TRAINING,
     Encoded,
-    Limited,
-    Recorded,
-    Repeated,
-    Run,
-    StudyOptions,
+    EpisodeStudyOptions,
+    Scaled,
+    SightedRun,
     Tables,
     WithData,
-    WithDevice,
     study_of,
     training_data,
 )
@@ -35,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FollowerTraining(Recorded, Run, Encoded, WithDevice):
+class FollowerTraining(SightedRun):
     """An agent that follows route instructions, on a VLN or HANNA data set with features (imitation)."""
 
     config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, words={"forcing": FORCING})]
@@ -43,24 +39,20 @@ class FollowerTraining(Recorded, Run, Encoded, WithDevice):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpeakerTraining(WithData, Encoded):
+class SpeakerTraining(WithData, Encoded, Scaled):
     """A network that describes walks, on a VLN or HANNA data set with features (maximum likelihood)."""
 
     out: OutputFolder
     """Run folder; rerun the command to resume an interrupted run."""
-    scale: Annotated[str, SCALE] = "mini"
-    """The settings to start from."""
     config: Annotated[SpeakerSettings, Settings(TRAINING, SPEAKER_SCALES)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class VlnStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
+class VlnStudyOptions(EpisodeStudyOptions, Encoded):
     """Agents that follow route instructions, and a speaker."""
 
     tables: Tables
     """Make these tables: followers, speaker or words."""
-    scale: Annotated[str, SCALE] = "mini"
-    """The settings to start from."""
     others: Count = 1
     """Training seeds of all rows but the first."""
     config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]

@@ -12,17 +12,11 @@ from embodied.agents.common.shipped import SHIPPED_VNLA
 from embodied.agents.learner import Learner, Players, PlayersOfSplit, PlaySettings, register_learner
 from embodied.agents.options import (
     EVALUATION,
-    SCALE,
     TRAINING,
     Encoded,
-    Limited,
-    Recorded,
-    Repeated,
-    Run,
-    StudyOptions,
+    EpisodeStudyOptions,
+    SightedRun,
     Tables,
-    WithData,
-    WithDevice,
     study_of,
     training_data,
 )
@@ -35,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class VnlaTraining(Recorded, Run, Encoded, WithDevice):
+class VnlaTraining(SightedRun):
     """An agent that asks an advisor within a budget (VNLA), by imitation, on a VNLA data set with features.
 
     Trains an agent by imitation to navigate by one view, to ask an advisor within a budget and to follow the advice.
@@ -52,13 +46,11 @@ class VnlaTraining(Recorded, Run, Encoded, WithDevice):
 
 
 @dataclass(frozen=True, kw_only=True)
-class VnlaStudyOptions(StudyOptions, Repeated, Limited, WithData, Encoded):
+class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
     """Agents that ask an advisor within a budget."""
 
     tables: Tables
     """Make these tables: askers, interventions, algorithm-6, rooms, rules or words."""
-    scale: Annotated[str, SCALE] = "mini"
-    """The settings to start from."""
     without_rooms: InputFolder | None = None
     """A data set of --no-rooms, for the table `rooms`."""
     others: Count | None = None
