@@ -22,15 +22,7 @@ SMALL = [
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    return with_features(built(tmp_path_factory.mktemp("vnla") / "data", "vnla"))
-
-
-@pytest.fixture(scope="module")
-def without_rooms(tmp_path_factory):
-    return with_features(built(tmp_path_factory.mktemp("no rooms") / "data", "vnla", rooms=False))
-
-
-def with_features(data):
+    data = built(tmp_path_factory.mktemp("vnla") / "data", "vnla")
     noise_features(data)
     return data
 
@@ -63,27 +55,24 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
 LISTENER = "scripted listener asking at random"
 
 
-def test_the_tables_of_the_paper_from_one_command(data, without_rooms, tmp_path, capsys):
-    words = ("study", "vnla", "interventions", "rooms", "--data", data.folder, "--out", tmp_path, *SMALL)
+def test_the_tables_of_the_paper_from_one_command(data, tmp_path):
+    words = ("study", "vnla", "interventions", "--data", data.folder, "--out", tmp_path, *SMALL)
     words = (*words, "--iterations", 1, "--seeds", 1, "--tasks", 2)
-    assert run(*words) == 2 and "--without-rooms" in capsys.readouterr().err
-    words = (*words, "--without-rooms", without_rooms.folder)
-    rows = ("--rows", "direct, in words", "learned, trained with rooms")
+    rows = ("--rows", "direct, in words", "indirect")
     assert run(*words, *rows) == 0
     text = (tmp_path / "vnla-interventions.md").read_text()
     assert "| direct, in words |" in text and "unlit_192" in text and "seeds 123, 435, 6757, 867, 983" in text
-    assert "| learned, trained with rooms |" in (tmp_path / "vnla-rooms.md").read_text()
     judged = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("runs/*/judged/*.json")}
     trained = {p: p.stat().st_mtime_ns for p in tmp_path.rglob("best.safetensors")}
     assert run(*words, *rows) == 0 and len(judged) == 2 * 2 and len(trained) == 1, "two rows of one agent"
     assert judged == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("runs/*/judged/*.json")}, "nothing is done twice"
     assert trained == {p: p.stat().st_mtime_ns for p in tmp_path.rglob("best.safetensors")}
-    askers = ("study", "vnla", "askers", *words[4:], "--rows", "learned", "teacher", LISTENER)
+    askers = ("study", "vnla", "askers", *words[3:], "--rows", "learned", "teacher", LISTENER)
     assert run(*askers) == 0
     text = (tmp_path / "vnla-askers.md").read_text()
     assert "| teacher |" in text and f"| {LISTENER} |" in text and "(34.95)" in text
     assert "Not run: none, first, random, learned, blind, scripted listener asking as the teacher." in text
-    printed = ("study", "vnla", "algorithm-6", *words[4:], "--rows", "Algorithm 6, learned")
+    printed = ("study", "vnla", "algorithm-6", *words[3:], "--rows", "Algorithm 6, learned")
     assert run(*printed) == 0 and "| Algorithm 6, learned |" in (tmp_path / "vnla-algorithm-6.md").read_text()
     (trained,) = tmp_path.glob("runs/rules_algorithm_6*/trained.json")
     assert read_finished(trained)[0]["settings"]["rules"] == "algorithm-6"

@@ -149,7 +149,7 @@ class HannaStudy(SightedStudy):
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
-            self.evaluation_data({}).split(split)
+            self.evaluation_data().split(split)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
@@ -158,7 +158,7 @@ class HannaStudy(SightedStudy):
     def policies(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        bank = self.evaluation_data(judge).split(split.removesuffix(SHIPPED)).bank
+        bank = self.evaluation_data().split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(BY_TEXT) and not split.endswith(SHIPPED)
         policy = hanna_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
         return self.heard(agent, policy, judge)
@@ -182,7 +182,7 @@ class HannaStudy(SightedStudy):
             "the likeliest action is taken."
         )
 
-    def evaluation_data(self, judge: Mapping[str, Any]) -> TrainingData:
+    def evaluation_data(self) -> TrainingData:
         return self.training_data_in(self.eval_data or self.data)
 
     def training_data_in(self, folder: Path) -> TrainingData:

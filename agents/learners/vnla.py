@@ -21,7 +21,7 @@ from embodied.agents.options import (
     training_data,
 )
 from embodied.agents.vnla.config import ASK_RULES, ASKERS, TRAINED_UNDER, VNLA_SCALES, VnlaSettings
-from embodied.options import Count, InputFolder, Settings
+from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
     from embodied.agents.studies.engine import StudyLearner
@@ -50,9 +50,7 @@ class VnlaStudyOptions(EpisodeStudyOptions, Encoded):
     """Agents that ask an advisor within a budget."""
 
     tables: Tables
-    """Make these tables: askers, interventions, algorithm-6, rooms, rules or words."""
-    without_rooms: InputFolder | None = None
-    """A data set of --no-rooms, for the table `rooms`."""
+    """Make these tables: askers, interventions, algorithm-6, rules or words."""
     others: Count | None = None
     """Training seeds of all rows but the learned asker's (default: --seeds)."""
     config: Annotated[VnlaSettings, Settings(TRAINING, VNLA_SCALES, skip=("asker", "ask_rules", "rules"))]

@@ -22,7 +22,6 @@ from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
 
 TEST_SPLITS = ("test_seen", "test_unseen")
-NOTHING: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +48,7 @@ class FeatureStudy(EpisodeStudy):
         return dataclasses.replace(self.config, seed=seed, **train)
 
     def depends(self, train: Mapping[str, Any]) -> Mapping[str, object]:
-        return self.training_data(train).identity()
+        return self.training_data().identity()
 
     def policy(self, agent: Any, bank: FeatureBank) -> Agent:
         """A trained agent as it plays, with features that it sees."""
@@ -58,25 +57,25 @@ class FeatureStudy(EpisodeStudy):
     def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return agent_without_learning(self.task_kind or self.name, judge["played"])
-        return self.policy(agent, self.evaluation_data(judge).split(split).bank)
+        return self.policy(agent, self.evaluation_data().split(split).bank)
 
     def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
-        return self.evaluation_data(judge).data
+        return self.evaluation_data().data
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {**super().judged(row, split), "pictures": self.evaluation_data(row.judge).pictures(split)}
+        return {**super().judged(row, split), "pictures": self.evaluation_data().pictures(split)}
 
-    def training_data(self, how: Mapping[str, Any] = NOTHING) -> TrainingData:
-        """Training data of the agents of a row, by what differs in it.
+    def training_data(self) -> TrainingData:
+        """Training data of the agents.
 
         Raises:
           DatasetError: a data set of another kind.
         """
         return self.training_data_in(self.data)
 
-    def evaluation_data(self, judge: Mapping[str, Any]) -> TrainingData:
+    def evaluation_data(self) -> TrainingData:
         """The data that they are judged in."""
-        return self.training_data(judge)
+        return self.training_data()
 
     def training_data_in(self, folder: Path) -> TrainingData:
         """A data set with features."""

@@ -15,8 +15,7 @@ from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import words_table
-from embodied.agents.vision.sighted_study import NOTHING, TEST_SPLITS, SightedStudy
-from embodied.agents.vision.training_data import TrainingData
+from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
 from embodied.agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
@@ -27,12 +26,10 @@ from embodied.interface import Agent
 EVALUATION_SEEDS = (123, 435, 6757, 867, 983)
 """The program's."""
 VNLA_MEASURES = ("success", "room success", "navigation error", "requests")
-ROOMS = "rooms"
-"""In a row: whether the requests name rooms that it learns from (train) or is judged by (judge)."""
 
 
-def _row(label: str, played: str = LEARNED, rooms: bool = True, **train: Any) -> StudyRow:
-    return StudyRow(label, train, {"played": played, ROOMS: rooms})
+def _row(label: str, played: str = LEARNED, **train: Any) -> StudyRow:
+    return StudyRow(label, train, {"played": played})
 
 
 def _table(title: str, *rows: StudyRow, compared: Sequence[tuple[StudyRow, StudyRow]] = ()) -> StudyTable:
@@ -51,8 +48,8 @@ VNLA_TABLES: Mapping[str, StudyTable] = {
         _row("teacher", TEACHER),
         LEARNED_ASKER,
         BLIND_ASKER,
-        StudyRow("scripted listener asking at random", None, {"played": "listener, random", ROOMS: True}),
-        StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher", ROOMS: True}),
+        StudyRow("scripted listener asking at random", None, {"played": "listener, random"}),
+        StudyRow("scripted listener asking as the teacher", None, {"played": "listener, teacher"}),
         compared=((LEARNED_ASKER, RANDOM_ASKER), (LEARNED_ASKER, BLIND_ASKER)),
     ),
     "interventions": _table(
@@ -60,18 +57,6 @@ VNLA_TABLES: Mapping[str, StudyTable] = {
         _row("direct, not in words", rules="direct-mute"),
         _row("direct, in words", DIRECT),
         _row("indirect"),
-    ),
-    "rooms": StudyTable(
-        "Requests that name no room",
-        (
-            StudyRow(
-                "random, trained without rooms", {"asker": "random", ROOMS: False}, {"played": LEARNED, ROOMS: False}
-            ),
-            StudyRow("learned, trained without rooms", {ROOMS: False}, {"played": LEARNED, ROOMS: False}),
-            StudyRow("learned, trained with rooms", {}, {"played": LEARNED, ROOMS: False}),
-        ),
-        VNLA_MEASURES,
-        TEST_SPLITS,
     ),
     "algorithm-6": StudyTable(
         "Algorithm 6 as printed beside the program's rules of play (docs/sources.md, S43)",
@@ -93,60 +78,30 @@ VNLA_TABLES: Mapping[str, StudyTable] = {
     ),
     "words": words_table(_row, VNLA_MEASURES, TEST_SPLITS[1:]),
 }
-"""The paper's Tables 2, 3, 4 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
+"""The paper's Tables 2, 3 and 7, and the dissertation's own algorithm, which nobody has printed results of."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class VnlaStudy(SightedStudy):
-    """Tables 2, 3, 4 and 7 of VNLA's first paper."""
+    """Tables 2, 3 and 7 of VNLA's first paper."""
 
     config: VnlaSettings
-    without_rooms: Path | None = None
-    """A data set whose requests name no room, for the table 'rooms'."""
     eval_seeds: tuple[int, ...] = EVALUATION_SEEDS
 
     name, agent_kind, all_tables = "vnla", VnlaAgent, VNLA_TABLES
     makers = ("embodied.agents.vnla.run",)
     judges = (*JUDGES, "embodied.agents.vnla.judging")
 
-    def settings(self, train: Mapping[str, Any], seed: int) -> VnlaSettings:
-        return super().settings({k: v for k, v in train.items() if k != ROOMS}, seed)
-
-    def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
-        """Data sets that are missing are told before anything is trained."""
-        for row in rows:
-            for how in (row.train or {}, row.judge):
-                self.training_data(how)
-
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
-        train_agent(self.training_data(train), self.settings(train, seed), self.evaluation, home, note=note)
+        train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
         return home / "best.safetensors"
 
     def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        return self.heard(agent, player(agent, self.training_data(judge).split(split).bank, judge["played"]), judge)
+        return self.heard(agent, player(agent, self.training_data().split(split).bank, judge["played"]), judge)
 
     def where(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         if agent is None:
             return super().where(agent, judge, split)
         return self.judged_in(judge).split(split, rules=rules_of_row(agent, judge["played"]))
-
-    def training_data(self, how: Mapping[str, Any] = NOTHING) -> TrainingData:
-        """
-        Raises:
-          ValueError: requests without rooms are wanted and there are none, or the data set names (no) rooms.
-        """
-        rooms = how.get(ROOMS, True)
-        folder = self.data if rooms else self.without_rooms
-        if folder is None:
-            raise ValueError(
-                "the table 'rooms' needs requests that name no room: `embodied dataset vnla --no-rooms --out DIR2`, "
-                "features for it, and --without-rooms DIR2"
-            )
-        source = self.training_data_in(folder)
-        if source.data.config.rooms != rooms:
-            raise ValueError(
-                f"the requests of {folder} {'name no' if rooms else 'name'} rooms; name the other data set"
-            )
-        return source
