@@ -23,21 +23,8 @@ from embodied.threads import keep_drawing_to_threads
 
 BACKENDS = ("egl", "osmesa")
 ELSEWHERE = (
-    "",
-    "glfw",
-    "glx",
-    "cgl",
-    "wgl",
-    "enable",
-    "enabled",
-    "on",
-    "true",
-    "1",
-    "disable",
-    "disabled",
-    "off",
-    "false",
-    "0",
+    *("", "glfw", "glx", "cgl", "wgl", "enable", "enabled", "on", "true", "1"),
+    *("disable", "disabled", "off", "false", "0"),
 )
 """Values of MUJOCO_GL that mujoco can be imported with, though nothing is drawn off-screen through them."""
 GL_REMEDY = (

@@ -298,8 +298,7 @@ def test_hannas_tasks_start_where_their_paths_start_and_are_shortest(data_sets, 
 # VNLA --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("prefix", ["asknav", "noroom"])
-def test_vnlas_trajectories_lead_to_their_goals_in_the_first_release(prefix, folders):
+def test_vnlas_trajectories_lead_to_their_goals_in_the_first_release(folders):
     root = folders / "vnla"
     sim = mattersim.module("v0.1").Simulator()
     sim.setNavGraphPath(str(root / "data/connectivity"))
@@ -310,7 +309,7 @@ def test_vnlas_trajectories_lead_to_their_goals_in_the_first_release(prefix, fol
     sim.init()
     n = 0
     for split in ("train", "val_seen", "val_unseen", "test_seen", "test_unseen"):
-        for item in read(root / f"data/{prefix}/{prefix}_{split}.json"):
+        for item in read(root / f"data/asknav/asknav_{split}.json"):
             assert len(item["trajectories"]) == len(item["paths"])
             for path, actions in zip(item["paths"], item["trajectories"], strict=True):
                 assert actions[-1] == [0, 0, 0], "the teacher stops"
@@ -336,15 +335,14 @@ def test_vnlas_goals_of_a_task_lie_in_rooms_of_one_letter(folders):
     assert set(region.values()) <= letters
 
 
-@pytest.mark.parametrize("prefix", ["asknav", "noroom"])
-def test_vnlas_vocabulary_holds_every_training_word_once_behind_the_special_ones(prefix, folders):
+def test_vnlas_vocabulary_holds_every_training_word_once_behind_the_special_ones(folders):
     """It is read before the words of sub-goals; a word that is missing is read as unknown without a word of it."""
-    home = folders / f"vnla/data/{prefix}"
+    home = folders / "vnla/data/asknav"
     words = (home / "train_vocab.txt").read_text().split("\n")[:-1]
     assert words[:3] == ["<PAD>", "<UNK>", "<EOS>"] and len(words) == len(set(words))
-    said = {w for i in read(home / f"{prefix}_train.json") for t in i["instructions"] for w in t.split()}
+    said = {w for i in read(home / "asknav_train.json") for t in i["instructions"] for w in t.split()}
     assert said == set(words[3:])
-    longest = max(len(t.split()) for i in read(home / f"{prefix}_train.json") for t in i["instructions"])
+    longest = max(len(t.split()) for i in read(home / "asknav_train.json") for t in i["instructions"])
     assert longest + 20 < 50, "with a sub-goal before it and the end behind it: it takes a full line for an empty one"
 
 
@@ -368,14 +366,6 @@ def test_a_data_set_without_rooms_is_exported_as_it_is(tmp_path):
     assert [i["instructions"][0] for i in items] == [t.request for t in tasks]
     assert all(" in " not in t.request for t in tasks)
     assert [len(i["paths"]) for i in items] == [len(t.goal_nodes) for t in tasks]
-
-
-def test_a_no_room_request_names_no_room_and_any_room_will_do(folders):
-    root = folders / "vnla" / "data"
-    by_room = {i["path_id"]: i for i in read(root / "asknav/asknav_train.json")}
-    without = read(root / "noroom/noroom_train.json")
-    assert without and all(" in " not in i["instructions"][0] for i in without)
-    assert max(len(i["paths"]) for i in without) >= max(len(i["paths"]) for i in by_room.values())
 
 
 # Room-to-Room and ILIAD --------------------------------------------------------------------------

@@ -23,26 +23,8 @@ from typing import NoReturn
 from embodied.errors import UnableError
 
 COMMANDS = (
-    "demo",
-    "doctor",
-    "assets",
-    "house",
-    "light",
-    "render",
-    "rollout",
-    "view",
-    "dataset",
-    "features",
-    "corpus",
-    "export",
-    "train",
-    "evaluate",
-    "serve",
-    "llm",
-    "study",
-    "show",
-    "bench",
-    "cache",
+    *("demo", "doctor", "assets", "house", "light", "render", "rollout", "view", "dataset", "features", "corpus"),
+    *("export", "train", "evaluate", "serve", "llm", "study", "show", "bench", "cache"),
 )
 """Subcommands in the order `--help` lists them; each is a module with `run(options)`, or with commands of its own:
 `COMMANDS`, or `commands(words)` of the command line."""

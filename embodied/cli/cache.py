@@ -17,16 +17,8 @@ from embodied.cli.common import Printed, show
 from embodied.options import Cached, Option, whole
 
 CACHE_FOLDERS = (
-    "assets",
-    "materials",
-    "collision",
-    "landscapes",
-    "light",
-    "panoramas",
-    "sightings",
-    "semantic",
-    "paths",
-    "days",
+    *("assets", "materials", "collision", "landscapes", "light"),
+    *("panoramas", "sightings", "semantic", "paths", "days"),
 )
 """Folders that the program makes in a cache; nothing else in it is counted or removed."""
 

@@ -8,8 +8,6 @@ asking the people. Both episodes are recorded for Rerun; --video also films the 
 from __future__ import annotations
 
 import contextlib
-import shutil
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -86,15 +84,8 @@ def demonstrate(args: DemoOptions, viewers: tuple[str, ...]) -> None:
             help_facts = ask_for_help(args, world, routes, viewers)
         facts: dict[str, object] = {"walk": walk, "help": help_facts, "plan": str(args.out / "plan.png")}
         facts |= {"seconds": seconds, "renderer": world.fingerprint["renderer"]}
-    look = f"look at a recording with: {as_typed(Path(sys.argv[0]))} view {help_facts['recording']}"
+    look = f"look at a recording with: embodied view {help_facts['recording']}"
     show(args, facts, "\n".join([told(walk), told(help_facts), f"floor plan  {facts['plan']}", look]))
-
-
-def as_typed(program: Path) -> str:
-    """How the user started `program`, as the beginning of a line to copy."""
-    if program.name != "embodied":
-        return f"{sys.executable} -m embodied"
-    return program.name if shutil.which(program.name) == str(program) else str(program)
 
 
 SMALL_FLAT = (32.0, 36.0)

@@ -9,7 +9,6 @@ writer says at the line how it is met.
 
 from __future__ import annotations
 
-import functools
 import importlib.util
 import itertools
 import json
@@ -26,7 +25,6 @@ import numpy as np
 from embodied.assets.cache import write_bytes
 from embodied.errors import UnableError
 from embodied.interface import TURNS, FindObject, FollowRoute, Pose, Route, Task
-from embodied.language.plain_language import PlainLanguage
 from embodied.mattersim.conventions import (
     CAMERA,
     REGIONS,
@@ -43,10 +41,7 @@ from embodied.mattersim.conventions import (
 from embodied.navigation.connectivity import to_matterport
 from embodied.navigation.free_space import EYE
 from embodied.navigation.graph import nearest
-from embodied.seeds import stream
-from embodied.tasks.goals import find_instances, goal_classes
-from embodied.tasks.vnla import FEWEST_NODES, VNLA_REACH
-from embodied.teachers.vnla import MonocularPlan, VnlaTeacher, state_of
+from embodied.teachers.vnla import VnlaTeacher
 
 if TYPE_CHECKING:
     from embodied.datasets.store import Dataset, StoredPlace
@@ -209,14 +204,13 @@ def action_space(data: Dataset) -> dict[str, list[Item]]:
     return table
 
 
-def _item(task: Task, number: int, place: StoredPlace, goals: Sequence[int] | None = None) -> Item:
+def _item(task: Task, number: int, place: StoredPlace) -> Item:
     ids, graph = place.graph.ids, place.graph
-    goals = task.goal_nodes if goals is None else goals
     return {
         "path_id": number,
         "scan": scan_name(task.world),
         "heading": heading(task.start),
-        "paths": [[ids[v] for v in graph.path(task.start.node, g)] for g in goals],
+        "paths": [[ids[v] for v in graph.path(task.start.node, g)] for g in task.goal_nodes],
         "instructions": [tokenised(task.request)],
     }
 
@@ -235,22 +229,20 @@ def _route(route: Route, graph: NavGraph) -> Item:
 
 
 def _vnla(data: Dataset, root: Path) -> list[Path]:
-    """Tasks with rooms, and without: those of a data set that names none as they are, else made from the others."""
-    teacher, files = VnlaTeacher(), []
-    makers = {"asknav": _asknav, "noroom": _noroom} if data.config.rooms else {"noroom": _asknav}
-    for prefix, item in makers.items():
-        home, words, numbers = root / "data" / prefix, Words(), itertools.count(1)
-        for split in data.splits:
-            made = (item(t, numbers, data, teacher) for t in data.tasks(split))
-            items = [i for i in made if i is not None]
-            if split == "train":
-                words.update(w for i in items for w in i["instructions"][0].split())
-            files.append(_json(home / f"{prefix}_{split}.json", items))
-        files += [
-            _vocabulary(home / "train_vocab.txt", words),
-            write_lines(home / "verbal_hard_vocab.txt", subgoal_words(merged=True)),
-            write_lines(home / "verbal_easy_vocab.txt", subgoal_words(merged=False)),
-        ]
+    """Tasks with rooms, or without where the data set names none."""
+    teacher, files, words, numbers = VnlaTeacher(), [], Words(), itertools.count(1)
+    prefix = "asknav" if data.config.rooms else "noroom"
+    home = root / "data" / prefix
+    for split in data.splits:
+        items = [_vnla_item(t, next(numbers), data.place(t.world), teacher) for t in data.tasks(split)]
+        if split == "train":
+            words.update(w for i in items for w in i["instructions"][0].split())
+        files.append(_json(home / f"{prefix}_{split}.json", items))
+    files += [
+        _vocabulary(home / "train_vocab.txt", words),
+        write_lines(home / "verbal_hard_vocab.txt", subgoal_words(merged=True)),
+        write_lines(home / "verbal_easy_vocab.txt", subgoal_words(merged=False)),
+    ]
     for name in names_of(data):
         regions = panorama_to_region(data.place(name))
         files += [
@@ -262,35 +254,10 @@ def _vnla(data: Dataset, root: Path) -> list[Path]:
     return [*files, write_lines(root / "data" / "region_label.txt", region_lines())]
 
 
-def _asknav(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item | None:
-    """The task as it is."""
-    place = data.place(task.world)
-    return {**_item(task, next(numbers), place), **_vnla_fields(task, task.goal_nodes, place, teacher.plan(place))}
-
-
-def _noroom(task: Task, numbers: Iterator[int], data: Dataset, teacher: VnlaTeacher) -> Item | None:
-    """The task without its room: any thing of the class in the house will do. None where that is too near."""
-    place, plan = data.place(task.world), teacher.plan(data.place(task.world))
-    goals = _anywhere(place)[sought(task).object_class]
-    goals = tuple(g for g in goals if plan.counts((g,))[state_of(task.start)] > 0)
-    if place.graph.hops[task.start.node, list(goals)].min() + 1 < FEWEST_NODES:
-        return None
-    rng = stream(data.config.seed, "noroom", task.id)
-    request = PlainLanguage().request(FindObject(sought(task).object_class), rng=rng)
-    item = _item(task, next(numbers), place, goals)
-    return {**item, "instructions": [tokenised(request)], **_vnla_fields(task, goals, place, plan)}
-
-
-@functools.lru_cache(maxsize=512)
-def _anywhere(place: StoredPlace) -> Mapping[str, tuple[int, ...]]:
-    """Class to the nodes where one of its things is nearest."""
-    classes = goal_classes(find_instances(place, VNLA_REACH), by_room=False, nearest_only=True)
-    return {c.object_class: c.goal_nodes for c in classes}
-
-
-def _vnla_fields(task: Task, goals: Sequence[int], place: StoredPlace, plan: MonocularPlan) -> Item:
-    room, rooms = place.house.room_by_id, place.graph.room_of_node
+def _vnla_item(task: Task, number: int, place: StoredPlace, teacher: VnlaTeacher) -> Item:
+    room, rooms, plan, goals = place.house.room_by_id, place.graph.room_of_node, teacher.plan(place), task.goal_nodes
     return {
+        **_item(task, number, place),
         "trajectories": [[list(CAMERA[w]) for w in plan.words(task.start, (g,), LONGEST_TEACHING)[0]] for g in goals],
         "start_region_name": region_name(room[rooms[task.start.node]].kind),
         "end_region_name": region_name(room[rooms[nearest(place.graph, task.start.node, goals)]].kind),

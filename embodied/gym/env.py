@@ -26,7 +26,6 @@ import gymnasium as gym
 import numpy as np
 from PIL import Image, ImageDraw, ImageOps
 
-from embodied.assets.cache import default_cache
 from embodied.envs.base import STEP_COST, ActionError, HelpEnv
 from embodied.gym.playground import Playground, PlaygroundSettings, flat_playground, split_playground
 from embodied.gym.semantic_features import FeatureTable
@@ -44,12 +43,10 @@ from embodied.gym.sensors import (
 from embodied.gym.spaces import SpaceLayout, action_space, decode, encode, observation_space
 from embodied.house.floor_plan import font, paint_plan
 from embodied.house.house import House
-from embodied.interface import Assistant, FeatureSource, Observation, Place, Pose, SeenPlace, Task
+from embodied.interface import FeatureSource, Observation, Place, Pose, SeenPlace, Task
 from embodied.kinds.metrics import PER_EPISODE
-from embodied.kinds.plugins import assistant_of
 from embodied.kinds.task_kind import kind_named
 from embodied.language.detokenize import detokenized
-from embodied.render.pictures import PictureSettings
 from embodied.scene.house_meshes import instance_classes
 from embodied.seeds import checked_seed
 from embodied.world import World
@@ -362,34 +359,20 @@ def make(kind: str, *, render_mode: str | None = None, **options: Any) -> HelpGy
 
 
 @dataclass(frozen=True, eq=False)
-class EnvironmentSettings:
+class EnvironmentSettings(PlaygroundSettings):
     """Houses, tasks, senses and rules of the environments of a kind of task."""
 
     data: str | Path | None = None
     """Folder that `embodied dataset` built; without it a flat is generated from `seed` and lit."""
     split: str = "train"
     seed: int = 0
-    cache: str | Path | None = None
     observations: str | Sequence[str] = ("rgb", "features")
     """Some of embodied.gym.sensors.OBSERVATIONS: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
     view: ViewSettings = ViewSettings()
     """How pixels are framed."""
-    pictures: PictureSettings | str | None = None
-    """How the houses are drawn: "unlit", "fast", ... as in embodied.open_world, or settings.
-
-    By default as the data set's pictures are, and 'fast' for a generated flat."""
     source: FeatureSource | None = None
     """The features; those of the installed default encoder where not given."""
-    worlds: Mapping[str, SeenPlace] | None = None
-    """Worlds to play in; otherwise opened from `data`."""
     layout: SpaceLayout | None = None
-    rules: Any = None
-    """Rules of play, of the type of TaskKind.rules; the usual ones if None. VNLA: one of embodied.envs.vnla.RULES.
-    HARI: HariRules (costs, stack, sub-goals' length, horizon, a willing assistant). Ask: AskSettings."""
-    rooms: bool = True
-    """False: requests in a generated flat name no room (VNLA); those of a data set are as it was built."""
-    assistant: Assistant | str | None = None
-    """Who answers requests instead of the kind's own assistant: an Assistant, or 'module:Class' to import one."""
 
 
 def open_resources(kind: str, **settings: Any) -> SharedResources:
@@ -400,28 +383,20 @@ def open_resources(kind: str, **settings: Any) -> SharedResources:
     """
     wanted = EnvironmentSettings(**settings)
     checked_seed(wanted.seed)
-    seen, where = checked_observations(wanted.observations), Path(wanted.cache) if wanted.cache else default_cache()
-    playground = PlaygroundSettings(
-        cache=where,
-        worlds=wanted.worlds,
-        pictures=wanted.pictures,
-        observations=seen,
-        rules=wanted.rules,
-        rooms=wanted.rooms,
-        assistant=assistant_of(wanted.assistant),
-    )
+    checked_observations(wanted.observations)
     if wanted.data:
-        play = split_playground(kind, Path(wanted.data), wanted.split, playground)
+        play = split_playground(kind, Path(wanted.data), wanted.split, wanted)
     else:
-        play = flat_playground(kind, wanted.seed, playground)
+        play = flat_playground(kind, wanted.seed, wanted)
     layout = wanted.layout or SpaceLayout.of(kind_named(kind), wanted.rules)
     opened = () if wanted.worlds is not None else [w for w in play.worlds.values() if isinstance(w, World)]
-    return SharedResources(play.make_env, play.tasks, _sensor_of(play, seen, wanted), layout, opened)
+    return SharedResources(play.make_env, play.tasks, _sensor_of(play, wanted), layout, opened)
 
 
-def _sensor_of(play: Playground, seen: Sequence[str], wanted: EnvironmentSettings) -> Sensor:
+def _sensor_of(play: Playground, wanted: EnvironmentSettings) -> Sensor:
     """Everything that is seen, over one store of decoded panoramas."""
     sensors: list[Sensor] = []
+    seen = wanted.seen
     drawn = {name: w for name, w in play.worlds.items() if isinstance(w, World)}
     store = PanoramaStore(drawn)
     if pixels := [name for name in PIXELS if name in seen]:

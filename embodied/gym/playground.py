@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from embodied.assets.cache import atomic_path, digest
+from embodied.assets.cache import atomic_path, default_cache, digest
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
 from embodied.assets.records import ROOM_KINDS
@@ -20,7 +20,9 @@ from embodied.datasets.store import Dataset
 from embodied.generate import HouseConfig
 from embodied.generate.people import add_people, place_people
 from embodied.gym.semantic_features import semantic_features
+from embodied.gym.sensors import checked_observations
 from embodied.interface import Assistant, Language, Route, SeenPlace, Task
+from embodied.kinds.plugins import assistant_of
 from embodied.kinds.task_kind import EnvInputs, EnvMaker, TaskInputs, TaskKind, kind_named
 from embodied.language import People, PlainLanguage
 from embodied.render.pictures import PictureSettings, Unlit, parse_pictures
@@ -44,23 +46,40 @@ class Playground:
     """(nodes, 36, D) float32 by world; empty when not asked for."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlaygroundSettings:
     """How houses are opened, and what is played in them."""
 
-    cache: Path
+    cache: str | Path | None = None
     worlds: Mapping[str, SeenPlace] | None = None
     """Worlds to play in; otherwise opened."""
     pictures: PictureSettings | str | None = None
-    """How the houses are drawn; by default as a data set's pictures are, and 'fast' for a flat."""
-    observations: Sequence[str] = ("oracle",)
-    """Some of embodied.gym.sensors.OBSERVATIONS; oracle's features are made for 'oracle' only."""
+    """How the houses are drawn: "unlit", "fast", ... as in embodied.open_world, or settings.
+
+    By default as the data set's pictures are, and 'fast' for a generated flat."""
+    observations: str | Sequence[str] = ("oracle",)
+    """Some of embodied.gym.sensors.OBSERVATIONS: 'rgb', 'depth', 'ids', 'features', 'oracle'."""
     rules: Any = None
-    """Rules of play, of the type of TaskKind.rules; the usual ones if None."""
+    """Rules of play, of the type of TaskKind.rules; the usual ones if None. VNLA: one of embodied.envs.vnla.RULES.
+    HARI: HariRules (costs, stack, sub-goals' length, horizon, a willing assistant). Ask: AskSettings."""
     rooms: bool = True
-    """False: requests name no room, where the kind can do without."""
-    assistant: Assistant | None = None
-    """Who answers, instead of the kind's own assistant."""
+    """False: requests in a generated flat name no room (VNLA); those of a data set are as it was built."""
+    assistant: Assistant | str | None = None
+    """Who answers requests instead of the kind's own assistant: an Assistant, or 'module:Class' to import one."""
+
+    @property
+    def cached(self) -> Path:
+        """The cache folder."""
+        return Path(self.cache) if self.cache else default_cache()
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """The observations.
+
+        Raises:
+          ValueError: something that cannot be seen, nothing, or the same twice.
+        """
+        return checked_observations(self.observations) if self.observations else ()
 
 
 def split_playground(kind: str, data: Path, split: str, settings: PlaygroundSettings) -> Playground:
@@ -69,7 +88,7 @@ def split_playground(kind: str, data: Path, split: str, settings: PlaygroundSett
     Raises:
       ValueError: the data set is of another kind, or pictures are wanted and it has none.
     """
-    catalogue, whole = load_catalogue(settings.cache), Dataset(data)
+    catalogue, whole = load_catalogue(settings.cached), Dataset(data)
     if whole.kind != kind:
         raise ValueError(f"{data} is a data set of {whole.kind!r}, not of {kind!r}")
     if (rooms := settings.rooms) != whole.config.rooms:
@@ -79,9 +98,9 @@ def split_playground(kind: str, data: Path, split: str, settings: PlaygroundSett
     worlds = settings.worlds
     if worlds is None:
         names = whole.names(split)
-        drawn = settings.pictures or pictures_of(whole, names, wanted=bool(set(settings.observations) - {"oracle"}))
-        worlds = {n: whole.open_world(n, catalogue, settings.cache, drawn) for n in names}
-    chosen = whole.split(split, worlds=worlds, rules=settings.rules, assistant=settings.assistant)
+        drawn = settings.pictures or pictures_of(whole, names, wanted=bool(set(settings.seen) - {"oracle"}))
+        worlds = {n: whole.open_world(n, catalogue, settings.cached, drawn) for n in names}
+    chosen = whole.split(split, worlds=worlds, rules=settings.rules, assistant=assistant_of(settings.assistant))
     return Playground(worlds, chosen.tasks, chosen.make_env, _oracle(worlds, catalogue, settings))
 
 
@@ -90,7 +109,7 @@ def flat_playground(kind: str, seed: int, settings: PlaygroundSettings) -> Playg
 
     In given worlds, which need not have pictures, people speak plainly; elsewhere of what they see.
     """
-    catalogue = load_catalogue(settings.cache)
+    catalogue = load_catalogue(settings.cached)
     if settings.worlds is None:
         return houses_playground(kind, [(f"flat_{seed}", seed)], seed, settings, catalogue, FLAT_AREA, FLAT_TASKS)
     name, place = next(iter(settings.worlds.items()))
@@ -117,7 +136,7 @@ def houses_playground(
       part: of the pool of tasks; that of unseen houses if None.
     """
     known, language = kind_named(kind), People(tries=1)
-    drawn = parse_pictures(settings.pictures or ("fast" if set(settings.observations) - {"oracle"} else "unlit"))
+    drawn = parse_pictures(settings.pictures or ("fast" if set(settings.seen) - {"oracle"} else "unlit"))
     worlds, tasks, routes = dict[str, SeenPlace](), list[Task](), dict[str, Sequence[Route]]()
     for name, house_seed in houses:
         house, graph = make_dataset_house(house_seed, name, HouseConfig(area=area), catalogue)
@@ -126,7 +145,7 @@ def houses_playground(
             met = place_people(house, graph, catalogue, seed=house_seed)
             paths = route_paths(graph, name, seed=house_seed, house_split="test", starts=met)
             house = add_people(house, met, (p[0] for p in paths))
-        world = open_world(house, catalogue, settings.cache, graph=graph, pictures=drawn)
+        world = open_world(house, catalogue, settings.cached, graph=graph, pictures=drawn)
         if drawn.quality is not None:
             world.baked(progress=True)
         more, routes[name] = _tasks_in(known, world, paths, seed, language, settings.rooms, each, part)
@@ -162,7 +181,9 @@ def _playground(
     catalogue: Catalogue,
 ) -> Playground:
     known, routes_of = kind_named(kind), lambda name: routes.get(name, ())
-    make_env = known.environments(EnvInputs(worlds, routes_of, rules=settings.rules, assistant=settings.assistant))
+    make_env = known.environments(
+        EnvInputs(worlds, routes_of, rules=settings.rules, assistant=assistant_of(settings.assistant))
+    )
     return Playground(
         worlds, known.tasks_under(tasks, worlds, settings.rules), make_env, _oracle(worlds, catalogue, settings)
     )
@@ -171,9 +192,9 @@ def _playground(
 def _oracle(
     worlds: Mapping[str, SeenPlace], catalogue: Catalogue, settings: PlaygroundSettings
 ) -> Mapping[str, np.ndarray]:
-    if "oracle" not in settings.observations:
+    if "oracle" not in settings.seen:
         return {}
-    return {name: seen_features(w, catalogue, settings.cache) for name, w in worlds.items()}
+    return {name: seen_features(w, catalogue, settings.cached) for name, w in worlds.items()}
 
 
 def pictures_of(data: Dataset, names: Sequence[str], *, wanted: bool) -> PictureSettings:
