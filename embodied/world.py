@@ -137,20 +137,24 @@ class World:
 
     def follow(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Show the bodies of a MuJoCo model as they are now: a robot that was attached to the house's own model, or one
-        alone. Call it again after the physics; bodies named as placements of the house move these."""
+        alone. Call it again after the physics; bodies named as placements of the house move these, and doors on hinges
+        the house's doors."""
         if self._followed is not model:
             from embodied.scene.bodies import body_parts  # late: it reads meshes by trimesh
+            from embodied.scene.doors import is_of_door
 
-            own = self.house.placement_by_id
-            for name, parts in body_parts(model, self.cache / "bodies", without=own).items():
-                self.add(name, parts)
+            for name, parts in body_parts(model, self.cache / "bodies").items():
+                if name not in self.house.placement_by_id and not is_of_door(name, self.house):
+                    self.add(name, parts)
             self._followed = model
         from embodied.scene.bodies import body_poses
+        from embodied.scene.doors import openness
 
         poses = body_poses(model, data, (*self._bodies, *self.house.placement_by_id))
         bodies = {name: pose for name, pose in poses.items() if name in self._bodies}
         moved = {name: pose for name, pose in poses.items() if name not in self._bodies}
-        self._moments[-1] = Moment({**self.moment.moved, **moved}, self.moment.openness, bodies)
+        opened = {**self.moment.openness, **openness(model, data)}
+        self._moments[-1] = Moment({**self.moment.moved, **moved}, opened, bodies)
         self._bring_up_to_date(slack=SLACK)
 
     def show(self, moment: Moment) -> None:

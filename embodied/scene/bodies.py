@@ -22,7 +22,7 @@ ROUND = 24
 
 
 def body_parts(
-    model: mujoco.MjModel, textures: Path, *, groups: Collection[int] = VISIBLE, without: Collection[str] = ()
+    model: mujoco.MjModel, textures: Path, *, groups: Collection[int] = VISIBLE
 ) -> dict[str, tuple[Part, ...]]:
     """The visible geoms of every body but the world's, by the body's name, in the body's frame.
 
@@ -32,7 +32,6 @@ def body_parts(
     Args:
       textures: a folder for the pictures of its materials.
       groups: of the geoms to draw.
-      without: names of bodies to leave out, such as the house's own.
     """
     out: dict[str, tuple[Part, ...]] = {}
     for body in range(1, model.nbody):
@@ -41,7 +40,7 @@ def body_parts(
         geoms = [g for g in range(first, first + count) if model.geom_group[g] in groups and _alpha(model, g) > 0]
         free = [g for g in geoms if not (model.geom_contype[g] or model.geom_conaffinity[g])]
         parts = [p for g in free or geoms if (p := _part(model, g, name, textures)) is not None]
-        if parts and name not in without:
+        if parts:
             out[name] = tuple(parts)
     return out
 

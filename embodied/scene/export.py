@@ -12,9 +12,10 @@ import mujoco
 import numpy as np
 import shapely
 
-from embodied.assets.cache import write_bytes
+from embodied.assets.cache import write_bytes, write_json
 from embodied.house.house import House
 from embodied.house.shapes import footprint
+from embodied.scene.doors import metadata
 from embodied.scene.lit_pages import LitPages
 from embodied.scene.model import UNDERFOOT, build_spec, compile_spec
 
@@ -28,7 +29,13 @@ MESHES, TEXTURES = "meshes", "textures"
 
 
 def export_mjcf(
-    house: House, catalogue: Catalogue, folder: Path, *, free: frozenset[str] = frozenset(), lit: LitPages | None = None
+    house: House,
+    catalogue: Catalogue,
+    folder: Path,
+    *,
+    free: frozenset[str] = frozenset(),
+    lit: LitPages | None = None,
+    hinged: bool = False,
 ) -> Path:
     """Write `folder`/house.xml with its meshes and textures; opens in MuJoCo's own viewer and in dm_control as it is.
 
@@ -40,16 +47,17 @@ def export_mjcf(
     Args:
       free: placements that physics may move, see embodied.scene.model.loose.
       lit: write the house with its baked light instead of its materials.
+      hinged: doors turn on hinges, and house_metadata.json says what bodies and joints are.
 
     Returns:
       The path of house.xml.
     """
     folder = Path(folder)
-    spec = build_spec(house, catalogue, free=free, lit=lit)
+    spec = build_spec(house, catalogue, free=free, lit=lit, hinged=hinged)
     _add_cameras(spec, house)
     for element in (*spec.geoms, *spec.bodies, *spec.joints, *spec.cameras):
         element.name = element.name.replace("/", ".")
-    compile_spec(spec)
+    model = compile_spec(spec)
     (folder / "house.xml").unlink(missing_ok=True)  # written last: where it is, its files are whole
     for name in (MESHES, TEXTURES):
         (folder / name).mkdir(parents=True, exist_ok=True)
@@ -67,9 +75,18 @@ def export_mjcf(
     spec.modelfiledir = str(folder)
     # MuJoCo writes this one as a word, which dm_control takes for a number.
     xml = re.sub(r'(<headlight[^>]* active=)"(true|false)"', lambda m: f'{m[1]}"{int(m[2] == "true")}"', spec.to_xml())
-    xml = re.sub(r"  <compiler[^>]*/>\n\n?", "", xml)  # it would hold for all that is added, and here are no angles
+    xml = re.sub(r"  <compiler[^>]*/>\n\n?", "", xml)  # it would hold for all that is added
+    xml = re.sub(r"(<joint [^>]*?(?:doorhinge|_handle)[^>]*>)", _in_degrees, xml)
+    if hinged or free:
+        write_json(folder / "house_metadata.json", metadata(house, model, free))
     write_bytes(folder / "house.xml", xml.encode())
     return folder / "house.xml"
+
+
+def _in_degrees(joint: re.Match[str]) -> str:
+    """A joint with its angles in degrees, which is what MuJoCo reads where no <compiler> says otherwise."""
+    turned = lambda m: " ".join(f"{math.degrees(float(x)):.6g}" for x in m[2].split())
+    return re.sub(r'\b(range|ref)="([^"]*)"', lambda m: f'{m[1]}="{turned(m)}"', joint[1])
 
 
 def _add_cameras(spec: mujoco.MjSpec, house: House) -> None:

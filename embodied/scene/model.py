@@ -26,8 +26,10 @@ import mujoco
 import numpy as np
 
 from embodied.assets.records import Finish, MeshPart
+from embodied.geometry import rotation
 from embodied.house.house import House, Placement
-from embodied.scene import backdrop, collision
+from embodied.scene import backdrop, collision, doors
+from embodied.scene.doors import Hung
 from embodied.scene.house_meshes import Part, house_parts, owners
 from embodied.scene.landscapes import scenery_of
 from embodied.scene.lit_pages import LitMesh, LitPages
@@ -151,11 +153,13 @@ def build_spec(
     collisions: bool = True,
     lit: LitPages | None = None,
     parts: Sequence[Part] | None = None,
+    hinged: bool = False,
 ) -> mujoco.MjSpec:
     """The house as an MjSpec.
 
     Args:
       free, collisions, lit: as for `compile_scene`.
+      hinged: doors turn on hinges (embodied.scene.doors); fixed at their angles without.
       parts: house_parts(house, catalogue) where the caller has them already.
 
     Raises:
@@ -169,20 +173,22 @@ def build_spec(
     if lit is not None and lit.owners and lit.owners != owners(house):
         raise ValueError(f"this light was baked for another house than {house.name!r}; bake it again (embodied light)")
     spec = _empty_spec(house)
-    if free:
+    if free or hinged:
         _let_move(spec)
+    shell = parts or (shell_parts(house, catalogue.finish) if hinged or collisions else ())
+    hung = doors.hang(spec, house, shell) if hinged else {}
     bodies = {p: _free_body(spec, house.placement_by_id[p]) for p in sorted(free)}
     if lit is None:
         _light(spec)
         _add_sky(spec, house, getattr(catalogue, "cache", None))
         parts = house_parts(house, catalogue) if parts is None else parts
-        _add_parts(spec, parts, bodies)
+        _add_parts(spec, parts, bodies, hung)
     else:
         spec.visual.headlight.active = 0
-        _add_pages(spec, lit, house)
+        _add_pages(spec, lit, house, shell, hung)
     if collisions:
         _add_collisions(spec, house, catalogue, bodies)
-        _add_leaves(spec, parts or shell_parts(house, catalogue.finish))
+        _add_leaves(spec, shell, hung)
     return spec
 
 
@@ -257,7 +263,12 @@ def yaw_quat(yaw: float) -> list[float]:
     return [math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
 
 
-def _add_parts(spec: mujoco.MjSpec, parts: Sequence[Part], bodies: Mapping[str, mujoco.MjsBody]) -> None:
+def _add_parts(
+    spec: mujoco.MjSpec,
+    parts: Sequence[Part],
+    bodies: Mapping[str, mujoco.MjsBody],
+    hung: Mapping[tuple[str, float], Hung],
+) -> None:
     meshes: dict[str, str] = {}
     looks = _Looks(spec, [p.mesh.finish.texture for p in parts if p.mesh.finish.texture])
     count: dict[str, int] = {}
@@ -275,6 +286,8 @@ def _add_parts(spec: mujoco.MjSpec, parts: Sequence[Part], bodies: Mapping[str, 
         material, rgba = looks.of(part.mesh.finish)
         body = bodies.get(part.owner)
         pose = {} if body is not None else {"pos": part.position, "quat": yaw_quat(part.yaw)}
+        if doors.is_leaf(part) and (leaf := hung.get((part.owner, part.yaw))) is not None:
+            body, pose = leaf.body, {"pos": leaf.origin}
         _draw(body or spec.worldbody, f"{part.owner}#{k}", meshes[part.mesh_key], material, rgba, **pose)
 
 
@@ -389,15 +402,36 @@ def load_texture(path: str, largest: int = TEXTURE_SIZE) -> np.ndarray:
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 
 
-def _add_pages(spec: mujoco.MjSpec, lit: LitPages, house: House) -> None:
+def _add_pages(
+    spec: mujoco.MjSpec,
+    lit: LitPages,
+    house: House,
+    parts: Sequence[Part] = (),
+    hung: Mapping[tuple[str, float], Hung] | None = None,
+) -> None:
+    leaves = {p.owner: p for p in parts if doors.is_leaf(p)} if hung else {}
     for i, page in enumerate(lit.pages):
         _add_picture(spec, f"page_{i}", page, emission=1.0)
     count: dict[str, int] = {}
     for i, m in drawn_meshes(lit, house):
         k = count[m.owner] = count.get(m.owner, -1) + 1
         name = f"{i:04d}_{k}_{re.sub(r'[^A-Za-z0-9]+', '_', m.owner)}"
-        _add_mesh(spec, name, m.vertices, None, m.uv, m.faces)
-        _draw(spec.worldbody, f"{m.owner}#{k}", name, f"page_{m.page}", (1, 1, 1, m.alpha))
+        vertices, body, pose = m.vertices, spec.worldbody, {}
+        if hung and (p := leaves.get(m.owner)) is not None and (p.owner, p.yaw) in hung:
+            leaf = hung[p.owner, p.yaw]
+            vertices, body, pose = (
+                _unturned(m.vertices - np.float32(p.position), p.yaw),
+                leaf.body,
+                {"pos": leaf.origin},
+            )
+        _add_mesh(spec, name, vertices, None, m.uv, m.faces)
+        _draw(body, f"{m.owner}#{k}", name, f"page_{m.page}", (1, 1, 1, m.alpha), **pose)
+
+
+def _unturned(vertices: np.ndarray, yaw: float) -> np.ndarray:
+    out = vertices.copy()
+    out[:, :2] = vertices[:, :2] @ rotation(yaw).astype(np.float32)
+    return out
 
 
 def drawn_meshes(lit: LitPages, house: House) -> Iterator[tuple[int, LitMesh]]:
@@ -453,11 +487,15 @@ def _add_collisions(
             _add_boxes(spec.worldbody, p.id, boxes, position=p.position, yaw=p.yaw)
 
 
-def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part]) -> None:
-    """One box for every door leaf and window pane, as it stands."""
+def _add_leaves(spec: mujoco.MjSpec, parts: Sequence[Part], hung: Mapping[tuple[str, float], Hung]) -> None:
+    """One box for every door leaf and window pane, as it stands; of doors on hinges, for the levers, too."""
     count: dict[str, int] = {}
     for part in parts:
-        if part.kind == "opening" and part.owner.endswith(LEAVES):
+        leaf = hung.get((part.owner, part.yaw)) if doors.is_leaf(part) else None
+        if leaf is not None:
+            box, first = collision.bounding_box(part.mesh.vertices), len(leaf.body.geoms)
+            _add_boxes(leaf.body, part.owner, [box], density=doors.LEAF_DENSITY, position=leaf.origin, first=first)
+        elif part.kind == "opening" and part.owner.endswith(LEAVES):
             first = count[part.owner] = count.get(part.owner, -1) + 1
             box = collision.bounding_box(part.mesh.vertices)
             _add_boxes(spec.worldbody, part.owner, [box], position=part.position, yaw=part.yaw, first=first)

@@ -46,6 +46,8 @@ class MjcfOptions(HouseOptions):
 
     out: OutputFolder
     """Folder to write."""
+    hinged: bool = False
+    """Let doors turn on hinges; house_metadata.json names their bodies and joints."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +74,7 @@ def run_mjcf(args: MjcfOptions) -> None:
 
     house, catalogue, lit = lit_house(args)
     with locked(args.out):
-        path = export_mjcf(house, catalogue, args.out, lit=lit)
+        path = export_mjcf(house, catalogue, args.out, lit=lit, hinged=args.hinged)
     show_written(args, "mjcf", house, lit, path)
 
 

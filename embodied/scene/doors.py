@@ -1,0 +1,141 @@
+"""Doors on hinges: bodies, joints and names that readers of other houses in MJCF expect.
+
+A leaf is the body 'doorway_<opening>' (a second one of a pair has '_2' behind it) with the joint '<opening>_doorhinge'
+(of a pair '<opening>_leftdoorhinge' and '_rightdoorhinge'), whose value is the angle of the leaf, 0 to pi / 2; its
+lever is a leaf body of the tree with the joint '<opening>_handle'. RoboCasa looks for 'door' in the names of joints;
+MolmoSpaces for '_door_' in those of bodies, takes the first joint without 'handle' for the hinge, and reads
+house_metadata.json.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from embodied.house.house import House
+from embodied.house.moment import WIDEST
+from embodied.scene.part import Part
+
+HINGE = {"damping": 10.0, "frictionloss": 10.0}
+"""Of a room door: MolmoSpaces has 8 to 12 of both, Infinigen 15 to 25 of damping."""
+LEVER = {"damping": 2.0, "frictionloss": 1.0, "stiffness": 5.0}
+"""Of a lever, which springs back: as Infinigen's."""
+LEVER_RANGE = 0.8
+"""How far a lever turns down, radians."""
+LEVER_INSET, LEVER_HEIGHT = 0.06, 1.03
+"""Metres of a lever's axis from the leaf's free edge and above its lower one."""
+LEAF_DENSITY = 380.0
+"""Of leaves, kg per cubic metre: frames of wood around a light core."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hung:
+    """A body that carries parts of a leaf, and the place of the leaf's frame in it."""
+
+    body: Any
+    origin: tuple[float, float, float]
+    """Metres."""
+
+
+def hang(spec: mujoco.MjSpec, house: House, parts: Sequence[Part]) -> dict[tuple[str, float], Hung]:
+    """Add the bodies and joints of all leaves of `house`, at their angles, to a spec that counts in degrees; by owner
+    and yaw of the parts they carry."""
+    out: dict[tuple[str, float], Hung] = {}
+    angles = {o.id: o.angle for o in house.openings}
+    leaves = [p for p in parts if is_leaf(p) and p.owner.endswith(("/leaf", "/leaf_2"))]
+    pairs = {p.owner.partition("/")[0] for p in leaves if p.owner.endswith("/leaf_2")}
+    for leaf in leaves:
+        opening, _, piece = leaf.owner.partition("/")
+        side = 1.0 if "/+1" in leaf.mesh_key else -1.0
+        which = {"leaf": "left", "leaf_2": "right"}[piece] if opening in pairs else ""
+        suffix = "_2" if piece == "leaf_2" else ""
+        half = leaf.yaw / 2
+        body = spec.worldbody.add_body(
+            name=f"doorway_{opening}{suffix}", pos=leaf.position, quat=[math.cos(half), 0, 0, math.sin(half)]
+        )
+        body.add_joint(
+            name=f"{opening}_{which}doorhinge",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, 0, side],
+            range=[0, math.degrees(WIDEST)],
+            limited=True,
+            ref=math.degrees(angles[opening]),
+            **HINGE,
+        )
+        width = float(np.abs(leaf.mesh.vertices[:, 0]).max())
+        at = (side * (width - LEVER_INSET), 0.0, LEVER_HEIGHT)
+        handle = body.add_body(name=f"{opening}_handle{suffix}", pos=at, gravcomp=1)
+        handle.add_joint(
+            name=f"{opening}_handle{suffix}",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=[0, -side, 0],
+            range=[0, math.degrees(LEVER_RANGE)],
+            limited=True,
+            **LEVER,
+        )
+        out[leaf.owner, leaf.yaw] = out[f"{opening}/glass", leaf.yaw] = Hung(body, (0.0, 0.0, 0.0))
+        out[f"{opening}/handle", leaf.yaw] = Hung(handle, (-at[0], -at[1], -at[2]))
+    return out
+
+
+def is_leaf(part: Part) -> bool:
+    """True for the parts of an opening that turn on its hinges."""
+    return part.mesh_key.startswith("leaf/")
+
+
+def is_of_door(body: str, house: House) -> bool:
+    """True for the bodies of the house's own doors."""
+    names = {o.id for o in house.openings}
+    stem = body.removeprefix("doorway_").removesuffix("_2").removesuffix("_handle")
+    return stem in names and body != stem
+
+
+def openness(model: mujoco.MjModel, data: mujoco.MjData) -> dict[str, float]:
+    """How far every door on hinges is open, 0 to 1, by opening; of a pair, the wider leaf."""
+    out: dict[str, float] = {}
+    for j in range(model.njnt):
+        stem, hinge, _ = model.joint(j).name.partition("doorhinge")
+        if hinge:
+            opening = stem.rpartition("_")[0]
+            value = float(np.clip(data.qpos[model.jnt_qposadr[j]] / WIDEST, 0, 1))
+            out[opening] = max(out.get(opening, 0.0), value)
+    return out
+
+
+def metadata(house: House, model: mujoco.MjModel, free: frozenset[str]) -> dict[str, Any]:
+    """Facts for house_metadata.json, of MolmoSpaces' form: by body, what it is and what its bodies and joints are
+    called."""
+    categories = {p.id: (p.asset, p.object_class) for p in house.placements}
+    joints: Mapping[int, list[str]] = {
+        b: [model.joint(j).name for j in range(model.njnt) if model.body_rootid[model.jnt_bodyid[j]] == b]
+        for b in range(1, model.nbody)
+        if model.body_rootid[b] == b
+    }
+    objects = {}
+    for body, named in joints.items():
+        name = model.body(body).name
+        asset, category = categories.get(name, ("doorway", "doorway"))
+        bodies = [model.body(b).name for b in range(1, model.nbody) if model.body_rootid[b] == body]
+        names = {"bodies": {n: n for n in bodies}, "joints": {n: n for n in named}}
+        objects[name] = {
+            "asset_id": asset,
+            "object_id": name,
+            "category": category,
+            "is_static": False,
+            "name_map": names,
+        }
+    for p in house.placements:
+        if p.id not in free:
+            objects[p.id] = {
+                "asset_id": p.asset,
+                "object_id": p.id,
+                "category": p.object_class,
+                "is_static": True,
+                "name_map": {"bodies": {}, "joints": {}},
+            }
+    return {"objects": objects}
