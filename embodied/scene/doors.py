@@ -1,10 +1,10 @@
 """Doors on hinges: bodies, joints and names that readers of other houses in MJCF expect.
 
 A leaf is the body 'doorway_<opening>' (a second one of a pair has '_2' behind it) with the joint '<opening>_doorhinge'
-(of a pair '<opening>_leftdoorhinge' and '_rightdoorhinge'), whose value is the angle of the leaf, 0 to pi / 2 (or as wide
-as it stands); its lever is a leaf body of the tree with the joint '<opening>_handle'. RoboCasa looks for 'door' in the names of joints;
-MolmoSpaces for '_door_' in those of bodies, takes the first joint without 'handle' for the hinge, and reads
-house_metadata.json.
+(of a pair '<opening>_leftdoorhinge' and '_rightdoorhinge'), whose value is the angle of the leaf, 0 to pi / 2 or as
+wide as it stands; its lever is a leaf body of the tree with the joint '<opening>_handle'. RoboCasa looks for 'door' in
+the names of joints; MolmoSpaces for '_door_' in those of bodies, takes the first joint without 'handle' for the hinge,
+and reads house_metadata.json.
 """
 
 from __future__ import annotations
