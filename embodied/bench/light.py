@@ -1,4 +1,4 @@
-"""All ways of drawing the same views, against the path tracer: quality, milliseconds, memory, disk."""
+"""All ways of drawing the same views, against the path tracer: quality and milliseconds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from embodied.assets.cache import write_json
 from embodied.generate import HouseConfig, generate_house
 from embodied.house.house import House
 from embodied.light.backend import device
-from embodied.light.baking.house import bake, forget
+from embodied.light.baking.house import bake
 from embodied.light.pages.files import Bake
 from embodied.light.tracing.reference import Tracer
 from embodied.navigation.graph import build_graph
@@ -62,8 +62,6 @@ class Shot:
     ms: float
     plain: np.ndarray | None = None
     """(h, w) bool, what is neither mirror nor metal; with way 'diffuse' only."""
-    processor: float = 0.0
-    """Seconds of all cores that tracing it took."""
 
 
 def compare(
@@ -75,7 +73,6 @@ def compare(
       seed: of the first house; the others have the next ones, each at another time of day.
     """
     shots: list[Shot] = []
-    bakes: list[dict[str, Bake]] = []
     kinds: list[str] = []
     for k in range(HOUSES):
         hour, weather = TIMES[k % len(TIMES)]
@@ -83,13 +80,11 @@ def compare(
         progress(
             f"house {seed + k} at {hour:g} h, {weather}: {len(house.rooms)} rooms, {len(house.placements)} objects"
         )
-        for quality in BAKES:
-            forget(cache, house, catalogue, quality)
-        bakes.append({quality: bake(house, catalogue, cache, quality) for quality in BAKES})
+        bakes = {quality: bake(house, catalogue, cache, quality) for quality in BAKES}
         chosen = viewpoints(house, kinds)
         kinds += [house.room_by_id[room].kind for room, _, _ in chosen]
-        shots += draw(house, catalogue, bakes[-1], chosen)
-    facts = measure(shots, bakes)
+        shots += draw(house, catalogue, bakes, chosen)
+    facts = measure(shots)
     out = Path(out)
     out.mkdir(parents=True, exist_ok=True)
     write_json(out / "light.json", facts, indent=1)
@@ -144,91 +139,55 @@ def _drawn(r: Renderer, way: str, view: tuple[str, np.ndarray, float], hour: flo
 def _traced(t: Tracer, way: str, view: tuple[str, np.ndarray, float], hour: float) -> Shot:
     room, eye, yaw = view
     camera = camera_at(eye, yaw, -0.1, VIEW_ANGLE)
-    start, used = time.perf_counter(), time.process_time()
+    start = time.perf_counter()
     rgb, _, _ = t.picture(eye, camera.forward, camera.up, VIEW_ANGLE, VIEW_SIZE)
     ms = 1e3 * (time.perf_counter() - start) * 256 * 256 / (VIEW_SIZE[0] * VIEW_SIZE[1])
-    used = time.process_time() - used
     plain = t.plain(eye, camera.forward, camera.up, VIEW_ANGLE, VIEW_SIZE) if way == "diffuse" else None
-    return Shot(room, hour, way, rgb, ms, plain, used)
+    return Shot(room, hour, way, rgb, ms, plain)
 
 
-def measure(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict:
-    """Medians over all views per way, and what the bakes cost.
+def measure(shots: Sequence[Shot]) -> dict:
+    """Medians over all views per way.
 
     Against the diffuse reference only diffuse surfaces count: a page cannot follow the eye as mirrors
-    and metals do. With them it is 'psnr_diffuse_all'. The full reference is compared whole, and mirrors and metals
-    alone with it as 'psnr_shiny' (in the median over the views that show at least SHOWN of them).
+    and metals do. The full reference is compared whole, and mirrors and metals alone with it as 'psnr_shiny' (in the
+    median over the views that show at least SHOWN of them).
     """
     by = {(s.room, s.hour, s.way): s for s in shots}
     views = sorted({(s.room, s.hour) for s in shots})
     rows = []
     for way in WAYS:
         row: dict = {"way": way, "ms_256": float(np.median([by[*v, way].ms for v in views]))}
-        for name, truth in (("reference", "reference"), ("diffuse", "diffuse"), ("diffuse_all", "diffuse")):
+        for truth in ("reference", "diffuse"):
             pairs = [
-                (by[*v, way].rgb, by[*v, truth].rgb, by[*v, "diffuse"].plain if name == "diffuse" else None)
+                (by[*v, way].rgb, by[*v, truth].rgb, by[*v, "diffuse"].plain if truth == "diffuse" else None)
                 for v in views
             ]
-            row[f"psnr_{name}"] = None if way == truth else float(np.median([psnr(*p) for p in pairs]))
-            row[f"ssim_{name}"] = None if way == truth else float(np.median([ssim(*p) for p in pairs]))
+            row[f"psnr_{truth}"] = None if way == truth else float(np.median([psnr(*p) for p in pairs]))
+            row[f"ssim_{truth}"] = None if way == truth else float(np.median([ssim(*p) for p in pairs]))
         shiny = [(v, ~plain) for v in views if (plain := by[*v, "diffuse"].plain) is not None]
         alone = [psnr(by[*v, way].rgb, by[*v, "reference"].rgb, m) for v, m in shiny if m.mean() >= SHOWN]
         row["psnr_shiny"] = None if way == "reference" or not alone else float(np.median(alone))
         rows.append(row)
-    bakes = [b[BAKES[-1]] for b in baked]
-    pages = [sum(v[0] for k, v in b.manifest["files"].items() if k.startswith("page_")) / 1e6 for b in bakes]
-    return {
-        "rows": rows,
-        "views": [list(v) for v in views],
-        "device": device(),
-        "renderer": str(gl.info()),
-        "processor": costs(shots, baked),
-        "bake_seconds": float(np.median([b.manifest["total_seconds"] for b in bakes])),
-        "luxels": int(np.median([b.manifest["luxels"] for b in bakes])),
-        "disk_mb": float(np.median(pages)),
-        "memory_mb": float(np.median([sum(p.nbytes for p in b.lit.pages) / 1e6 for b in bakes])),
-        "shiny": float(np.mean([1 - p.mean() for v in views if (p := by[*v, "diffuse"].plain) is not None])),
-        "bias": float(np.median([b.manifest["check"]["bias"] for b in bakes])),
-    }
-
-
-def costs(shots: Sequence[Shot], baked: Sequence[Mapping[str, Bake]]) -> dict[str, float]:
-    """Median processor seconds: of a bake per quality, its furniture imported and unwrapped, and of path tracing one
-    view of the reference, by the name of the way."""
-    without_unwrapping = lambda spent: sum(v for k, v in spent.items() if k != "unwrap")
-    lit = {q: [without_unwrapping(b[q].manifest["seconds"]) for b in baked] for q in BAKES}
-    lit["reference"] = [s.processor for s in shots if s.way == "reference"]
-    return {name: round(float(np.median(seconds)), 1) for name, seconds in lit.items()}
+    return {"rows": rows, "views": [list(v) for v in views], "device": device(), "renderer": str(gl.info())}
 
 
 def table(facts: dict) -> str:
     """The measures as Markdown."""
     number = lambda x, form: "" if x is None else format(x, form)
     lines = [
-        "| way | ms per 256 × 256 | PSNR / SSIM to reference | mirrors and metal alone | to diffuse reference "
-        "| the same with mirrors and metal |",
-        "|---|---|---|---|---|---|",
+        "| way | ms per 256 × 256 | PSNR / SSIM to reference | mirrors and metal alone | to diffuse reference |",
+        "|---|---|---|---|---|",
     ]
     for r in facts["rows"]:
-        cells = [
-            f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}"
-            for t in ("reference", "diffuse", "diffuse_all")
-        ]
-        cells.insert(1, number(r["psnr_shiny"], ".1f"))
-        lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {' | '.join(cells)} |")
-    spent, last = facts["processor"], facts["processor"][BAKES[-1]]
-    lines.append(
-        "\nProcessor time of a flat's light, furniture unwrapped: "
-        + ", ".join(f"{q} {spent[q]:.0f} s ({spent[q] / last:.2f})" for q in BAKES)
-        + f"; of one view of {VIEW_SIZE[1]} × {VIEW_SIZE[0]} by the path tracer: {spent['reference']:.0f} s."
+        whole, diffuse = (
+            f"{number(r[f'psnr_{t}'], '.1f')} / {number(r[f'ssim_{t}'], '.3f')}" for t in ("reference", "diffuse")
+        )
+        lines.append(f"| {r['way']} | {r['ms_256']:.0f} | {whole} | {number(r['psnr_shiny'], '.1f')} | {diffuse} |")
+    views = len(facts["views"])
+    return "\n".join(
+        [*lines, f"\nMedians of {views} views of one run; {facts['renderer']}, light by {facts['device']}."]
     )
-    lines.append(
-        f"\nMedians of {len(facts['views'])} views of one run, {facts['shiny']:.1%} of whose pixels show mirrors or "
-        f"metal; {facts['renderer']}. "
-        f"Bake {facts['bake_seconds']:.0f} s ({facts['luxels']} luxels, {facts['device']}), "
-        f"bias {facts['bias']:+.1%}; textures {facts['disk_mb']:.1f} MB on disk, {facts['memory_mb']:.0f} MB in memory."
-    )
-    return "\n".join(lines)
 
 
 def psnr(a: np.ndarray, b: np.ndarray, where: np.ndarray | None = None) -> float:

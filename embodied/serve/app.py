@@ -42,11 +42,6 @@ LONGEST_MESSAGE = 16_384
 """Bytes of a message from a browser; longer ones close the connection."""
 RATE, BURST = 8.0, 30.0
 """Messages per second that a browser may send for long, and at once."""
-JOIN_RATE, JOIN_BURST = 2.0, 60.0
-"""People per second that may join."""
-SOCKETS = 2000
-LOGGED_STRANGERS = 100
-"""Addresses of other pages that are logged, each once."""
 HELLO_SECONDS = 30.0
 """Seconds that a new connection has to say who it is."""
 SAFE = {
@@ -106,11 +101,8 @@ class Server:
         self.origins = None if addresses is None else tuple(origin_of(a) for a in addresses)
         self.paths = frozenset(urlsplit(page_address(a)).path for a in addresses or ()) - {""}
         """Under which a proxy may pass requests on; others are as at the root."""
-        self._strangers: set[str] = set()
         self._secret = secret.encode()
         self._sockets: dict[str, WebSocket] = {}
-        self._open = 0
-        self._joining = Bucket(JOIN_RATE, JOIN_BURST)
         self._bots: dict[str, asyncio.Task[None]] = {}
         houses = houses_of(sessions)
         self._plan = functools.cache(lambda house: plan_of(houses[house], pictures))
@@ -204,7 +196,6 @@ class Server:
         if refusal := self.refusal(socket):
             await self._refuse(socket, refusal)
             return
-        self._open += 1
         person: Person | None = None
         try:
             hello = read_message(await asyncio.wait_for(socket.receive_text(), HELLO_SECONDS))
@@ -219,7 +210,6 @@ class Server:
             # it has gone, also while something was sent; KeyError: a binary message
             pass
         finally:
-            self._open -= 1
             if person is not None and self._sockets.get(person.id) is socket:
                 del self._sockets[person.id]
                 person.connected, person.away_since, person.waiting = 0, time.time(), None
@@ -234,8 +224,6 @@ class Server:
 
     def refusal(self, socket: WebSocket) -> str | None:
         """The reason why a page may not connect, in words for who reads it; browsers always say which page it is."""
-        if self._open >= SOCKETS:
-            return "Too many people are here just now. Please try again later."
         page = socket.headers["origin"]
         try:
             page = origin_of(page)
@@ -246,9 +234,7 @@ class Server:
             return None
         text = f"This page was opened at {page}, but the study is at {' or '.join(wanted[:1]) or 'another address'}. "
         text += f"Please open the link that you were given. (The server admits {page} if it is started with --address.)"
-        if page not in self._strangers and len(self._strangers) < LOGGED_STRANGERS:
-            self._strangers.add(page)
-            log.warning("refused the page at %s: the study is at %s; see --address", page, ", ".join(wanted))
+        log.warning("refused the page at %s: the study is at %s; see --address", page, ", ".join(wanted))
         return text
 
     async def _enter(self, socket: WebSocket, hello: dict[str, Any]) -> Person:
@@ -277,7 +263,7 @@ class Server:
             raise Refused("This link is not valid. Please use the link that you were given.")
         if single and invitation in self.sessions.used:
             raise Refused("This link was used before, in another browser.")
-        if len(self.sessions.people) >= self.sessions.study.people or not self._joining.take():
+        if len(self.sessions.people) >= self.sessions.study.people:
             raise Refused("Too many people want to take part just now. Please try again later.")
         token, name = secrets.token_urlsafe(24), secrets.token_hex(4)
         body = {"person": name, "key": key_of(token), "invitation": invitation if single else None}
