@@ -345,7 +345,7 @@ def grounds(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("learner", ["adel", "dagger", "continuous"])
+@pytest.mark.parametrize("learner", ["adel", "continuous"])
 def test_a_run_is_kept_resumed_and_loaded(grounds, tmp_path, learner):
     config = dataclasses.replace(QUICK, learner=learner)
     problem = lambda: grounds.problem(config.seed, tmp_path / "begun", silent)

@@ -69,11 +69,11 @@ def some_phrases(lexicon, rng) -> list[Phrase]:
 def test_what_every_speaker_says_is_read_back_as_it_was_meant(lexicon):
     rng = np.random.default_rng(1)
     right = 0
-    for n in range(120):
+    for n in range(60):
         phrases = some_phrases(lexicon, rng)
         text = say(phrases, SPEAKERS[n % len(SPEAKERS)], rng=rng)
         right += parse(text, lexicon).clauses == tuple(p.clause for p in phrases)
-    assert right >= 114, f"{right} of 120"
+    assert right >= 57, f"{right} of 60"
 
 
 SLOTS = {"side": "left", "room": "kitchen", "other": "study", "metres": "three meters", "steps": "one big step"}
