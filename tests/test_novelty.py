@@ -20,7 +20,6 @@ from embodied.language.grammar import NOVEL_TEMPLATES, NOVEL_WORDS, Phrase, say
 from embodied.language.lexicon import lexicon_of
 from embodied.language.speakers import SPEAKERS, draw_speaker
 from embodied.language.templates import TEMPLATES
-from embodied.novelty import novel_among
 
 AREA = (50.0, 80.0)
 SEEDS = range(4)
@@ -37,13 +36,6 @@ def houses(catalogue):
         novelty: [generate_house(s, HouseConfig(area=AREA, novelty=novelty), catalogue) for s in SEEDS]
         for novelty in ("familiar", "novel")
     }
-
-
-def test_novel_things_depend_on_the_names_alone():
-    names = [f"model {k}" for k in range(40)]
-    assert novel_among(names) == novel_among(reversed(names)) == novel_among([*names, *names])
-    assert len(novel_among(names)) == 10
-    assert not novel_among(names[:3])
 
 
 def test_no_model_of_a_divided_class_is_in_houses_of_both_kinds(catalogue, houses):

@@ -221,11 +221,6 @@ def test_light_of_another_house_is_refused(house):
         scene.build_spec(house, HandCatalogue(), lit=pages)
 
 
-def test_a_missing_texture_says_how_to_get_it():
-    with pytest.raises(OSError, match="missing or damaged; delete"):
-        scene.load_texture("/nowhere/oak.png")
-
-
 def test_rooms_that_are_no_rectangles_have_floors_to_their_edges():
     house = two_rooms()
     room = dataclasses.replace(house.rooms[0], polygon=((0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4)))

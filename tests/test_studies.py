@@ -128,12 +128,6 @@ def test_each_run_is_trained_and_judged_once_and_its_numbers_are_right(tmp_path)
     assert (out / "archer-1.png").read_bytes().startswith(b"\x89PNG") and "| far |" in (out / "archer-1.md").read_text()
 
 
-def test_processor_time_counts_each_run_once(tmp_path, monkeypatch):
-    monkeypatch.setattr("embodied.agents.studies.engine._processor", lambda home: 3600.0)
-    found = table(Archer(tmp_path / "log"), tmp_path / "out")  # six runs; two rows show those of 'far'
-    assert "Processor time of training: 6.00 hours." in found["notes"]
-
-
 def test_numbers_of_other_settings_are_never_shown_under_new_ones(tmp_path):
     archer, out = Archer(tmp_path / "log"), tmp_path / "out"
     before = table(archer, out)

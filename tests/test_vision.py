@@ -22,7 +22,7 @@ from embodied.agents.vision.encoder import load_encoder, pool_views, random_enco
 from embodied.agents.vision.features import feature_path, load_bank, load_features, save_features
 from embodied.agents.vision.lite import Lite, folded, load_imagenet
 from embodied.agents.vision.probe import LabelledFeatures, average_precision, place_auc, read
-from embodied.agents.vision.training import photograph_strip, train_encoder, turn_strip
+from embodied.agents.vision.training import photograph_strip, train_encoder
 from embodied.errors import UnableError
 from embodied.interface import Sight
 from embodied.render.pictures import Baked, Unlit, parse_pictures
@@ -141,12 +141,6 @@ def test_labels_count_what_each_cell_shows():
     seen = labels.visible_in_views(share[None])
     assert seen[0, :, 0].any()
     assert not seen[0, :, 1].any()
-
-
-def test_mirroring_and_turning_undo_themselves():
-    a = np.arange(24).reshape(2, 12)
-    assert np.array_equal(turn_strip(turn_strip(a, 5, False), 7, False), a)
-    assert np.array_equal(turn_strip(turn_strip(a, 0, True), 0, True), a)
 
 
 def test_whitened_features_have_no_mean_and_unit_covariance():
