@@ -157,8 +157,11 @@ class World:
         self._moments[-1] = Moment({**self.moment.moved, **moved}, opened, bodies)
         self._bring_up_to_date(slack=SLACK)
 
-    def show(self, moment: Moment) -> None:
+    def show(self, moment: Moment, *, slack: float = 0.0) -> None:
         """Bring the house to a moment, in all that is drawn from now on.
+
+        Args:
+          slack: metres, and thrice as many radians, that something may move until its light is computed anew.
 
         Raises:
           ValueError: the moment is not of this house, or it is drawn by tracing rays, which knows the house at rest.
@@ -169,7 +172,7 @@ class World:
         if isinstance(self.pictures, Traced):
             raise ValueError("ray-traced pictures show a house at rest: open a world of moment.applied(house)")
         self._moments[-1] = moment
-        self._bring_up_to_date()
+        self._bring_up_to_date(slack)
 
     def at(self, hour: float) -> World:
         """The same house at rest at another hour: a world of its own, with light of its own.
@@ -183,7 +186,8 @@ class World:
     def _bring_up_to_date(self, slack: float = 0.0) -> None:
         """Draw the moment from now on."""
         self._recent.cache_clear()
-        self.__dict__.pop("_poses", None)
+        for name in ("_poses", "parts"):
+            self.__dict__.pop(name, None)
         if self.pictures.quality is None or self.moment.is_rest:
             if self._renderer is not None:
                 self._renderer.close()
@@ -220,8 +224,8 @@ class World:
 
     @functools.cached_property
     def parts(self) -> tuple[Part, ...]:
-        """Everything visible in the house, as meshes."""
-        return house_parts(self.house, self.catalogue)
+        """Everything visible in the house as it is now, as meshes."""
+        return house_parts(self.moment.applied(self.house), self.catalogue)
 
     @functools.cached_property
     def owners(self) -> tuple[str, ...]:
@@ -279,8 +283,10 @@ class World:
 
     @property
     def lit(self) -> LitPages | None:
-        """The house with its baked light painted on; None where it is not lit. Bakes on first use."""
-        return self.baked().lit if self.pictures.quality else None
+        """The house as it is now with its light painted on; None where it is not lit. Bakes on first use."""
+        if self.pictures.quality is None:
+            return None
+        return self.baked().lit if self._moving is None else self._moving.as_shown()
 
     def darkness(self, position: Sequence[float] | np.ndarray) -> float:
         """How much darker than one where white paper has 100 cd/m2 the room at `position` is, by its exposure; 1 where
@@ -295,7 +301,8 @@ class World:
         if self._renderer is None:
             overlay = gloss_of(self.baked()) if _reflects(self.pictures) else None
             house = self.house if self.pictures.quality else self.moment.applied(self.house)
-            self._renderer = Renderer(house, self.catalogue, size=self.pictures.size, lit=self.lit, overlay=overlay)
+            lit = self.baked().lit if self.pictures.quality else None
+            self._renderer = Renderer(house, self.catalogue, size=self.pictures.size, lit=lit, overlay=overlay)
         return self._renderer
 
     def baked(self, progress: bool = False) -> Bake:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import mujoco
 import numpy as np
 import pytest
 from conftest import two_rooms
@@ -15,7 +16,9 @@ from embodied.house.house import HouseError, Light, Sky
 from embodied.house.moment import Moment, RigidPose
 from embodied.light import bake
 from embodied.light.moving import filled
+from embodied.light.viewer import ViewerLight
 from embodied.navigation.graph import build_graph
+from embodied.scene.model import build_spec
 from embodied.scene.part import Part
 from embodied.world import World
 
@@ -147,3 +150,45 @@ def test_floors_darken_under_a_thing_and_only_near_it(world):
     same = (before.ids == floor) & (after.ids == floor)
     change = after.rgb.astype(float).mean(2) - before.rgb.astype(float).mean(2)
     assert np.percentile(change[same], 2) < -25 and np.abs(np.percentile(change[same], 60)) < 8
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_body_that_the_moment_does_not_have_any_more_is_not_drawn_and_leaves_no_shadow(world):
+    flat = box_mesh((-0.5, -0.5, 0.0), (0.5, 0.5, 0.05), (0.1, 0.1, 0.1, 1.0))
+    small = box_mesh((0.0, 0.0, 0.0), (0.1, 0.1, 0.1), (0.5, 0.5, 0.5, 1.0))
+    for name, mesh in (("lid", flat), ("cube", small)):
+        world.add(name, [Part("", "object", "", mesh, name)])
+    eye = ((1.5, 3.6, 0.2), -math.pi / 2, -0.1, 1.4, (96, 128))
+    far = RigidPose((8.5, 0.5, 0.1))
+    world.show(Moment(bodies={"cube": far}))
+    without = world.camera(*eye).rgb
+    world.show(Moment(bodies={"cube": far, "lid": RigidPose((1.5, 2.4, 0.25))}))
+    world.show(Moment(bodies={"cube": far}))
+    np.testing.assert_array_equal(world.camera(*eye).rgb, without)
+    world.show(Moment())
+
+
+@pytest.mark.slow
+def test_a_grey_ball_in_mujocos_viewer_takes_the_light_of_the_room_that_it_is_in(world):
+    spec = build_spec(SUNNY, HandCatalogue(), lit=world.lit)
+    for name in ("one", "other"):
+        ball = spec.worldbody.add_body(name=name)
+        ball.add_freejoint()
+        ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0], rgba=[0.5, 0.5, 0.5, 1.0])
+    model = spec.compile()
+    data, light = mujoco.MjData(model), ViewerLight(model, world.baked(), SUNNY)
+    places = {"living_room_1": (2.5, 1.0, 1.0), "bedroom_1": (8.5, 0.5, 1.0)}
+    seen = {}
+    for order in (1, -1):
+        for body, place in zip(("one", "other"), list(places.values())[::order], strict=True):
+            data.joint(model.body(body).jntadr[0]).qpos[:3] = place
+        mujoco.mj_forward(model, data)
+        light.shine(data)
+        seen[order] = [model.geom_rgba[model.body(b).geomadr[0]] for b in ("one", "other")]
+        seen[order] = np.array(seen[order])
+    np.testing.assert_array_equal(seen[1], seen[-1][::-1])  # by place, whichever ball it is
+    lights = [world.baked().probes.at(np.array([p]), room)[0, 0] for room, p in places.items()]
+    gains = world.baked().exposure.near(np.array(list(places.values())))
+    assert np.argmax((np.array(lights) * gains).sum(1)) == np.argmax(seen[1][:, :3].sum(1))
+    assert np.ptp(seen[1][:, :3].sum(1)) > 0.02

@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -32,6 +34,7 @@ from embodied.light.tracing.emitters import Lamp
 from embodied.light.tracing.luxels import luxels_of, with_glow
 from embodied.light.tracing.rays import rays_among
 from embodied.render.gloss import Rays
+from embodied.render.sampling import numba_kernels
 from embodied.scene.lit_pages import LitMesh
 from embodied.scene.part import Part
 
@@ -328,6 +331,23 @@ def hiding(cloud: Cloud, position: np.ndarray, normal: np.ndarray) -> tuple[np.n
     Returns:
       (n,) share hidden, (n, 3) the mean direction of it, and (n, 3) e that they send from there.
     """
+    if (compiled := kernels()) is not None:
+        total, mean, light = np.empty(len(position), np.float32), *np.empty((2, len(position), 3), np.float32)
+        both = [np.ascontiguousarray(a, np.float32) for a in (position, normal, cloud.position, cloud.normal)]
+        compiled.hiding(*both, cloud.thin, cloud.area, np.ascontiguousarray(cloud.sent, np.float32), total, mean, light)
+    else:
+        total, mean, light = _hiding(cloud, position, normal)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
+    return total, mean, light
+
+
+def kernels() -> ModuleType | None:
+    """embodied.light.moving_kernels, if Numba is installed and works."""
+    return importlib.import_module("embodied.light.moving_kernels") if numba_kernels() is not None else None
+
+
+def _hiding(cloud: Cloud, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`hiding` without Numba, the mean direction not yet of unit length."""
     at, out = cloud.position, cloud.normal
     far2 = (position**2).sum(1)[:, None] + (at**2).sum(1) - 2 * position @ at.T
     far2 = np.maximum(far2, 1e-6)
@@ -338,7 +358,6 @@ def hiding(cloud: Cloud, position: np.ndarray, normal: np.ndarray) -> tuple[np.n
     total = share.sum(1)
     share *= (np.minimum(total, 1) / np.maximum(total, 1e-9))[:, None]
     mean = share @ at - share.sum(1)[:, None] * position
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
     return np.minimum(total, 1), mean, (share @ cloud.sent).astype(np.float32)
 
 

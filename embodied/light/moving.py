@@ -29,6 +29,7 @@ from embodied.light.movers import (
     cloud_of,
     hidden_share,
     hiding,
+    kernels,
     shading,
     surface_of,
     unhidden,
@@ -37,6 +38,7 @@ from embodied.light.pages.colours import linear
 from embodied.light.pages.cover import sources
 from embodied.light.pages.files import Bake, Ingredients
 from embodied.light.pages.gloss_data import gloss_data_of
+from embodied.light.pages.tone import _shown_table as shown_table
 from embodied.light.pages.tone import displayed
 from embodied.light.probes import CORNERS, harmonics, radiance, turned
 from embodied.light.settings import LightSettings
@@ -51,17 +53,20 @@ from embodied.scene.part import Part
 
 TILE = 16
 """Luxels along the sides of the tiles in which pages change."""
-SAMPLES = TILE * TILE // 4
+HALF_TILE = TILE // 2
+SAMPLES = HALF_TILE * HALF_TILE
 FAINT = 0.025
 """Share of what a place sees, hidden by a thing, below which that is not shown."""
-SLIGHT = 0.01
-"""Change of the share of its light that a place gets which goes unnoticed."""
+SLIGHT, SLIGHT_MOVING = 0.01, 0.03
+"""Change of the share of its light that a place gets which goes unnoticed, in a picture and in one of many."""
 NEARBY = 0.05
 """Share hidden by the discs of a thing from which on rays are asked what it hid where it was baked."""
 BODIES = "*"
 """Name of the group of all that is no part of the house."""
 BODY_LUXELS = 0.25
 """Luxels of a body, of those of a piece of furniture: robots have many."""
+FEW_FROM, FEW_DISCS = 0.3, 12
+"""Metres from a thing from which on so few discs stand for it."""
 SHADOW_REACH = 0.8
 """Metres from a thing up to which it is asked what light it hides."""
 UNKNOWN_BELOW, KNOWN_FROM = 0.3, 0.65
@@ -71,7 +76,8 @@ BRIGHT = (0.3, 2.0)
 """Bounds of how bright what a thing hides is, beside the rest: nine harmonics are no more sure of one direction."""
 METALLIC = 77
 """Metallic share, times 255, from which on a page wears what the face mirrors, which does not change."""
-
+AWAY = RigidPose((0.0, 0.0, -1e3))
+"""Pose of a body that the moment does not have."""
 
 Tile: TypeAlias = tuple[int, int, int]
 """Page, row and column of a tile."""
@@ -144,6 +150,8 @@ class MovingHouse:
         self._hiding: dict[str, _Hides] = {}
         self._opens: dict[Tile, tuple[np.ndarray, np.ndarray]] = {}
         self._shown_things: dict[str, np.ndarray] = {}
+        self._drawn_at: dict[str, RigidPose] = {}
+        self._sunlit: dict[int, np.ndarray] = {}
         self._extra: dict[str, tuple[Part, ...]] = {}
         self._lamps = read_lamps(bake.folder / "lamps.npz", bake.manifest["lamps"])
         towards = sun_direction(house.sky)
@@ -189,11 +197,13 @@ class MovingHouse:
         if new:
             self.__dict__.pop("_static", None)
             self.__dict__.pop("lit", None)
-            self._shown, self._shown_things = {}, {}
+            self._shown, self._shown_things, self._drawn_at = {}, {}, {}
             self._take_out(new)
         for name, thing in self._things.items():
             pose = wanted.get(name, thing.rest)
-            if thing.surface is not None and pose is not None:
+            if pose is None:
+                self._placed.pop(name, None)
+            elif thing.surface is not None:
                 known = self._placed.get(name)
                 if known is None or known.lit_at.apart(pose) > slack:
                     self._placed[name] = self._lit_at(name, thing.surface, pose)
@@ -270,6 +280,32 @@ class MovingHouse:
         return LitPages(tuple(meshes), tuple(pages), self.bake.lit.digest, ())
 
     @property
+    def surfaces(self) -> list[Surface]:
+        """Of all that moved, in the order of their meshes and pages in `lit`."""
+        return [t.surface for t in self._things.values() if t.surface is not None]
+
+    def as_shown(self) -> LitPages:
+        """The house as `show` had it last, for what draws or writes it elsewhere."""
+        meshes, pages = list(self.lit.meshes), [page.copy() for page in self.lit.pages]
+        number, page = len(self.bake.lit.meshes), len(self.bake.lit.pages)
+        for name, thing in self._things.items():
+            own = thing.surface.meshes if thing.surface is not None else ()
+            if (placed := self._placed.get(name)) is not None:
+                room = room_at(self.house, np.mean(placed.box, axis=0)) or ANYWHERE
+                for k, m in enumerate(own):
+                    vertices = placed.pose.points(m.vertices)
+                    meshes[number + k] = dataclasses.replace(meshes[number + k], vertices=vertices, room=room)
+                for k, painted in enumerate(placed.surface.pages):
+                    pages[page + k] = self._own_picture(placed, painted)
+            else:
+                meshes[number : number + len(own)] = [_nothing(m) for m in meshes[number : number + len(own)]]
+            number, page = number + len(own), page + len(thing.surface.pages if thing.surface is not None else ())
+        for patch in self._patches(list(self._shown)):
+            h, w = patch.picture.shape[:2]
+            pages[patch.page][patch.row : patch.row + h, patch.column : patch.column + w] = patch.picture
+        return dataclasses.replace(self.lit, meshes=tuple(meshes), pages=tuple(pages))
+
+    @property
     def moving(self) -> range:
         """Numbers in `lit` of the meshes that move."""
         return range(len(self.bake.lit.meshes), len(self.lit.meshes))
@@ -284,7 +320,7 @@ class MovingHouse:
         still, meshes = self._gloss_at_rest, self.bake.lit.meshes
         kept = [bool(len(m.faces)) for m in self.lit.meshes[: len(meshes)]]
         cut = lambda known: [a if a is None or keep else a[:0] for a, keep in zip(known, kept)]
-        surfaces = [t.surface for t in self._things.values() if t.surface is not None]
+        surfaces = self.surfaces
         own = [(s, m, g) for s in surfaces for m, g in zip(s.meshes, s.gloss, strict=True)]
         return dataclasses.replace(
             still,
@@ -299,12 +335,16 @@ class MovingHouse:
         return frozenset().union(*(t.owners for t in self._things.values()))
 
     def _corners(self) -> dict[int, np.ndarray]:
+        """By number of mesh in `lit`, where vertices are of what is not where it was drawn last."""
         out, number = {}, len(self.bake.lit.meshes)
         for name, thing in self._things.items():
-            for m in thing.surface.meshes if thing.surface is not None else ():
-                if name in self._placed:
-                    out[number] = self._placed[name].pose.points(m.vertices)
-                number += 1
+            placed = self._placed.get(name)
+            meshes = thing.surface.meshes if thing.surface is not None else ()
+            pose = AWAY if placed is None else placed.pose
+            if self._drawn_at.get(name) != pose:
+                self._drawn_at[name] = pose
+                out |= {number + k: pose.points(m.vertices) for k, m in enumerate(meshes)}
+            number += len(meshes)
         return out
 
     def _own_patches(self) -> Iterator[Patch]:
@@ -448,6 +488,7 @@ class MovingHouse:
 
     def _take_out(self, names: Sequence[str]) -> None:
         """Give pages the light back that things hid where they were baked."""
+        self._sunlit = {}
         for name in names:
             thing = self._things[name]
             if thing.surface is None or thing.rest is None:
@@ -520,25 +561,43 @@ class MovingHouse:
 
     def _house_patches(self, slack: float) -> Iterator[Patch]:
         """Tiles whose light is not what was shown last."""
-        now: dict[Tile, list[_Hides]] = {tile: [] for tile in (*self._touched, *self._shown)}
         groups: dict[str, list[Placed]] = {}
         for name, placed in self._placed.items():
             groups.setdefault(BODIES if self._things[name].rest is None else name, []).append(placed)
-        for name, group in groups.items():
-            known = self._hiding.get(name)
-            if known is None or not known.holds(group, slack):
-                known = self._hiding[name] = self._hides(group)
-            for tile in (*known.tiles, *known.sunlit):
-                if known not in now.setdefault(tile, []):
-                    now[tile].append(known)
-        for tile, things in sorted(now.items(), key=lambda item: item[0]):
-            shown = self._shown.get(tile)
-            if shown is not None and shown.things == things:
-                continue
-            new = _Shown(things, _together([t.tiles[tile] for t in things if tile in t.tiles]))
-            if shown is None or shown.differs(new, tile):
-                self._shown[tile] = new
-                yield self._patch(tile, new)
+        moved = [n for n, g in groups.items() if n not in self._hiding or not self._hiding[n].holds(g, slack)]
+        before = [self._hiding.pop(n) for n in [*self._hiding] if n in moved or n not in groups]
+        self._hiding |= {name: self._hides(groups[name]) for name in moved}
+        about = [*before, *(self._hiding[name] for name in moved)]
+        if not self._shown:
+            about = [*self._hiding.values()]
+        tiles = {tile for hides in about for tile in (*hides.tiles, *hides.sunlit)}
+        tiles |= set() if self._shown else self._touched
+        new = {}
+        for tile in tiles:
+            things = [h for h in self._hiding.values() if tile in h.tiles or tile in h.sunlit]
+            new[tile] = _Shown(things, _together([t.tiles[tile] for t in things if tile in t.tiles]))
+        changed = [tile for tile, shown in new.items() if self._differs(tile, shown)]
+        same = list(new.keys() - set(changed))
+        if same:
+            passed = [np.stack([some[tile].light[..., 0] for tile in same]) for some in (self._shown, new)]
+            off = np.abs(passed[0] - passed[1]).max((1, 2)) > (SLIGHT if slack == 0 else SLIGHT_MOVING)
+            changed += [tile for tile, differs in zip(same, off, strict=True) if differs]
+        self._shown |= {tile: new[tile] for tile in changed}
+        yield from self._patches(changed)
+
+    def _differs(self, tile: Tile, new: _Shown) -> bool:
+        """True where a tile surely looks another way than it is shown."""
+        shown = self._shown.get(tile)
+        return shown is None or not new.things or any(tile in t.sunlit for t in (*shown.things, *new.things))
+
+    def _patches(self, tiles: Sequence[Tile]) -> Iterator[Patch]:
+        """Tiles as they are to be shown, those that touch each other in one."""
+        by_page: dict[int, list[Tile]] = {}
+        for tile in sorted(tiles):
+            by_page.setdefault(tile[0], []).append(tile)
+        for page, own in by_page.items():
+            for island in _islands(np.array(own)[:, 1:]):
+                yield self._patch(page, island)
 
     def _hides(self, things: Sequence[Placed]) -> _Hides:
         """The tiles from which things hide light."""
@@ -546,31 +605,32 @@ class MovingHouse:
         near = list(self._pages_near(low - SHADOW_REACH, high + SHADOW_REACH))
         sunlit: list[Tile] = []
         if len(self._portals):
-            for page, r, tiles in self._pages_near(*_shadow_box(low, high, self._towards)):
-                sun = self._light(page)[1]
-                cut = lambda k, r=r: slice(k * TILE * r.fineness, (k + 1) * TILE * r.fineness)
-                sunlit += [(page, i, k) for i, k in tiles.tolist() if sun[cut(i), cut(k)].any()]
+            for page, _, tiles in self._pages_near(*_shadow_box(low, high, self._towards)):
+                sunlit += [(page, i, k) for i, k in tiles[self._sunny(page)[tuple(tiles.T)]].tolist()]
         if not near:
-            return _Hides(tuple(things), {}, tuple(sunlit))
+            return _Hides(tuple(things), {}, frozenset(sunlit))
         names = [(page, i, k) for page, _, tiles in near for i, k in tiles.tolist()]
         take = lambda what: np.concatenate([getattr(r, what)[tuple(t.T)] for _, r, t in near]).reshape(-1, 3)
         position, normal = take("samples"), take("sample_normals")
-        share, towards, sent = hiding(cloud_of(things, DISCS), position, normal)
+        away = np.maximum(np.maximum(low - position, position - high), 0)
+        far = (away**2).sum(1) > FEW_FROM**2
+        share, towards, sent = (np.empty((len(position), *shape), np.float32) for shape in ((), (3,), (3,)))
+        for which, most in ((far, FEW_DISCS), (~far, DISCS)):
+            share[which], towards[which], sent[which] = hiding(cloud_of(things, most), position[which], normal[which])
         fade = np.clip(share / FAINT - 0.5, 0, 1)  # tiles must not end with a step
         share, sent = share * fade, sent * fade[:, None]
         by_tile = lambda a: a.reshape(len(names), SAMPLES, *a.shape[1:])
         which = np.flatnonzero(by_tile(share).any(1))
         if not len(which):
-            return _Hides(tuple(things), {}, tuple(sunlit))
+            return _Hides(tuple(things), {}, frozenset(sunlit))
         position, normal = by_tile(position), by_tile(normal)
         opens = [self._open(names[k], position[k], normal[k]) for k in which]
         some = lambda a: by_tile(a)[which].reshape(-1, *a.shape[1:])
         open_, around = (np.concatenate([o[i] for o in opens]) for i in (0, 1))
         passed = _passed(some(share), some(towards), open_, around)
-        side = TILE // 2
-        light = np.concatenate([passed, some(sent)], axis=1).reshape(-1, side, side, 4)
-        hidden = {names[k]: cv2.resize(one, (TILE, TILE)) for k, one in zip(which, light, strict=True)}
-        return _Hides(tuple(things), hidden, tuple(sunlit))
+        light = np.concatenate([passed, some(sent)], axis=1).reshape(-1, HALF_TILE, HALF_TILE, 4)
+        hidden = {names[k]: one for k, one in zip(which, light, strict=True)}
+        return _Hides(tuple(things), hidden, frozenset(sunlit))
 
     def _open(self, tile: Tile, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n,) light that samples of a tile have in an empty room, and (n, 9) what arrives there, both as means of the
@@ -579,32 +639,94 @@ class MovingHouse:
             self._opens[tile] = self._in_the_open(position, normal)
         return self._opens[tile]
 
-    def _patch(self, named: Tile, shown: _Shown) -> Patch:
-        page, *tile = named
-        r, at = self._receiver(page), _luxels(tile)
-        soft, sun = self._light(page)
-        e = soft[at]
-        both = shown.light[: e.shape[0], : e.shape[1]]
-        e = e * both[..., :1] + both[..., 1:]
-        fine, fine_normal, texels = self._texels(r, tile)
-        h, w = sun[texels].shape
-        share = sun[texels].ravel()
-        if len(self._portals) and share.any():
-            lit = np.flatnonzero(share)
-            for thing in shown.things:
-                for placed in thing.things:
-                    lit = lit[~_hidden_by(placed, fine[lit] + fine_normal[lit] * 2e-3, self._towards)]
-            left = np.zeros_like(share)
-            left[lit] = share[lit]
-            share = left
-        exposed = cv2.resize(e * r.gain[at], (w, h), interpolation=cv2.INTER_LINEAR)
-        if share.any():
-            gain = cv2.resize(r.gain[at], (w, h), interpolation=cv2.INTER_LINEAR)
-            exposed = exposed + share.reshape(h, w, 1) * self._sun * gain
-        picture = displayed(LINEAR[r.held.albedo[texels]] * exposed)
-        keeps = ~cv2.resize(r.takes[at].astype(np.uint8), (w, h), interpolation=cv2.INTER_NEAREST).astype(bool)
-        picture[keeps] = r.held.picture[texels][keeps]
+    def _patch(self, page: int, tiles: np.ndarray) -> Patch:
+        """The rectangle around tiles (k, 2); what is none of them, or has no change of light, stays as it was baked."""
+        r, (soft, _) = self._receiver(page), self._light(page)
+        low, high = tiles.min(0), tiles.max(0) + 1
+        size, f = np.array(soft.shape[:2]), r.fineness
+        begin, end = low * TILE, np.minimum(high * TILE, size)
+        first, last = np.maximum(begin - 1, 0), np.minimum(end + 1, size)  # one more, so that tiles join
+        around = slice(first[0], last[0]), slice(first[1], last[1])
+        both = self._light_past(page, low - 1, high + 1)
+        from_, to = first - (low - 1) * TILE, last - (low - 1) * TILE
+        both = both[from_[0] : to[0], from_[1] : to[1]]
+        exposed = (soft[around] * both[..., :1] + both[..., 1:]) * r.gain[around]
+        (h, w), within = (end - begin).tolist(), (slice(begin[0], end[0]), slice(begin[1], end[1]))
+        sunny = self._sunny(page)[tuple(tiles.T)].any()
+        changes, sun = np.zeros((h, w), bool), np.zeros((h * f, w * f) if sunny else (0, 0), np.float32)
+        for tile in tiles:
+            name = (page, int(tile[0]), int(tile[1]))
+            if self._shown[name].things or name in self._touched:
+                part = _luxels(tile - low)
+                changes[part] = r.takes[_luxels(tile)]
+                if self._sunny(page)[name[1:]]:
+                    left = self._sun_left(page, tile)
+                    sun[part[0].start * f :, part[1].start * f :][: left.shape[0], : left.shape[1]] = left
+        texels = slice(within[0].start * f, within[0].stop * f), slice(within[1].start * f, within[1].stop * f)
+        picture = r.held.picture[texels].copy()
+        _paint(r.held.albedo[texels], exposed, begin - first, f, changes, sun, self._sun * r.gain[within], picture)
         return Patch(page, texels[0].start, texels[1].start, picture)
+
+    def _sunny(self, page: int) -> np.ndarray:
+        """(rows, columns) bool: tiles that some sun falls on, without what moved."""
+        if page not in self._sunlit:
+            sun, side = self._light(page)[1], TILE * self._receiver(page).fineness
+            rows, columns = (-(-n // side) for n in sun.shape)
+            whole = cv2.copyMakeBorder(
+                sun, 0, rows * side - sun.shape[0], 0, columns * side - sun.shape[1], cv2.BORDER_CONSTANT
+            )
+            self._sunlit[page] = whole.reshape(rows, side, columns, side).any((1, 3))
+        return self._sunlit[page]
+
+    def _light_past(self, page: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """(h, w, 4) float32 as `_together`, but for luxels, of the tiles from `low` to before `high`."""
+        rows, columns = (high - low).tolist()
+        out = np.zeros((rows * HALF_TILE, columns * HALF_TILE, 4), np.float32)
+        out[..., 0] = 1
+        for i, k in np.ndindex(rows, columns):
+            shown = self._shown.get((page, int(low[0]) + i, int(low[1]) + k))
+            if shown is not None:
+                out[i * HALF_TILE : (i + 1) * HALF_TILE, k * HALF_TILE : (k + 1) * HALF_TILE] = shown.light
+        return cv2.resize(out, (columns * TILE, rows * TILE), interpolation=cv2.INTER_LINEAR)
+
+    def _sun_left(self, page: int, tile: np.ndarray) -> np.ndarray:
+        """(h, w) share of the sun that the texels of a tile see past what moves."""
+        r, (_, sun) = self._receiver(page), self._light(page)
+        rows, columns = (slice(s.start * r.fineness, s.stop * r.fineness) for s in _luxels(tile))
+        share = sun[rows, columns].copy()
+        position, normal, _ = self._texels(r, tile)
+        left, start = share.ravel(), position + normal * 2e-3
+        shown = self._shown[(page, int(tile[0]), int(tile[1]))]
+        lit = np.flatnonzero(left)
+        for placed in (p for hides in shown.things for p in hides.things):
+            lit = lit[~_hidden_by(placed, start[lit], self._towards)]
+        out = np.zeros_like(left)
+        out[lit] = left[lit]
+        return out.reshape(share.shape)
+
+
+def _paint(
+    albedo: np.ndarray,
+    light: np.ndarray,
+    margin: np.ndarray,
+    f: int,
+    changes: np.ndarray,
+    sun: np.ndarray,
+    sunlight: np.ndarray,
+    picture: np.ndarray,
+) -> None:
+    """Write what texels look like in a light, as `moving_kernels.paint` says."""
+    if (compiled := kernels()) is not None:
+        light, sunlight = (np.ascontiguousarray(a, np.float32) for a in (light, sunlight))
+        compiled.paint(albedo, light, margin, f, changes, sun, sunlight, LINEAR, shown_table(), picture)
+        return
+    h, w = picture.shape[:2]
+    top, left = (margin * f).tolist()
+    wide = (light.shape[1] * f, light.shape[0] * f)
+    exposed = cv2.resize(light, wide, interpolation=cv2.INTER_LINEAR)[top : top + h, left : left + w]
+    exposed = exposed + sun[..., None] * sunlight.repeat(f, 0).repeat(f, 1) if len(sun) else exposed
+    fine = changes.repeat(f, 0).repeat(f, 1)[..., None]
+    np.copyto(picture, displayed(cv2.LUT(albedo, LINEAR) * exposed), where=fine)
 
 
 LINEAR = linear(np.arange(256, dtype=np.float32) / 255)
@@ -616,9 +738,9 @@ class _Hides:
 
     things: tuple[Placed, ...]
     tiles: Mapping[Tile, np.ndarray]
-    """(TILE, TILE, 4) float32: the share of its light that every luxel gets past the thing, and what the thing
-    sends."""
-    sunlit: tuple[Tile, ...]
+    """(HALF_TILE, HALF_TILE, 4) float32: the share of its light that every second luxel gets past the thing, and the
+    light that the thing sends it."""
+    sunlit: frozenset[Tile]
     """Tiles from which they may hide the sun."""
 
     def holds(self, things: Sequence[Placed], slack: float) -> bool:
@@ -630,8 +752,10 @@ class _Hides:
 
 
 def _together(tiles: Sequence[np.ndarray]) -> np.ndarray:
-    """(TILE, TILE, 4) as `_Hides.tiles` of several things."""
-    out = np.zeros((TILE, TILE, 4), np.float32)
+    """(HALF_TILE, HALF_TILE, 4) as `_Hides.tiles` of several things."""
+    if len(tiles) == 1:
+        return tiles[0]
+    out = np.zeros((HALF_TILE, HALF_TILE, 4), np.float32)
     out[..., 0] = 1
     for both in tiles:
         out[..., :1] *= both[..., :1]
@@ -646,11 +770,6 @@ class _Shown:
     things: list[_Hides]
     light: np.ndarray
     """As `_together`."""
-
-    def differs(self, new: _Shown, tile: Tile) -> bool:
-        """True where `new` looks another way."""
-        sunny = any(tile in t.sunlit for t in (*self.things, *new.things))
-        return sunny or bool(np.abs(self.light[..., 0] - new.light[..., 0]).max() > SLIGHT)
 
 
 def _passed(share: np.ndarray, towards: np.ndarray, open_: np.ndarray, around: np.ndarray) -> np.ndarray:
@@ -706,10 +825,10 @@ def _hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray) -> np.nda
 def _sampled(a: np.ndarray) -> np.ndarray:
     """(rows, columns, SAMPLES, 3) means of two by two luxels of a page (h, w, 3), tile by tile."""
     h, w = a.shape[:2]
-    rows, columns, half = -(-h // TILE), -(-w // TILE), TILE // 2
+    rows, columns = -(-h // TILE), -(-w // TILE)
     whole = cv2.copyMakeBorder(a, 0, rows * TILE - h, 0, columns * TILE - w, cv2.BORDER_REPLICATE)
-    small = cv2.resize(whole, (columns * half, rows * half), interpolation=cv2.INTER_AREA)
-    return small.reshape(rows, half, columns, half, 3).swapaxes(1, 2).reshape(rows, columns, SAMPLES, 3)
+    small = cv2.resize(whole, (columns * HALF_TILE, rows * HALF_TILE), interpolation=cv2.INTER_AREA)
+    return small.reshape(rows, HALF_TILE, columns, HALF_TILE, 3).swapaxes(1, 2).reshape(rows, columns, SAMPLES, 3)
 
 
 def filled(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -730,6 +849,15 @@ def filled(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
         larger /= np.maximum(larger[..., 3:], 1e-6)
         out = level + (1 - np.minimum(level[..., 3:], 1)) * larger
     return out[..., :3]
+
+
+def _islands(tiles: np.ndarray) -> list[np.ndarray]:
+    """Tiles (k, 2) that touch each other, set by set."""
+    low = tiles.min(0)
+    grid = np.zeros(tiles.max(0) - low + 1, np.uint8)
+    grid[tuple((tiles - low).T)] = 1
+    count, marks = cv2.connectedComponents(grid, connectivity=4)
+    return [np.argwhere(marks == k) + low for k in range(1, count)]
 
 
 def _nothing(m: LitMesh) -> LitMesh:

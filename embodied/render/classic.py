@@ -46,6 +46,10 @@ class Overlay(Protocol):
         """(h, w, 3) uint8: the picture that `camera` drew, with it."""
         ...
 
+    def change(self, corners: Mapping[int, np.ndarray], patches: Sequence[tuple[int, int, int, np.ndarray]]) -> None:
+        """Follow `Renderer.change`."""
+        ...
+
 
 class Renderer:
     """Draws one house. Owns textures and display lists on the graphics side until `close`.
@@ -152,6 +156,8 @@ class Renderer:
             drawing.move(self._numbers[number], vertices)  # type: ignore[union-attr]
         for page, row, column, picture in patches:
             drawing.repaint(page, (row, column), picture)  # type: ignore[union-attr]
+        if self._overlay is not None:
+            self._overlay.change(corners, patches)
 
     def view(
         self,

@@ -144,7 +144,7 @@ class Raster:
     def move(self, mesh: int, vertices: np.ndarray) -> None:
         """Put the vertices (n, 3) float32 of a moving mesh elsewhere, metres."""
         first, corners = self._moving[mesh]
-        corners["xyz"] = vertices
+        corners["xyz"] = np.tile(vertices, (len(corners) // len(vertices), 1))  # a hollow thing has two sides
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._buffers[0])
         GL.glBufferSubData(GL.GL_ARRAY_BUFFER, first * CORNER.itemsize, corners.nbytes, corners.view(np.uint8))
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, 0)

@@ -60,10 +60,10 @@ def body_poses(model: mujoco.MjModel, data: mujoco.MjData, names: Collection[str
 
 
 def _alpha(model: mujoco.MjModel, geom: int) -> float:
-    return float(_color(model, geom)[3])
+    return float(geom_color(model, geom)[3])
 
 
-def _color(model: mujoco.MjModel, geom: int) -> np.ndarray:
+def geom_color(model: mujoco.MjModel, geom: int) -> np.ndarray:
     """(4,) as MuJoCo draws it: the geom's own unless that is the default, else the material's."""
     material, own = model.geom_matid[geom], model.geom_rgba[geom]
     if material < 0 or not np.allclose(own, 0.5 * np.array([1, 1, 1, 2])):
@@ -126,7 +126,7 @@ def _mesh(model: mujoco.MjModel, mesh: int) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _finish(model: mujoco.MjModel, geom: int, textures: Path) -> Finish:
-    material, (red, green, blue, alpha) = int(model.geom_matid[geom]), _color(model, geom).tolist()
+    material, (red, green, blue, alpha) = int(model.geom_matid[geom]), geom_color(model, geom).tolist()
     if material < 0:
         return Finish(color=(red, green, blue, alpha), roughness=0.6)
     shine = float(model.mat_shininess[material])

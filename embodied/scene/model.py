@@ -46,6 +46,9 @@ DECODERS = 4
 """Threads that decode textures."""
 PIECES = 24
 """Directions by which the outdoors of a lit house are cut up."""
+PROBE_LIT = "lit_by_probes"
+"""Material of a lit house for the bodies that are added to it: they shine in the colour of their light
+(embodied.light.viewer)."""
 OFFSCREEN = 1024
 """Side of the off-screen buffer: the largest picture, pixels."""
 LOOSE = ("floor", "against_wall", "corner", "surface")
@@ -186,6 +189,7 @@ def build_spec(
     else:
         spec.visual.headlight.active = 0
         _add_pages(spec, lit, house, shell, hung)
+        spec.add_material(name=PROBE_LIT, emission=1.0, specular=0.0, shininess=0.0)
     if collisions:
         _add_collisions(spec, house, catalogue, bodies)
         _add_leaves(spec, shell, hung)
