@@ -6,6 +6,7 @@
   gpu                       pictures, features and learning on a CUDA device; without one, a short check on the CPU
   bakes                     light a flat repeatedly
   light                     compare the ways of rendering with a path tracer
+  moving                    compare what moves with a path tracer, and what a frame costs then; takes an hour, in pieces
 
 Close other programs first.
 """
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from embodied.assets.catalogue import Catalogue
     from embodied.bench.timing import Measure
 
-PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes", "light")
+PARTS = ("houses", "pictures", "views", "plays", "seen", "drive", "gpu", "bakes", "light", "moving")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +39,7 @@ class BenchOptions(Furnished, Printed):
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
     """How pictures, seen and drive draw the house."""
     out: OutputFolder = Path("out/bench")
-    """Folder for the file of light."""
+    """Folder for the files of light and moving."""
 
 
 def run(args: BenchOptions) -> None:
@@ -76,6 +77,11 @@ def run(args: BenchOptions) -> None:
     if "light" in parts:
         facts["light"] = light.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
         texts.append(light.table(facts["light"]))
+    if "moving" in parts:
+        from embodied.bench import moving  # late: loads the path tracer and MuJoCo
+
+        facts["moving"] = moving.compare(catalogue, args.cache, args.out, seed=args.seed, progress=note)
+        texts.append(moving.table(facts["moving"]))
     show(args, facts, "\n\n".join(texts))
 
 
