@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from embodied.light.probes import NORMALS, Probes, harmonics, lobed, projected, radiance, turned
+from embodied.light.probes import FROM_NORMALS, NORMALS, Probes, harmonics, lobed, radiance, turned
 
 WHITE = np.zeros((9, 1)) + np.sqrt(4 * np.pi) * (np.arange(9) == 0)[:, None]
 
@@ -25,7 +25,7 @@ def test_even_light_is_the_same_to_every_normal_and_from_every_side():
 
 def test_what_is_projected_comes_back():
     coefficients = np.random.default_rng(1).normal(size=(5, 9, 3))
-    np.testing.assert_allclose(projected(harmonics(NORMALS) @ coefficients), coefficients, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(FROM_NORMALS @ harmonics(NORMALS) @ coefficients, coefficients, rtol=1e-6, atol=1e-7)
     np.testing.assert_allclose(radiance(lobed(coefficients)), coefficients, rtol=1e-6)
 
 

@@ -37,7 +37,7 @@ def _icosahedron() -> np.ndarray:
 
 
 NORMALS = _icosahedron()
-"""(12, 3) in which a probe's light is asked for."""
+"""(12, 3) that tell all nine harmonics."""
 
 
 def terms(x: Any, y: Any, z: Any) -> tuple[Any, ...]:
@@ -59,9 +59,8 @@ def harmonics(normals: np.ndarray) -> np.ndarray:
     return np.stack(terms(*np.moveaxis(np.asarray(normals), -1, 0)), axis=-1)
 
 
-def projected(values: np.ndarray) -> np.ndarray:
-    """(..., 9, c) coefficients of values (..., 12, c) at `NORMALS`."""
-    return (4 * np.pi / len(NORMALS) * harmonics(NORMALS)).T @ values
+FROM_NORMALS = 4 * np.pi / len(NORMALS) * harmonics(NORMALS).T
+"""(9, 12) from values at `NORMALS` to coefficients."""
 
 
 def lobed(coefficients: np.ndarray) -> np.ndarray:
@@ -79,7 +78,7 @@ def turned(coefficients: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 
     A body of pose `rotation` sees a room's light in its own frame turned by `rotation.T`.
     """
-    return projected(harmonics(NORMALS @ np.asarray(rotation, float)) @ coefficients)
+    return (FROM_NORMALS @ harmonics(NORMALS @ np.asarray(rotation, float))) @ coefficients
 
 
 @dataclass(frozen=True, eq=False)

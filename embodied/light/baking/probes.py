@@ -45,28 +45,28 @@ def probes_of(s: LightSolution, settings: LightSettings, memory: LightingCache |
     asked = np.flatnonzero(probes.valid)
     places = get_or_compute(own, "places", lambda: places_of(probes.position[asked]))
     met = get_or_compute(own, "met", lambda: air.meet_around(s.space, places, AROUND_RAYS))
-    c = air.bounced_at(met, places, floats(clamp_fireflies(s.lux, leaving(s.lux, s.light.soft))))
-    c[:, 0] += np.sqrt(4 * np.pi) * AMBIENT
+    light = air.bounced_at(met, places, floats(clamp_fireflies(s.lux, leaving(s.lux, s.light.soft))))
+    light[:, 0] += np.sqrt(4 * np.pi) * AMBIENT
     rooms = probes.room[asked]
 
-    def shone(light: Callable[[Points, int], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Probes of the rooms that a light reaches, and its coefficients there."""
-        reached = np.flatnonzero(np.isin(rooms, rooms[light(places, PROBE_TRIAL_RAYS)[:, 0].any(1)]))
-        return reached, light(radiosity.only(places, reached), PROBE_RAYS) if len(reached) else np.zeros((0, 9, 3))
+    def shone(source: Callable[[Points, int], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Probes of the rooms that a source reaches, and its light there."""
+        reached = np.flatnonzero(np.isin(rooms, rooms[source(places, PROBE_TRIAL_RAYS)[:, 0].any(1)]))
+        return reached, source(radiosity.only(places, reached), PROBE_RAYS) if len(reached) else np.zeros((0, 9, 3))
 
     for portal in portals_of(s.house):
-        which, its = shone(functools.partial(air.sky_at, s.space, portal))
-        c[which] += its
+        reached, arriving = shone(functools.partial(air.sky_at, s.space, portal))
+        light[reached] += arriving
     for lamp in s.lamps:
         scene = s.without.get(lamp.owner or "", s.space.scene)
         lit = functools.partial(shone, functools.partial(air.lamp_at, scene, lamp))
-        which, its = get_or_compute(own, ("lamp", lamp.id), lit)
-        c[which] += its * lamp.radiance.astype(np.float32)
+        reached, arriving = get_or_compute(own, ("lamp", lamp.id), lit)
+        light[reached] += arriving * lamp.radiance.astype(np.float32)
     for patches in sunlit(inputs, s.light.sun, settings.patches):
-        c += air.patches_at(s.space.scene, patches, places)
+        light += air.patches_at(s.space.scene, patches, places)
     coefficients, valid = probes.coefficients.copy(), probes.valid.copy()
     valid[asked] = open_air(met.bad / met.rays, rooms)
-    coefficients[asked] = np.clip(c, -6e4, 6e4)
+    coefficients[asked] = np.clip(light, -6e4, 6e4)
     coefficients[~valid] = 0.0
     return dataclasses.replace(probes, coefficients=coefficients, valid=valid)
 
