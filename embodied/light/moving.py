@@ -69,7 +69,7 @@ FEW_FROM, FEW_DISCS = 0.3, 12
 """Metres from a thing from which on so few discs stand for it."""
 SHADOW_REACH = 0.8
 """Metres from a thing up to which it is asked what light it hides."""
-UNKNOWN_BELOW, KNOWN_FROM = 0.3, 0.65
+UNKNOWN_BELOW, KNOWN_FROM = 0.5, 0.92
 """Share of its light that a place gets past a thing, below which its baked light says nothing of it once the thing is
 gone, and above which it says all."""
 BRIGHT = (0.3, 2.0)
@@ -506,7 +506,7 @@ class MovingHouse:
                     own = receiver.mesh == k
                     rows, columns = (slice(i.min(), i.max() + 1) for i in np.nonzero(own))
                     part, sure = soft[rows, columns], (known * own)[rows, columns]
-                    around = filled(part, sure)
+                    around = filled(part, sure**4)
                     sure, own = sure[..., None], own[rows, columns, None]
                     soft[rows, columns] = np.where(own, sure * part + (1 - sure) * around, part)
             if len(self._portals):
@@ -640,7 +640,7 @@ class MovingHouse:
         return self._opens[tile]
 
     def _patch(self, page: int, tiles: np.ndarray) -> Patch:
-        """The rectangle around tiles (k, 2); what is none of them, or has no change of light, stays as it was baked."""
+        """The rectangle around tiles (k, 2); what has no change of light stays as it was baked."""
         r, (soft, _) = self._receiver(page), self._light(page)
         low, high = tiles.min(0), tiles.max(0) + 1
         size, f = np.array(soft.shape[:2]), r.fineness
@@ -652,11 +652,11 @@ class MovingHouse:
         both = both[from_[0] : to[0], from_[1] : to[1]]
         exposed = (soft[around] * both[..., :1] + both[..., 1:]) * r.gain[around]
         (h, w), within = (end - begin).tolist(), (slice(begin[0], end[0]), slice(begin[1], end[1]))
-        sunny = self._sunny(page)[tuple(tiles.T)].any()
+        sunny = self._sunny(page)[low[0] : high[0], low[1] : high[1]].any()
         changes, sun = np.zeros((h, w), bool), np.zeros((h * f, w * f) if sunny else (0, 0), np.float32)
-        for tile in tiles:
+        for tile in low + np.array([*np.ndindex(*(high - low))]):  # also those that were changed before
             name = (page, int(tile[0]), int(tile[1]))
-            if self._shown[name].things or name in self._touched:
+            if name in self._shown and (self._shown[name].things or name in self._touched):
                 part = _luxels(tile - low)
                 changes[part] = r.takes[_luxels(tile)]
                 if self._sunny(page)[name[1:]]:
