@@ -1,4 +1,4 @@
-"""VLN's follower and speaker on a grid: losses by hand, no leak, no dependence on the batch, and learning."""
+"""VLN's follower on a grid: losses by hand, no leak, no dependence on the batch, and learning."""
 
 from __future__ import annotations
 
@@ -18,13 +18,12 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.training_data import Split
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
-from embodied.agents.vln.config import FollowerSettings, SpeakerSettings
+from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import FollowerOutputs
 from embodied.agents.vln.policy import VlnMoment
 from embodied.agents.vln.run import VlnLearner, losses_of, teacher_share
-from embodied.agents.vln.speaker import SpeakerAbout, new_speaker, reranked
 from embodied.assistants.route_system import build_routes
-from embodied.datasets.store import SplitData, dataset_of
+from embodied.datasets.store import dataset_of
 from embodied.evaluation.rollout import play
 from embodied.interface import Move
 from embodied.kinds.shipped.vln import VLN
@@ -105,13 +104,6 @@ def test_a_follower_learns_its_routes(split):
     done = play(split.make_env, agent.policy(split.bank), split.tasks, seed=0, batch=12)
     near = [split.worlds["grid"].graph.distance[e.nodes[-1], e.task.goal_nodes[0]] <= 3 for e in done]
     assert np.mean(near) >= 0.5
-    speaker = new_speaker(SpeakerAbout(SpeakerSettings(hidden_size=16, heads=2), "hand", 16, agent.vocabulary.words))
-    whole = SplitData("grid", split.worlds, tuple(split.tasks), split.make_env)
-    one = reranked(whole, split.tasks, agent, speaker, split.bank, candidates=1, seed=0)
-    assert walks(one) == walks(done), "the first candidate is the likeliest walk"
-    many = reranked(whole, split.tasks, new(split), speaker, split.bank, candidates=4, seed=0)
-    assert walks(many) != walks(reranked(whole, split.tasks, new(split), speaker, split.bank, candidates=1, seed=0))
-    assert [e.task.id for e in many] == [t.id for t in split.tasks]
 
 
 def test_routes_of_a_hanna_data_set_are_tasks_of_vln(tmp_path):

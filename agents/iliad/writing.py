@@ -129,6 +129,11 @@ def log_likelihood(logits: Tensor, written: Tensor) -> Tensor:
     return torch.zeros(written.shape).masked_scatter(present, -loss)
 
 
+def likelihood_loss(logits: Tensor, written: Tensor) -> Tensor:
+    """Negative log-likelihood of the numbers written, averaged over rows."""
+    return -log_likelihood(logits, written).sum() / len(written)
+
+
 def before(written: Tensor, start: int) -> Tensor:
     """The number before each number."""
     return torch.cat([torch.full_like(written[:, :1], start), written[:, :-1]], 1)

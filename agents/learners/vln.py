@@ -1,4 +1,4 @@
-"""VLN: agents that follow route instructions, and a speaker that describes walks."""
+"""VLN: agents that follow route instructions."""
 
 from __future__ import annotations
 
@@ -14,18 +14,15 @@ from embodied.agents.options import (
     TRAINING,
     Encoded,
     EpisodeStudyOptions,
-    Scaled,
     SightedRun,
     Tables,
-    WithData,
     study_of,
     training_data,
 )
-from embodied.agents.vln.config import FORCING, MEASURES, SPEAKER_SCALES, VLN_SCALES, FollowerSettings, SpeakerSettings
-from embodied.options import Count, OutputFolder, Settings
+from embodied.agents.vln.config import FORCING, MEASURES, VLN_SCALES, FollowerSettings
+from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
-    from embodied.agents.common.session import Note
     from embodied.agents.studies.engine import StudyLearner
     from embodied.datasets.store import Dataset
 
@@ -39,20 +36,11 @@ class FollowerTraining(SightedRun):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpeakerTraining(WithData, Encoded, Scaled):
-    """A network that describes walks, on a VLN or HANNA data set with features (maximum likelihood)."""
-
-    out: OutputFolder
-    """Run folder; rerun the command to resume an interrupted run."""
-    config: Annotated[SpeakerSettings, Settings(TRAINING, SPEAKER_SCALES)]
-
-
-@dataclass(frozen=True, kw_only=True)
 class VlnStudyOptions(EpisodeStudyOptions, Encoded):
-    """Agents that follow route instructions, and a speaker."""
+    """Agents that follow route instructions."""
 
     tables: Tables
-    """Make these tables: followers, speaker or words."""
+    """Make these tables: followers or words."""
     others: Count = 1
     """Training seeds of all rows but the first."""
     config: Annotated[FollowerSettings, Settings(TRAINING, VLN_SCALES, skip=("forcing", "blind", "wordless"))]
@@ -66,16 +54,10 @@ def follower(args: FollowerTraining, **session: Any) -> None:
     train_follower(source, args.config, args.evaluation, args.out, minutes=args.minutes, **session)
 
 
-def speaker(args: SpeakerTraining, *, note: Note) -> None:
-    from embodied.agents.vln.speaker import train_speaker
-
-    train_speaker(training_data(args, "vln"), args.config, args.out, note=note)
-
-
 def study(args: VlnStudyOptions) -> StudyLearner:
     from embodied.agents.vln.study import VlnStudy
 
-    return study_of(VlnStudy, args, speaker=SPEAKER_SCALES[args.scale])
+    return study_of(VlnStudy, args)
 
 
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
@@ -97,10 +79,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 register_learner(
     Learner(
         name="vln",
-        train=(
-            "Agents that follow route instructions, and a speaker that describes walks.",
-            {"follower": (FollowerTraining, follower), "speaker": (SpeakerTraining, speaker)},
-        ),
+        train=("Agents that follow route instructions.", {"follower": (FollowerTraining, follower)}),
         study=(VlnStudyOptions, study),
         players=players,
         columns=MEASURES,

@@ -1,1 +1,1 @@
-"""VLN: followers of route instructions, and a speaker that describes walks (dissertation 2.2; Room-to-Room)."""
+"""VLN: followers of route instructions (dissertation 2.2; Room-to-Room)."""

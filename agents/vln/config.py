@@ -1,4 +1,4 @@
-"""Settings of VLN's follower and speaker. Free of torch, so that the command line answers at once."""
+"""Settings of VLN's follower. Free of torch, so that the command line answers at once."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from embodied.agents.common.settings import (
     NOT_NEGATIVE,
     SHARE,
     ImitationSettings,
-    RunSettings,
     require,
     require_word,
 )
@@ -61,24 +60,6 @@ class FollowerSettings(ImitationSettings):
         require(self, SHARE, "least_teacher")
 
 
-@dataclass(frozen=True, kw_only=True)
-class SpeakerSettings(RunSettings):
-    """How a speaker is trained."""
-
-    hidden_size: int = 256
-    """Width of the networks."""
-    heads: int = 8
-    """Attention heads."""
-    iterations: int = 20_000
-    """Updates of the weights."""
-    learning_rate: float = 1e-4
-    """Highest learning rate of Adam."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require(self, AT_LEAST_ONE, "hidden_size", "heads", "iterations")
-
-
 VLN_SCALES: dict[str, FollowerSettings] = {
     "mini": FollowerSettings(
         hidden_size=128,
@@ -94,9 +75,5 @@ VLN_SCALES: dict[str, FollowerSettings] = {
         validate_every=500,
     ),
     "paper": FollowerSettings(),
-}
-SPEAKER_SCALES: dict[str, SpeakerSettings] = {
-    "mini": SpeakerSettings(hidden_size=128, heads=4, iterations=2500, learning_rate=1e-3),
-    "paper": SpeakerSettings(),
 }
 """'mini': ten minutes of one core, and twenty more where paths are not worded yet; 'paper': for one GPU."""

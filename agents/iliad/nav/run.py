@@ -11,10 +11,17 @@ from typing import Any
 from embodied.agents.common.paraphrases import varied
 from embodied.agents.common.session import Note
 from embodied.agents.common.vocabulary import build_vocabulary
+from embodied.agents.common.weights import save_weights
 from embodied.agents.common.word_vectors import vocabulary_with
 from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.data import NAV_SPLITS, NavData, nav_data
-from embodied.agents.iliad.nav.stages import load_follower, new_follower, save_walker, teach_describer, teach_executor
+from embodied.agents.iliad.nav.stages import (
+    about_follower,
+    load_follower,
+    new_follower,
+    teach_describer,
+    teach_executor,
+)
 from embodied.agents.iliad.nav.student import LoopFree, NavStudent
 from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, LearnedNavTeacher, OtherWords
 from embodied.agents.iliad.nav.world import NavMarginal, NavWorld
@@ -116,7 +123,9 @@ class NavGrounds:
         validation = splits["validation"][:: max(1, len(splits["validation"]) // VALIDATION_TRIPS)]
         about = {"world": "nav", "data": self.data.digest, "pictures": self.data.pictures, "teacher": c}
         identity = identity_of("embodied.agents.iliad.nav.run", **about)
-        save = lambda path, identity: save_walker(path, student.network, c, eyes, identity)
+        save = lambda path, identity: save_weights(
+            path, "nav", student.network.state_dict(), about_follower(c, eyes), identity
+        )
         return IliadProblem(
             NavWorld(eyes.places), teacher, NavMarginal(eyes.places), student, explorer,
             splits["train"], validation, identity, save,

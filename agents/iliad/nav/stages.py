@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from torch import Tensor, nn
+from torch import Tensor
 
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensor_file import load_into
-from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.common.weights import load_weights, seeded
 from embodied.agents.common.word_vectors import use_vectors, vocabulary_with
 from embodied.agents.iliad.nav.config import NavConfig
 from embodied.agents.iliad.nav.data import NavData
@@ -21,12 +21,11 @@ from embodied.agents.iliad.nav.network import WalkDescriber
 from embodied.agents.iliad.nav.student import NavEyes, NavStudent
 from embodied.agents.iliad.nav.teacher import LONGEST_DESCRIPTION, arrives, encoded_walks, texts_of
 from embodied.agents.iliad.nav.world import HORIZON, NavWorld, Trip, walk_along
-from embodied.agents.iliad.stages import TeachingStage
+from embodied.agents.iliad.stages import asked, drawn, teach
 from embodied.agents.iliad.training import success_rate
-from embodied.agents.iliad.writing import log_likelihood
+from embodied.agents.iliad.writing import likelihood_loss
 from embodied.agents.vln.config import FollowerSettings
 from embodied.agents.vln.network import FollowerNetwork
-from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
 NAV_REMEDY = "train it again with `embodied train iliad nav`"
@@ -66,14 +65,15 @@ def teach_executor(data: NavData, config: NavConfig, folder: Path, *, note: Note
     trips = data.splits["train"]
 
     def loss_of(rng: np.random.Generator) -> Tensor:
-        chosen, requests = _batch(trips, config.teacher_batch, rng)
+        chosen = drawn(trips, config.teacher_batch, rng)
+        requests = asked(chosen, rng)
         done = executor.rollout_for_dagger(chosen, requests, rng=rng)
         shown = [world.demonstrate(q, e) for q, e in zip(chosen, done, strict=True)]
         return -executor.scores(chosen, requests, done, shown).objective.sum() / len(chosen)
 
     judge = lambda: {"success": success_rate(world, executor, _sample(data))}
-    stage = _stage("executor", folder, config.executor_iterations, config, data)
-    stage.train(executor.network, loss_of, judge, note)
+    how = _settings(folder, config.executor_iterations, config, data)
+    teach(executor.network, "executor", loss_of, judge, note=note, **how)
     return executor
 
 
@@ -87,14 +87,14 @@ def teach_describer(
     trips = data.splits["train"]
 
     def loss_of(rng: np.random.Generator) -> Tensor:
-        chosen, requests = _batch(trips, config.teacher_batch, rng)
-        wanted = eyes.words(requests)[:, :LONGEST_DESCRIPTION]
+        chosen = drawn(trips, config.teacher_batch, rng)
+        wanted = eyes.words(asked(chosen, rng))[:, :LONGEST_DESCRIPTION]
         logits = describer(*encoded_walks(eyes, chosen, [walk_along(t.path) for t in chosen]), wanted)
-        return -log_likelihood(logits, wanted).sum() / len(wanted)
+        return likelihood_loss(logits, wanted)
 
     judge = lambda: {"followed": followed(world, describer, executor, _sample(data))}
-    stage = _stage("describer", folder, config.describer_iterations, config, data)
-    return stage.train(describer, loss_of, judge, note)
+    how = _settings(folder, config.describer_iterations, config, data)
+    return teach(describer, "describer", loss_of, judge, note=note, **how)
 
 
 def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, trips: Sequence[Trip]) -> float:
@@ -105,13 +105,8 @@ def followed(world: NavWorld, describer: WalkDescriber, executor: NavStudent, tr
     return float(np.mean([arrives(world, t, e.nodes, t.path) for t, e in zip(trips, done, strict=True)]))
 
 
-def save_walker(path: Path, network: nn.Module, config: NavConfig, eyes: NavEyes, identity: Identity) -> None:
-    """Write weights, settings, words, whose features they want and what they were trained with, atomically."""
-    save_weights(path, "nav", network.state_dict(), _about(config, eyes), identity)
-
-
 def load_follower(path: Path, eyes: NavEyes) -> NavStudent:
-    """A follower that `save_walker` wrote, with its settings and the words that it knows.
+    """A follower as training saved it, with its settings and the words that it knows.
 
     Args:
       eyes: what is seen; its words are replaced.
@@ -141,23 +136,17 @@ def config_of(path: Path) -> NavConfig:
     return load_weights(path, "nav", NavAbout, NAV_REMEDY)[1].config
 
 
-def _about(config: NavConfig, eyes: NavEyes) -> NavAbout:
+def about_follower(config: NavConfig, eyes: NavEyes) -> NavAbout:
+    """Metadata of a follower with these eyes."""
     return NavAbout(config, eyes.vocabulary.words, eyes.bank.digest)
 
 
-def _stage(name: str, folder: Path, updates: int, config: NavConfig, data: NavData) -> TeachingStage:
+def _settings(folder: Path, updates: int, config: NavConfig, data: NavData) -> dict[str, Any]:
+    """How a network of the teacher is taught, and what it depends on."""
     students = {"teacher", "candidates", "executor_iterations", "describer_iterations", "blind", "varied_words"}
-    settings = {k: v for k, v in dataclasses.asdict(config).items() if k not in students}
-    parts = {"stage": name, "updates": updates, "seed": config.data_seed, "settings": settings, "data": data.digest}
-    identity, rate = identity_of("embodied.agents.iliad.nav.stages", **parts), config.teacher_rate
-    about = _about(config, data.eyes)
-    return TeachingStage("nav", name, Path(folder), updates, rate, config.data_seed, identity, about)
-
-
-def _batch(trips: Sequence[Trip], count: int, rng: np.random.Generator) -> tuple[list[Trip], list[str]]:
-    """Random trips, each with one of its requests."""
-    chosen = [trips[int(i)] for i in rng.integers(len(trips), size=count)]
-    return chosen, [t.requests[int(rng.integers(len(t.requests)))] for t in chosen]
+    settings = {k: v for k, v in vars(config).items() if k not in students}
+    how = {"world": "nav", "folder": folder, "updates": updates, "rate": config.teacher_rate, "seed": config.data_seed}
+    return {**how, "about": about_follower(config, data.eyes), "settings": settings, "data": data.digest}
 
 
 def _sample(data: NavData) -> Sequence[Trip]:

@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.common.session import Note
+from embodied.agents.common.weights import save_weights
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.regex.coding import Requests, request_words
 from embodied.agents.iliad.regex.config import RegexConfig
 from embodied.agents.iliad.regex.data import RegexData, make_data, rules_without_requests
 from embodied.agents.iliad.regex.networks import Speller
 from embodied.agents.iliad.regex.stages import (
+    RegexAbout,
     load_network,
     new_network,
     pretrain_student,
-    save_network,
     teach_describer,
     teach_executor,
 )
@@ -88,7 +89,9 @@ class RegexGrounds:
         rng, student = stream(c.data_seed, "regex", "unlabeled"), new_student()
         marginal = RegexMarginal(tuple(rules_without_requests(self.data.words, c.unlabeled, rng=rng)))
         identity = identity_of("embodied.agents.iliad.regex.run", world="regex", data=self.data.digest, teacher=c)
-        save = lambda path, identity: save_network(path, student.network, c, requests, identity)
+        save = lambda path, identity: save_weights(
+            path, "regex", student.network.state_dict(), RegexAbout(c, requests.vocabulary.words), identity
+        )
         return IliadProblem(
             RegexWorld(), self.teacher, marginal, student, new_student(),
             splits["train"], splits["validation"][:VALIDATION_REQUESTS], identity, save,

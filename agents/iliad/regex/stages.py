@@ -8,25 +8,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from torch import Tensor, nn
+from torch import Tensor
 
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.session import Note
 from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.common.weights import load_weights, seeded
 from embodied.agents.iliad.protocol import NOTHING
 from embodied.agents.iliad.regex.coding import Requests, changes, characters, texts
 from embodied.agents.iliad.regex.config import RegexConfig
 from embodied.agents.iliad.regex.data import RegexData, WordTask, rules_without_requests
 from embodied.agents.iliad.regex.networks import ChangeDescriber, Speller
 from embodied.agents.iliad.regex.rules import outputs
-from embodied.agents.iliad.stages import Network, TeachingStage
-from embodied.agents.iliad.writing import log_likelihood
+from embodied.agents.iliad.stages import Network, asked, drawn, teach
+from embodied.agents.iliad.writing import likelihood_loss
 from embodied.assets.cache import digest
-from embodied.identity import Identity, identity_of
 from embodied.seeds import stream
 
 REGEX_REMEDY = "delete it and train it again with `embodied train iliad regex`"
@@ -58,15 +58,15 @@ def teach_executor(data: RegexData, config: RegexConfig, requests: Requests, fol
     items = data.splits["train"]
 
     def loss_of(rng: np.random.Generator) -> Tensor:
-        chosen = [items[int(i)] for i in rng.integers(len(items), size=config.teacher_batch)]
+        chosen = drawn(items, config.teacher_batch, rng)
         places = rng.integers(config.examples, size=len(chosen))
         words = characters([q.words[j] for q, j in zip(chosen, places)])
         wanted = characters([q.outputs[j] for q, j in zip(chosen, places)])
-        return _likelihood(network(words, requests(_asked(chosen, rng)), wanted), wanted)
+        return likelihood_loss(network(words, requests(asked(chosen, rng)), wanted), wanted)
 
-    stage = _stage("executor", folder, config.executor_iterations, config, requests, config.data_seed)
-    judge = lambda: executor_success(network, requests, _sample(data))
-    return stage.train(network, loss_of, judge, note)
+    judge = lambda: executor_success(network, requests, data.splits["validation"][:256])
+    how = _settings(folder, config.executor_iterations, config, requests, config.data_seed)
+    return teach(network, "executor", loss_of, judge, note=note, **how)
 
 
 def teach_describer(
@@ -77,13 +77,13 @@ def teach_describer(
     items = data.splits["train"]
 
     def loss_of(rng: np.random.Generator) -> Tensor:
-        chosen = [items[int(i)] for i in rng.integers(len(items), size=config.teacher_batch)]
+        chosen = drawn(items, config.teacher_batch, rng)
         changed = changes([list(zip(q.words, q.outputs, strict=True)) for q in chosen])
-        wanted = requests(_asked(chosen, rng))
-        return _likelihood(network(changed, wanted), wanted)
+        wanted = requests(asked(chosen, rng))
+        return likelihood_loss(network(changed, wanted), wanted)
 
-    stage = _stage("describer", folder, config.describer_iterations, config, requests, config.data_seed)
-    return stage.train(network, loss_of, dict, note)
+    how = _settings(folder, config.describer_iterations, config, requests, config.data_seed)
+    return teach(network, "describer", loss_of, dict, note=note, **how)
 
 
 def pretrain_student(
@@ -95,10 +95,10 @@ def pretrain_student(
     def loss_of(rng: np.random.Generator) -> Tensor:
         words, rules = changing_rules(data.words, config.teacher_batch, rng=rng)
         wanted = characters(rules)
-        return _likelihood(network(characters(words), requests([NOTHING] * len(words)), wanted), wanted)
+        return likelihood_loss(network(characters(words), requests([NOTHING] * len(words)), wanted), wanted)
 
-    stage = _stage("student", folder, config.pretraining_iterations, config, requests, seed)
-    return stage.train(network, loss_of, dict, note)
+    how = _settings(folder, config.pretraining_iterations, config, requests, seed)
+    return teach(network, "student", loss_of, dict, note=note, **how)
 
 
 def changing_rules(known: Sequence[str], count: int, *, rng: np.random.Generator) -> tuple[list[str], list[str]]:
@@ -122,13 +122,8 @@ def executor_success(executor: Speller, requests: Requests, items: Sequence[Word
     return {"success": float(np.mean([w == q.outputs[0] for w, q in zip(written, items, strict=True)]))}
 
 
-def save_network(path: Path, network: nn.Module, config: RegexConfig, requests: Requests, identity: Identity) -> None:
-    """Write weights, settings, words and what they were trained with, atomically."""
-    save_weights(path, "regex", network.state_dict(), RegexAbout(config, requests.vocabulary.words), identity)
-
-
 def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Requests, RegexConfig]:
-    """Load a network that `save_network` wrote.
+    """A network as training saved it.
 
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
@@ -140,24 +135,9 @@ def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Req
     return network.eval(), requests, about.config
 
 
-def _stage(name: str, folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> TeachingStage:
-    """How a network is trained, and all that it depends on."""
+def _settings(folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> dict[str, Any]:
+    """How a network is taught, and what it depends on."""
     settings = {k: v for k, v in vars(config).items() if k not in _OF_OTHERS}
+    how = {"world": "regex", "folder": folder, "updates": updates, "rate": config.teacher_rate, "seed": seed}
     words = requests.vocabulary.words
-    about = {"stage": name, "updates": updates, "seed": seed, "settings": settings, "words": digest(words)}
-    identity = identity_of("embodied.agents.iliad.regex.stages", **about)
-    return TeachingStage("regex", name, folder, updates, config.teacher_rate, seed, identity, RegexAbout(config, words))
-
-
-def _likelihood(logits: Tensor, wanted: Tensor) -> Tensor:
-    """Negative log-likelihood per data point."""
-    return -log_likelihood(logits, wanted).sum() / len(wanted)
-
-
-def _asked(items: Sequence[WordTask], rng: np.random.Generator) -> list[str]:
-    """One request of each item."""
-    return [q.requests[int(rng.integers(len(q.requests)))] for q in items]
-
-
-def _sample(data: RegexData) -> Sequence[WordTask]:
-    return data.splits["validation"][:256]
+    return {**how, "about": RegexAbout(config, words), "settings": settings, "words": digest(words)}
