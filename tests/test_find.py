@@ -9,10 +9,11 @@ import pytest
 import torch
 from hand_worlds import grid_world, line_world
 
+from embodied.agents.common.playing import Supervised
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.find.config import FinderConfig
 from embodied.agents.find.network import AROUND, READ, Explorer, SeekNetwork
-from embodied.agents.find.policy import STOP, WORDS, Search, Watched, costs_of
+from embodied.agents.find.policy import STOP, WORDS, Search, costs_of
 from embodied.agents.find.run import Finder, FinderAbout, FindLearner, Labels, new_finder, tasks_in
 from embodied.agents.find.way_map import WayMap
 from embodied.agents.vision.bank import FeatureBank
@@ -114,7 +115,7 @@ def test_who_sees_learns_to_find_things_and_who_is_blind_does_not(tmp_path, monk
 
 def test_a_lesson_never_stops_at_a_wrong_place():
     split = split_of(grid_world(4))
-    env = play(split.make_env, Watched(finder_for(split).policy(split.bank)), split.tasks[:8], seed=0, batch=8)
+    env = play(split.make_env, Supervised(finder_for(split).policy(split.bank)), split.tasks[:8], seed=0, batch=8)
     assert all(e.ended == "limit" or e.steps[-1].pose.node in e.task.goal_nodes for e in env)
 
 

@@ -12,16 +12,7 @@ from torch import Tensor, nn
 
 from embodied.agents.common.session import descend
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.learners import (
-    RequestBatch,
-    RunningMean,
-    adel,
-    adel_loss,
-    dagger,
-    mixture,
-    reinforce,
-    reinforce_loss,
-)
+from embodied.agents.iliad.learners import RequestBatch, adel, adel_loss, dagger, mixture, reinforce, reinforce_loss
 from embodied.agents.iliad.protocol import ExecutionScores
 from embodied.agents.iliad.training import IliadProblem, episodes_to, success_rate, train
 from embodied.seeds import stream
@@ -147,10 +138,9 @@ def test_reinforce_by_hand():
 
 
 def test_the_baseline_is_the_mean_of_all_rewards_this_batch_included():
-    mean, student = RunningMean(3.0, 3), flat([0.25] * 4)
-    reward = lambda task, execution: 0.0
-    lesson = reinforce(RequestBatch([Wish(0)], ["0"], stream(0, "r")), reward, mean, student, 0.0)
-    assert mean.value == pytest.approx(3 / 4)
+    student, reward = flat([0.25] * 4), lambda task, execution: 0.0
+    lesson = reinforce(RequestBatch([Wish(0)], ["0"], stream(0, "r")), reward, student, 0.0, (3.0, 3))
+    assert lesson.rewards == [0.0]
     assert lesson.loss.item() == pytest.approx((0 - 3 / 4) * math.log(4))
 
 

@@ -1,14 +1,30 @@
-"""Playing training episodes with a policy whose last memory is wanted: it holds all outputs of the episodes."""
+"""Playing training episodes with a policy that is shown the situations, and whose last memory is wanted: it holds all
+outputs of the episodes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from embodied.envs.base import HelpEnv
 from embodied.evaluation.rollout import rollout
 from embodied.interface import Actions, Agent, Episode, Observations, Place, Rngs, Situations, Task, act
+
+
+@dataclass(frozen=True, eq=False)
+class Supervised:
+    """A policy while a teacher watches: its `play` is given the situations."""
+
+    policy: Any
+    how: Mapping[str, Any] = field(default_factory=dict)
+    """Further arguments of `play`."""
+
+    def act_privileged(
+        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
+    ) -> tuple[Actions, Any]:
+        """See embodied.interface.PrivilegedPolicy."""
+        return self.policy.play(observations, situations, memory, rngs=rngs, **self.how)
 
 
 class _MemoryKeeper:

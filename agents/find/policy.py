@@ -98,11 +98,12 @@ class FindPolicy:
 
     def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, dict[int, Search]]:
         """One step of every running episode; see embodied.interface.Policy."""
-        return self._act(observations, [None] * len(observations), memory, rngs)
+        return self.play(observations, [None] * len(observations), memory, rngs=rngs)
 
-    def _act(
-        self, observations: Observations, situations: Situations, memory: dict[int, Search] | None, rngs: Rngs
+    def play(
+        self, observations: Observations, situations: Situations, memory: dict[int, Search] | None, *, rngs: Rngs
     ) -> tuple[Actions, dict[int, Search]]:
+        """One step of every running episode; a teacher labels decisions where it has `situations`."""
         running = [(i, o) for i, o in enumerate(observations) if o is not None]
         memory = memory or {i: Search(self.vocabulary.encode(o.instruction, WORDS)) for i, o in running}
         looks = self.looks.gather([o.sight for _, o in running]).float().numpy()
@@ -191,18 +192,6 @@ def wanted(costs: np.ndarray) -> np.ndarray:
     """(m,) float32: how likely options of these costs should be."""
     weights = np.exp((costs.min() - costs) / CERTAIN)
     return (weights / weights.sum()).astype(np.float32)
-
-
-@dataclass(frozen=True, eq=False)
-class Watched:
-    """The same policy while a teacher watches who says what each decision should have been."""
-
-    policy: FindPolicy
-
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
-    ) -> tuple[Actions, dict[int, Search]]:
-        return self.policy._act(observations, situations, memory, rngs)
 
 
 def padded(rows: Sequence[np.ndarray]) -> Tensor:

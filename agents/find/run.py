@@ -14,7 +14,7 @@ import torch.nn.functional as F
 from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
-from embodied.agents.common.playing import play_with_memory
+from embodied.agents.common.playing import Supervised, play_with_memory
 from embodied.agents.common.session import (
     Note,
     descend,
@@ -30,7 +30,7 @@ from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
 from embodied.agents.common.weights import check_features, load_weights, save_weights, seeded
 from embodied.agents.find.config import THINGS, FinderConfig
 from embodied.agents.find.network import READ, Explorer, SeekNetwork
-from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, Watched, imitation_loss
+from embodied.agents.find.policy import CERTAIN, WORDS, FindPolicy, Search, imitation_loss
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.assets.catalogue import load_catalogue
@@ -144,7 +144,7 @@ class FindLearner(imitation.ImitationLearner):
     def _search(self, update: int) -> tuple[list[Search], dict[str, float]]:
         """Whole episodes, watched by a teacher."""
         c, split = self.config, self.training
-        policy = Watched(dataclasses.replace(self.agent.policy(split.bank), choose=choose_sampled))
+        policy = Supervised(dataclasses.replace(self.agent.policy(split.bank), choose=choose_sampled))
         tasks = tasks_of_update(split.tasks, update, c.batch, c.seed)
         episodes, searches = play_with_memory(split.make_env, policy, tasks, seed=episode_seed(c.seed, update))
         return list(searches.values()), imitation.played(episodes, split.worlds)

@@ -53,13 +53,17 @@ class AskFirst(Rule):
     """Ask GOAL once, at the beginning."""
     state: bool = False
     """Ask CUR before every move."""
+    sub: bool = False
+    """Ask SUB whenever possible; not in the dissertation."""
 
     def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
         if self.goal and not moment.taken[GOAL]:
             return GOAL
         if self.state and not moment.described:
             return CUR
-        return DONE if moment.would_stop else DO
+        if moment.would_stop:
+            return DONE
+        return SUB if self.sub and moment.possible[SUB] else DO
 
 
 @dataclass(frozen=True)
@@ -93,22 +97,12 @@ class RandomWithBudgets(Rule):
         return int(rng.choice(np.flatnonzero(free))) if free.any() else DONE
 
 
-@dataclass(frozen=True)
-class AlwaysSub(Rule):
-    """Asks SUB whenever it may, does, and is done when the execution policy is; not in the dissertation."""
-
-    def choose(self, moment: RuleMoment, rng: np.random.Generator) -> int:
-        if moment.would_stop:
-            return DONE
-        return SUB if moment.possible[SUB] else DO
-
-
 RULES: Mapping[str, Rule] = {
     "no assistance": AskFirst(),
     "dense goal": AskFirst(goal=True),
     "dense state": AskFirst(state=True),
     "dense goal and state": AskFirst(goal=True, state=True),
-    "SUB whenever possible": AlwaysSub(),
+    "SUB whenever possible": AskFirst(sub=True),
 }
 """Rows 1 to 4 of Table 4.7, and the strongest rule that we know of."""
 

@@ -47,6 +47,8 @@ class IliadLesson:
     """The agent's executions of the requests."""
     descriptions: Sequence[str | None] = ()
     """The teacher's descriptions of them, where there is one."""
+    rewards: Sequence[float] = ()
+    """Their rewards, where they are learned from."""
 
 
 def adel(
@@ -126,14 +128,22 @@ def dagger(asked: RequestBatch, world: RequestWorld, student: Student) -> IliadL
 
 
 def reinforce(
-    asked: RequestBatch, reward: Callable[[Any, Any], float], mean: RunningMean, student: Student, entropy: float
+    asked: RequestBatch,
+    reward: Callable[[Any, Any], float],
+    student: Student,
+    entropy: float,
+    before: tuple[float, float] = (0.0, 0),
 ) -> IliadLesson:
-    """REINFORCE against the mean of all rewards so far, those of this batch included."""
+    """REINFORCE against the mean of all rewards so far, those of this batch included.
+
+    Args:
+      before: sum and number of the rewards of earlier batches.
+    """
     done = student.sample(asked.tasks, asked.requests, rng=asked.rng)
     rewards = [float(reward(q, e)) for q, e in zip(asked.tasks, done, strict=True)]
-    mean.add(rewards)
+    mean = (before[0] + sum(rewards)) / (before[1] + len(rewards))
     scores = student.scores(asked.tasks, asked.requests, done)
-    return IliadLesson(reinforce_loss(scores, rewards, mean.value, entropy), done)
+    return IliadLesson(reinforce_loss(scores, rewards, mean, entropy), done, rewards=rewards)
 
 
 def reinforce_loss(scores: ExecutionScores, rewards: Sequence[float], baseline: float, entropy: float) -> Tensor:
@@ -142,19 +152,3 @@ def reinforce_loss(scores: ExecutionScores, rewards: Sequence[float], baseline: 
     values = torch.full_like(scores.log_probabilities, baseline)
     rated = Decisions(scores.log_probabilities, values, returns, scores.mask)
     return actor_loss(rated) - entropy * (scores.entropies * scores.mask).sum() / len(returns)
-
-
-@dataclass
-class RunningMean:
-    """The mean of all numbers so far."""
-
-    total: float = 0.0
-    count: int = 0
-
-    @property
-    def value(self) -> float:
-        return self.total / max(1, self.count)
-
-    def add(self, numbers: Sequence[float]) -> None:
-        self.total += float(sum(numbers))
-        self.count += len(numbers)

@@ -12,7 +12,7 @@ import torch
 
 from embodied.agents.common.session import Note, Session, descend, seeded_dropout, set_learning_rate, tasks_of_update
 from embodied.agents.iliad.config import LearnerConfig, mixing_at
-from embodied.agents.iliad.learners import IliadLesson, RequestBatch, RunningMean, adel, dagger, mixture, reinforce
+from embodied.agents.iliad.learners import IliadLesson, RequestBatch, adel, dagger, mixture, reinforce
 from embodied.agents.iliad.protocol import DescribingTeacher, Marginal, RequestWorld, Student, Tasks
 from embodied.identity import Identity
 from embodied.seeds import stream
@@ -64,9 +64,8 @@ def train(
         every=config.validate_every,
         note=note,
     ) as session:
-        learner.restore(session.sums)
         for update in session:
-            session.add(learner.update(update))
+            session.add(learner.update(update, session.sums))
             if session.due(config.validate_every):
                 success = success_rate(problem.world, problem.student, problem.validation)
                 session.record(_found(session.done, success, config, session.sums))
@@ -98,7 +97,7 @@ def episodes_to(history: Sequence[Mapping[str, float]], threshold: float) -> flo
 
 
 class _Learner:
-    """Owns the optimizer and what is counted; one update of whichever learner the settings name."""
+    """Owns the optimizer; one update of whichever learner the settings name."""
 
     def __init__(self, problem: IliadProblem, config: LearnerConfig) -> None:
         self.problem, self.config = problem, config
@@ -107,31 +106,25 @@ class _Learner:
             self.modules["explorer"] = problem.explorer.network
         weights = [p for m in self.modules.values() for p in m.parameters()]
         self.optimizer = torch.optim.Adam(weights, config.rate, fused=True)
-        self.mean = RunningMean()
 
-    def restore(self, sums: Mapping[str, float]) -> None:
-        """Go on counting rewards."""
-        self.mean = RunningMean(sums.get("reward", 0.0), int(sums.get("episodes", 0)))
-
-    def update(self, update: int) -> dict[str, float]:
-        """One update; returns numbers to add up."""
+    def update(self, update: int, sums: Mapping[str, float]) -> dict[str, float]:
+        """One update; returns numbers to add up to `sums`."""
         c, world = self.config, self.problem.world
         set_learning_rate(self.optimizer, c.rate, update, c.iterations, c.cooldown)
         tasks = tasks_of_update(self.problem.training, update, c.batch, c.seed)
         rng = stream(c.seed, "iliad", update)
         asked = RequestBatch(tasks, [world.request(q, rng=rng) for q in tasks], rng)
-        before = self.mean.total
         with seeded_dropout(c.seed, update):
-            lesson = self._learn(asked, mixing_at(c, update))
+            lesson = self._learn(asked, mixing_at(c, update), sums)
             descend(lesson.loss, self.optimizer, c.learner, c.clip)
         fulfilled = sum(world.success(q, e) for q, e in zip(tasks, lesson.executions, strict=True))
         loss = float(lesson.loss.detach())
         numbers = {"episodes": len(tasks), "fulfilled": fulfilled, "loss": loss, "updates": 1.0}
         if lesson.descriptions:
             numbers["described"] = sum(d is not None for d in lesson.descriptions) / len(tasks)
-        return numbers | ({"reward": self.mean.total - before} if self.mean.count else {})
+        return numbers | ({"reward": float(sum(lesson.rewards))} if lesson.rewards else {})
 
-    def _learn(self, asked: RequestBatch, mixing: float) -> IliadLesson:
+    def _learn(self, asked: RequestBatch, mixing: float, sums: Mapping[str, float]) -> IliadLesson:
         p, c = self.problem, self.config
         if c.learner == "adel":
             return adel(asked, p.teacher, p.marginal, p.explorer, p.student, mixing)
@@ -140,7 +133,7 @@ class _Learner:
         if c.learner == "dagger":
             return dagger(asked, p.world, p.student)
         reward = p.world.success if c.learner == "binary" else p.world.reward
-        return reinforce(asked, reward, self.mean, p.student, c.entropy)
+        return reinforce(asked, reward, p.student, c.entropy, (sums.get("reward", 0.0), sums.get("episodes", 0)))
 
 
 def _found(done: int, success: float, config: LearnerConfig, sums: Mapping[str, float]) -> dict[str, float]:

@@ -140,19 +140,6 @@ class VlnPolicy:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class SupervisedVln:
-    """The follower as it learns, with the teacher's labels."""
-
-    policy: VlnPolicy
-    guided: Guided
-
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: VlnMemory | None, *, rngs: Rngs
-    ) -> tuple[Actions, VlnMemory]:
-        return self.policy.play(observations, situations, memory, rngs=rngs, guided=self.guided)
-
-
 def _directions(like: Tensor, yaws: np.ndarray, pitches: np.ndarray) -> Tensor:
     return orientation(torch.tensor(yaws, device=like.device), torch.tensor(pitches, device=like.device), COPIES)
 

@@ -20,6 +20,7 @@ from embodied.agents.common import imitation
 from embodied.agents.common.choosing import choose_sampled
 from embodied.agents.common.losses import IGNORE, negative_log_likelihood
 from embodied.agents.common.more_paths import more_routes
+from embodied.agents.common.playing import Supervised
 from embodied.agents.common.session import Progress
 from embodied.agents.common.settings import EvaluationSettings
 from embodied.agents.common.vocabulary import build_vocabulary
@@ -27,7 +28,7 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.training_data import Split, TrainingData
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
-from embodied.agents.vln.policy import SupervisedVln, VlnMoment
+from embodied.agents.vln.policy import VlnMoment
 from embodied.identity import identity_of
 from embodied.interface import Agent, Episode, Task
 from embodied.tasks.vln import vln_task
@@ -47,7 +48,7 @@ class VlnLearner(imitation.ImitationLearner):
     def player(self, update: int, bank: FeatureBank) -> Agent:
         dropout, share = self.config.environment_dropout, teacher_share(self.config, update)
         policy = dataclasses.replace(self.agent.policy(bank), choose=choose_sampled, environment_dropout=dropout)
-        return SupervisedVln(policy, lambda _, rng: bool(rng.random() < share))
+        return Supervised(policy, {"guided": lambda _, rng: bool(rng.random() < share)})
 
     def loss_of(self, episodes: Sequence[Episode], experience: Sequence[VlnMoment]) -> imitation.BatchLoss:
         c = self.config

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from embodied.agents.common.choosing import choose_at
+from embodied.agents.common.playing import Supervised
 from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.weights import check_features
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vnla.config import ASK_RULES, VnlaSettings
 from embodied.agents.vnla.network import VnlaNetwork
-from embodied.agents.vnla.policy import SupervisedVnla, VnlaPolicy
+from embodied.agents.vnla.policy import VnlaPolicy
 from embodied.interface import Agent
 from embodied.teachers.vnla import AskRules
 
@@ -54,7 +55,8 @@ class VnlaAgent(SightedAgent):
     def player(self, bank: FeatureBank, asker: str | None = None) -> Agent:
         """The agent as it is judged: shown the situations only where its asker needs them."""
         policy = self.policy(bank, asker)
-        return SupervisedVnla(policy, rules_of(self.config)) if policy.asker in ("random", "teacher") else policy
+        shown = policy.asker in ("random", "teacher")
+        return Supervised(policy, {"rules": rules_of(self.config)}) if shown else policy
 
 
 def rules_of(config: VnlaSettings) -> AskRules:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from torch import Tensor
 
 from embodied.action_spaces import WORDS
 from embodied.agents.common.choosing import Chooser, choose_greedily, choose_sampled
+from embodied.agents.common.playing import Supervised
 from embodied.agents.common.rows import RunningRows, hidden_channels
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.vision.bank import FeatureBank
@@ -42,6 +43,7 @@ from embodied.interface import (
     Observations,
     Pose,
     Rngs,
+    Situation,
     Situations,
     Stop,
     Thought,
@@ -80,10 +82,6 @@ class VnlaMemory(RunningRows):
     """When the asker 'random' asks."""
 
 
-Decide = Callable[[int, Observation, Thought, frozenset[int], np.random.Generator], bool]
-"""(position, what is seen, what the networks said, times drawn at the beginning, generator) -> whether to ask now."""
-
-
 @dataclass(frozen=True, eq=False)
 class VnlaPolicy:
     """A trained (or training) network that acts, and asks by a rule that needs no privilege."""
@@ -92,7 +90,7 @@ class VnlaPolicy:
     vocabulary: Vocabulary
     bank: FeatureBank
     asker: str = "learned"
-    """'learned', 'none' or 'first'; 'random' and 'teacher' need SupervisedVnla."""
+    """'learned', 'none' or 'first'; 'random' and 'teacher' need to be shown the situations (Supervised)."""
     ask_threshold: float = 0.5
     choose: Chooser = choose_greedily
     instruction_length: int = 50
@@ -101,16 +99,7 @@ class VnlaPolicy:
 
     def act(self, observations: Observations, memory: VnlaMemory | None, *, rngs: Rngs) -> tuple[Actions, VnlaMemory]:
         """One step of every running episode; see embodied.interface.Policy."""
-        none = [None] * len(observations)
-        return self.play(observations, none, memory, rngs=rngs, decide=self.wants)
-
-    def wants(
-        self, position: int, observation: Observation, thought: Thought, times: frozenset[int], rng: np.random.Generator
-    ) -> bool:
-        """True to ask now, where that is possible."""
-        if self.asker == "learned":
-            return (thought.asks or {})["help"] > self.ask_threshold
-        return self.asker == "first"
+        return self.play(observations, [None] * len(observations), memory, rngs=rngs)
 
     def play(
         self,
@@ -119,14 +108,14 @@ class VnlaPolicy:
         memory: VnlaMemory | None,
         *,
         rngs: Rngs,
-        decide: Decide,
+        rules: AskRules | None = None,
         teacher: VnlaTeacher | None = None,
     ) -> tuple[Actions, VnlaMemory]:
         """One step of every running episode.
 
         Args:
           situations: of the episodes, for 'random' and for the teacher; None without.
-          decide: whether to ask.
+          rules: of the asking teacher; the learned asker asks when that would, as in training.
           teacher: whose labels are kept with what was said, with its gradients.
         """
         running = [(i, o) for i, o in enumerate(observations) if o is not None]
@@ -144,7 +133,7 @@ class VnlaPolicy:
             asking = []
             for row in able:
                 place = positions[row]
-                if decide(place, seen[row], thoughts[row], memory.times[row], rngs[place]):
+                if self._wants(seen[row], now[row], thoughts[row], memory.times[row], rules):
                     actions[place] = Ask(seen[row].can_ask[0], thoughts[row])
                     asking.append(row)
             acting = [row for row in range(len(seen)) if row not in asking]
@@ -159,6 +148,16 @@ class VnlaPolicy:
             moment = _moment(teacher, now, thoughts, asks, able, moves, acting)
             memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
         return actions, _after(memory, seen, set(asking))
+
+    def _wants(
+        self, o: Observation, s: Situation | None, thought: Thought, times: frozenset[int], rules: AskRules | None
+    ) -> bool:
+        """True to ask now, where that is possible."""
+        if self.asker == "random":
+            return o.time in times
+        if rules is not None and s is not None and self.asker in ("teacher", "learned"):
+            return ask_reason(s, thought, rules) is not None
+        return self.asker == "first" or (self.asker == "learned" and (thought.asks or {})["help"] > self.ask_threshold)
 
     def start(self, positions: tuple[int, ...], situations: Situations, rngs: Rngs) -> VnlaMemory:
         """Memory before the first step of the episodes at `positions`."""
@@ -248,36 +247,10 @@ class VnlaPolicy:
         return dataclasses.replace(memory, state=state, text=text, previous_ask=asked), moves
 
 
-@dataclass(frozen=True, eq=False)
-class SupervisedVnla:
-    """The same networks asking at random or, as in training, when the teacher says so, and with labels for training."""
-
-    policy: VnlaPolicy
-    rules: AskRules = AskRules()
-    teacher: VnlaTeacher | None = None
-    """The teacher whose labels are kept, for training."""
-
-    def act_privileged(
-        self, observations: Observations, situations: Situations, memory: VnlaMemory | None, *, rngs: Rngs
-    ) -> tuple[Actions, VnlaMemory]:
-        def wants(
-            position: int, o: Observation, thought: Thought, times: frozenset[int], rng: np.random.Generator
-        ) -> bool:
-            asker, situation = self.policy.asker, situations[position]
-            assert situation is not None, "the episode is running"
-            if asker == "random":
-                return o.time in times
-            if asker in ("teacher", "learned"):
-                return ask_reason(situation, thought, self.rules) is not None
-            return self.policy.wants(position, o, thought, times, rng)
-
-        return self.policy.play(observations, situations, memory, rngs=rngs, decide=wants, teacher=self.teacher)
-
-
-def for_training(policy: VnlaPolicy, teacher: VnlaTeacher, environment_dropout: float = 0.0) -> SupervisedVnla:
+def for_training(policy: VnlaPolicy, teacher: VnlaTeacher, environment_dropout: float = 0.0) -> Supervised:
     """The networks as they learn: moves are sampled, the learned asker asks when its teacher would."""
     sampling = dataclasses.replace(policy, choose=choose_sampled, environment_dropout=environment_dropout)
-    return SupervisedVnla(sampling, teacher.rules, teacher)
+    return Supervised(sampling, {"rules": teacher.rules, "teacher": teacher})
 
 
 def carried_out(before: Observation, now: Observation) -> int:
