@@ -82,22 +82,21 @@ def _unpacked(folder: Path) -> Path:
     packages = [p for name in PACKAGES for p in sorted(folder.glob(f"{name}_*.deb"))[-1:]]
     if not packages:
         return folder
+    if shutil.which("dpkg-deb") is None:
+        raise UnableError(
+            f"dpkg-deb is needed to unpack {folder}; unpack it elsewhere and name that folder with --from"
+        )
     root = folder / "unpacked"
+    root.mkdir(parents=True, exist_ok=True)
     for path in packages:
         done = root / f".{path.name}"
         if not done.exists():
-            _unpack(path, root)
+            tool = subprocess.run(["dpkg-deb", "-x", str(path), str(root)], capture_output=True, text=True, check=False)
+            if tool.returncode:
+                reason = tool.stderr.strip().splitlines()[-1]
+                raise CorpusError(f"{path}: damaged ({reason}); delete it and fetch it again")
             done.touch()
     return root
-
-
-def _unpack(path: Path, root: Path) -> None:
-    if shutil.which("dpkg-deb") is None:
-        raise UnableError(f"dpkg-deb is needed to unpack {path}; unpack it elsewhere and name that folder with --from")
-    root.mkdir(parents=True, exist_ok=True)
-    done = subprocess.run(["dpkg-deb", "-x", str(path), str(root)], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise CorpusError(f"{path}: damaged ({done.stderr.strip().splitlines()[-1]}); delete it and fetch it again")
 
 
 def _help(folder: Path) -> Iterator[Pair]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Unpack
 
@@ -46,7 +46,13 @@ def task_split_of(data: Dataset, splits: Sequence[str], config: IntentionConfig,
     each = None if limit is None else -(-limit // len(splits))
     tasks = [t for part in parts for t in spread(part.tasks, each)]
     places: Mapping[str, Place] = {name: place for part in parts for name, place in part.worlds.items()}
-    return TaskSet(places, tasks, parts[0].make_env if len(parts) == 1 else _over(parts[0].make_env, places))
+
+    def make_env() -> HelpEnv:
+        env = parts[0].make_env()
+        env.worlds = places
+        return env
+
+    return TaskSet(places, tasks, make_env)
 
 
 def validation_means(data: Dataset, agent: HariAgent, *, seed: int) -> dict[str, float]:
@@ -54,17 +60,6 @@ def validation_means(data: Dataset, agent: HariAgent, *, seed: int) -> dict[str,
     ground = task_split_of(data, VALIDATION_CONDITIONS, agent.config, agent.config.validation_tasks)
     with torch.inference_mode():
         return counts_of(play(ground.make_env, policy_of(agent), ground.tasks, seed=seed, batch=agent.config.batch))
-
-
-def _over(make: Callable[[], HelpEnv], places: Mapping[str, Place]) -> Callable[[], HelpEnv]:
-    """Environments of one split with the houses of several."""
-
-    def made() -> HelpEnv:
-        env = make()
-        env.worlds = places
-        return env
-
-    return made
 
 
 def train_execution(
@@ -79,10 +74,9 @@ def train_execution(
     validation = spread(data.tasks("pretrain_val"), None)
     describer = Describer(frequent_classes(data.places("train").values(), config.keep_fraction))
     source = PretrainingData(where, describer, data.tasks("pretrain"), validation)
-    describe = source.describer.dense
     houses = {t.world for t in source.training}
     places = [source.places[name] for name in sorted(houses)]
-    words = feature_words(describe(place, v) for place in places for v in range(len(place.graph.ids)))
+    words = feature_words(describer.dense(place, v) for place in places for v in range(len(place.graph.ids)))
     other = None if init_from is None else load_executor(init_from)
     executor = new_executor(config, other.words if other else words)
     if other is not None and init_from is not None:

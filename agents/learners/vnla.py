@@ -73,17 +73,16 @@ def study(args: VnlaStudyOptions) -> StudyLearner:
 def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     """The learned asker beside other askers, direct intervention and agents without learning."""
     from embodied.agents.vision.training_data import evaluation_data
-    from embodied.agents.vnla.agent import VnlaAgent
-    from embodied.agents.vnla.judging import WITHOUT_LEARNING, player, row_names, rules_of_row
+    from embodied.agents.vnla.agent import WITHOUT_LEARNING, VnlaAgent
 
     source, agent = evaluation_data(data, how), VnlaAgent.load(file)
 
     about = f"rules of play: {agent.config.rules}; trained on pictures {agent.about.pictures}"
 
     def of_split(split: str) -> Players:
-        bank, names = source.split(split).bank, row_names(agent)
+        bank, names = source.split(split).bank, agent.rows()
         under = functools.cache(lambda rules: data.split(split, rules=rules))
-        rows = {name: (under(rules_of_row(agent, name)), player(agent, bank, name)) for name in names}
+        rows = {name: (under(agent.rules_of_row(name)), agent.player(bank, name)) for name in names}
         return Players(rows, names, WITHOUT_LEARNING, about)
 
     return of_split
@@ -96,13 +95,8 @@ register_learner(
         study=(VnlaStudyOptions, study),
         players=players,
         columns=(
-            "success",
-            "strict success",
-            "room success",
-            "navigation error",
-            "requests",
-            "oracle success",
-            "steps",
+            *("success", "strict success", "room success", "navigation error"),
+            *("requests", "oracle success", "steps"),
         ),
         shipped=SHIPPED_VNLA,
     )

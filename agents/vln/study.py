@@ -21,10 +21,6 @@ def _row(label: str, **train: Any) -> StudyRow:
     return StudyRow(label, train, {"played": "learned"})
 
 
-def _without(name: str) -> StudyRow:
-    return StudyRow(name, None, {"played": name})
-
-
 FOLLOWER, BLIND_FOLLOWER = _row("DAgger"), _row("DAgger, blind", blind=True)
 VLN_TABLES: Mapping[str, StudyTable] = {
     "followers": StudyTable(
@@ -35,8 +31,7 @@ VLN_TABLES: Mapping[str, StudyTable] = {
             _row("teacher forcing", forcing="teacher"),
             BLIND_FOLLOWER,
             _row("DAgger, no instruction", wordless=True),
-            _without("random walk"),
-            _without("shortest"),
+            *(StudyRow(name, None, {"played": name}) for name in ("random walk", "shortest")),
         ),
         MEASURES,
         TEST_SPLITS,

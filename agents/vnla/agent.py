@@ -1,4 +1,5 @@
-"""VnlaAgent: a trained network with all that is needed to act again."""
+"""VnlaAgent: a trained network with all that is needed to act again, and the rows that it is judged in: other askers,
+direct intervention, agents without learning."""
 
 from __future__ import annotations
 
@@ -13,7 +14,21 @@ from embodied.agents.vnla.config import ASK_RULES, VnlaSettings
 from embodied.agents.vnla.network import VnlaNetwork
 from embodied.agents.vnla.policy import VnlaPolicy
 from embodied.interface import Agent
+from embodied.kinds.shipped.vnla import VNLA
 from embodied.teachers.vnla import AskRules
+
+WITHOUT_LEARNING = ("random walk", "listener, teacher", "shortest")
+TEACHER = "learned, asks as its teacher"
+ASKED = {
+    "learned, asks never": "none",
+    "learned, asks first": "first",
+    "learned, asks at random": "random",
+    TEACHER: "teacher",
+}
+"""Rows that put another asker in front of the same networks (docs/sources.md, S39), and that asker."""
+DIRECT = "learned, direct intervention"
+"""The advisor carries out what it said: direct with sub-goals in the paper."""
+LEARNED = "learned"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,9 +67,20 @@ class VnlaAgent(SightedAgent):
             instruction_length=config.instruction_length,
         )
 
-    def player(self, bank: FeatureBank, asker: str | None = None) -> Agent:
-        """The agent as it is judged: shown the situations only where its asker needs them."""
-        policy = self.policy(bank, asker)
+    def rows(self) -> tuple[str, ...]:
+        """All rows that it gives; direct intervention is that of one which learned to read what the advisor says."""
+        direct = (DIRECT,) if self.config.rules == "indirect" else ()
+        return (LEARNED, *ASKED, *direct, *WITHOUT_LEARNING)
+
+    def rules_of_row(self, row: str) -> str:
+        """The rule of play that a row is judged under."""
+        return "direct" if row == DIRECT else self.config.rules
+
+    def player(self, bank: FeatureBank, row: str = LEARNED) -> Agent:
+        """Who plays a row: shown the situations only where its asker needs them."""
+        if row in WITHOUT_LEARNING:
+            return VNLA.agent(row)
+        policy = self.policy(bank, ASKED.get(row))
         shown = policy.asker in ("random", "teacher")
         return Supervised(policy, {"rules": rules_of(self.config)}) if shown else policy
 

@@ -147,7 +147,10 @@ class VnlaPolicy:
         if teacher is not None:
             moment = _moment(teacher, now, thoughts, asks, able, moves, acting)
             memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
-        return actions, _after(memory, seen, set(asking))
+        told = torch.tensor(asking, dtype=torch.long, device=moves.device)
+        before = tuple(None if row in asking else o for row, o in enumerate(seen))  # who moved will see what came of it
+        previous_ask = memory.previous_ask.index_fill(0, told, ASK)
+        return actions, dataclasses.replace(memory, previous_ask=previous_ask, before=before)
 
     def _wants(
         self, o: Observation, s: Situation | None, thought: Thought, times: frozenset[int], rules: AskRules | None
@@ -262,17 +265,6 @@ def carried_out(before: Observation, now: Observation) -> int:
     if now.tilt != before.tilt:
         return WORDS.index("up" if now.tilt > before.tilt else "down")
     return STOP
-
-
-def _after(memory: VnlaMemory, seen: Sequence[Observation], asking: set[int]) -> VnlaMemory:
-    """The memory after the actions: who asked goes on with the same step, who moved will see what came of it."""
-    asked = memory.previous_ask.tolist()
-    for row in asking:
-        asked[row] = ASK
-    before = tuple(None if row in asking else o for row, o in enumerate(seen))
-    return dataclasses.replace(
-        memory, previous_ask=torch.tensor(asked, device=memory.previous_ask.device), before=before
-    )
 
 
 def _moment(

@@ -16,9 +16,8 @@ from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.agents.studies.wordings import words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
-from embodied.agents.vnla.agent import VnlaAgent
+from embodied.agents.vnla.agent import DIRECT, LEARNED, TEACHER, VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
-from embodied.agents.vnla.judging import DIRECT, LEARNED, TEACHER, player, rules_of_row
 from embodied.agents.vnla.run import train_agent
 from embodied.datasets.store import SplitData
 from embodied.interface import Agent
@@ -90,7 +89,7 @@ class VnlaStudy(SightedStudy):
 
     name, agent_kind, all_tables = "vnla", VnlaAgent, VNLA_TABLES
     makers = ("embodied.agents.vnla.run",)
-    judges = (*JUDGES, "embodied.agents.vnla.judging")
+    judges = (*JUDGES, "embodied.agents.vnla.agent")
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
@@ -99,9 +98,9 @@ class VnlaStudy(SightedStudy):
     def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        return self.heard(agent, player(agent, self.training_data().split(split).bank, judge["played"]), judge)
+        return self.heard(agent, agent.player(self.training_data().split(split).bank, judge["played"]), judge)
 
     def where(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         if agent is None:
             return super().where(agent, judge, split)
-        return self.judged_in(judge).split(split, rules=rules_of_row(agent, judge["played"]))
+        return self.judged_in(judge).split(split, rules=agent.rules_of_row(judge["played"]))

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from embodied.agents.common.more_paths import more_routes
 from embodied.agents.common.paraphrases import varied
 from embodied.agents.common.session import Note
 from embodied.agents.common.vocabulary import build_vocabulary
 from embodied.agents.common.weights import save_weights
 from embodied.agents.common.word_vectors import vocabulary_with
 from embodied.agents.iliad.nav.config import NavConfig
-from embodied.agents.iliad.nav.data import NAV_SPLITS, NavData, nav_data
+from embodied.agents.iliad.nav.data import NAV_SPLITS, NavData
 from embodied.agents.iliad.nav.stages import (
     about_follower,
     load_follower,
@@ -22,14 +23,17 @@ from embodied.agents.iliad.nav.stages import (
     teach_describer,
     teach_executor,
 )
-from embodied.agents.iliad.nav.student import LoopFree, NavStudent
+from embodied.agents.iliad.nav.student import LoopFree, NavEyes, NavStudent
 from embodied.agents.iliad.nav.teacher import GrammarNavTeacher, LearnedNavTeacher, OtherWords
-from embodied.agents.iliad.nav.world import NavMarginal, NavWorld
+from embodied.agents.iliad.nav.world import NavMarginal, NavWorld, trips_of
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, successes
 from embodied.agents.studies.wordings import WORDING, saying
+from embodied.agents.vision.config import drawing
+from embodied.agents.vision.drawn import pictures_of
+from embodied.agents.vision.features import feature_path, load_bank
 from embodied.assets.catalogue import load_catalogue
-from embodied.datasets.store import Dataset
+from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.tables import Samples
 from embodied.identity import identity_of
 from embodied.interface import SeenPlace
@@ -68,15 +72,33 @@ class NavSetup:
     def data(self) -> NavData:
         """
         Raises:
-          FileNotFoundError, ValueError: as nav_data.
+          FileNotFoundError, ValueError: a data set of another kind, or without such features.
         """
-        return nav_data(self.folder, self.config, self.encoder, self.picture_kind, self.cache)
+        config, source = self.config, dataset_of(self.folder, "vln", "hanna")
+        houses = {part: source.names(name) for part, name in NAV_SPLITS.items()}
+        splits = {part: [t for n in names for t in trips_of(n, source.routes(n))] for part, names in houses.items()}
+        for name in houses["train"] if config.more_paths else ():
+            more = more_routes(source, name, config.more_paths, seed=config.data_seed, cache=self.cache)
+            splits["train"] += trips_of(name, more)
+        for part in ("validation", "test"):
+            splits[part] = [dataclasses.replace(trip, requests=(r,)) for trip in splits[part] for r in trip.requests]
+        names = tuple(name for many in houses.values() for name in many)
+        places = {name: source.place(name) for name in names}
+        pictures = {name: pictures_of(source, name, self.picture_kind) for name in names}
+        paths: dict[str, Path] = {
+            n: feature_path(source.folder / "features", self.encoder, n, pictures[n]) for n in names
+        }
+        vocabulary = build_vocabulary(request for trip in splits["train"] for request in trip.requests)
+        words = vocabulary_with(vocabulary.words, config.word_vectors)
+        eyes = NavEyes(places, load_bank(paths, self.encoder, places, pictures), words)
+        drawn = ", ".join(sorted({drawing(p) for p in pictures.values()}))
+        return NavData(source, eyes, splits, drawn)
 
     def prepare(self, folder: Path, note: Note) -> NavGrounds:
         """Data and teacher, trained into `folder` unless it is there.
 
         Raises:
-          FileNotFoundError, ValueError: as nav_data.
+          FileNotFoundError, ValueError: as `data`.
         """
         config, data = self.config, self.data()
         counts = ", ".join(f"{len(v)} {part}" for part, v in data.splits.items())

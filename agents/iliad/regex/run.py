@@ -8,15 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from embodied.agents.common.session import Note
-from embodied.agents.common.weights import save_weights
+from embodied.agents.common.tensor_file import load_into
+from embodied.agents.common.vocabulary import Vocabulary
+from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.regex.coding import Requests, request_words
 from embodied.agents.iliad.regex.config import RegexConfig
 from embodied.agents.iliad.regex.data import RegexData, make_data, rules_without_requests
 from embodied.agents.iliad.regex.networks import Speller
 from embodied.agents.iliad.regex.stages import (
+    REGEX_REMEDY,
     RegexAbout,
-    load_network,
     new_network,
     pretrain_student,
     teach_describer,
@@ -109,5 +111,8 @@ def load_student(path: Path) -> tuple[RegexStudent, RegexConfig]:
     Raises:
       FileNotFoundError, ValueError: missing, damaged or of another format.
     """
-    speller, requests, config = load_network(path, Speller)
-    return RegexStudent(speller, requests), config
+    tensors, about = load_weights(path, "regex", RegexAbout, REGEX_REMEDY)
+    requests = Requests(Vocabulary(about.words))
+    speller = new_network(Speller, about.config, requests, 0, "loaded")
+    load_into(speller, tensors, path)
+    return RegexStudent(speller.eval(), requests), about.config

@@ -15,9 +15,7 @@ from torch import Tensor
 
 from embodied.agents.common.choosing import greedy_choice
 from embodied.agents.common.session import Note
-from embodied.agents.common.tensor_file import load_into
-from embodied.agents.common.vocabulary import Vocabulary
-from embodied.agents.common.weights import load_weights, seeded
+from embodied.agents.common.weights import seeded
 from embodied.agents.iliad.protocol import NOTHING
 from embodied.agents.iliad.regex.coding import Requests, changes, characters, texts
 from embodied.agents.iliad.regex.config import RegexConfig
@@ -120,19 +118,6 @@ def executor_success(executor: Speller, requests: Requests, items: Sequence[Word
     longest = max(len(q.outputs[0]) for q in items) + 2
     written = texts(executor.write(words, requests([q.requests[0] for q in items]), greedy_choice, longest))
     return {"success": float(np.mean([w == q.outputs[0] for w, q in zip(written, items, strict=True)]))}
-
-
-def load_network(path: Path, kind: Callable[..., Network]) -> tuple[Network, Requests, RegexConfig]:
-    """A network as training saved it.
-
-    Raises:
-      FileNotFoundError, ValueError: missing, damaged or of another format.
-    """
-    tensors, about = load_weights(path, "regex", RegexAbout, REGEX_REMEDY)
-    requests = Requests(Vocabulary(about.words))
-    network = new_network(kind, about.config, requests, 0, "loaded")
-    load_into(network, tensors, path)
-    return network.eval(), requests, about.config
 
 
 def _settings(folder: Path, updates: int, config: RegexConfig, requests: Requests, seed: int) -> dict[str, Any]:
