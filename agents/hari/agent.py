@@ -64,11 +64,11 @@ def new_heads(config: IntentionConfig, belief: int) -> tuple[RecurrentHead, Recu
 
 def save(made: Executor | HariAgent, path: Path, identity: Identity | None = None) -> None:
     """Write an execution policy, or an agent with its own, and what it was trained with, atomically."""
-    executor, parts, config = made, nn.ModuleDict(), None
-    if isinstance(made, HariAgent):
-        executor, parts, config = made.executor, nn.ModuleDict({"actor": made.actor}), made.config
-    parts["execution"] = executor.network
-    save_weights(path, "hari", parts.state_dict(), HariAbout(executor.words.names, executor.config, config), identity)
+    agent = made if isinstance(made, HariAgent) else None
+    executor = made.executor if isinstance(made, HariAgent) else made
+    parts = nn.ModuleDict({"execution": executor.network} | ({"actor": agent.actor} if agent else {}))
+    about = HariAbout(executor.words.names, executor.config, agent.config if agent else None)
+    save_weights(path, "hari", parts.state_dict(), about, identity)
 
 
 def load_executor(path: Path) -> Executor:

@@ -147,9 +147,9 @@ class VnlaPolicy:
         if teacher is not None:
             moment = _moment(teacher, now, thoughts, asks, able, moves, acting)
             memory = dataclasses.replace(memory, moments=(*memory.moments, moment))
-        told = torch.tensor(asking, dtype=torch.long, device=moves.device)
+        rows_asking = torch.tensor(asking, dtype=torch.long, device=moves.device)
         before = tuple(None if row in asking else o for row, o in enumerate(seen))  # who moved will see what came of it
-        previous_ask = memory.previous_ask.index_fill(0, told, ASK)
+        previous_ask = memory.previous_ask.index_fill(0, rows_asking, ASK)
         return actions, dataclasses.replace(memory, previous_ask=previous_ask, before=before)
 
     def _wants(
