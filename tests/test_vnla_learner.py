@@ -15,8 +15,8 @@ from embodied.agents.common import imitation
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.playing import play_with_memory
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vnla.agent import VnlaAbout, VnlaAgent, rules_of
-from embodied.agents.vnla.config import ASKERS, TRAINED_UNDER, VNLA_SCALES
+from embodied.agents.vnla.agent import ASKED, LEARNED, TEACHER, VnlaAbout, VnlaAgent, rules_of
+from embodied.agents.vnla.config import TRAINED_UNDER, VNLA_SCALES
 from embodied.agents.vnla.network import (
     ASK,
     DONT,
@@ -151,11 +151,11 @@ def test_rules_of_the_teacher_can_be_left_out():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("asker", ASKERS)
-def test_every_asker_keeps_to_its_budget_and_to_itself(asker):
+@pytest.mark.parametrize(("row", "asker"), [(LEARNED, "learned"), *ASKED.items()])
+def test_every_asker_keeps_to_its_budget_and_to_itself(row, asker):
     agent, _, split = lesson()
     agent.network.eval()
-    player = agent.player(split.bank, asker)
+    player = agent.player(split.bank, row)
     some = itertools.islice(itertools.cycle(split.tasks), 33)
     tasks = [dataclasses.replace(t, id=f"{t.id}/{k}", budget=2.0, horizon=8) for k, t in enumerate(some)]
     together = play(split.make_env, player, tasks, seed=1, batch=32)
@@ -169,7 +169,7 @@ def test_every_asker_keeps_to_its_budget_and_to_itself(asker):
 @pytest.mark.slow
 def test_the_asker_teacher_asks_by_the_first_pass():
     agent, _, split = lesson()
-    for e in play(split.make_env, agent.player(split.bank, "teacher"), split.tasks[:4], seed=1):
+    for e in play(split.make_env, agent.player(split.bank, TEACHER), split.tasks[:4], seed=1):
         env = split.make_env()
         env.reset(e.task, seed=1)
         for step in e.steps:

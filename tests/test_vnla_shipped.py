@@ -11,7 +11,7 @@ from hand_worlds import grid_world
 from embodied.agents.common.shipped import SHIPPED_ENCODER, SHIPPED_VNLA
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
-from embodied.agents.vnla.agent import VnlaAgent
+from embodied.agents.vnla.agent import LEARNED, VnlaAgent
 from embodied.evaluation.rollout import play
 from embodied.interface import Episode
 from embodied.kinds.shipped.vnla import VNLA
@@ -30,13 +30,13 @@ def test_it_is_small_and_says_what_it_was_trained_as(agent):
     assert {"find", "forward", "steps", "left"} <= set(agent.vocabulary.words)
 
 
-def played(agent: VnlaAgent, asker: str | None = None) -> list[Episode]:
+def played(agent: VnlaAgent, row: str = LEARNED) -> list[Episode]:
     """Sixteen tasks of a house by hand, whose pictures tell nothing: all it knows it was told."""
     world = grid_world()
     blank = FeatureBank({"grid": np.zeros((len(world.graph.ids), 36, agent.about.feature_size))}, agent.about.encoder)
     make = VNLA.environments(EnvInputs({"grid": world}))
     with torch.inference_mode():
-        return play(make, agent.player(blank, asker), tasks_of(world, 16), seed=0, batch=8)
+        return play(make, agent.player(blank, row), tasks_of(world, 16), seed=0, batch=8)
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_it_plays_asks_within_its_budget_and_ends(agent):
 def test_it_does_what_it_is_told(agent):
     """Of the moves that follow a request, as many as were spoken of, most are those that were said."""
     said = done = 0
-    for e in played(agent, "first"):
+    for e in played(agent, "learned, asks first"):
         words: list[str] = []
         for step in e.steps:
             if step.reply is not None:

@@ -80,7 +80,7 @@ class VnlaAgent(SightedAgent):
         """Who plays a row: shown the situations only where its asker needs them."""
         if row in WITHOUT_LEARNING:
             return VNLA.agent(row)
-        policy = self.policy(bank, ASKED.get(row))
+        policy = self.policy(bank, None if row in (LEARNED, DIRECT) else ASKED[row])
         shown = policy.asker in ("random", "teacher")
         return Supervised(policy, {"rules": rules_of(self.config)}) if shown else policy
 
