@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
+from embodied.agents.vision.config import SAME_TIME
 from embodied.assets.cache import default_cache
 from embodied.kinds.plugins import record_named
 
@@ -37,8 +38,8 @@ class PlaySettings:
     encoder: Path = SHIPPED_ENCODER
     pictures: str | None = None
     """Of the pictures that features come from; as the data set holds them where not given."""
-    goal_image: str = "same"
-    """How the pictures that helpers show were taken, one of agents.vision.config.CAPTURE_CONDITIONS."""
+    goal_image: str = SAME_TIME
+    """One of embodied.agents.vision.config.GOAL_IMAGES."""
     cache: Path = field(default_factory=default_cache)
     seed: int = 0
 

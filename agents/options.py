@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
-from embodied.agents.vision.config import CAPTURE_CONDITIONS, RENDER_PRESETS
+from embodied.agents.vision.config import RENDER_PRESETS
 from embodied.options import (
     PICTURE_HELP,
     REPEATS,
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from embodied.agents.vision.training_data import TrainingData
 
 PRESET = Option(words=tuple(RENDER_PRESETS), helps=PICTURE_HELP)
-GOAL_IMAGES = tuple(CAPTURE_CONDITIONS)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import contextlib
-import csv
 import dataclasses
 import itertools
 import os
@@ -106,10 +105,21 @@ def noise_features(data, encoder=None, seed=0):
     return encoder
 
 
-def metrics_of(folder):
-    """(update, metric, value) of all that a run's metrics.csv holds."""
-    with open(folder / "metrics.csv", newline="") as f:
-        return [(int(row["update"]), row["metric"], float(row["value"])) for row in csv.DictReader(f)]
+def random_encoder(name="compact", *, seed):
+    """An untrained encoder."""
+    from embodied.agents.common.weights import seeded
+    from embodied.agents.vision.encoder import ENCODER_NETWORKS, Encoder
+
+    with seeded(seed):
+        return Encoder(ENCODER_NETWORKS[name]().eval(), name)
+
+
+def validations_of(folder):
+    """(update, measure, value) of all validations of a run."""
+    from embodied.agents.common.checkpoint import read_checkpoint
+
+    history = read_checkpoint(folder / "checkpoint.pt")["history"]
+    return [(int(entry["update"]), name, value) for entry in history for name, value in entry.items()]
 
 
 def read_features(path):

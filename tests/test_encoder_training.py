@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from hand_data import build, small_house
+from hand_data import build, random_encoder, small_house
 from hand_pixels import coloured_strips
 
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.vision.config import RENDER_PRESETS, StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import Detector
 from embodied.agents.vision.drawn import StripSource
-from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.run import detector_for, train_vision
 from embodied.records import read_json
 
@@ -29,7 +28,7 @@ def source(data, tmp_path, monkeypatch):
         for seed, kind in enumerate(("fast", "unlit")):
             file = tmp_path / "strips" / drawing(RENDER_PRESETS[kind]) / f"{name}.npz"
             coloured_strips(name, nodes, seed=5 * seed).save(file)
-    monkeypatch.setattr("embodied.agents.vision.compact.WIDTHS", (8, 8, 16, 16))
+    monkeypatch.setattr("embodied.agents.vision.compact.STAGE_WIDTHS", (8, 8, 16, 16))
     return StripSource(data.folder, tmp_path / "strips", tmp_path / "cache", "unlit")
 
 

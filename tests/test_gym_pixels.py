@@ -7,12 +7,11 @@ import math
 import gymnasium as gym
 import numpy as np
 import pytest
-from hand_data import built
+from hand_data import built, random_encoder
 from hand_pixels import tasks_in, world_in
 from hand_worlds import grid_world
 
 import embodied.gym.env
-from embodied.agents.vision.encoder import random_encoder
 from embodied.agents.vision.features import encode_panoramas
 from embodied.agents.vision.live import LiveFeatures
 from embodied.envs.base import HelpEnv

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import torch
 import torch.distributed as dist
-from hand_data import metrics_of
+from hand_data import validations_of
 from hand_worlds import grid_world
 
 from embodied.action_spaces import PanoramicMoves
@@ -28,18 +28,19 @@ from embodied.agents.common.playing import play_with_memory
 from embodied.agents.common.session import (
     DivergedError,
     Session,
-    scheduled_rate,
+    set_learning_rate,
     tasks_of_update,
     within_standard_error,
 )
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary, tokenize
-from embodied.agents.hanna.agent import HannaAbout, HannaAgent, take_weights
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent
 from embodied.agents.hanna.asking import RULES, ask_above
-from embodied.agents.hanna.collect import imitation_loss, labelled
 from embodied.agents.hanna.losses import (
     IGNORE,
     curiosity,
     help_loss,
+    imitation_loss,
+    labelled,
     navigation_loss,
     negative_log_likelihood,
     reason_loss,
@@ -391,10 +392,8 @@ def test_a_run_stopped_and_continued_equals_one_that_was_not(tmp_path):
     assert progress.update == 4
     for name, value in straight.network.state_dict().items():
         assert torch.equal(value, resumed.network.state_dict()[name]), name
-    a, b = (
-        [line for line in metrics_of(tmp_path / d) if line[1].startswith("validation/")] for d in ("straight", "broken")
-    )
-    assert a == b and {name for _, name, _ in a} >= {"validation/success", "validation/spl"}
+    a, b = (validations_of(tmp_path / d) for d in ("straight", "broken"))
+    assert a == b and {name for _, name, _ in a} >= {"success", "spl"}
 
 
 @pytest.mark.slow
@@ -402,26 +401,13 @@ def test_training_writes_what_a_researcher_looks_at(tmp_path):
     seen = []
     _, progress = run(tmp_path, on_validation=lambda update, episodes: seen.append((update, len(episodes))))
     assert seen == [(2, 6), (4, 6)]
-    found = {update: value for update, name, value in metrics_of(tmp_path) if name == "validation/success"}
+    found = {update: value for update, name, value in validations_of(tmp_path) if name == "success"}
     assert list(found) == [2, 4] and progress.best == max(found.values())
     assert progress.best_update in [
         update for update, success in found.items() if within_standard_error(success, progress.best, 6)
     ]
     assert list(tmp_path.glob("events.out.tfevents.*"))
     assert json.loads((tmp_path / "settings.json").read_text())["settings"]["batch"] == 6
-
-
-def test_a_run_may_begin_with_a_trained_agent_of_the_same_sizes(tmp_path):
-    split = setting()
-    first, second = agent_for(split), agent_for(split, dataclasses.replace(TINY, ask_rule="every5", seed=5))
-    name = next(n for n, p in first.network.named_parameters() if p.dim() > 1)
-    assert not torch.equal(first.network.state_dict()[name], second.network.state_dict()[name])
-    take_weights(second, first, tmp_path / "first.safetensors")
-    for n, value in first.network.state_dict().items():
-        assert torch.equal(value, second.network.state_dict()[n]), n
-    other = agent_for(split, dataclasses.replace(TINY, hidden_size=16))
-    with pytest.raises(ValueError, match="cannot initialise this agent"):
-        take_weights(other, first, tmp_path / "first.safetensors")
 
 
 def test_of_agents_as_good_as_each_other_the_later_is_kept():
@@ -473,20 +459,11 @@ def test_a_checkpoint_that_cannot_be_gone_on_with_is_refused(tmp_path):
             session.save()
         return folder / "checkpoint.pt"
 
-    bad = parts()
-    bad["network"].weight.data.fill_(math.nan)
-    with pytest.raises(CheckpointError, match="not finite"):
-        restore(save(tmp_path / "nan", bad), {"settings": {}}, parts())
     path = save(tmp_path / "whole", parts())
     with pytest.raises(CheckpointError, match="network is another's"):
         restore(path, {"settings": {}}, parts(4))
     with pytest.raises(CheckpointError, match=r"holds \['adam', 'network'\], this run has \['network'\]"):
         restore(path, {"settings": {}}, {"network": parts()["network"]})
-    body = torch.load(path, weights_only=True)
-    del body["parts"]["adam"]["param_groups"]
-    torch.save(body, path)
-    with pytest.raises(CheckpointError, match="do not fit its digest"):
-        restore(path, {"settings": {}}, parts())
 
 
 def test_a_second_training_in_the_same_folder_is_refused(tmp_path):
@@ -541,9 +518,15 @@ def test_impossible_settings_are_refused(change, message):
 
 def test_the_learning_rate_falls_over_the_last_share_of_the_updates():
     config = dataclasses.replace(TINY, iterations=100, cooldown=0.4, learning_rate=1e-3)
-    rates = [scheduled_rate(1e-3, u, 100, 0.4) for u in range(100)]
+    optimizer = torch.optim.SGD([torch.zeros(1)])
+
+    def rate(update: int, cooldown: float) -> float:
+        set_learning_rate(optimizer, 1e-3, update, 100, cooldown)
+        return optimizer.param_groups[0]["lr"]
+
+    rates = [rate(u, 0.4) for u in range(100)]
     assert rates[:60] == [1e-3] * 60 and np.all(np.diff(rates[60:]) < 0) and 0 < rates[-1] < 5e-5
-    assert scheduled_rate(1e-3, 99, 100, 0.0) == 1e-3
+    assert rate(99, 0.0) == 1e-3
     learner = HannaLearner(agent_for(setting(), config), setting(), HannaTeacher())
     learner.learn(99)
     assert learner.optimizer.param_groups[0]["lr"] == rates[-1]

@@ -6,7 +6,6 @@ import base64
 import dataclasses
 import io
 import json
-import sqlite3
 import threading
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from embodied.agents.language_models.agent import LanguageModelAgent, Messages
 from embodied.agents.language_models.assistant import ModelAssistant, PersonAssistant, assistant_maker
 from embodied.agents.language_models.client import AnswerCache, Client, ServerSettings
 from embodied.agents.language_models.completions import object_schema
-from embodied.agents.language_models.observations import OracleNames
+from embodied.agents.language_models.observations import oracle_names
 from embodied.agents.language_models.prompts import PromptBuilder, read_prompt
 from embodied.agents.language_models.routes import ModelJudge, followed_replies, listener_arrives, paraphrased
 from embodied.agents.language_models.transport import MOST_BYTES, completions_url, proxy_of
@@ -110,7 +109,6 @@ UNDERSTOOD = {
     "where the reasoning stands": said("", reasoning_content=GOOD),
     "arguments as a text": called(GOOD),
     "the same call twice": called(GOOD, {"word": "yes"}),
-    "a function of old servers": said(None, function_call={"name": "answer", "arguments": GOOD}),
     "complete at the longest answer": said(GOOD, ended="length"),
 }
 
@@ -335,10 +333,6 @@ def test_another_file_is_not_taken_for_answers(tmp_path):
     (tmp_path / "text").write_text("hello, this is no data base at all, whatever its length may be" * 20)
     with pytest.raises(ValueError, match="cannot be used to keep answers"):
         AnswerCache(tmp_path / "text")
-    with sqlite3.connect(tmp_path / "other") as other:
-        other.execute("CREATE TABLE people (name TEXT)")
-    with pytest.raises(ValueError, match="not of answers"):
-        AnswerCache(tmp_path / "other")
 
 
 def test_a_prompt_of_ones_own_replaces_the_shipped_one_and_is_checked(tmp_path):
@@ -391,7 +385,7 @@ def test_a_model_is_told_the_names_of_what_is_seen_and_where():
 
     world = Furnished(grid_world().house, grid_world().graph)
     o = find_env().reset(dataclasses.replace(find_tasks(1)[0], start=Pose(0, 0)))
-    text = PromptBuilder(OracleNames({"grid": world})).text(o)
+    text = PromptBuilder(oracle_names({"grid": world})).text(o)
     assert "sofa (30 degrees to the left, 2 m)" in text and "key" not in text
 
 

@@ -10,27 +10,26 @@ import shlex
 import numpy as np
 import pytest
 import torch
-from hand_data import COMPACT, built, metrics_of, noise_features
+from hand_data import COMPACT, built, noise_features, random_encoder, validations_of
 
 from embodied import options
 from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
 from embodied.agents.common.weights import origin_of, weights_digest
 from embodied.agents.hanna.agent import HannaAbout, HannaAgent
-from embodied.agents.hanna.evaluation import counted, hanna_policies
+from embodied.agents.hanna.evaluation import hanna_policies
 from embodied.agents.hanna.map_policy import PerfectInterpretation
 from embodied.agents.hanna.run import train_agent, vocabulary_of
 from embodied.agents.hanna.study import HannaStudy
 from embodied.agents.learners.hanna import HannaTraining
 from embodied.agents.studies.engine import run_study
 from embodied.agents.vision.config import PLAIN
-from embodied.agents.vision.encoder import load_encoder, random_encoder, save_encoder
+from embodied.agents.vision.encoder import load_encoder, save_encoder
 from embodied.agents.vision.features import feature_path
 from embodied.agents.vision.training_data import TrainingData
 from embodied.cli import main
 from embodied.cli.view import looked_at
 from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import evaluate
-from embodied.evaluation.tables import interval
 from embodied.interface import Mode, Stop
 from embodied.records import read_json
 from embodied.teachers.hanna import segments
@@ -63,7 +62,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     train = ("train", "hanna", "--data", data.folder, "--out", tmp_path, "--encoder", COMPACT, *SMALL)
     assert run(*train, "--iterations", 2) == 0 and run(*train, "--iterations", 3) == 0
     assert "continuing after update 2" in capsys.readouterr().err
-    assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2, 3]
+    assert [u for u, name, _ in validations_of(tmp_path) if name == "success"] == [1, 2, 3]
     best, out = tmp_path / "best.safetensors", tmp_path / "table"
     judge = ("evaluate", "hanna", "--data", data.folder, "--agent", best, "--encoder", COMPACT, "--tasks", 4)
     judge = (*judge, "--threads", 1)
@@ -72,9 +71,9 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     for row in ("random walk", "shortest", "learned", "learned, no ask", "learned, perfect interpretation"):
         assert f"| {row} |" in table
     assert len(list(out.glob("episodes_*.jsonl"))) == table.count("| test_unseen |")
-    looked, (name,) = looked_at(out), data.names("test_unseen")
-    assert looked.by("learned", name) == looked.by("learned, no ask", name) == PLAIN, "recordings show what it saw"
-    assert looked.by("shortest", name) is looked.by("learned", "elsewhere") is None
+    (name,) = data.names("test_unseen")
+    assert looked_at(out, "learned", name) == looked_at(out, "learned, no ask", name) == PLAIN, "what recordings show"
+    assert looked_at(out, "shortest", name) is looked_at(out, "learned", "elsewhere") is None
     told = json.loads((out / "run.json").read_text())
     assert told["agent"] == weights_digest(best) and told["data"] == data.digest
     origin = origin_of(best)
@@ -100,9 +99,7 @@ def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
     pieces = [(worlds[e.task.world].graph, p) for e in sum(episodes.values(), []) for p in segments(e.steps)]
     left = [(g, p) for g, p in pieces if p[0].mode is Mode.SUB and isinstance(p[-1].action, Stop)]
     assert left and all(g.distance[p[-1].pose.node, p[0].targets[0]] <= 2.0 + 1e-9 for g, p in left)
-    found = counted(episodes["always"], worlds)
-    assert interval([found["request share"]]).mean > 0.2
-    assert {f"{r} accuracy" for r in ("lost", "uncertain wrong", "never asked")} <= set(found)
+    assert sum(e.requests for e in episodes["always"]) > 0
 
 
 @pytest.fixture(scope="module")
@@ -138,10 +135,9 @@ def test_a_study_trains_each_agent_once_and_prints_the_dissertation_beside(study
     assert "success_test_unseen_as_shipped" in body["rows"][0]["values"]
     assert "success_test_unseen_as_shipped" not in body["rows"][0]["printed"]
     weights, judged = times(out, "best.safetensors"), times(out, "judged/*")
-    run_study(learner, ["4.4", "D.1"], out, rows=["Learned", "Target image only"], note=print)
+    run_study(learner, ["4.4", "4.5"], out, rows=["Learned", "Target image only"], note=print)
     assert times(out, "best.safetensors") == weights, "rows that tables share are trained once"
     assert judged.items() <= times(out, "judged/*").items(), "what was played is not played again"
-    assert "lost_accuracy_test_unseen" in read_json(out / "hanna-d.1.json")["rows"][0]["values"]
 
 
 def test_the_papers_columns_take_the_likeliest_action_and_ours_stand_apart(study):
@@ -170,31 +166,13 @@ def test_agents_that_are_compared_differ_in_one_setting(study):
             assert len(differ) == 1 or differ == {"alpha", "ask_rule"}, pair  # alpha is the authors' for a rule
 
 
-def test_agents_may_be_judged_in_the_unseen_houses_of_another_data_set(study, tmp_path):
-    learner, out = study
-    other = built(tmp_path / "other", routes="spanning")
-    there = dataclasses.replace(learner, eval_data=other.folder)
-    splits = ("test_unseen", "test_unseen as shipped")
-    assert there.tables()["4.5"].splits == splits, "nobody has seen its houses, none are out of distribution"
-    before = times(out, "best.safetensors")
-    with pytest.raises(FileNotFoundError, match="embodied features"):
-        run_study(there, ["4.4"], out, note=print)
-    noise_features(other, load_encoder(learner.encoder), seed=3)
-    text = run_study(there, ["4.4"], out, note=print)["4.4"].read_text()
-    assert times(out, "best.safetensors") == before and f"in the data set {other.digest[:16]}" in text
-    assert "(45.43)" in text and "(86.67)" not in text, "the printed numbers are those of unseen houses"
-    run_study(learner, ["4.4"], out, note=print)
-
-
-def test_an_agent_that_knows_no_varied_words_cannot_go_on_with_them(study, tmp_path):
+def test_an_agent_of_varied_words_knows_words_as_they_are_and_others(study, tmp_path):
     learner, out = study
     source = TrainingData(dataset_of(learner.data, "hanna"), load_encoder(learner.encoder))
-    varied, begin = dataclasses.replace(learner.config, varied_words=True), next(iter(times(out, "best.safetensors")))
-    with pytest.raises(ValueError, match="knows no varied words; add --word-vectors minilm"):
-        train_agent(source, varied, learner.evaluation, tmp_path / "begun", init_from=begin, note=print)
+    varied, plain = dataclasses.replace(learner.config, varied_words=True), next(iter(times(out, "best.safetensors")))
     train_agent(source, varied, learner.evaluation, tmp_path / "new", note=print)
-    words, plain = (HannaAgent.load(f).about.words for f in ((tmp_path / "new" / "best.safetensors"), begin))
-    assert set(plain) < set(words), "it heard the words as they are and others"
+    words, before = (HannaAgent.load(f).about.words for f in (tmp_path / "new" / "best.safetensors", plain))
+    assert set(before) < set(words)
 
 
 def test_missing_features_are_told_before_anything_is_trained(study, data, tmp_path):

@@ -13,7 +13,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from embodied import generate
-from embodied.agents.vision import features, recognise
+from embodied.agents.vision import detector, features
 from embodied.agents.vision.config import PLAIN
 from embodied.assets.cache import digest
 from embodied.assets.catalogue import load_catalogue
@@ -100,7 +100,7 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
             recognised.append(len(parts[0].positions.as_arrow_array()))
         log(stream, path, *parts, **more)
 
-    monkeypatch.setattr(recognise, "strip_of", strip_of)
+    monkeypatch.setattr(detector, "strip_of", strip_of)
     monkeypatch.setattr(features, "strip_of", lambda p: (fed.append(p), strip_of(p))[1])
     monkeypatch.setattr(recording, "log_sight", lambda r, v, pose: (poses.append(pose), log_sight(r, v, pose))[1])
     monkeypatch.setattr(rr.RecordingStream, "log", watched_log)

@@ -167,7 +167,7 @@ def test_what_other_code_judged_is_judged_again_and_the_check_tells_it(tmp_path)
     (out / "old.json").write_text(json.dumps({**body, "identity": None, "table": "old"}))
     assert check(out) == [
         f"{out / 'archer-1.json'}: archer-1 judged by other code than this",
-        f"{out / 'old.json'}: old has no identity; nobody can tell what it belongs to",
+        f"{out / 'old.json'}: old judged by other code than this",
     ]
     assert table(archer, out, report=True)["rows"] == [] and table(archer, out)["rows"] == body["rows"]
     assert did(archer) == {"train": 0, "judge": 14}

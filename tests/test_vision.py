@@ -7,10 +7,10 @@ import math
 import sys
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 import torch
+from hand_data import random_encoder
 from hand_pixels import coloured_strips
 
 from embodied.agents.common.checkpoint import CheckpointError
@@ -18,15 +18,14 @@ from embodied.agents.common.tensor_file import read_weights, save_tensors
 from embodied.agents.vision import labels, strip
 from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.config import PLAIN, RENDER_PRESETS, VisionConfig, drawing
-from embodied.agents.vision.encoder import load_encoder, pool_views, random_encoder, save_encoder, strip_map, whitening
-from embodied.agents.vision.features import feature_path, load_bank, load_features, save_features
+from embodied.agents.vision.encoder import load_encoder, pool_views, save_encoder, strip_map, whitening
+from embodied.agents.vision.features import feature_path, load_features, save_features
 from embodied.agents.vision.lite import Lite, folded, load_imagenet
 from embodied.agents.vision.probe import LabelledFeatures, average_precision, place_auc, read
-from embodied.agents.vision.training import photograph_strip, train_encoder
+from embodied.agents.vision.training import train_encoder
 from embodied.errors import UnableError
 from embodied.interface import Sight
 from embodied.render.pictures import Baked, Unlit, parse_pictures
-from embodied.seeds import stream
 
 
 def test_a_truncated_file_of_weights_is_refused(tmp_path):
@@ -192,7 +191,7 @@ def test_training_the_encoder_lowers_its_loss(tmp_path):
     lines = []
     config = VisionConfig(epochs=6, batch=2, least_views=1)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("embodied.agents.vision.compact.WIDTHS", (8, 8, 16, 16))
+        patch.setattr("embodied.agents.vision.compact.STAGE_WIDTHS", (8, 8, 16, 16))
         houses = [coloured_strips("a", 8, seed=0)]
         encoder, classes = train_encoder(houses, config, tmp_path / "run", note=lines.append)
         assert classes == ["rose", "fern"]
@@ -207,7 +206,7 @@ def test_training_the_encoder_lowers_its_loss(tmp_path):
 
 @pytest.mark.slow
 def test_training_goes_on_after_the_epoch_it_was_stopped_in(tmp_path, monkeypatch):
-    monkeypatch.setattr("embodied.agents.vision.compact.WIDTHS", (8, 8, 16, 16))
+    monkeypatch.setattr("embodied.agents.vision.compact.STAGE_WIDTHS", (8, 8, 16, 16))
     config = VisionConfig(epochs=3, batch=2, least_views=1)
     houses, folder = [coloured_strips(name, 4, seed=k) for k, name in enumerate("ab")], tmp_path / "run"
     whole, _ = train_encoder(houses, config, tmp_path / "whole", note=lambda line: None)
@@ -243,28 +242,24 @@ def test_features_name_their_encoder_and_their_house(tmp_path):
     encoder, path = random_encoder(seed=1), tmp_path / "house.safetensors"
     features = np.random.default_rng(5).normal(size=(3, 36, encoder.size)).astype(np.float16)
     save_features(path, features, encoder, "house digest")
-    back, digest = load_features(path, encoder=encoder.digest, source="house digest")
-    assert np.array_equal(back, features) and digest == encoder.digest
+    right = {"encoder": encoder.digest, "source": "house digest", "pictures": PLAIN}
+    assert np.array_equal(load_features(path, **right), features)
     with pytest.raises(ValueError, match="made from encoder"):
-        load_features(path, encoder=random_encoder(seed=2).digest)
+        load_features(path, **right | {"encoder": random_encoder(seed=2).digest})
     with pytest.raises(ValueError, match="made from source"):
-        load_features(path, source="another house")
+        load_features(path, **right | {"source": "another house"})
     with pytest.raises(FileNotFoundError, match="embodied features"):
-        load_features(tmp_path / "nothing.safetensors")
+        load_features(tmp_path / "nothing.safetensors", **right)
     with pytest.raises(ValueError, match="made from drawing unlit_192, expected normal_gloss; .*--pictures normal"):
-        load_features(path, pictures=Baked(size=192))
-    bank = load_bank({"house": path})
+        load_features(path, **right | {"pictures": Baked(size=192)})
+    bank = FeatureBank({"house": features}, encoder.digest)
     assert np.array_equal(bank.features(Sight("house", 2)), features[2].astype(np.float32))
     assert torch.equal(bank.gather([None, Sight("house", 1)])[0], torch.zeros(36, encoder.size))
     with pytest.raises(KeyError, match="no features of node 3"):
         bank.features(Sight("house", 3))
 
 
-def test_features_of_two_encoders_do_not_mix(tmp_path):
-    for seed in (1, 2):
-        save_features(tmp_path / f"{seed}.safetensors", np.zeros((1, 36, 4)), random_encoder(seed=seed), "h")
-    with pytest.raises(ValueError, match="with one encoder"):
-        load_bank({"a": tmp_path / "1.safetensors", "b": tmp_path / "2.safetensors"})
+def test_a_bank_wants_features_of_36_views():
     with pytest.raises(ValueError, match="must all be"):
         FeatureBank({"a": np.zeros((1, 35, 4))}, "digest")
 
@@ -283,15 +278,3 @@ def test_every_way_of_drawing_has_its_own_features():
 def test_settings_that_nothing_can_be_learned_with_are_refused():
     with pytest.raises(ValueError, match="learning_rate"):
         VisionConfig(learning_rate=float("nan"))
-
-
-def test_training_strips_can_be_photographed_and_are_the_same_without(tmp_path):
-    rng = np.random.default_rng(0)
-    strip = rng.integers(0, 200, (192, 576, 3), dtype=np.uint8)
-    strip = cv2.GaussianBlur(strip, (0, 0), 8)
-    assert photograph_strip(strip, ("ideal",), rng=stream(0, "t")) is strip
-    shots = [photograph_strip(strip, ("phone", "robot"), rng=stream(k, "t")) for k in (0, 0, 1)]
-    assert np.array_equal(shots[0], shots[1]) and not np.array_equal(shots[0], shots[2])
-    assert all(s.shape == strip.shape and s.dtype == np.uint8 for s in shots)
-    with pytest.raises(ValueError, match="unknown"):
-        VisionConfig(cameras=("webcam",))

@@ -1,15 +1,14 @@
-"""embodied.agents.vision.recognise and embodied.agents.vision.detector: what is found in a panorama, and where."""
+"""embodied.agents.vision.detector: what is found in a panorama, and where."""
 
 import numpy as np
 import pytest
+from hand_data import random_encoder
 from hand_pixels import coloured_strips
 
-from embodied.agents.common.shipped import SHIPPED_DETECTOR
 from embodied.agents.common.weights import origin_of
 from embodied.agents.vision.config import StripTraining
 from embodied.agents.vision.detector import Detector, train_detector
-from embodied.agents.vision.encoder import load_encoder, random_encoder
-from embodied.agents.vision.recognise import Recogniser
+from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.strip import CELL, STRIP_COLUMNS, STRIP_ROWS, cell_direction, directions
 from embodied.render.panorama import Panorama
 
@@ -63,12 +62,12 @@ def test_a_thing_is_named_where_it_is_seen_best(panorama, monkeypatch):
     cells[0, 0, 4, 7], cells[0, 1, 2, 2], cells[0, 2, 5, 5] = 0.8, 0.9, 0.2
     detector = Detector(random_encoder(seed=0), None, ("mug", "wall", "sofa"))
     monkeypatch.setattr(Detector, "__call__", lambda self, strips: (cells, None))
-    (found,) = Recogniser(detector)(panorama)
+    (found,) = detector.recognise(panorama)
     assert found.name == "mug" and found.probability == pytest.approx(0.8)
     assert (found.yaw, found.pitch) == cell_direction(4, 7)
 
 
 def test_the_shipped_detector_is_that_of_the_shipped_encoder(panorama):
-    found = Recogniser.load(load_encoder(), SHIPPED_DETECTOR)
-    assert "sofa" in found.detector.classes and len(found.detector.classes) > 250
-    assert all(0.3 <= thing.probability <= 1 for thing in found(panorama))
+    found = Detector.load(load_encoder())
+    assert "sofa" in found.classes and len(found.classes) > 250
+    assert all(0.3 <= thing.probability <= 1 for thing in found.recognise(panorama))

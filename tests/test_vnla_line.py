@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from hand_data import COMPACT, built, metrics_of, noise_features
+from hand_data import COMPACT, built, noise_features, validations_of
 
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.cli import main
@@ -36,7 +36,7 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert run(*train, 1) == 0 and run(*train, 2) == 0
     said = capsys.readouterr()
     assert "continuing after update 1" in said.out + said.err and "pictures: unlit_192" in said.out + said.err
-    assert [u for u, name, _ in metrics_of(tmp_path) if name == "validation/success"] == [1, 2]
+    assert [u for u, name, _ in validations_of(tmp_path) if name == "success"] == [1, 2]
     best = tmp_path / "best.safetensors"
     assert VnlaAgent.load(best).about.pictures == "unlit_192"
     judge = ("evaluate", "vnla", "--data", data.folder, "--agent", best, "--encoder", COMPACT, "--tasks", 2, "--json")

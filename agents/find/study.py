@@ -73,9 +73,9 @@ class FindStudy(SightedStudy):
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split), "house tasks": self.house_tasks}
 
-    def training_data_in(self, folder: Path) -> TrainingData:
+    def training_data(self) -> TrainingData:
         """Of any kind: its houses are all that counts."""
-        return TrainingData(Dataset(folder), load_encoder(self.encoder), self.pictures, cache=self.cache)
+        return TrainingData(Dataset(self.data), load_encoder(self.encoder), self.pictures, cache=self.cache)
 
     def about(self) -> str:
         return f"{super().about()} {self.house_tasks} tasks of each house; hidden size {self.config.hidden_size}."

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from embodied.agents.hanna.recognition import SAME_PLACE, matches
-from embodied.agents.hanna.topological_map import fewest_moves
+from embodied.agents.hanna.topological_map import SAME_PLACE, fewest_moves, matches
 from embodied.geometry import wrap
 from embodied.interface import Observation
 

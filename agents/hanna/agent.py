@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from embodied.agents.common.choosing import choose_at
-from embodied.agents.common.settings import LEARNED_WORDS
 from embodied.agents.common.sighted import About, SightedAgent
 from embodied.agents.common.weights import check_features
-from embodied.agents.common.word_vectors import take_weights as take_into
 from embodied.agents.hanna.asking import RULES, ask_patiently
 from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.map_policy import MapPolicy
@@ -19,11 +16,6 @@ from embodied.agents.hanna.policy import HannaPolicy
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
 
-SIZES = (
-    *("model", "hidden_size", "navigation_embedding", "ask_embedding", "self_heads", "text_heads", "dropout"),
-    *("reset_inter_task", "predict_reasons", "similarity_attention"),
-)
-"""Settings of which the networks are made."""
 NETWORKS: Mapping[str, type[AgentNetwork]] = {"hanna": HannaNetwork, "lstm": LstmNetwork}
 
 
@@ -64,24 +56,3 @@ class HannaAgent(SightedAgent):
             read_assistance=config.read_assistance,
         )
         return MapPolicy(policy, judged.revisit_weight, judged.use_goal_image, judged.frontier_discount)
-
-
-def take_weights(agent: HannaAgent, other: HannaAgent, source: Path) -> None:
-    """Copy the weights of `other`, read from `source`, into `agent`.
-
-    Raises:
-      ValueError: their networks differ, or the features that they know.
-    """
-    sizes, its = _kind(agent.about), _kind(other.about)
-    vectors = agent.config.word_vectors, other.config.word_vectors
-    differ = [f"{k} {its[k]} -> {v}" for k, v in sizes.items() if v != its[k]]
-    if differ or vectors[1] not in (LEARNED_WORDS, vectors[0]):
-        changed = ", ".join(differ or [f"word_vectors {vectors[1]} -> {vectors[0]}"])
-        raise ValueError(f"{source} cannot initialise this agent: {changed}; give this run its settings")
-    take_into(agent.network, other.network.state_dict())
-
-
-def _kind(about: HannaAbout) -> dict[str, object]:
-    """Settings that must be alike in agents that share weights."""
-    sizes = {name: getattr(about.config, name) for name in SIZES}
-    return {"encoder": about.encoder[:12], "words": len(about.words), **sizes}

@@ -11,8 +11,7 @@ import numpy as np
 
 from embodied.agents.hanna.inputs import action_index
 from embodied.agents.hanna.policy import HannaMemory, HannaPolicy, Steering, unsteered
-from embodied.agents.hanna.recognition import PlaceMap
-from embodied.agents.hanna.topological_map import Trail, weigh_by_image
+from embodied.agents.hanna.topological_map import PlaceMap, Trail, weigh_by_image
 from embodied.interface import Actions, Mode, Observation, Observations, Rngs, Situations
 from embodied.teachers.shortest import shortest_of
 

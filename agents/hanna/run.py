@@ -2,7 +2,7 @@
 what its commands do: a data set with features becomes a split, a split an agent.
 
 episodes = play tasks with the sampling policies
-labels = teacher.relabel(episodes)                        (collect)
+labels = teacher.relabel(episodes)                        (losses)
 loss = L_main + L_ask  (4.9, 4.10, 4.13, 4.14)            (losses)
 """
 
@@ -17,11 +17,9 @@ from embodied.agents.common import imitation
 from embodied.agents.common.losses import IGNORE
 from embodied.agents.common.session import Progress
 from embodied.agents.common.vocabulary import Vocabulary, build_vocabulary
-from embodied.agents.common.weights import weights_digest
-from embodied.agents.common.word_vectors import LEARNED_WORDS
-from embodied.agents.hanna.agent import HannaAbout, HannaAgent, take_weights
+from embodied.agents.hanna.agent import HannaAbout, HannaAgent
 from embodied.agents.hanna.asking import RULES
-from embodied.agents.hanna.collect import Experience, imitation_loss, labelled
+from embodied.agents.hanna.losses import Experience, imitation_loss, labelled
 from embodied.agents.hanna.policy import HannaMemory, for_training
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
 from embodied.agents.vision.bank import FeatureBank
@@ -79,30 +77,14 @@ def train_agent(
     config: TrainingConfig,
     evaluation: HannaEvaluation,
     folder: Path,
-    *,
-    init_from: Path | None = None,
     **options: Unpack[imitation.Options],
 ) -> Progress:
-    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train.
-
-    Args:
-      init_from: a trained agent whose weights and words a new run begins with.
-
-    Raises:
-      ValueError: `init_from` has networks of other sizes, learned from another encoder, or knows no varied words.
-    """
-    houses = config.training_houses or None
+    """Train, or go on training, the agent of a run folder; other arguments as in agents.common.imitation.train."""
+    houses, reword = config.training_houses or None, source.rewording(config)
     training = source.split("train", houses=houses)
     validation = source.split("val_unseen", limit=config.validation_tasks)
-    other = None if init_from is None else HannaAgent.load(init_from)
-    if other and config.varied_words and not other.config.varied_words and config.word_vectors == LEARNED_WORDS:
-        raise ValueError(f"{init_from} knows no varied words; add --word-vectors minilm, or leave --init-from out")
-    reword, initial = source.rewording(config), dict[str, str]()
-    words = other.vocabulary if other else vocabulary_of(source.data, houses, reword)
+    words = vocabulary_of(source.data, houses, reword)
     agent = HannaAgent.new(source.about(HannaAbout, config, evaluation, words), reword)
-    if other is not None and init_from is not None:
-        take_weights(agent, other, init_from)  # a checkpoint in `folder` replaces them
-        initial["begin"] = weights_digest(init_from)
     agent.network.to(source.device)
-    identity = identity_of("embodied.agents.hanna.run", settings=config, **source.identity(), **initial)
+    identity = identity_of("embodied.agents.hanna.run", settings=config, **source.identity())
     return imitation.train(HannaLearner(agent, training, HannaTeacher()), validation, folder, identity, **options)

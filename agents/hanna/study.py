@@ -10,18 +10,17 @@ from typing import Any
 
 from embodied.agents.common.session import Note
 from embodied.agents.hanna.agent import HannaAgent
-from embodied.agents.hanna.evaluation import by_the_text, counted, hanna_policies
+from embodied.agents.hanna.evaluation import by_the_text, hanna_policies
 from embodied.agents.hanna.run import train_agent
 from embodied.agents.hanna.training_config import HannaEvaluation, TrainingConfig
-from embodied.agents.studies.engine import Measured
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import words_table
+from embodied.agents.studies.wordings import hearing, words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS as TEST
 from embodied.agents.vision.sighted_study import SightedStudy
 from embodied.agents.vision.training_data import TrainingData
 from embodied.datasets.store import Dataset, SplitData
-from embodied.interface import Agent, Episode
+from embodied.interface import Agent
 
 VALIDATION_SPLITS = ("val_seen", "val_unseen")
 FULL = ("success", "spl", "navigation error", "requests")
@@ -54,9 +53,6 @@ ABLATIONS: Mapping[str, Mapping[str, Any]] = {
     "No cosine-similarity attention": {"similarity_attention": False},
     "No curiosity loss": {"alpha": 0.0},
 }
-REASONS = tuple(
-    f"{r} {what}" for r in ("lost", "uncertain wrong", "never asked") for what in ("accuracy", "precision", "recall")
-)
 HANNA_TABLES: Mapping[str, StudyTable] = {
     "4.3": StudyTable(
         "Results on the test splits",
@@ -89,7 +85,6 @@ HANNA_TABLES: Mapping[str, StudyTable] = {
         ("test_unseen",),
         ((PLAIN_OURS, LSTM), (OURS, NO_CURIOSITY)),
     ),
-    "D.1": StudyTable("When and why it asks", (LEARNED,), ("request share", *REASONS), ("test_unseen",)),
     "D.2": StudyTable(
         "Ablations",
         (learned("Final agent"), *(learned(name, **off) for name, off in ABLATIONS.items())),
@@ -122,34 +117,28 @@ def in_both_ways(table: StudyTable) -> StudyTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HannaStudy(SightedStudy):
-    """Tables 4.3 to 4.6, D.1 and D.2, and those of unheard words and people."""
+    """Tables 4.3 to 4.6 and D.2, and that of unheard words."""
 
     config: TrainingConfig
     evaluation: HannaEvaluation
     device: str = "cpu"
-    eval_data: Path | None = None
-    """Another data set, in whose houses, that nobody learned from, agents are judged; None: in those of `data`."""
 
     name, agent_kind = "hanna", HannaAgent
     makers = ("embodied.agents.hanna.run",)
     judges = (*JUDGES, "embodied.agents.hanna.evaluation")
 
     def tables(self) -> Mapping[str, StudyTable]:
-        """Splits out of distribution come beside the test splits; seen houses are those of `data`."""
-        ood = Dataset(self.eval_data or self.data).ood
-        tables = {}
+        """Splits out of distribution come beside the test splits."""
+        ood, tables = Dataset(self.data).ood, {}
         for name, table in HANNA_TABLES.items():
-            splits = [s for s in table.splits if self.eval_data is None or not s.endswith("_seen")]
-            splits += ood if table.splits == TEST else ()
-            tables[name] = dataclasses.replace(table, splits=tuple(splits))
-            if name in PRINTED:
-                tables[name] = in_both_ways(tables[name])
+            wider = dataclasses.replace(table, splits=(*table.splits, *ood)) if table.splits == TEST else table
+            tables[name] = in_both_ways(wider) if name in PRINTED else wider
         return tables
 
     def prepare(self, rows: Sequence[StudyRow], splits: Sequence[str], folder: Path, note: Note) -> None:
         """Features that are missing are told before anything is trained."""
         for split in dict.fromkeys(s.removesuffix(SHIPPED) for s in splits):
-            self.evaluation_data().split(split)
+            self.training_data().split(split)
 
     def train(self, train: Mapping[str, Any], seed: int, folder: Path, home: Path, note: Note) -> Path:
         train_agent(self.training_data(), self.settings(train, seed), self.evaluation, home, note=note)
@@ -158,10 +147,10 @@ class HannaStudy(SightedStudy):
     def policies(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        bank = self.evaluation_data().split(split.removesuffix(SHIPPED)).bank
+        bank = self.training_data().split(split.removesuffix(SHIPPED)).bank
         by_text = judge.get(BY_TEXT) and not split.endswith(SHIPPED)
         policy = hanna_policies(agent, bank, by_the_text if by_text else HannaAgent.policy)[judge["played"]]
-        return self.heard(agent, policy, judge)
+        return hearing(policy, judge, agent.about.words, self.cache)
 
     def where(self, agent: HannaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         return super().where(agent, judge, split.removesuffix(SHIPPED))
@@ -169,21 +158,12 @@ class HannaStudy(SightedStudy):
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return super().judged(row, split.removesuffix(SHIPPED))
 
-    def count(self, episodes: Sequence[Episode], split: SplitData, judge: Mapping[str, Any]) -> Measured:
-        return counted(episodes, split.worlds)
-
     def about(self) -> str:
-        other = self.judged_in({}).digest[:16]
-        judged = f" Judged in the data set {other}, not that of training." if self.eval_data else ""
         return (
-            f"{super().about()}{judged} Judged at "
-            f"temperature {self.evaluation.evaluation_temperature:g} and by docs/sources.md, S36, S161, S162; in "
-            f"{', '.join(PRINTED)} so in the columns 'as shipped' alone, in the others, beside the printed numbers, "
-            "the likeliest action is taken."
+            f"{super().about()} Judged at temperature {self.evaluation.evaluation_temperature:g} and by "
+            f"docs/sources.md, S36, S161, S162; in {', '.join(PRINTED)} so in the columns 'as shipped' alone, in the "
+            "others, beside the printed numbers, the likeliest action is taken."
         )
 
-    def evaluation_data(self) -> TrainingData:
-        return self.training_data_in(self.eval_data or self.data)
-
-    def training_data_in(self, folder: Path) -> TrainingData:
-        return dataclasses.replace(super().training_data_in(folder), device=self.device)
+    def training_data(self) -> TrainingData:
+        return dataclasses.replace(super().training_data(), device=self.device)

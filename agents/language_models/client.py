@@ -17,13 +17,14 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from embodied.agents.language_models.completions import TOOL, Answer, StoredAnswer, read_answer, read_completion
 from embodied.agents.language_models.transport import Endpoint, ServerError, completions_url
 from embodied.assets.cache import digest
 from embodied.errors import UnableError
 from embodied.interface import Usage
+from embodied.options import InputFolder, InputPath, Settings
 from embodied.records import from_json, to_json
 
 FORMS = ("schema", "object", "tools", "text")
@@ -32,8 +33,6 @@ LONGEST_WAIT = 30.0
 """Seconds between two tries."""
 UNSUPPORTED = re.compile(r"support|deprecated|only the default|not allowed|not permitted", re.IGNORECASE)
 """Words of a server that does not know a setting, unlike one that finds its value wrong."""
-APPLICATION = 0x456D4C4D
-"""Marks a file of answers as ours ('EmLM')."""
 WRITE_WAIT = 60.0
 """Seconds that a process waits for another one that writes to the same file."""
 log = logging.getLogger(__name__)
@@ -99,12 +98,6 @@ class AnswerCache:
         self._lock = threading.Lock()
         try:
             self._file = sqlite3.connect(self.path, timeout=WRITE_WAIT, isolation_level=None, check_same_thread=False)
-            (mark,) = self._file.execute("PRAGMA application_id").fetchone()
-            (tables,) = self._file.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            if mark != APPLICATION and tables:
-                raise ValueError(f"{path} is a data base, but not of answers; choose another file")
-            if mark != APPLICATION:
-                self._file.execute(f"PRAGMA application_id = {APPLICATION}")
             self._file.execute(
                 "CREATE TABLE IF NOT EXISTS answers (key TEXT PRIMARY KEY, request TEXT NOT NULL, answer TEXT NOT NULL)"
                 " WITHOUT ROWID"
@@ -260,6 +253,32 @@ class Client:
             self._warned.add(text)
         if is_new:
             log.warning("%s", text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WithModel:
+    """The language model."""
+
+    server: Annotated[
+        ServerSettings, Settings("the language model", ServerSettings(""), skip=("wait",), words={"form": FORMS})
+    ]
+    answers: InputPath = Path("answers.sqlite")
+    """File that keeps every answer: the same question is not asked twice."""
+    offline: bool = False
+    """Use only stored answers; send nothing to a server."""
+    prompts: InputFolder | None = None
+    """Folder with prompts of your own (agent.md, ...)."""
+
+
+def client_of(args: WithModel) -> Client:
+    """The client that the options describe.
+
+    Raises:
+      ValueError: no model was named.
+    """
+    if not args.server.model:
+        raise ValueError("a language model takes part: name it with --model NAME (and its server with --base-url URL)")
+    return Client(args.server, AnswerCache(args.answers), offline=args.offline)
 
 
 def _without_pictures(value: Any) -> Any:

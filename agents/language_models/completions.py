@@ -21,9 +21,7 @@ MOST_BRACES = 200
 """Opening braces of an answer at which an object is looked for."""
 TOOL = "answer"
 """Name of the one tool that is offered with the form 'tools'."""
-JSON_TYPES: Mapping[str, Any] = {
-    "object": dict, "string": str, "integer": int, "number": (int, float), "boolean": bool,
-}  # fmt: skip
+JSON_TYPES = {"string": str, "integer": int}
 """Types of JSON Schema that answers are made of."""
 THOUGHTS = re.compile(r"(?s)^.*</(think|thinking|thought|reasoning)>|^\s*<(think|thinking|thought|reasoning)>.*")
 """Reasoning before an answer: up to its end, which a template may have opened, or without an end."""
@@ -95,24 +93,26 @@ def read_answer(stored: StoredAnswer, schema: Mapping[str, Any]) -> Answer:
     return Answer(stored.text, problem, stored.refused, stored.tokens_in, stored.tokens_out, stored.cut, value)
 
 
-def misfit(value: object, schema: Mapping[str, Any], where: str = "the answer") -> str:
-    """The first fault of a value by the part of JSON Schema that is used here; '' for none."""
-    kind = JSON_TYPES[schema["type"]]
-    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        return f"{where} should be of type {schema['type']}"
-    if "enum" in schema and value not in schema["enum"]:
-        return f"{where} should be one of {list(schema['enum'])[:20]}"
-    if isinstance(value, str) and len(value) > schema.get("maxLength", MOST_TEXT):
-        return f"{where} is too long"
-    if isinstance(value, int | float) and not schema.get("minimum", value) <= value <= schema.get("maximum", value):
-        return f"{where} is out of range"
-    if isinstance(value, dict):
-        known = schema.get("properties", {})
-        if missing := [n for n in schema.get("required", ()) if n not in value]:
-            return f"{where} lacks {missing}"
-        if unknown := [str(n)[:40] for n in value if n not in known]:
-            return f"{where} has unknown fields {unknown[:5]}"
-        return next((m for n, v in value.items() if (m := misfit(v, known[n], n))), "")
+def misfit(value: object, schema: Mapping[str, Any]) -> str:
+    """The first fault of a value by a schema of `object_schema`, whose properties are texts or whole numbers; '' for
+    none."""
+    known = schema["properties"]
+    if not isinstance(value, dict):
+        return "the answer should be an object"
+    if missing := [n for n in known if n not in value]:
+        return f"the answer lacks {missing}"
+    if unknown := [str(n)[:40] for n in value if n not in known]:
+        return f"the answer has unknown fields {unknown[:5]}"
+    for name, wanted in known.items():
+        field = value[name]
+        if type(field) is not JSON_TYPES[wanted["type"]]:
+            return f"{name} should be of type {wanted['type']}"
+        if "enum" in wanted and field not in wanted["enum"]:
+            return f"{name} should be one of {list(wanted['enum'])[:20]}"
+        if isinstance(field, str) and len(field) > wanted.get("maxLength", MOST_TEXT):
+            return f"{name} is too long"
+        if isinstance(field, int) and not wanted["minimum"] <= field <= wanted["maximum"]:
+            return f"{name} is out of range"
     return ""
 
 
@@ -137,8 +137,6 @@ def _no_completion(content: bytes) -> ServerError:
 def _text_of(message: Mapping[str, Any]) -> tuple[str, str]:
     """The text of a message, or else the problem."""
     calls = message.get("tool_calls")
-    if not calls and message.get("function_call"):
-        calls = [{"function": message["function_call"]}]
     text = _arguments(calls) if calls else _text(message.get("content"))
     if text is None:
         return "", "calls of unknown tools"

@@ -9,14 +9,14 @@ from __future__ import annotations
 import base64
 import io
 import math
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
 
 from embodied.assistants.words import side
 from embodied.geometry import wrap
+from embodied.gym.sensors import PanoramaStore
 from embodied.house.floor_plan import font
 from embodied.interface import STEP, VIEW_PITCHES, Action, Ask, Move, Observation, SeenPlace, Sight, Stop, viewpoint
 from embodied.render.panorama import Panorama
@@ -34,23 +34,20 @@ PANORAMA_HEIGHT = 384
 PICTURE_FORMS = ("strip", "panorama")
 
 
-class ObjectNamer(Protocol):
-    """Names what can be seen of a sight; a stand-in for eyes, and an oracle."""
-
-    def names(self, sight: Sight) -> Sequence[tuple[str, float, float]]:
-        """(object class, yaw in radians, metres), the largest in view first."""
+Names = Callable[[Sight], Sequence[tuple[str, float, float]]]
+"""Names what can be seen of a sight, a stand-in for eyes: (object class, yaw in radians, metres), the largest in view
+first."""
 
 
-class OracleNames:
+def oracle_names(worlds: Mapping[str, SeenPlace]) -> Names:
     """The true names of what can be seen: an oracle in place of pictures."""
 
-    def __init__(self, worlds: Mapping[str, SeenPlace]) -> None:
-        self._worlds = worlds
-
-    def names(self, sight: Sight) -> list[tuple[str, float, float]]:
+    def names(sight: Sight) -> list[tuple[str, float, float]]:
         here = viewpoint(sight)
-        seen = self._worlds[here.world].sightings(here.node)
+        seen = worlds[here.world].sightings(here.node)
         return [(s.object_class, s.yaw, s.distance) for s in seen if s.pixels >= SMALLEST_SIGHTING][:MOST_NAMES]
+
+    return names
 
 
 def actions_by_name(o: Observation) -> dict[str, Action]:
@@ -85,13 +82,7 @@ def observation_in_words(o: Observation, names: Sequence[tuple[str, float, float
     return "; ".join(parts) or "nothing that has a name"
 
 
-class Panoramas(Protocol):
-    """Gives the panorama of a sight; embodied.gym.sensors.PanoramaStore is one."""
-
-    def at(self, sight: Sight) -> Panorama: ...
-
-
-def pictures_for(o: Observation, panoramas: Panoramas, how: str) -> tuple[str, ...]:
+def pictures_for(o: Observation, panoramas: PanoramaStore, how: str) -> tuple[str, ...]:
     """The pictures of an observation as data URLs; the image that is looked for (HANNA) last.
 
     Args:

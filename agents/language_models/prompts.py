@@ -15,8 +15,7 @@ from typing import Any
 from embodied.agents.language_models.client import Message
 from embodied.agents.language_models.completions import object_schema
 from embodied.agents.language_models.observations import (
-    ObjectNamer,
-    Panoramas,
+    Names,
     actions_by_name,
     candidates_in_words,
     observation_in_words,
@@ -24,6 +23,7 @@ from embodied.agents.language_models.observations import (
 )
 from embodied.assets.json_file import read_text
 from embodied.assistants.words import side
+from embodied.gym.sensors import PanoramaStore
 from embodied.interface import Action, Ask, Intention, Observation, Stop
 
 PROMPTS = Path(__file__).parent / "prompts"
@@ -79,9 +79,9 @@ def read_prompt(name: str, names: tuple[str, ...], folder: Path | None = None) -
 class PromptBuilder:
     """Builds the prompt of an agent's model from an observation."""
 
-    namer: ObjectNamer | None = None
+    namer: Names | None = None
     """Names the things in sight; None for a model that is told only where it can go."""
-    panoramas: Panoramas | None = None
+    panoramas: PanoramaStore | None = None
     """Pictures for a model that sees; None for one that reads only."""
     pictures: str = "strip"
     """One of embodied.agents.language_models.observations.PICTURE_FORMS."""
@@ -101,7 +101,7 @@ class PromptBuilder:
         return self.prompt.messages(pictures, **self._facts(o, history))
 
     def _facts(self, o: Observation, history: Sequence[str]) -> dict[str, str]:
-        names = () if self.namer is None else self.namer.names(o.sight)
+        names = () if self.namer is None else self.namer(o.sight)
         return {
             "instruction": o.instruction,
             "history": " ".join(history[-REMEMBERED_STEPS:]) or "nothing yet",

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from embodied.agents.ask.config import AskerConfig, AskEvaluation
-from embodied.agents.language_models.options import WithModel, client_of
+from embodied.agents.language_models.client import WithModel, client_of
 from embodied.agents.learner import Learner, register_learner
 from embodied.agents.options import EVALUATION, Repeated, StudyOptions, Tables, study_of
 from embodied.options import Cached, Settings

@@ -21,7 +21,7 @@ from embodied.agents.options import (
     study_of,
     training_data,
 )
-from embodied.options import Count, InputFolder, InputPath, Settings
+from embodied.options import Count, Settings
 
 if TYPE_CHECKING:
     from embodied.agents.studies.engine import StudyLearner
@@ -36,8 +36,6 @@ class HannaTraining(SightedRun):
     """
 
     threads: Count = 2
-    init_from: InputPath | None = None
-    """Initialise with the weights of this agent."""
     config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES)]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
@@ -47,10 +45,8 @@ class HannaStudyOptions(EpisodeStudyOptions, Encoded, WithDevice):
     """Agents that ask people for help and follow their routes."""
 
     tables: Tables
-    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.1, D.2 or words."""
+    """Make these tables: 4.3, 4.4, 4.5, 4.6, D.2 or words."""
     seeds: Seeds = 1
-    eval_data: InputFolder | None = None
-    """Evaluate in the unseen houses of another data set that has features (default: of --data)."""
     config: Annotated[TrainingConfig, Settings(TRAINING, HANNA_SCALES, skip=("training_houses",))]
     evaluation: Annotated[HannaEvaluation, Settings(EVALUATION, EVALUATIONS)]
 
@@ -60,7 +56,7 @@ def train(args: HannaTraining, **session: Any) -> None:
 
     source = training_data(args, "hanna", args.device)
     session["minutes"] = args.minutes
-    train_agent(source, args.config, args.evaluation, args.out, init_from=args.init_from, **session)
+    train_agent(source, args.config, args.evaluation, args.out, **session)
 
 
 def study(args: HannaStudyOptions) -> StudyLearner:

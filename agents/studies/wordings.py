@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from embodied.agents.common.paraphrases import UNHEARD, in_synonyms, paraphraser, reworded
+from embodied.agents.common.paraphrases import UNHEARD, Reworded, in_synonyms, paraphraser
 from embodied.agents.studies.tables import StudyRow, StudyTable
 from embodied.assets.catalogue import load_catalogue
 from embodied.assets.closure import code_digest
@@ -61,4 +61,4 @@ def saying(how: str, known: Sequence[str], cache: Path) -> Callable[[str], str]:
 def hearing(agent: Agent, judge: Mapping[str, Any], known: Sequence[str], cache: Path) -> Agent:
     """An agent that knows the words `known`, to which everything is said as a row has it."""
     how = judge.get(WORDING)
-    return reworded(agent, saying(how, known, cache)) if how else agent
+    return Reworded(agent, saying(how, known, cache)) if how else agent

@@ -7,7 +7,7 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 COMPACT = "compact"
-WIDTHS, STRIDES = (32, 64, 128, 192), (1, 2, 2, 1)
+STAGE_WIDTHS, STAGE_STRIDES = (32, 64, 128, 192), (1, 2, 2, 1)
 """Of the stages: channels, and by how much they halve the resolution."""
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Of ImageNet's RGB in [0, 1]."""
@@ -38,11 +38,11 @@ class Compact(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.channels = WIDTHS[1], WIDTHS[2], WIDTHS[3]
-        self.size, inputs = WIDTHS[-1], WIDTHS[0]
+        self.channels = STAGE_WIDTHS[1], STAGE_WIDTHS[2], STAGE_WIDTHS[3]
+        self.size, inputs = STAGE_WIDTHS[-1], STAGE_WIDTHS[0]
         self.conv1 = nn.Conv2d(3, inputs, 7, 2, 3, bias=False)
         self.bn1 = nn.BatchNorm2d(inputs)
-        for i, (width, stride) in enumerate(zip(WIDTHS, STRIDES, strict=True), 1):
+        for i, (width, stride) in enumerate(zip(STAGE_WIDTHS, STAGE_STRIDES, strict=True), 1):
             setattr(self, f"layer{i}", nn.Sequential(ResidualBlock(inputs, width, stride)))
             inputs = width
         for module in self.modules():

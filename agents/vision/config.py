@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from embodied.agents.common.settings import AT_LEAST_ONE, NOT_NEGATIVE, POSITIVE, require
-from embodied.render.photograph import check_camera
 from embodied.render.pictures import Baked, PictureSettings, Traced, Unlit, recorded
 
 TRAINED_NETWORKS = ("compact", "lite0")
@@ -38,48 +37,10 @@ def drawing(pictures: PictureSettings) -> str:
     return "_".join([quality, *light, *look, str(pictures.size), *rays])
 
 
-@dataclass(frozen=True)
-class CaptureCondition:
-    """Differences of a picture from what the agent sees at the same place."""
-
-    lighting: int = 0
-    """Number in embodied.light.lightings_of: another hour, weather and lamps; 0 is the house's own."""
-    day: int = 0
-    """Day of embodied.generate.rearrange: people elsewhere, small things moved; 0 is the agent's own."""
-    camera: str = "ideal"
-    """The camera that took it, one of embodied.render.photograph.CAMERAS: exposure, balance, lens, noise, JPEG."""
-
-    @property
-    def name(self) -> str:
-        """The name that its features are filed under, after the house."""
-        parts = [f"light{self.lighting}" * bool(self.lighting), f"day{self.day}" * bool(self.day)]
-        parts += [self.camera * (self.camera != "ideal")]
-        return "".join(f"+{p}" for p in parts if p)
-
-
-CAPTURE_CONDITIONS: Mapping[str, CaptureCondition] = {
-    "same": CaptureCondition(),
-    "camera": CaptureCondition(camera="robot"),
-    "hour": CaptureCondition(lighting=1),
-    "day": CaptureCondition(day=1),
-    "later": CaptureCondition(lighting=1, day=1),
-    "later-camera": CaptureCondition(lighting=1, day=1, camera="robot"),
-}
-"""Values of --goal-image."""
-
-
-@dataclass(frozen=True)
-class RenderedInputs:
-    """The pictures that the agents of an evaluation saw, as its run.json says."""
-
-    looking: tuple[str, ...] = ()
-    """Rows whose agents look at pictures."""
-    pictures: Mapping[str, PictureSettings] = field(default_factory=dict)
-    """How those are drawn, by house."""
-
-    def by(self, agent: str, house: str) -> PictureSettings | None:
-        """How the pictures of `house` were drawn that `agent` looked at; None if it looked at none that are known."""
-        return self.pictures.get(house) if agent in self.looking else None
+SAME_TIME, LATER_CAMERA = "same", "later-camera"
+GOAL_IMAGES = (SAME_TIME, LATER_CAMERA)
+"""How the goal images that helpers show were taken: as the agent sees the place; or at another hour of another day,
+with people elsewhere and small things moved, by a robot's camera."""
 
 
 @dataclass(frozen=True)
@@ -102,14 +63,8 @@ class StripTraining:
     """Leave out classes that are visible in fewer training views."""
     seed: int = 0
     """Random seed."""
-    cameras: tuple[str, ...] = ("ideal",)
-    """Simulated cameras for augmentation, 'ideal', 'phone' or 'robot'; each strip is taken by a random one."""
 
     def __post_init__(self) -> None:
-        if not self.cameras:
-            raise ValueError("cameras must name at least one kind of camera; 'ideal' leaves the strips as drawn")
-        for name in self.cameras:
-            check_camera(name)
         require(self, AT_LEAST_ONE, "epochs", "batch", "least_views")
         require(self, NOT_NEGATIVE, "training_houses", "shade", "weight_decay")
         require(self, POSITIVE, "learning_rate")

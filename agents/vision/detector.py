@@ -21,11 +21,13 @@ from embodied.agents.common.tensor_file import load_into
 from embodied.agents.common.weights import half_precision, load_weights, save_weights, seeded
 from embodied.agents.vision.config import StripTraining
 from embodied.agents.vision.encoder import Encoder, pool_views
-from embodied.agents.vision.labels import HouseStrips, visible_in_views
+from embodied.agents.vision.features import strip_of
+from embodied.agents.vision.labels import SHELL, HouseStrips, visible_in_views
 from embodied.agents.vision.probe import average_precision
-from embodied.agents.vision.strip import inside_windows
+from embodied.agents.vision.strip import STRIP_COLUMNS, cell_direction, inside_windows
 from embodied.agents.vision.training import StripBatch, classes_of, learn
 from embodied.identity import Identity, identity_of
+from embodied.render.panorama import Panorama, Recognised
 
 WIDTH = 128
 """Channels of the detector's maps."""
@@ -125,6 +127,28 @@ class Detector:
         """(n, 192, 576, 3) uint8 -> probabilities of each class, (n, C, 12, 36) of cells and (n, 36, C) of views."""
         cells, views = self.network(self.encoder.pyramid(strips))
         return cells.sigmoid().cpu().numpy(), views.sigmoid().cpu().numpy()
+
+    def recognise(self, panorama: Panorama, most: int = 8, least: float = 0.3) -> list[Recognised]:
+        """The `most` surest things in a panorama, but for walls, floors and ceilings, the surest first, each where it
+        is seen best, to a cell of 10 degrees.
+
+        Args:
+          least: probability from which on a cell shows a class.
+
+        Examples:
+          >>> Detector.load(load_encoder()).recognise(world.panorama(0))[0].name
+          'sofa'
+        """
+        likely = self(strip_of(panorama)[None])[0][0].reshape(len(self.classes), -1)  # (C, 12 * 36)
+        best, cells = likely.max(1), likely.argmax(1)
+        recognised: list[Recognised] = []
+        for k in (-best).argsort(kind="stable").tolist():
+            if best[k] < least or len(recognised) == most:
+                break
+            if (name := self.classes[k]) not in SHELL:
+                where = cell_direction(*divmod(int(cells[k]), STRIP_COLUMNS))
+                recognised.append(Recognised(name, float(best[k]), *where))
+        return recognised
 
     def precision(self, houses: Sequence[HouseStrips]) -> dict[str, float]:
         """Average precision of each class that some view of `houses` shows: is it visible in this view?"""

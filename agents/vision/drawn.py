@@ -18,11 +18,6 @@ from embodied.render.pictures import PictureSettings
 from embodied.world import World, open_world
 
 
-def houses_of(data: Dataset, splits: Sequence[str]) -> list[str]:
-    """Names of the houses of several splits, each once."""
-    return list(dict.fromkeys(n for s in splits for n in data.names(s)))
-
-
 def pictures_of(data: Dataset, name: str, picture_kind: str | None = None) -> PictureSettings:
     """How the pictures of a house are drawn that features are made from.
 
@@ -34,6 +29,11 @@ def pictures_of(data: Dataset, name: str, picture_kind: str | None = None) -> Pi
     if drawn is None or picture_kind not in (None, drawn.word):
         return RENDER_PRESETS[picture_kind or "unlit"]
     return drawn
+
+
+def drawings_of(data: Dataset, names: Sequence[str], picture_kind: str | None = None) -> str:
+    """How the pictures of some houses are drawn, in words: 'unlit_192', or several of them."""
+    return ", ".join(sorted({drawing(pictures_of(data, name, picture_kind)) for name in names}))
 
 
 def drawn_world(data: Dataset, name: str, cache: Path, pictures: PictureSettings, lit: House | None = None) -> World:

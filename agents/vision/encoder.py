@@ -16,7 +16,7 @@ from torch import Tensor
 
 from embodied.agents.common.shipped import SHIPPED_ENCODER
 from embodied.agents.common.tensor_file import load_into
-from embodied.agents.common.weights import load_weights, save_weights, seeded
+from embodied.agents.common.weights import load_weights, save_weights
 from embodied.agents.vision.compact import COMPACT, Compact
 from embodied.agents.vision.lite import LITE, Lite, folded
 from embodied.agents.vision.strip import CELL, HEIGHT, STRIP_COLUMNS, STRIP_ROWS, WIDTH, inside_windows, windows
@@ -26,7 +26,7 @@ DIGESTED = "embodied-encoder-1"
 """The beginning of what digests of encoders are made of."""
 Network = Compact | Lite
 """Makes a map of `size` channels, of which the last `peaks` are pooled as maxima, in cells of `stride` pixels."""
-NETWORKS: Mapping[str, type[Network]] = {COMPACT: Compact, LITE: Lite}
+ENCODER_NETWORKS: Mapping[str, type[Network]] = {COMPACT: Compact, LITE: Lite}
 SHARING = "strip"
 """Views share one look at the panorama, of whose feature map they are windows."""
 MARGIN = 3 * CELL
@@ -48,7 +48,7 @@ class Encoder:
 
     network: Network
     name: str
-    """Key of NETWORKS."""
+    """Key of ENCODER_NETWORKS."""
     mean: Tensor | None = None
     """(D,) subtracted from features; None leaves them as the network gives them."""
     mix: Tensor | None = None
@@ -156,12 +156,6 @@ def whitening(features: Tensor, floor: float = 1e-2) -> tuple[Tensor, Tensor]:
     return mean, ((vectors * scale) @ vectors.T).float()
 
 
-def random_encoder(name: str = COMPACT, *, seed: int) -> Encoder:
-    """An untrained encoder: the floor that training has to beat."""
-    with seeded(seed):
-        return Encoder(NETWORKS[name]().eval(), name)
-
-
 def save_encoder(encoder: Encoder, path: Path, identity: Identity | None = None) -> None:
     """Write half-precision weights, settings and what they were trained with, atomically."""
     about = EncoderAbout(encoder.name, encoder.digest)
@@ -176,11 +170,11 @@ def load_encoder(path: Path = SHIPPED_ENCODER) -> Encoder:
     """
     remedy = "train the encoder again with `embodied train vision`"
     tensors, about = load_weights(path, "encoder", EncoderAbout, remedy)
-    if about.name not in NETWORKS or about.sharing != SHARING:
+    if about.name not in ENCODER_NETWORKS or about.sharing != SHARING:
         raise ValueError(f"{path}: unknown settings {about}; {remedy}")
     tensors = {k: v.float() for k, v in tensors.items()}
     mean, mix = tensors.pop("mean", None), tensors.pop("mix", None)
-    network = NETWORKS[about.name]()
+    network = ENCODER_NETWORKS[about.name]()
     counters = {k: v for k, v in network.state_dict().items() if k.endswith("num_batches_tracked")}
     load_into(network, {**counters, **tensors}, path)
     encoder = Encoder(network.eval(), about.name, mean, mix)

@@ -8,24 +8,21 @@ from pathlib import Path
 import numpy as np
 
 from embodied.agents.common.parallel import use_threads
-from embodied.agents.vision.capture import captured_path, digest_at, house_at
-from embodied.agents.vision.config import CaptureCondition
+from embodied.agents.vision.capture import CAMERAS_OF, captured_path, digest_at, house_at
+from embodied.agents.vision.config import SAME_TIME
 from embodied.agents.vision.drawn import drawn_world, pictures_of
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.features import EQUIRECT, encode_strips, has_features, margin, save_features
 from embodied.datasets.store import Dataset
-from embodied.render.photograph import PhotoCamera
 from embodied.render.pictures import Traced
 from embodied.world import World
 
-AS_SEEN = CaptureCondition()
 
-
-def features_of(world: World, encoder: Encoder, condition: CaptureCondition = AS_SEEN) -> np.ndarray:
-    """(n, 36, D) float16 features of the panoramas of a house, as the camera of `condition` takes them."""
-    if isinstance(world.pictures, Traced) or condition != AS_SEEN:
-        world.render_all()  # kept: they cost minutes a house, and several conditions show the same
-    camera, house = PhotoCamera(condition.camera, seed=condition.day), world.house.name
+def features_of(world: World, encoder: Encoder, goal_image: str = SAME_TIME) -> np.ndarray:
+    """(n, 36, D) float16 features of the panoramas of a house, as the camera of such goal images takes them."""
+    if isinstance(world.pictures, Traced) or goal_image != SAME_TIME:
+        world.render_all()  # kept: they cost minutes a house
+    camera, house = CAMERAS_OF[goal_image], world.house.name
     seen = (world.panorama(node).equirect(EQUIRECT) for node in range(len(world.graph.positions)))
     photographs = (camera.photographed(picture, None, house, node) for node, picture in enumerate(seen))
     return encode_strips(encoder, (photograph[margin()] for photograph in photographs))
@@ -41,33 +38,29 @@ class Extractor:
     cache: Path
     picture_kind: str | None = None
     """Of the pictures, as embodied.agents.vision.drawn.pictures_of takes it."""
-    conditions: tuple[CaptureCondition, ...] = (AS_SEEN,)
+    goal_images: tuple[str, ...] = (SAME_TIME,)
+    """Some of embodied.agents.vision.config.GOAL_IMAGES."""
     threads: int = 1
 
-    def missing(self, name: str) -> list[CaptureCondition]:
-        """The conditions under which a house has no features; those of one day and hour stand together."""
-        data = Dataset(self.data)
+    def missing(self, name: str) -> list[str]:
+        """The goal images of which a house has no features."""
+        data, encoder = Dataset(self.data), self.encoder
         pictures = pictures_of(data, name, self.picture_kind)
-        return [
-            at
-            for at in sorted(set(self.conditions), key=lambda c: (c.lighting, c.day))
-            if not has_features(
-                captured_path(data, name, at, self.encoder.digest, pictures),
-                self.encoder,
-                digest_at(data, name, at, self.cache),
-                pictures,
-            )
-        ]
+
+        def is_there(goal_image: str) -> bool:
+            path = captured_path(data, name, goal_image, encoder.digest, pictures)
+            return has_features(path, encoder, digest_at(data, name, goal_image, self.cache), pictures)
+
+        return [goal_image for goal_image in dict.fromkeys(self.goal_images) if not is_there(goal_image)]
 
     def __call__(self, name: str) -> str:
         """Extract the missing features of a house; returns a line about it."""
         use_threads(self.threads)
-        data, conditions = Dataset(self.data), self.missing(name)
+        data, missing = Dataset(self.data), self.missing(name)
         pictures = pictures_of(data, name, self.picture_kind)
-        for at in conditions:
-            house = house_at(data, name, at, self.cache)
+        for goal_image in missing:
+            house = house_at(data, name, goal_image, self.cache)
             with drawn_world(data, name, self.cache, pictures, house) as world:
-                path = captured_path(data, name, at, self.encoder.digest, pictures)
-                save_features(path, features_of(world, self.encoder, at), self.encoder, house.digest, pictures)
-        ways = ", ".join(at.name or "as seen" for at in conditions)
-        return f"{name}: {ways}; {pictures.word} pictures of {pictures.size} pixels"
+                path = captured_path(data, name, goal_image, self.encoder.digest, pictures)
+                save_features(path, features_of(world, self.encoder, goal_image), self.encoder, house.digest, pictures)
+        return f"{name}: {', '.join(missing)}; {pictures.word} pictures of {pictures.size} pixels"

@@ -8,24 +8,20 @@ k % 12 (counter-clockwise from +x), tilt k // 12 - 1.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from embodied.agents.common.tensor_file import load_tensors, save_tensors
-from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.config import PLAIN, drawing
 from embodied.agents.vision.encoder import Encoder
 from embodied.agents.vision.strip import HEIGHT
-from embodied.interface import VIEWS, Place
 from embodied.render.panorama import Panorama
 from embodied.render.pictures import PictureSettings
 
 FEATURES_FORMAT = "embodied-features-2"
-KEYS = ("encoder", "source", "drawing")
-"""Entries of a feature file on what it was made from."""
 EQUIRECT = 288
 """Height of the equirect that the strip is cut from: 1.6 pixels per degree."""
 
@@ -68,31 +64,20 @@ def save_features(
     save_tensors(Path(path), {"features": tensor}, about)
 
 
-def load_features(
-    path: Path, *, encoder: str | None = None, source: str | None = None, pictures: PictureSettings | None = None
-) -> tuple[np.ndarray, str]:
-    """(n, 36, D) float16 features and the digest of their encoder.
-
-    Args:
-      encoder, source, pictures: what is expected, if anything.
+def load_features(path: Path, *, encoder: str, source: str, pictures: PictureSettings) -> np.ndarray:
+    """(n, 36, D) float16 features by the encoder of a digest, of the house of a digest, from pictures drawn so.
 
     Raises:
       FileNotFoundError: there is no such file.
       ValueError: truncated, changed, of another format, encoder, house or way of drawing.
     """
-    path, command = Path(path), _command(pictures)
-    remedy = f"make it again with `{command}`"
-    if not path.exists():
-        raise FileNotFoundError(f"{path} does not exist; make it with `{command}`")
-    tensors, about = load_tensors(path, FEATURES_FORMAT, remedy)
-    features = tensors.get("features")
-    if features is None or features.dim() != 3 or features.shape[1] != VIEWS or not {*KEYS} <= set(about):
-        raise ValueError(f"{path}: not a feature file of format {FEATURES_FORMAT!r}; {remedy}")
-    drawn = None if pictures is None else drawing(pictures)
-    for name, expected in zip(KEYS, (encoder, source, drawn), strict=True):
-        if expected is not None and about[name] != expected:
+    picture_kind = "" if pictures.word == PLAIN.word else f" --pictures {pictures.word}"
+    remedy = f"make it with `embodied features{picture_kind}`"
+    tensors, about = load_tensors(Path(path), FEATURES_FORMAT, remedy)
+    for name, expected in {"encoder": encoder, "source": source, "drawing": drawing(pictures)}.items():
+        if about[name] != expected:
             raise ValueError(f"{path}: made from {name} {about[name][:12]}, expected {expected[:12]}; {remedy}")
-    return features.numpy(), about["encoder"]
+    return tensors["features"].numpy()
 
 
 def has_features(path: Path, encoder: Encoder, source: str, pictures: PictureSettings) -> bool:
@@ -102,39 +87,3 @@ def has_features(path: Path, encoder: Encoder, source: str, pictures: PictureSet
         return True
     except (FileNotFoundError, ValueError):
         return False
-
-
-def _command(pictures: PictureSettings | None) -> str:
-    picture_kind = "" if pictures is None or pictures.word == PLAIN.word else f" --pictures {pictures.word}"
-    return f"embodied features{picture_kind}"
-
-
-def load_bank(
-    paths: Mapping[str, Path],
-    encoder: str | None = None,
-    places: Mapping[str, Place] | None = None,
-    pictures: Mapping[str, PictureSettings] | None = None,
-) -> FeatureBank:
-    """The features of several worlds (name -> file); all must come from one encoder.
-
-    Args:
-      encoder: what is expected, if anything.
-      places, pictures: whose features they should be, and how these are drawn, by name.
-    """
-    worlds, digests = dict[str, np.ndarray](), set()
-    for name, path in sorted(paths.items()):
-        place = None if places is None else places[name]
-        source = None if place is None else place.house.digest
-        drawn = None if pictures is None else pictures[name]
-        worlds[name], digest = load_features(path, encoder=encoder, source=source, pictures=drawn)
-        if place is not None and len(worlds[name]) != len(place.graph.ids):
-            raise ValueError(
-                f"{path}: {len(worlds[name])} nodes, {name!r} has {len(place.graph.ids)}; "
-                f"make it again with `{_command(drawn)}`"
-            )
-        digests.add(digest)
-    if len(digests) > 1:
-        raise ValueError(
-            f"features come from the encoders {sorted(d[:12] for d in digests)}; make them all with one encoder"
-        )
-    return FeatureBank(worlds, digests.pop())

@@ -52,15 +52,7 @@ class HouseStrips:
 
     def save(self, path: Path) -> None:
         with atomic_path(Path(path)) as temporary, open(temporary, "wb") as f:
-            np.savez_compressed(
-                f,
-                classes=np.array(self.classes),
-                rgb=self.rgb,
-                share=self.share,
-                rooms=self.rooms,
-                log_depth=self.log_depth,
-                room=self.room,
-            )
+            np.savez_compressed(f, **{name: value for name, value in vars(self).items() if name != "name"})
 
     @staticmethod
     def load(path: Path) -> HouseStrips:
@@ -68,7 +60,7 @@ class HouseStrips:
 
         Raises:
           FileNotFoundError, OSError.
-          ValueError: damaged, or arrays that do not fit each other.
+          ValueError: damaged.
         """
         try:
             with open_arrays(path, MOST) as f:
@@ -76,11 +68,6 @@ class HouseStrips:
                 arrays = {name: f[name] for name in ("rgb", "share", "rooms", "log_depth", "room")}
         except DAMAGED as e:
             raise ValueError(f"{path}: not a file of strips, or damaged ({e}); delete it and render again") from e
-        n, shapes = len(arrays["room"]), {name: a.shape for name, a in arrays.items()}
-        cells = (n, STRIP_ROWS, STRIP_COLUMNS)
-        wanted = {"rgb": (n, HEIGHT, WIDTH, 3), "share": (*cells, len(classes)), "rooms": cells, "log_depth": cells}
-        if shapes != {**wanted, "room": (n,)}:
-            raise ValueError(f"{path}: its arrays do not fit each other ({shapes}); delete it and render again")
         return HouseStrips(Path(path).stem, classes, **arrays)
 
 

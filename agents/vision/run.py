@@ -14,7 +14,7 @@ from embodied.agents.common.parallel import check_device
 from embodied.agents.common.session import Note
 from embodied.agents.vision.config import StripTraining, VisionConfig, drawing
 from embodied.agents.vision.detector import train_detector
-from embodied.agents.vision.drawn import StripSource, houses_of, pictures_of
+from embodied.agents.vision.drawn import StripSource, drawings_of, pictures_of
 from embodied.agents.vision.encoder import Encoder, load_encoder, save_encoder
 from embodied.agents.vision.extract import Extractor
 from embodied.agents.vision.probe import labelled, read
@@ -48,7 +48,7 @@ def train_vision(
     """
     check_device(device)
     data = Dataset(source.data)
-    names, unseen = training_houses(data, config), houses_of(data, ("val_unseen",))
+    names, unseen = training_houses(data, config), data.names("val_unseen")
     with locked(out):
         seen = source.strips(names, lit=lit, workers=workers, note=note)
         encoder, classes = train_encoder(seen, config, out / "training", device=device, note=note)
@@ -91,7 +91,7 @@ def detector_for(
     data = Dataset(source.data)
     with locked(out):
         seen = source.strips(training_houses(data, config), lit=lit, workers=workers, note=note)
-        unseen = source.strips(houses_of(data, ("val_unseen",)), workers=workers, note=note)
+        unseen = source.strips(data.names("val_unseen"), workers=workers, note=note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
         learned = {**_learned_in(source, config, lit), "encoder": encoder.digest}
         detector.save(out / "detector.safetensors", learned)
@@ -101,16 +101,15 @@ def detector_for(
         note(f"average precision {whole:.3f}, {len(precision)} classes in validation houses")
 
 
-def training_houses(data: Dataset, config: StripTraining) -> list[str]:
+def training_houses(data: Dataset, config: StripTraining) -> Sequence[str]:
     """Names of the houses to learn from."""
-    return houses_of(data, ("train",))[: config.training_houses or None]
+    return data.names("train")[: config.training_houses or None]
 
 
 def _learned_in(source: StripSource, config: StripTraining, lit: int) -> Identity:
     """The identity of what is trained on strips."""
     data = Dataset(source.data)
-    drawn = {drawing(pictures_of(data, name, source.picture_kind)) for name in training_houses(data, config)}
-    pictures = ", ".join(sorted(drawn))
+    pictures = drawings_of(data, training_houses(data, config), source.picture_kind)
     return identity_of("embodied.agents.vision.run", settings=config, data=data.digest, pictures=pictures, lit=lit)
 
 

@@ -17,7 +17,7 @@ from embodied.agents.vision.bank import FeatureBank
 from embodied.agents.vision.encoder import load_encoder
 from embodied.agents.vision.training_data import TrainingData
 from embodied.assets.cache import default_cache
-from embodied.datasets.store import Dataset, dataset_of
+from embodied.datasets.store import dataset_of
 from embodied.evaluation.evaluate import agent as agent_without_learning
 from embodied.interface import Agent
 
@@ -57,29 +57,18 @@ class FeatureStudy(EpisodeStudy):
     def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return agent_without_learning(self.task_kind or self.name, judge["played"])
-        return self.policy(agent, self.evaluation_data().split(split).bank)
-
-    def judged_in(self, judge: Mapping[str, Any]) -> Dataset:
-        return self.evaluation_data().data
+        return self.policy(agent, self.training_data().split(split).bank)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
-        return {**super().judged(row, split), "pictures": self.evaluation_data().pictures(split)}
+        return {**super().judged(row, split), "pictures": self.training_data().pictures(split)}
 
     def training_data(self) -> TrainingData:
-        """Training data of the agents.
+        """The data set with features.
 
         Raises:
           DatasetError: a data set of another kind.
         """
-        return self.training_data_in(self.data)
-
-    def evaluation_data(self) -> TrainingData:
-        """The data that they are judged in."""
-        return self.training_data()
-
-    def training_data_in(self, folder: Path) -> TrainingData:
-        """A data set with features."""
-        data = dataset_of(folder, self.task_kind or self.name)
+        data = dataset_of(self.data, self.task_kind or self.name)
         return TrainingData(data, load_encoder(self.encoder), self.pictures, cache=self.cache)
 
 
@@ -103,11 +92,7 @@ class SightedStudy(FeatureStudy):
 
     def policies(self, agent: Any, judge: Mapping[str, Any], split: str) -> Agent:
         policy = super().policies(agent, judge, split)
-        return policy if agent is None else self.heard(agent, policy, judge)
-
-    def heard(self, agent: Any, policy: Any, judge: Mapping[str, Any]) -> Agent:
-        """The policy of an agent, to which everything is said as the row has it."""
-        return hearing(policy, judge, agent.about.words, self.cache)
+        return policy if agent is None else hearing(policy, judge, agent.about.words, self.cache)
 
     def judged(self, row: StudyRow, split: str) -> Mapping[str, object]:
         return {**super().judged(row, split), "evaluation": self.evaluation, **code_of(row.judge)}

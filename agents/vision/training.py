@@ -25,14 +25,13 @@ from embodied.agents.common.checkpoint import Stateful
 from embodied.agents.common.session import Note, Session, descend
 from embodied.agents.common.weights import seeded
 from embodied.agents.vision.config import StripTraining, VisionConfig
-from embodied.agents.vision.encoder import NETWORKS, Encoder, Network, pool_views, strip_map, whitening
+from embodied.agents.vision.encoder import ENCODER_NETWORKS, Encoder, Network, pool_views, strip_map, whitening
 from embodied.agents.vision.labels import HouseStrips, visible_in_views
 from embodied.agents.vision.lite import Lite, load_imagenet
 from embodied.agents.vision.strip import CELL, STRIP_COLUMNS
 from embodied.assets.cache import digest
 from embodied.assets.records import ROOM_KINDS
 from embodied.identity import Identity, identity_of
-from embodied.render.photograph import camera_traits, photograph
 from embodied.seeds import stream
 
 
@@ -90,16 +89,9 @@ def vision_loss(network: Network, heads: Heads, batch: StripBatch) -> tuple[Tens
 
 
 def batches(
-    houses: Sequence[HouseStrips],
-    classes: Sequence[int],
-    size: int,
-    cameras: Sequence[str] = ("ideal",),
-    shade: float = 0.0,
-    *,
-    rng: np.random.Generator,
+    houses: Sequence[HouseStrips], classes: Sequence[int], size: int, shade: float = 0.0, *, rng: np.random.Generator
 ) -> Iterator[StripBatch]:
-    """One pass over all nodes in random order, each rolled, perhaps mirrored, recoloured, and photographed by one of
-    `cameras`."""
+    """One pass over all nodes in random order, each rolled, perhaps mirrored, and recoloured."""
     where = [(house, i) for house in houses for i in range(len(house.rgb))]
     order = rng.permutation(len(where))
     columns = np.asarray(classes)
@@ -108,8 +100,7 @@ def batches(
         rgb, share, rooms, depth, room = [], [], [], [], []
         for house, i in chosen:
             turn, mirror = int(rng.integers(STRIP_COLUMNS)), bool(rng.random() < 0.5)
-            seen = recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng)
-            rgb.append(photograph_strip(seen, cameras, rng=rng) if set(cameras) != {"ideal"} else seen)
+            rgb.append(recolour(turn_strip(house.rgb[i], turn * CELL, mirror), shade, rng=rng))
             share.append(turn_strip(house.share[i], turn, mirror)[..., columns])
             rooms.append(turn_strip(house.rooms[i], turn, mirror))
             depth.append(turn_strip(house.log_depth[i], turn, mirror))
@@ -146,13 +137,6 @@ def recolour(image: np.ndarray, uneven: float = 0.0, *, rng: np.random.Generator
     return np.clip(recoloured * shade[..., None], 0, 255).astype(np.uint8)
 
 
-def photograph_strip(strip: np.ndarray, cameras: Sequence[str], *, rng: np.random.Generator) -> np.ndarray:
-    """A strip as a random device of one of `cameras` takes it: exposure, white balance, bloom, noise and JPEG, but no
-    lens distortion, which would move the picture against its labels."""
-    traits = camera_traits(cameras[int(rng.integers(len(cameras)))], rng=rng)
-    return strip if traits is None else photograph(np.ascontiguousarray(strip), traits, None, rng=rng)
-
-
 def frequent_classes(houses: Sequence[HouseStrips], least: int) -> list[int]:
     """Indices of the classes visible in at least `least` views of `houses`."""
     count = sum(visible_in_views(h.share).sum((0, 1)) for h in houses)
@@ -168,7 +152,7 @@ def train_encoder(
     """
     classes = classes_of(houses, config)
     with seeded(config.seed):
-        network = NETWORKS[config.network]()
+        network = ENCODER_NETWORKS[config.network]()
         heads = Heads(network.size, len(classes))
     if isinstance(network, Lite):
         load_imagenet(network)
@@ -236,7 +220,7 @@ def learn(
         for module in modules.values():
             module.train()
         rng = stream(config.seed, "vision", "epoch", epoch)
-        drawn = batches(houses, classes, config.batch, config.cameras, config.shade, rng=rng)
+        drawn = batches(houses, classes, config.batch, config.shade, rng=rng)
         losses = (update(batch, f"epoch {epoch + 1}, update {done}") for done, batch in enumerate(drawn, 1))
         return _watched(losses, f"epoch {epoch + 1}", updates, config.batch, note)
 

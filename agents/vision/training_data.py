@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,11 +15,10 @@ from embodied.agents.common.sighted import About
 from embodied.agents.common.vocabulary import Vocabulary
 from embodied.agents.learner import PlaySettings
 from embodied.agents.vision.bank import FeatureBank
-from embodied.agents.vision.capture import with_goal_images
-from embodied.agents.vision.config import CAPTURE_CONDITIONS, drawing
-from embodied.agents.vision.drawn import pictures_of
+from embodied.agents.vision.capture import house_features
+from embodied.agents.vision.config import SAME_TIME
+from embodied.agents.vision.drawn import drawings_of
 from embodied.agents.vision.encoder import Encoder, load_encoder
-from embodied.agents.vision.features import feature_path, load_bank
 from embodied.assets.cache import default_cache
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset
@@ -43,8 +43,8 @@ class TrainingData:
     picture_kind: str | None = None
     """Of the pictures that the features come from, as in embodied.agents.vision.run.pictures_of."""
     device: str = "cpu"
-    goal_image: str = "same"
-    """How the pictures that helpers show were taken, one of embodied.agents.vision.config.CAPTURE_CONDITIONS."""
+    goal_image: str = SAME_TIME
+    """One of embodied.agents.vision.config.GOAL_IMAGES."""
     cache: Path = field(default_factory=default_cache)
     """Folder of the furniture, for other pictures than the agent sees."""
 
@@ -59,12 +59,11 @@ class TrainingData:
         if houses is not None and houses > (there := len(data.names(name))):
             raise ValueError(f"{houses} houses of {name!r} are wanted, {data.folder} has {there}; ask for fewer")
         split = data.split(name, houses=houses, rules=rules)
-        pictures = {n: pictures_of(data, n, kind) for n in split.worlds}
-        paths = {n: feature_path(data.folder / "features", encoder, n, pictures[n]) for n in split.worlds}
         tasks = split.tasks if limit is None else spread(split.tasks, limit)
-        bank = load_bank(paths, encoder, split.worlds, pictures).to(self.device)
-        condition = CAPTURE_CONDITIONS[self.goal_image]
-        bank = with_goal_images(bank, data, list(split.worlds), condition, encoder, self.cache, kind)
+        features = functools.partial(house_features, data, list(split.worlds), encoder, kind, self.cache)
+        bank = FeatureBank(features(), encoder).to(self.device)
+        if self.goal_image != SAME_TIME:
+            bank = bank.with_goal_images(features(self.goal_image))
         return Split(split.worlds, tasks, split.make_env, bank)
 
     def rewording(self, config: ImitationSettings) -> Callable[[str], str] | None:
@@ -74,7 +73,7 @@ class TrainingData:
     def identity(self) -> dict[str, str]:
         """Everything that an agent depends on besides its settings: the data set, the encoder, how its houses were
         drawn."""
-        shown = {} if self.goal_image == "same" else {"shown": self.goal_image}
+        shown = {} if self.goal_image == SAME_TIME else {"shown": self.goal_image}
         return {"data": self.data.digest, "encoder": self.encoder.digest, "pictures": self.pictures("train"), **shown}
 
     def about(self, kind: type[A], config: ImitationSettings, evaluation: EvaluationSettings, words: Vocabulary) -> A:
@@ -91,8 +90,7 @@ class TrainingData:
 
     def pictures(self, name: str) -> str:
         """How the pictures of a split's houses were drawn, in words: 'unlit_192', or several of them."""
-        drawn = (drawing(pictures_of(self.data, n, self.picture_kind)) for n in self.data.names(name))
-        return ", ".join(sorted(set(drawn)))
+        return drawings_of(self.data, self.data.names(name), self.picture_kind)
 
 
 def evaluation_data(data: Dataset, how: PlaySettings) -> TrainingData:

@@ -14,7 +14,7 @@ from typing import Any
 from embodied.agents.common.session import Note
 from embodied.agents.studies.episodes import JUDGES
 from embodied.agents.studies.tables import StudyRow, StudyTable
-from embodied.agents.studies.wordings import words_table
+from embodied.agents.studies.wordings import hearing, words_table
 from embodied.agents.vision.sighted_study import TEST_SPLITS, SightedStudy
 from embodied.agents.vnla.agent import DIRECT, LEARNED, TEACHER, VnlaAgent
 from embodied.agents.vnla.config import VnlaSettings
@@ -98,7 +98,8 @@ class VnlaStudy(SightedStudy):
     def policies(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> Agent:
         if agent is None:
             return super().policies(agent, judge, split)
-        return self.heard(agent, agent.player(self.training_data().split(split).bank, judge["played"]), judge)
+        player = agent.player(self.training_data().split(split).bank, judge["played"])
+        return hearing(player, judge, agent.about.words, self.cache)
 
     def where(self, agent: VnlaAgent | None, judge: Mapping[str, Any], split: str) -> SplitData:
         if agent is None:

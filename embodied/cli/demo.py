@@ -160,9 +160,9 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
     from embodied.agents.hanna.agent import HannaAgent
     from embodied.agents.hanna.evaluation import hanna_policies
     from embodied.agents.vision.bank import FeatureBank
+    from embodied.agents.vision.detector import Detector
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.features import encode_panoramas
-    from embodied.agents.vision.recognise import Recogniser
     from embodied.evaluation.rollout import play
     from embodied.kinds.shipped.hanna import HANNA
     from embodied.kinds.task_kind import EnvInputs
@@ -179,7 +179,7 @@ def ask_for_help(args: DemoOptions, world: World, routes: Sequence[Route], viewe
     episode = play(make, hanna_policies(agent, bank)["learned"], [task], seed=args.seed, agent="learned")[0]
     if args.video:
         film(world, episode, args.video, args.video_size)
-    recognise = Recogniser.load(encoder)
+    recognise = Detector.load(encoder).recognise
     return recorded(world, episode, args.out / "help.rrd", viewers, eyes=world, recognise=recognise)
 
 

@@ -24,8 +24,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from embodied.agents.language_models.options import WithModel, client_of
-from embodied.agents.options import GOAL_IMAGES, Encoded, Threaded
+from embodied.agents.language_models.client import WithModel, client_of
+from embodied.agents.options import Encoded, Threaded
+from embodied.agents.vision.config import GOAL_IMAGES
 from embodied.cli.common import Furnished, Printed, bar, catalogue_of, note, show
 from embodied.options import Count, InputFolder, InputPath, Option, OutputFolder
 
@@ -89,9 +90,8 @@ class OfTrained:
     """Rows of the table of a trained agent, such as 'learned' or 'learned, no ask' (default: all, or 'learned' where
     other agents are named)."""
     goal_image: Annotated[str, Option(words=GOAL_IMAGES)] = "same"
-    """How goal images differ from what the agent sees there; same: not at all; camera: taken by a robot's camera; hour:
-    at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
-    another day; -camera: also by a robot's camera; -view: that, and only one view of 60 degrees."""
+    """How goal images differ from what the agent sees there; same: not at all; later-camera: taken at another hour of
+    another day, with people elsewhere and small things moved, by a robot's camera."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,7 +288,6 @@ def play_trained(evaluation: Evaluation, data: Dataset, learner: Learner, file: 
     from embodied.agents.common.weights import weights_digest
     from embodied.agents.learner import PlaySettings
     from embodied.agents.studies.episodes import JUDGES, evaluate_frozen
-    from embodied.agents.vision.config import CAPTURE_CONDITIONS
     from embodied.agents.vision.drawn import pictures_of
     from embodied.identity import identity_of
     from embodied.render.pictures import in_words
@@ -315,7 +314,7 @@ def play_trained(evaluation: Evaluation, data: Dataset, learner: Learner, file: 
     names = [n for split in evaluation.splits for n in data.names(split)] if looking else []
     facts: dict[str, object] = {"agent": weights_digest(file) if file.is_file() else str(file), "looking": looking}
     facts["pictures"] = {n: in_words(pictures_of(data, n, args.pictures)) for n in names}
-    facts["goal_image"] = dataclasses.asdict(CAPTURE_CONDITIONS[args.goal_image])
+    facts["goal_image"] = args.goal_image
     evaluation.rows.extend(rows)
     evaluation.facts.update(facts | {"identity": identity_of(*JUDGES)})
 
@@ -361,14 +360,14 @@ def agent_of(evaluation: Evaluation, name: str, split: SplitData, worlds: Mappin
         kind = evaluation.kind
         return kind.agent(name, worlds) if name in kind.agent_names else submitted(name)
     from embodied.agents.language_models.agent import LanguageModelAgent
-    from embodied.agents.language_models.observations import OracleNames
+    from embodied.agents.language_models.observations import oracle_names
     from embodied.agents.language_models.prompts import PromptBuilder, agent_prompt
     from embodied.gym.sensors import PanoramaStore
     from embodied.world import World
 
     prompt, sees = agent_prompt(evaluation.args.prompts), evaluation.args.sees
     if sees == "names":
-        builder = PromptBuilder(OracleNames(seen_places(split.worlds)), prompt=prompt)
+        builder = PromptBuilder(oracle_names(seen_places(split.worlds)), prompt=prompt)
     elif sees == "nothing":
         builder = PromptBuilder(prompt=prompt)
     else:

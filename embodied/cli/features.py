@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from embodied.agents.options import GOAL_IMAGES, Encoded, WithData, WithDevice
+from embodied.agents.options import Encoded, WithData, WithDevice
+from embodied.agents.vision.config import GOAL_IMAGES, SAME_TIME
 from embodied.cli.common import note
 from embodied.options import Count, Option
 
@@ -22,17 +23,14 @@ class FeatureOptions(WithData, Encoded, WithDevice):
     split: tuple[Annotated[str, Option(metavar="SPLIT")], ...] = ()
     """Use the houses of these splits (default: all)."""
     goal_image: tuple[Annotated[str, Option(words=GOAL_IMAGES)], ...] = ()
-    """Also make features of goal images that differ from what the agent sees there: camera: taken by a robot's camera;
-    hour: at another hour; day: on another day, with people elsewhere and small things moved; later: at another hour of
-    another day; later-camera: that by a robot's camera; same: identical."""
+    """Also make features of goal images that differ from what the agent sees there; later-camera: taken at another hour
+    of another day, with people elsewhere and small things moved, by a robot's camera; same: identical."""
     ray: Annotated[str | None, Option(metavar="ADDRESS")] = None
     """Use a Ray cluster instead: its address, or 'local'."""
 
 
 def run(args: FeatureOptions) -> None:
     from embodied.agents.common.parallel import check_device
-    from embodied.agents.vision.config import CAPTURE_CONDITIONS
-    from embodied.agents.vision.drawn import houses_of
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.extract import Extractor
     from embodied.agents.vision.run import make_features
@@ -40,7 +38,7 @@ def run(args: FeatureOptions) -> None:
 
     check_device(args.device)
     data, encoder = Dataset(args.data), load_encoder(args.encoder).to(args.device)
-    conditions = tuple(CAPTURE_CONDITIONS[word] for word in ("same", *args.goal_image))
-    extract = Extractor(data.folder.resolve(), encoder, args.cache, args.pictures, conditions, args.threads)
-    names = houses_of(data, args.split or data.splits)
+    goal_images = (SAME_TIME, *args.goal_image)
+    extract = Extractor(data.folder.resolve(), encoder, args.cache, args.pictures, goal_images, args.threads)
+    names = list(dict.fromkeys(name for split in args.split or data.splits for name in data.names(split)))
     make_features(extract, names, workers=args.workers, ray=args.ray, note=note)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from embodied.agents.language_models.options import WithModel, client_of
+from embodied.agents.language_models.client import WithModel, client_of
 from embodied.agents.options import Threaded
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from embodied.agents.language_models.options import WithModel, client_of
+from embodied.agents.language_models.client import WithModel, client_of
 from embodied.cli.common import Furnished, Printed, catalogue_of, note, show
 from embodied.distribution import DISTRIBUTION
 from embodied.errors import UnableError

@@ -19,10 +19,10 @@ from embodied.options import InputFolder, Option, OutputRrd, any_path, drawn_as,
 from embodied.render.pictures import DRAWN
 
 if TYPE_CHECKING:
-    from embodied.agents.vision.config import RenderedInputs
     from embodied.assets.catalogue import Catalogue
     from embodied.datasets.store import Dataset
     from embodied.interface import Episode
+    from embodied.render.pictures import PictureSettings
     from embodied.viz.report import Listed
     from embodied.viz.sinks import Sinks
 
@@ -119,7 +119,7 @@ def record_again(
 
     name = episode.task.world
     data.place_of(episode)
-    seen = looked_at(run).by(episode.agent, name)
+    seen = looked_at(run, episode.agent, name)
     with contextlib.ExitStack() as stack:
         eyes = None
         if seen is not None:
@@ -134,21 +134,21 @@ def record_again(
     note(f"recorded {episode.task.id}")
 
 
-def looked_at(run: Path) -> RenderedInputs:
-    """Pictures that the agents of a run looked at; none where it does not say.
+def looked_at(run: Path, agent: str, house: str) -> PictureSettings | None:
+    """How the pictures of a house were drawn that an agent of a run looked at; None if it looked at none.
 
     Raises:
       RecordError: a damaged run.json.
     """
-    from embodied.agents.vision.config import RenderedInputs
     from embodied.records import RecordError, from_plain, read_json
     from embodied.render.pictures import from_words
 
     path = run / "run.json"
     facts = read_json(path) if path.exists() else {}
-    looking = from_plain(tuple[str, ...], facts.get("looking", []), f"looking of {path}")
+    if agent not in from_plain(tuple[str, ...], facts.get("looking", []), f"looking of {path}"):
+        return None
     try:
-        pictures = {str(name): from_words(words) for name, words in facts.get("pictures", {}).items()}
+        words = facts.get("pictures", {}).get(house)
+        return None if words is None else from_words(words)
     except (AttributeError, TypeError, ValueError) as e:
         raise RecordError(f"{path} does not say how pictures were drawn ({e}); evaluate again") from e
-    return RenderedInputs(looking, pictures)

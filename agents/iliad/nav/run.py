@@ -29,9 +29,9 @@ from embodied.agents.iliad.nav.world import NavMarginal, NavWorld, trips_of
 from embodied.agents.iliad.protocol import DescribingTeacher
 from embodied.agents.iliad.training import IliadProblem, successes
 from embodied.agents.studies.wordings import WORDING, saying
-from embodied.agents.vision.config import drawing
-from embodied.agents.vision.drawn import pictures_of
-from embodied.agents.vision.features import feature_path, load_bank
+from embodied.agents.vision.bank import FeatureBank
+from embodied.agents.vision.capture import house_features
+from embodied.agents.vision.drawn import drawings_of
 from embodied.assets.catalogue import load_catalogue
 from embodied.datasets.store import Dataset, dataset_of
 from embodied.evaluation.tables import Samples
@@ -84,15 +84,11 @@ class NavSetup:
             splits[part] = [dataclasses.replace(trip, requests=(r,)) for trip in splits[part] for r in trip.requests]
         names = tuple(name for many in houses.values() for name in many)
         places = {name: source.place(name) for name in names}
-        pictures = {name: pictures_of(source, name, self.picture_kind) for name in names}
-        paths: dict[str, Path] = {
-            n: feature_path(source.folder / "features", self.encoder, n, pictures[n]) for n in names
-        }
         vocabulary = build_vocabulary(request for trip in splits["train"] for request in trip.requests)
         words = vocabulary_with(vocabulary.words, config.word_vectors)
-        eyes = NavEyes(places, load_bank(paths, self.encoder, places, pictures), words)
-        drawn = ", ".join(sorted({drawing(p) for p in pictures.values()}))
-        return NavData(source, eyes, splits, drawn)
+        features = house_features(source, names, self.encoder, self.picture_kind, self.cache)
+        eyes = NavEyes(places, FeatureBank(features, self.encoder), words)
+        return NavData(source, eyes, splits, drawings_of(source, names, self.picture_kind))
 
     def prepare(self, folder: Path, note: Note) -> NavGrounds:
         """Data and teacher, trained into `folder` unless it is there.

@@ -73,7 +73,7 @@ def feature_rows(data: Dataset, args: ProgramOptions) -> Iterator[tuple[str, str
 
     def read(name: str) -> tuple[tuple[str, ...], np.ndarray]:
         place, pictures = data.place(name), drawn[name]
-        features, _ = load_features(files[name], encoder=encoder.digest, source=place.house.digest, pictures=pictures)
+        features = load_features(files[name], encoder=encoder.digest, source=place.house.digest, pictures=pictures)
         n = features.shape[2]
         if n > args.pad:
             raise ValueError(f"{files[name]} holds features of {n} numbers, --pad is {args.pad}; raise it")
