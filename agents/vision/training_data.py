@@ -41,7 +41,7 @@ class TrainingData:
     data: Dataset
     encoder: Encoder
     picture_kind: str | None = None
-    """Of the pictures that the features come from, as in embodied.agents.vision.run.pictures_of."""
+    """Of the pictures that the features come from, as in embodied.agents.vision.drawn.pictures_of."""
     device: str = "cpu"
     goal_image: str = SAME_TIME
     """One of embodied.agents.vision.config.GOAL_IMAGES."""

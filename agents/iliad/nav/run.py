@@ -55,7 +55,7 @@ class NavSetup:
     encoder: str
     """Digest of the encoder that made them."""
     picture_kind: str | None
-    """Of the pictures, as in embodied.agents.vision.run.pictures_of."""
+    """Of the pictures, as in embodied.agents.vision.drawn.pictures_of."""
     cache: Path
     """The cache with the catalogue."""
 
