@@ -42,14 +42,6 @@ def _learned(label: str, played: str = "learned", **train: Any) -> StudyRow:
     return StudyRow(label, train, {"played": played})
 
 
-def _costs() -> tuple[StudyRow, ...]:
-    pairs = [(c, h) for h in (10, 20, 30) for c in (0.01, 0.05, 0.1, 0.2, 0.5)]
-    return tuple(
-        StudyRow(f"cost {c:g}, H {h}", {"cost": c, "horizon": h}, {"played": "learned"}, None, c, f"H = {h}")
-        for c, h in pairs
-    )
-
-
 HARI_TABLES: Mapping[str, StudyTable] = {
     "4.7": StudyTable(
         "Asking by learning and by rules",
@@ -85,7 +77,11 @@ HARI_TABLES: Mapping[str, StudyTable] = {
     ),
     "figure 4.6": StudyTable(
         "What costs change",
-        _costs(),
+        tuple(
+            StudyRow(f"cost {c:g}, H {h}", {"cost": c, "horizon": h}, {"played": "learned"}, None, c, f"H = {h}")
+            for h in (10, 20, 30)
+            for c in (0.01, 0.05, 0.1, 0.2, 0.5)
+        ),
         ("success", *ACTIONS),
         VALIDATION_CONDITIONS,
         figure=Figure(("success",), "cost of an action", "success (%)", log=True),
