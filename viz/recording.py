@@ -307,7 +307,7 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
 
 
 def log_recognised(recording: rr.RecordingStream, objects: Sequence[Recognised], pose: Pose, height: int) -> None:
-    """What an agent recognises around it, in its panorama of (height, 2 height) pixels."""
+    """Log what an agent recognises around it, in its panorama of (height, 2 height) pixels."""
     at = pixels_towards(np.array([f.yaw for f in objects]), np.array([f.pitch for f in objects]), pose, height)
     names, colour = [f"{f.name.replace('_', ' ')} {f.probability:.0%}" for f in objects], PALETTE["recognised"]
     recording.log("view/panorama/recognised", rr.Points2D(at, labels=names, show_labels=True, radii=3.0, colors=colour))

@@ -158,7 +158,8 @@ def _elsewhere(house: House, p: Placement, taken: Sequence[Placement], rng: np.r
     floor = shapely.union_all([house.floor(r) for r in house.rooms])
     floor = floor.difference(shapely.union_all([footprint(q) for q in stand])).buffer(-0.03)
     shapely.prepare(floor)
-    for x, y in rng.uniform(*np.split(np.array(floor.bounds), 2), (4000, 2)):
+    low, high = np.split(np.array(floor.bounds), 2)
+    for x, y in rng.uniform(low, high, (4000, 2)):
         at, yaw = (float(x), float(y), p.position[2]), p.yaw + float(rng.uniform(0, 6.28))
         there = dataclasses.replace(p, position=at, yaw=yaw, room=str(room_at(house, (x, y, 0.05))))
         if floor.contains(footprint(there)) and math.dist((x, y), p.position[:2]) > 0.5:
@@ -184,7 +185,8 @@ def truth(s: Staged, catalogue: WithRobot, cache: Path, path: Path) -> dict[str,
         tracer = Tracer(same, moved, quality="reference", rays=TRUTH_RAYS)
         with Renderer(moved, cast(Catalogue, catalogue), lit=same.lit, overlay=gloss_of(same)) as renderer:
             seen = {name: _seen(s, name, moved, catalogue, renderer, tracer) for name in s.movers}
-        np.savez_compressed(path, **{f"{name}/{key}": a for name, facts in seen.items() for key, a in facts.items()})
+        arrays = {f"{name}/{key}": a for name, facts in seen.items() for key, a in facts.items()}
+        np.savez_compressed(path, **arrays)  # type: ignore[arg-type]  # its options are no arrays
     with np.load(path) as known:
         return dict(known)
 

@@ -69,10 +69,10 @@ def judged(s: Staged, catalogue: WithRobot, cache: Path, known: Mapping[str, np.
         ways = {"static": fact["static"], **{way: seen[name].rgb for way, seen in views.items()}}
         own = {p.id for p in s.house.placements if s.moment.carrier(s.house, p) == name} | {name}
         own |= set(catalogue.bodies) if kind == BENCH_ROBOT else set()
-        mine = [i + 1 for i, o in enumerate(owners) if o.partition("/")[0] in own]
+        numbers = [i + 1 for i, o in enumerate(owners) if o.partition("/")[0] in own]
         floors = [i + 1 for i, o in enumerate(owners) if o.endswith("/floor")]
         ids = views["moving"][name].ids
-        masks = {"mover": fact["mover"] & np.isin(ids, mine), "floor": fact["floor"] & np.isin(ids, floors)}
+        masks = {"mover": fact["mover"] & np.isin(ids, numbers), "floor": fact["floor"] & np.isin(ids, floors)}
         masks = {key: cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for key, m in masks.items()}
         row: dict = {"house": s.house.seed, "hour": s.house.sky.hour, "name": name, "kind": kind}
         for key, mask in masks.items():
@@ -92,7 +92,8 @@ def compare(
     """Five movers in each of eight houses, then the prices; what is finished lies in `out`/moving and is kept."""
     folder = Path(out) / "moving"
     folder.mkdir(parents=True, exist_ok=True)
-    known, rows = with_robot(catalogue, cache), []
+    known = with_robot(catalogue, cache)
+    rows: list = []
     for k in range(len(MOVING_HOURS)):
         s, path = staged(known, seed, k), folder / f"{seed + k}.json"
         if not path.exists():

@@ -102,7 +102,7 @@ def write_spark_dsg(facts: dict[str, Any], path: Path) -> None:
       UnableError: the package spark-dsg is not installed.
     """
     try:
-        import spark_dsg as dsg
+        import spark_dsg as dsg  # type: ignore[import-not-found,unused-ignore]
     except ImportError as e:
         raise UnableError(f"--form spark needs spark-dsg ({e}); pip install spark-dsg, or write --form json") from e
 

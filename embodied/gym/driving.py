@@ -245,8 +245,13 @@ class Driving:
 
     def trajectory(self) -> Trajectory:
         """The way since the last reset, as it is judged."""
-        way = {"distances": np.array(self._distances), "lengths": np.array(self._lengths), "shortest": self.shortest}
-        return Trajectory(rule=SuccessRule(self.goal.radius), stopped=self.ended in ("reached", "said"), **way)
+        return Trajectory(
+            rule=SuccessRule(self.goal.radius),
+            distances=np.array(self._distances),
+            lengths=np.array(self._lengths),
+            shortest=self.shortest,
+            stopped=self.ended in ("reached", "said"),
+        )
 
     @property
     def left(self) -> float:

@@ -25,7 +25,7 @@ class QuestionWords:
     long_words: tuple[str, ...]
     short_words: Mapping[str, str]
     names: Mapping[str, str]
-    """What stands for {ROOM} and the like in patterns."""
+    """Expressions for {ROOM} and the like in patterns."""
     patterns: tuple[QuestionPattern, ...]
 
 

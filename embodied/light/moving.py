@@ -336,7 +336,8 @@ class MovingHouse:
 
     def _corners(self) -> dict[int, np.ndarray]:
         """By number of mesh in `lit`, where vertices are of what is not where it was drawn last."""
-        out, number = {}, len(self.bake.lit.meshes)
+        out: dict[int, np.ndarray] = {}
+        number = len(self.bake.lit.meshes)
         for name, thing in self._things.items():
             placed = self._placed.get(name)
             meshes = thing.surface.meshes if thing.surface is not None else ()
@@ -660,7 +661,7 @@ class MovingHouse:
                 part = _luxels(tile - low)
                 changes[part] = r.takes[_luxels(tile)]
                 if self._sunny(page)[name[1:]]:
-                    left = self._sun_left(page, tile)
+                    left = self._sun_left(page, name[1:])
                     sun[part[0].start * f :, part[1].start * f :][: left.shape[0], : left.shape[1]] = left
         texels = slice(within[0].start * f, within[0].stop * f), slice(within[1].start * f, within[1].stop * f)
         picture = r.held.picture[texels].copy()
@@ -689,7 +690,7 @@ class MovingHouse:
                 out[i * HALF_TILE : (i + 1) * HALF_TILE, k * HALF_TILE : (k + 1) * HALF_TILE] = shown.light
         return cv2.resize(out, (columns * TILE, rows * TILE), interpolation=cv2.INTER_LINEAR)
 
-    def _sun_left(self, page: int, tile: np.ndarray) -> np.ndarray:
+    def _sun_left(self, page: int, tile: Sequence[int]) -> np.ndarray:
         """(h, w) share of the sun that the texels of a tile see past what moves."""
         r, (_, sun) = self._receiver(page), self._light(page)
         rows, columns = (slice(s.start * r.fineness, s.stop * r.fineness) for s in _luxels(tile))

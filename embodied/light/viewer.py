@@ -42,7 +42,7 @@ class ViewerLight:
         material = model.geom_matid  # pages of the house and lamps have light of their own, on leaves of doors, too
         lit = (material >= 0) & (model.mat_emission[material] > 0.5)
         self._geoms = np.flatnonzero((model.geom_bodyid > 0) & ~lit)
-        self._own = np.array([geom_color(model, g) for g in self._geoms]).reshape(-1, 4)
+        self._own = np.array([geom_color(model, int(g)) for g in self._geoms]).reshape(-1, 4)
         for g in self._geoms:
             material = int(model.geom_matid[g])
             if material >= 0 and (model.mat_texid[material] >= 0).any():

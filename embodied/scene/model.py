@@ -424,7 +424,7 @@ def _add_pages(
         if hung and (p := leaves.get(m.owner)) is not None and (p.owner, p.yaw) in hung:
             leaf = hung[p.owner, p.yaw]
             vertices, body, pose = (
-                _unturned(m.vertices - np.float32(p.position), p.yaw),
+                _unturned(m.vertices - np.array(p.position, np.float32), p.yaw),
                 leaf.body,
                 {"pos": leaf.origin},
             )
