@@ -11,7 +11,7 @@ and of the `Learner` in it. Free of torch, as the files of agents/learners are, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,8 +50,6 @@ class Players:
 
     agents: Mapping[str, tuple[SplitData, Agent]]
     """By row of a table, with the split under the rules that the row is judged by."""
-    usual: Sequence[str] = ()
-    """Rows that are played unless others are named; none for all."""
     blind: Collection[str] = ()
     """Rows whose agents need no pictures."""
     about: str = ""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from hand_data import build, random_encoder, small_house
 from hand_pixels import coloured_strips
@@ -35,26 +37,28 @@ def source(data, tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_an_encoder_learns_in_lit_houses_and_is_measured_with_light_and_without(source, tmp_path):
     config, lines = VisionConfig(epochs=1, batch=2, least_views=1), list[str]()
-    train_vision(source, config, tmp_path / "lit", lit=1, note=lines.append)
+    lit = dataclasses.replace(source, lit=1)
+    train_vision(lit, config, tmp_path / "lit", note=lines.append)
     train_vision(source, config, tmp_path / "unlit", note=lines.append)
     readings = read_json(tmp_path / "lit" / "readings.json")
     assert [*readings] == ["unlit_192", "fast_gloss_192"] and readings["unlit_192"]["AP"] > 0.5
     assert [*read_json(tmp_path / "unlit" / "readings.json")] == ["unlit_192"]
     files = [tmp_path / name / "encoder.safetensors" for name in ("lit", "unlit")]
     assert len({weights_digest(f) for f in files}) == 2 and [origin_of(f)["lit"] for f in files] == [1, 0]
-    train_vision(source, config, tmp_path / "lit", lit=1, note=lines.append)
+    train_vision(lit, config, tmp_path / "lit", note=lines.append)
     assert "continuing after update 1" in lines and read_json(tmp_path / "lit" / "readings.json") == readings
 
 
 @pytest.mark.slow
 def test_a_detector_learns_in_lit_and_unlit_houses_and_is_measured_in_others(source, tmp_path):
     encoder, config, lines = random_encoder(seed=0), StripTraining(epochs=1, batch=2, least_views=1), list[str]()
-    detector_for(encoder, source, config, tmp_path / "run", lit=1, note=lines.append)
+    lit = dataclasses.replace(source, lit=1)
+    detector_for(encoder, lit, config, tmp_path / "run", note=lines.append)
     found = Detector.load(encoder, tmp_path / "run" / "detector.safetensors")
     origin = origin_of(tmp_path / "run" / "detector.safetensors")
     assert found.classes == ("rose", "fern") and origin["lit"] == 1 and origin["pictures"] == "unlit_192"
     assert 0 < read_json(tmp_path / "run" / "readings.json")["AP"] <= 1 and lines[-1].startswith("average precision")
-    detector_for(encoder, source, config, tmp_path / "run", lit=1, note=lines.append)
+    detector_for(encoder, lit, config, tmp_path / "run", note=lines.append)
     again = Detector.load(encoder, tmp_path / "run" / "detector.safetensors")
     weights = zip(found.network.parameters(), again.network.parameters(), strict=True)
     assert "continuing after update 1" in lines and all((a == b).all() for a, b in weights)

@@ -32,8 +32,7 @@ def train(args: DetectorTraining, *, note: Note) -> None:
     from embodied.agents.vision.encoder import load_encoder
     from embodied.agents.vision.run import detector_for
 
-    encoder, source, lit = load_encoder(args.encoder), args.source(), args.lit_houses
-    detector_for(encoder, source, args.config, args.out, lit=lit, device=args.device, workers=args.workers, note=note)
+    detector_for(load_encoder(args.encoder), args.source(), args.config, args.out, device=args.device, note=note)
 
 
 register_learner(Learner(name="detector", train=(DetectorTraining, train)))

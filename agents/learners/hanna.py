@@ -75,7 +75,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 
     def of_split(split: str) -> Players:
         whole, policies = data.split(split), players(agent, source.split(split).bank)
-        return Players({name: (whole, policy) for name, policy in policies.items()}, blind=WITHOUT_LEARNING)
+        return Players({name: (whole, policy) for name, policy in policies.items()}, WITHOUT_LEARNING)
 
     return of_split
 

@@ -88,7 +88,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
 
     def of_split(split: str) -> Players:
         whole = data.split(split, rules=rules_of(agent.config))
-        return Players({name: (whole, policy) for name, policy in rows.items()}, list(rows), rows)
+        return Players({name: (whole, policy) for name, policy in rows.items()}, rows)
 
     return of_split
 

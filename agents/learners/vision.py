@@ -31,7 +31,8 @@ class StripTrainingOptions(Drawn, WithDevice, WithData):
         """The strips of the data set."""
         from embodied.agents.vision.drawn import StripSource
 
-        return StripSource(self.data, self.strips or self.out / "strips", self.cache, self.pictures)
+        folder = self.strips or self.out / "strips"
+        return StripSource(self.data, folder, self.cache, self.pictures, self.lit_houses, self.workers)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +49,7 @@ class VisionTraining(StripTrainingOptions):
 def train(args: VisionTraining, *, note: Note) -> None:
     from embodied.agents.vision.run import train_vision
 
-    source, lit = args.source(), args.lit_houses
-    train_vision(source, args.config, args.out, lit=lit, device=args.device, workers=args.workers, note=note)
+    train_vision(args.source(), args.config, args.out, device=args.device, note=note)
 
 
 register_learner(Learner(name="vision", train=(VisionTraining, train)))

@@ -71,7 +71,7 @@ def players(file: Path, data: Dataset, how: PlaySettings) -> PlayersOfSplit:
     def of_split(split: str) -> Players:
         whole, learned = data.split(split), agent.policy(source.split(split).bank)
         rows = {"learned": (whole, learned), **{name: (whole, make()) for name, make in PLAIN_AGENTS.items()}}
-        return Players(rows, list(rows), PLAIN_AGENTS, f"trained on pictures {agent.about.pictures}")
+        return Players(rows, PLAIN_AGENTS, f"trained on pictures {agent.about.pictures}")
 
     return of_split
 

@@ -58,18 +58,21 @@ class StripSource:
     cache: Path
     picture_kind: str | None = None
     """As `pictures_of` takes it."""
+    lit: int = 0
+    """So many training houses are seen in light ('fast')."""
+    workers: int = 1
+    """Houses drawn side by side."""
 
-    def strips(
-        self, names: Sequence[str], *, lit: int = 0, workers: int = 1, note: Callable[[str], None] = print
-    ) -> list[HouseStrips]:
-        """The strips of houses, the first `lit` of them in light ('fast'), drawn where they are missing."""
-        if lit:
-            in_light = dataclasses.replace(self, picture_kind="fast")
-            strips = in_light.strips(names[:lit], workers=workers, note=note)
-            return [*strips, *self.strips(names[lit:], workers=workers, note=note)]
+    def training_strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[HouseStrips]:
+        """The strips of training houses, the first `lit` of them in light."""
+        in_light = dataclasses.replace(self, picture_kind="fast")
+        return [*in_light.strips(names[: self.lit], note), *self.strips(names[self.lit :], note)]
+
+    def strips(self, names: Sequence[str], note: Callable[[str], None]) -> list[HouseStrips]:
+        """The strips of houses, drawn where they are missing."""
         data = Dataset(self.data)
         jobs = (joblib.delayed(self._draw)(n) for n in names if not self._path(data, n).exists())
-        for name in joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+        for name in joblib.Parallel(n_jobs=self.workers, return_as="generator_unordered")(jobs):
             note(f"drawn: {name}")
         return [HouseStrips.load(self._path(data, n)) for n in names]
 

@@ -27,21 +27,11 @@ from embodied.locks import locked
 
 
 def train_vision(
-    source: StripSource,
-    config: VisionConfig,
-    out: Path,
-    *,
-    lit: int = 0,
-    device: str = "cpu",
-    workers: int = 1,
-    note: Note = print,
+    source: StripSource, config: VisionConfig, out: Path, *, device: str = "cpu", note: Note = print
 ) -> None:
     """Train an encoder on the training houses, and measure in validation houses what linear readers of its features
-    tell; training goes on from the last epoch that was finished.
-
-    Args:
-      lit: so many training houses are seen in light ('fast'). Readers are then fitted in these, and judged with light
-        and without.
+    tell; training goes on from the last epoch that was finished. Where some houses are lit, readers are fitted in
+    these, and judged with light and without.
 
     Raises:
       LockedError: another process writes to `out`.
@@ -50,16 +40,16 @@ def train_vision(
     data = Dataset(source.data)
     names, unseen = training_houses(data, config), data.names("val_unseen")
     with locked(out):
-        seen = source.strips(names, lit=lit, workers=workers, note=note)
+        seen = source.training_strips(names, note)
         encoder, classes = train_encoder(seen, config, out / "training", device=device, note=note)
         file = out / "encoder.safetensors"
-        save_encoder(whitened(encoder, seen), file, _learned_in(source, config, lit))
+        save_encoder(whitened(encoder, seen), file, _learned_in(source, config))
         encoder, readings = load_encoder(file), dict[str, Any]()
-        for kind in dict.fromkeys((source.picture_kind, *["fast"][:lit])):
+        for kind in dict.fromkeys((source.picture_kind, *["fast"][: source.lit])):
             drawn = dataclasses.replace(source, picture_kind=kind)
             first, other = (
-                labelled(data, drawn.strips(houses, workers=workers, note=note), encoder, classes)
-                for houses in (names[: lit or None], unseen)
+                labelled(data, drawn.strips(houses, note), encoder, classes)
+                for houses in (names[: source.lit or None], unseen)
             )
             reading = read(first, other, classes, seed=config.seed)
             readings[drawing(pictures_of(data, unseen[0], kind))] = reading
@@ -68,21 +58,10 @@ def train_vision(
 
 
 def detector_for(
-    encoder: Encoder,
-    source: StripSource,
-    config: StripTraining,
-    out: Path,
-    *,
-    lit: int = 0,
-    device: str = "cpu",
-    workers: int = 1,
-    note: Note = print,
+    encoder: Encoder, source: StripSource, config: StripTraining, out: Path, *, device: str = "cpu", note: Note = print
 ) -> None:
     """Train a detector on an encoder, in the training houses, and measure its precision in validation houses; training
     goes on from the last epoch that was finished.
-
-    Args:
-      lit: so many training houses are seen in light ('fast').
 
     Raises:
       LockedError: another process writes to `out`.
@@ -90,10 +69,10 @@ def detector_for(
     check_device(device)
     data = Dataset(source.data)
     with locked(out):
-        seen = source.strips(training_houses(data, config), lit=lit, workers=workers, note=note)
-        unseen = source.strips(data.names("val_unseen"), workers=workers, note=note)
+        seen = source.training_strips(training_houses(data, config), note)
+        unseen = source.strips(data.names("val_unseen"), note)
         detector = train_detector(seen, encoder, config, out / "training", device=device, note=note)
-        learned = {**_learned_in(source, config, lit), "encoder": encoder.digest}
+        learned = {**_learned_in(source, config), "encoder": encoder.digest}
         detector.save(out / "detector.safetensors", learned)
         precision = detector.precision(unseen)
         whole = float(np.mean(list(precision.values())))
@@ -106,11 +85,13 @@ def training_houses(data: Dataset, config: StripTraining) -> Sequence[str]:
     return data.names("train")[: config.training_houses or None]
 
 
-def _learned_in(source: StripSource, config: StripTraining, lit: int) -> Identity:
+def _learned_in(source: StripSource, config: StripTraining) -> Identity:
     """The identity of what is trained on strips."""
     data = Dataset(source.data)
     pictures = drawings_of(data, training_houses(data, config), source.picture_kind)
-    return identity_of("embodied.agents.vision.run", settings=config, data=data.digest, pictures=pictures, lit=lit)
+    return identity_of(
+        "embodied.agents.vision.run", settings=config, data=data.digest, pictures=pictures, lit=source.lit
+    )
 
 
 # Features ----------------------------------------------------------------------------------------

@@ -305,7 +305,7 @@ def play_trained(evaluation: Evaluation, data: Dataset, learner: Learner, file: 
             note(players.about)
         if unknown := sorted(set(wanted) - set(players.agents)):
             raise ValueError(f"unknown rows {unknown}; there are {list(players.agents)}")
-        for name in bar(wanted or players.usual or [*players.agents], "agents", "agent"):
+        for name in bar(wanted or [*players.agents], "agents", "agent"):
             whole, agent = players.agents[name]
             playing: dict[str, Any] = {"seed": args.seed, "limit": args.tasks, "batch": args.batch or 32, "keep": keep}
             rows += evaluate_frozen(evaluation.changed(whole), {name: agent}, **playing)
