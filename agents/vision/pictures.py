@@ -37,7 +37,6 @@ OPEN = 16
 class _House:
     """Facts about a house beside its pictures; n viewpoints."""
 
-    name: str
     positions: np.ndarray
     """(n, 3) float32, metres, world."""
     room: np.ndarray
@@ -191,7 +190,7 @@ def _known(data: Dataset, name: str, classes: Sequence[str]) -> _House:
     place = data.place(name)
     rooms = [ROOM_KINDS.index(place.house.room_by_id[str(r)].kind) for r in place.graph.room_of_node]
     class_of_id, _ = ids_to_labels(place.house, classes)
-    return _House(name, place.graph.positions.astype(np.float32), np.array(rooms, np.int64), class_of_id)
+    return _House(place.graph.positions.astype(np.float32), np.array(rooms, np.int64), class_of_id)
 
 
 def _objects(data: Dataset, names: Sequence[str]) -> tuple[str, ...]:
