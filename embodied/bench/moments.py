@@ -56,15 +56,20 @@ BENCH_ROBOT = "robot"
 
 @dataclass(frozen=True)
 class Staged:
-    """A house at rest, and a moment of it with five movers, by name; the robot is no part of the house."""
+    """A house at rest, and two moments of it: one with four movers, one with a door turned. The robot is no part of the
+    house."""
 
     house: House
     graph: NavGraph
     """Of the house without the person, who may stand in the way."""
-    moment: Moment
-    movers: Mapping[str, str]
-    """Kind by placement or opening id."""
+    moments: tuple[Moment, Moment]
+    movers: tuple[Mapping[str, str], Mapping[str, str]]
+    """Kind by placement or opening id, of each."""
     robot: Placement
+
+    def carried(self, name: str) -> set[str]:
+        """Owners of what moves with a mover."""
+        return {p.id for p in self.house.placements if self.moments[0].carrier(self.house, p) == name} | {name}
 
 
 @dataclass(frozen=True)
@@ -140,9 +145,8 @@ def staged(catalogue: WithRobot, seed: int, k: int) -> Staged:
     bodies = {name: _on(base, pose) for name, pose in catalogue.poses.items()}
     moved = {p.id: RigidPose.upright(p.position, p.yaw) for p in others}
     movers = {p.id: p.id if p.id == BENCH_ROBOT else "person" if p.id == "person_1" else "furniture" for p in placed}
-    return Staged(
-        house, graph, Moment(moved, {door.id: DOOR_OPENNESS[k % 3]}, bodies), {**movers, door.id: "door"}, base
-    )
+    moments = Moment(moved, {}, bodies), Moment({}, {door.id: DOOR_OPENNESS[k % 3]})
+    return Staged(house, graph, moments, (movers, {door.id: "door"}), base)
 
 
 def _on(base: Placement, pose: RigidPose) -> RigidPose:
@@ -171,30 +175,35 @@ def truth(s: Staged, catalogue: WithRobot, cache: Path, path: Path) -> dict[str,
     """Of every mover, by name and word: an eye, what the path tracer and a bake of the moment itself show, and which
     pixels count. Kept in a file."""
     if not path.exists():
-        moved = dataclasses.replace(s.moment, bodies={}).applied(s.house)
+        some, door = s.moments
+        moved = dataclasses.replace(some, bodies={}).applied(s.house)
         moved = dataclasses.replace(moved, placements=(*moved.placements, s.robot))
-        at_rest, own = (bake(h, cast(Catalogue, catalogue), cache, "fast") for h in (s.house, moved))
-        same = Bake(own.folder, own.manifest | {"exposure": at_rest.manifest["exposure"]})
-        ratio = dict(zip((r.id for r in moved.rooms), same.exposure.gains / own.exposure.gains, strict=True))
-        rooms = {m.page: m.room for m in own.lit.meshes if m.room in ratio}
-        pages = [
-            shown_of((light_of(page) * ratio[rooms[i]]).astype(np.float32)) if i in rooms else page
-            for i, page in enumerate(own.lit.pages)
-        ]
-        same.__dict__["lit"] = dataclasses.replace(own.lit, pages=tuple(pages))
-        tracer = Tracer(same, moved, quality="reference", rays=TRUTH_RAYS)
-        with Renderer(moved, cast(Catalogue, catalogue), lit=same.lit, overlay=gloss_of(same)) as renderer:
-            seen = {name: _seen(s, name, moved, catalogue, renderer, tracer) for name in s.movers}
+        seen = _truth(s, 0, moved, catalogue, cache) | _truth(s, 1, door.applied(s.house), catalogue, cache)
         arrays = {f"{name}/{key}": a for name, facts in seen.items() for key, a in facts.items()}
         np.savez_compressed(path, **arrays)  # type: ignore[arg-type]  # its options are no arrays
     with np.load(path) as known:
         return dict(known)
 
 
+def _truth(s: Staged, which: int, moved: House, catalogue: WithRobot, cache: Path) -> dict[str, dict[str, np.ndarray]]:
+    at_rest, own = (bake(h, cast(Catalogue, catalogue), cache, "fast") for h in (s.house, moved))
+    same = Bake(own.folder, own.manifest | {"exposure": at_rest.manifest["exposure"]})
+    ratio = dict(zip((r.id for r in moved.rooms), same.exposure.gains / own.exposure.gains, strict=True))
+    rooms = {m.page: m.room for m in own.lit.meshes if m.room in ratio}
+    pages = [
+        shown_of((light_of(page) * ratio[rooms[i]]).astype(np.float32)) if i in rooms else page
+        for i, page in enumerate(own.lit.pages)
+    ]
+    same.__dict__["lit"] = dataclasses.replace(own.lit, pages=tuple(pages))
+    tracer = Tracer(same, moved, quality="reference", rays=TRUTH_RAYS)
+    with Renderer(moved, cast(Catalogue, catalogue), lit=same.lit, overlay=gloss_of(same)) as renderer:
+        return {name: _seen(s, name, moved, catalogue, renderer, tracer) for name in s.movers[which]}
+
+
 def _seen(
     s: Staged, name: str, moved: House, catalogue: WithRobot, renderer: Renderer, tracer: Tracer
 ) -> dict[str, np.ndarray]:
-    carried = {p.id for p in s.house.placements if s.moment.carrier(s.house, p) == name} | {name}
+    carried = s.carried(name)
     moves = lambda p: p.kind == "object" or p.mesh_key.startswith("leaf/")
     parts = [p for p in house_parts(moved, catalogue) if p.owner.partition("/")[0] in carried and moves(p)]
     points = np.concatenate([RigidPose.upright(p.position, p.yaw).points(p.mesh.vertices) for p in parts])

@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TypeAlias
 
 import cv2
 import numpy as np
@@ -32,47 +33,49 @@ TIMED_FRAMES = 24
 FEWEST_PIXELS = 60
 """Pixels of a part of a picture that is judged."""
 WAYS_MOVED = ("moving", "static", "flat")
+Seen: TypeAlias = tuple[View, tuple[str, ...]]
+"""A view, and the owners that its ids number."""
 
 
-def drawn(
-    s: Staged, catalogue: WithRobot, cache: Path, known: Mapping[str, np.ndarray]
-) -> tuple[dict[str, dict[str, View]], tuple[str, ...]]:
-    """Views of every mover from an eye, with the light of what moves and with flat light and no shadows; and owners."""
-    with open_world(s.house, catalogue.catalogue, cache, "fast", graph=s.graph) as world:
-        for name, parts in catalogue.bodies.items():
-            world.add(name, parts)
-        world.show(s.moment)
+def drawn(s: Staged, catalogue: WithRobot, cache: Path, known: Mapping[str, np.ndarray]) -> dict[str, dict[str, Seen]]:
+    """Views of every mover from its eye, with the light of what moves and with flat light and no shadows."""
+    views: dict[str, dict[str, Seen]] = {"moving": {}, "flat": {}}
+    for moment, movers in zip(s.moments, s.movers, strict=True):
+        with open_world(s.house, catalogue.catalogue, cache, "fast", graph=s.graph) as world:
+            for name, parts in catalogue.bodies.items():
+                world.add(name, parts)
+            world.show(moment)
+            owners, first = world.renderer.owners, len(world.baked().lit.pages)
 
-        def look() -> dict[str, View]:
-            eyes = {name: known[f"{name}/eye"] for name in s.movers}
-            sizes = {name: known[f"{name}/reference"].shape[:2] for name in s.movers}
-            return {n: world.camera(e[:3], e[3], e[4], VIEW_ANGLE, sizes[n]) for n, e in eyes.items()}
+            def look(way: str) -> None:
+                for name in movers:  # noqa: B023
+                    (*eye, yaw, pitch), size = known[f"{name}/eye"], known[f"{name}/reference"].shape[:2]
+                    views[way][name] = world.camera(eye, yaw, pitch, VIEW_ANGLE, size), owners  # noqa: B023
 
-        moving, owners = look(), world.renderer.owners
-        bare = MovingHouse(world.baked(), s.house, catalogue.catalogue, cache)
-        for name, parts in catalogue.bodies.items():
-            bare.add(name, parts)
-        shown, first = bare.show(s.moment), len(world.baked().lit.pages)
-        painted = [p for thing in bare.surfaces for p in thing.pages]
-        flat = [(first + k, 0, 0, displayed(page.albedo * FLAT_LIGHT)) for k, page in enumerate(painted)]
-        world.renderer.replace(bare.lit, bare.moving, owners, gloss_of(world.baked(), moving=bare))
-        world.renderer.change(shown.corners, flat)
-        return {"moving": moving, "flat": look()}, owners
+            look("moving")
+            bare = MovingHouse(world.baked(), s.house, catalogue.catalogue, cache)
+            for name, parts in catalogue.bodies.items():
+                bare.add(name, parts)
+            shown = bare.show(moment)
+            painted = [page for surface in bare.surfaces for page in surface.pages]
+            flat = [(first + k, 0, 0, displayed(page.albedo * FLAT_LIGHT)) for k, page in enumerate(painted)]
+            world.renderer.replace(bare.lit, bare.moving, owners, gloss_of(world.baked(), moving=bare))
+            world.renderer.change(shown.corners, flat)
+            look("flat")
+    return views
 
 
 def judged(s: Staged, catalogue: WithRobot, cache: Path, known: Mapping[str, np.ndarray], out: Path) -> list[dict]:
     """A row of every mover: decibels of each way on the mover and on the floor; and a picture with all ways."""
-    views, owners = drawn(s, catalogue, cache, known)
-    rows = []
-    for name, kind in s.movers.items():
+    views, rows = drawn(s, catalogue, cache, known), []
+    for name, kind in {**s.movers[0], **s.movers[1]}.items():
         fact = {key: known[f"{name}/{key}"] for key in ("reference", "static", "mover", "floor")}
-        ways = {"static": fact["static"], **{way: seen[name].rgb for way, seen in views.items()}}
-        own = {p.id for p in s.house.placements if s.moment.carrier(s.house, p) == name} | {name}
-        own |= set(catalogue.bodies) if kind == BENCH_ROBOT else set()
+        ways = {"static": fact["static"], **{way: seen[name][0].rgb for way, seen in views.items()}}
+        own = s.carried(name) | (set(catalogue.bodies) if kind == BENCH_ROBOT else set())
+        view, owners = views["moving"][name]
         numbers = [i + 1 for i, o in enumerate(owners) if o.partition("/")[0] in own]
         floors = [i + 1 for i, o in enumerate(owners) if o.endswith("/floor")]
-        ids = views["moving"][name].ids
-        masks = {"mover": fact["mover"] & np.isin(ids, numbers), "floor": fact["floor"] & np.isin(ids, floors)}
+        masks = {"mover": fact["mover"] & np.isin(view.ids, numbers), "floor": fact["floor"] & np.isin(view.ids, floors)}
         masks = {key: cv2.erode(m.astype(np.uint8), np.ones((3, 3))) > 0 for key, m in masks.items()}
         row: dict = {"house": s.house.seed, "hour": s.house.sky.hour, "name": name, "kind": kind}
         for key, mask in masks.items():
@@ -110,12 +113,12 @@ def compare(
 def prices(s: Staged, catalogue: WithRobot, cache: Path) -> list[dict]:
     """Milliseconds of a frame, processor time, in the ways in which things move, and as shares of one at rest."""
     rows = []
-    moved = {name: pose for name, pose in s.moment.moved.items() if s.movers[name] == "furniture"}
+    moved = {name: pose for name, pose in s.moments[0].moved.items() if s.movers[0][name] == "furniture"}
     name, pose = next(iter(moved.items()))
     x, y, z = pose.position
     drive = lambda i: {
         n: dataclasses.replace(p, position=tuple(np.add(p.position, (0.02 * i, 0, 0))))
-        for n, p in s.moment.bodies.items()
+        for n, p in s.moments[0].bodies.items()
     }
     ways = {
         "at rest": lambda i: Moment(),
