@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -14,10 +15,13 @@ from handmade import HandCatalogue, box_mesh, decibels, furnished
 
 from embodied.house.house import HouseError, Light, Sky
 from embodied.house.moment import Moment, RigidPose
+from embodied.interface import Pose
 from embodied.light import bake
 from embodied.light.moving import filled
 from embodied.light.viewer import ViewerLight
 from embodied.navigation.graph import build_graph
+from embodied.render.classic import Renderer
+from embodied.render.pictures import Baked
 from embodied.scene.model import build_spec
 from embodied.scene.part import Part
 from embodied.world import World
@@ -93,8 +97,6 @@ def world(tmp_path_factory):
 
 
 def _tiny():
-    from embodied.render.pictures import Baked
-
     return Baked("fast", gloss=False)
 
 
@@ -192,3 +194,54 @@ def test_a_grey_ball_in_mujocos_viewer_takes_the_light_of_the_room_that_it_is_in
     gains = world.baked().exposure.near(np.array(list(places.values())))
     assert np.argmax((np.array(lights) * gains).sum(1)) == np.argmax(seen[1][:, :3].sum(1))
     assert np.ptp(seen[1][:, :3].sum(1)) > 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_recording_shows_the_house_as_it_is_now(world):
+    recorded = pytest.importorskip("embodied.viz.recording")
+    root = SUNNY.placement_by_id[thing()]
+    logged: dict[str, list] = {}
+    stream = SimpleNamespace(log=lambda path, *what, **_: logged.setdefault(path, []).append(what[0]))
+    pictures, places, path = [], [], f"house/{root.room}/{root.id}"
+    for x in (root.position[0], 1.0):
+        world.move(root.id, (x, *root.position[1:]))
+        recorded.log_world(stream, world)
+        recorded.log_sight(stream, recorded.views_of(world, None), Pose(0, 0.0, 0.0))
+        places.append(np.mean(logged[path][-1].vertex_positions.as_arrow_array().to_pylist(), axis=0))
+        pictures.append(bytes(logged["view/panorama"][-1].blob.as_arrow_array()[0].as_py()))
+    world.show(Moment())
+    np.testing.assert_allclose(places[1] - places[0], [1.0 - root.position[0], 0, 0], atol=0.02)
+    assert pictures[0] != pictures[1]
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_pages_for_others_are_those_that_are_drawn(world):
+    root = SUNNY.placement_by_id[thing()]
+    world.move(root.id, (1.0, *root.position[1:]))
+    shown = world.camera(*CAMERA)
+    with Renderer(SUNNY, HandCatalogue(), lit=world.lit) as other:
+        again = other.view(*CAMERA)
+    world.show(Moment())
+    np.testing.assert_array_equal(shown.ids, again.ids)
+    assert decibels(shown.rgb, again.rgb) > 45
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_a_mirror_shows_a_thing_that_moves_before_it(world):
+    mirror = box_mesh((0.0, -0.6, 0.0), (0.02, 0.6, 1.2), (0.9, 0.9, 0.9, 1.0))
+    mirror = dataclasses.replace(mirror, finish=dataclasses.replace(mirror.finish, mirror=True, roughness=0.01))
+    red = box_mesh((-0.3, -0.3, 0.0), (0.3, 0.3, 1.2), (0.9, 0.02, 0.02, 1.0))
+    with World(SUNNY, HandCatalogue(), world.graph, world.cache, Baked("fast")) as glossy:
+        glossy._bake = world.baked()
+        for name, mesh in (("mirror", mirror), ("red", red)):
+            glossy.add(name, [Part("", "object", "", mesh, name)])
+        seen = []
+        for y in (3.4, 1.2):
+            glossy.show(Moment(bodies={"mirror": RigidPose((1.0, 2.0, 0.4)), "red": RigidPose((3.2, y, 0.2))}))
+            view = glossy.camera((2.0, 2.8, 1.0), math.atan2(-0.8, -1.0), 0.0, 0.8, (96, 96))
+            on_it = view.ids == len(glossy.owners) + 1
+            seen.append((view.rgb[on_it][:, 0].astype(int) - view.rgb[on_it][:, 1] > 60).mean())
+    assert on_it.mean() > 0.05 and abs(seen[0] - seen[1]) > 0.05

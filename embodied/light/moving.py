@@ -303,7 +303,7 @@ class MovingHouse:
         for patch in self._patches(list(self._shown)):
             h, w = patch.picture.shape[:2]
             pages[patch.page][patch.row : patch.row + h, patch.column : patch.column + w] = patch.picture
-        return dataclasses.replace(self.lit, meshes=tuple(meshes), pages=tuple(pages))
+        return dataclasses.replace(self.lit, meshes=tuple(m for m in meshes if len(m.faces)), pages=tuple(pages))
 
     @property
     def moving(self) -> range:
@@ -592,13 +592,13 @@ class MovingHouse:
         return shown is None or not new.things or any(tile in t.sunlit for t in (*shown.things, *new.things))
 
     def _patches(self, tiles: Sequence[Tile]) -> Iterator[Patch]:
-        """Tiles as they are to be shown, those that touch each other in one."""
+        """Tiles as they are to be shown, near ones in one."""
         by_page: dict[int, list[Tile]] = {}
         for tile in sorted(tiles):
             by_page.setdefault(tile[0], []).append(tile)
         for page, own in by_page.items():
-            for island in _islands(np.array(own)[:, 1:]):
-                yield self._patch(page, island)
+            for block in _blocks(np.array(own)[:, 1:]):
+                yield self._patch(page, block)
 
     def _hides(self, things: Sequence[Placed]) -> _Hides:
         """The tiles from which things hide light."""
@@ -852,13 +852,16 @@ def filled(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return out[..., :3]
 
 
-def _islands(tiles: np.ndarray) -> list[np.ndarray]:
-    """Tiles (k, 2) that touch each other, set by set."""
-    low = tiles.min(0)
-    grid = np.zeros(tiles.max(0) - low + 1, np.uint8)
-    grid[tuple((tiles - low).T)] = 1
-    count, marks = cv2.connectedComponents(grid, connectivity=4)
-    return [np.argwhere(marks == k) + low for k in range(1, count)]
+def _blocks(tiles: np.ndarray) -> list[np.ndarray]:
+    """Tiles (k, 2) in sets whose rectangles they fill at least by half."""
+    low, high = tiles.min(0), tiles.max(0) + 1
+    if 2 * len(tiles) >= (high - low).prod():
+        return [tiles]
+    axis = int(np.argmax(high - low))
+    order = tiles[np.argsort(tiles[:, axis], kind="stable")]
+    gaps = np.diff(order[:, axis])
+    cut = int(np.argmax(gaps)) + 1 if gaps.max() > 1 else int(np.searchsorted(order[:, axis], (low + high)[axis] / 2))
+    return [*_blocks(order[:cut]), *_blocks(order[cut:])]
 
 
 def _nothing(m: LitMesh) -> LitMesh:
