@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -199,6 +199,7 @@ class MovingHouse:
             self.__dict__.pop("lit", None)
             self._shown, self._shown_things, self._drawn_at = {}, {}, {}
             self._take_out(new)
+        unlit = {}
         for name, thing in self._things.items():
             pose = wanted.get(name, thing.rest)
             if pose is None:
@@ -206,9 +207,10 @@ class MovingHouse:
             elif thing.surface is not None:
                 known = self._placed.get(name)
                 if known is None or known.lit_at.apart(pose) > slack:
-                    self._placed[name] = self._lit_at(name, thing.surface, pose)
+                    unlit[name] = thing.surface, pose
                 elif known.pose != pose:
                     self._placed[name] = dataclasses.replace(known, pose=pose)
+        self._placed |= self._lit_at(unlit)
         return SceneChange(self._corners(), (*self._own_patches(), *self._house_patches(slack)))
 
     # ------------------------------------------------------------------ things
@@ -242,18 +244,33 @@ class MovingHouse:
         owners = frozenset(p.owner for p in parts)
         return _Thing(self._surface([_in_frame(p, rest) for p in parts]), rest, owners)
 
-    def _lit_at(self, name: str, s: Surface, pose: RigidPose) -> Placed:
+    def _lit_at(self, things: Mapping[str, tuple[Surface, RigidPose]]) -> dict[str, Placed]:
+        """Things where they are to be, and the light on them."""
+        placed = {name: Placed(s, pose, pose, self._soft_light(s, pose)) for name, (s, pose) in things.items()}
+        if not len(self._portals) or not placed:
+            return placed
+        every = list(placed.values())
+        position = np.concatenate([p.pose.points(p.surface.position) for p in every])
+        normal = np.concatenate([p.surface.normal @ p.pose.rotation.T.astype(np.float32) for p in every])
+        thin = np.concatenate([p.surface.thin for p in every])
+        share = self._sun_share(position, normal, thin, things, every)
+        parts = np.split(share, np.cumsum([len(p.e) for p in every])[:-1])
+        return {
+            name: dataclasses.replace(p, e=p.e + part[:, None] * self._sun)
+            for (name, p), part in zip(placed.items(), parts, strict=True)
+        }
+
+    def _soft_light(self, s: Surface, pose: RigidPose) -> np.ndarray:
+        """(n, 3) light of luxels but the sun's own."""
         corners = pose.points(s.box_corners)
         middle = corners.mean(0)
         home = room_at(self.house, middle) or self._nearest_room(middle)
-        coefficients = np.concatenate([self._radiance(c[None], room_at(self.house, c) or home) for c in corners])
-        e = shading(s, turned(coefficients, pose.rotation.T).astype(np.float32))
-        placed = Placed(s, pose, pose, e)
-        if len(self._portals):
-            normal = s.normal @ pose.rotation.T.astype(np.float32)
-            share = self._sun_share(pose.points(s.position), normal, s.thin, name, (placed,))
-            placed = dataclasses.replace(placed, e=e + share[:, None] * self._sun)
-        return placed
+        rooms = [room_at(self.house, c) or home for c in corners]
+        if set(rooms) == {home}:
+            coefficients = self._radiance(corners, home)
+        else:
+            coefficients = np.concatenate([self._radiance(c[None], room) for c, room in zip(corners, rooms)])
+        return shading(s, turned(coefficients, pose.rotation.T).astype(np.float32))
 
     def _radiance(self, points: np.ndarray, room: str) -> np.ndarray:
         """(n, 9, 3) float32 coefficients of the light that arrives at points of a room."""
@@ -381,12 +398,17 @@ class MovingHouse:
         return lambda start, ahead: first(start, ahead)[0] >= 0
 
     def _sun_share(
-        self, position: np.ndarray, normal: np.ndarray, thin: np.ndarray, without: str, own: Sequence[Placed] = ()
+        self,
+        position: np.ndarray,
+        normal: np.ndarray,
+        thin: np.ndarray,
+        without: Collection[str],
+        own: Sequence[Placed] = (),
     ) -> np.ndarray:
         """(n,) float32 cosine-weighted share of the sun that points see, past all that stands or moves.
 
         Args:
-          without: name of the thing that is not asked for.
+          without: names of things that are not asked for.
           own: things that are asked for besides.
         """
         cos = normal @ self._towards
@@ -397,7 +419,7 @@ class MovingHouse:
             side = np.sign(normal[which] @ self._towards)[:, None] * normal[which]
             start = (position[which] + side * 4e-3).astype(np.float32)
             met = self._static(start, np.broadcast_to(self._towards, start.shape))
-            for placed in (*(p for name, p in self._placed.items() if name != without), *own):
+            for placed in (*(p for name, p in self._placed.items() if name not in without), *own):
                 met |= _hidden_by(placed, start, self._towards)
             which = which[~met]
         share = np.zeros(len(position), np.float32)
@@ -494,7 +516,7 @@ class MovingHouse:
             thing = self._things[name]
             if thing.surface is None or thing.rest is None:
                 continue
-            placed = self._lit_at(name, thing.surface, thing.rest)
+            placed = self._lit_at({name: (thing.surface, thing.rest)})[name]
             low, high = placed.box
             for page, receiver, tiles in self._pages_near(low - SHADOW_REACH, high + SHADOW_REACH):
                 soft, _ = self._light(page)
@@ -543,7 +565,7 @@ class MovingHouse:
                 which = np.flatnonzero(_hidden_by(placed, position + normal * 2e-3, self._towards))
                 if len(which):
                     none = np.zeros(len(which), bool)
-                    share = self._sun_share(position[which], normal[which], none, name)
+                    share = self._sun_share(position[which], normal[which], none, (name,))
                     part = sun[at].ravel()
                     part[which] = np.maximum(part[which], share)
                     sun[at] = part.reshape(sun[at].shape)
@@ -655,14 +677,16 @@ class MovingHouse:
         (h, w), within = (end - begin).tolist(), (slice(begin[0], end[0]), slice(begin[1], end[1]))
         sunny = self._sunny(page)[low[0] : high[0], low[1] : high[1]].any()
         changes, sun = np.zeros((h, w), bool), np.zeros((h * f, w * f) if sunny else (0, 0), np.float32)
+        sunlit = []
         for tile in low + np.array([*np.ndindex(*(high - low))]):  # also those that were changed before
             name = (page, int(tile[0]), int(tile[1]))
             if name in self._shown and (self._shown[name].things or name in self._touched):
                 part = _luxels(tile - low)
                 changes[part] = r.takes[_luxels(tile)]
-                if self._sunny(page)[name[1:]]:
-                    left = self._sun_left(page, name[1:])
-                    sun[part[0].start * f :, part[1].start * f :][: left.shape[0], : left.shape[1]] = left
+                sunlit += [tile] if self._sunny(page)[name[1:]] else []
+        for tile, left in zip(sunlit, self._sun_left(page, sunlit), strict=True):
+            row, column = (tile - low) * TILE * f
+            sun[row : row + left.shape[0], column : column + left.shape[1]] = left
         texels = slice(within[0].start * f, within[0].stop * f), slice(within[1].start * f, within[1].stop * f)
         picture = r.held.picture[texels].copy()
         _paint(r.held.albedo[texels], exposed, begin - first, f, changes, sun, self._sun * r.gain[within], picture)
@@ -690,20 +714,25 @@ class MovingHouse:
                 out[i * HALF_TILE : (i + 1) * HALF_TILE, k * HALF_TILE : (k + 1) * HALF_TILE] = shown.light
         return cv2.resize(out, (columns * TILE, rows * TILE), interpolation=cv2.INTER_LINEAR)
 
-    def _sun_left(self, page: int, tile: Sequence[int]) -> np.ndarray:
-        """(h, w) share of the sun that the texels of a tile see past what moves."""
+    def _sun_left(self, page: int, tiles: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """(h, w) share of the sun that the texels of each tile see past what moves."""
         r, (_, sun) = self._receiver(page), self._light(page)
-        rows, columns = (slice(s.start * r.fineness, s.stop * r.fineness) for s in _luxels(tile))
-        share = sun[rows, columns].copy()
-        position, normal, _ = self._texels(r, tile)
-        left, start = share.ravel(), position + normal * 2e-3
-        shown = self._shown[(page, int(tile[0]), int(tile[1]))]
-        lit = np.flatnonzero(left)
-        for placed in (p for hides in shown.things for p in hides.things):
-            lit = lit[~_hidden_by(placed, start[lit], self._towards)]
-        out = np.zeros_like(left)
-        out[lit] = left[lit]
-        return out.reshape(share.shape)
+        shares, starts = [], []
+        for tile in tiles:
+            position, normal, at = self._texels(r, tile)
+            shares.append(sun[at].copy())
+            lit = np.flatnonzero(shares[-1])
+            starts.append(position[lit] + normal[lit] * 2e-3)
+        if not tiles:
+            return []
+        names = [(page, int(tile[0]), int(tile[1])) for tile in tiles]
+        things = {id(p): p for name in names for hides in self._shown[name].things for p in hides.things}
+        start, left = np.concatenate(starts), np.concatenate([s.ravel()[np.flatnonzero(s)] for s in shares])
+        for placed in things.values():
+            left[_hidden_by(placed, start, self._towards)] = 0
+        for share, part in zip(shares, np.split(left, np.cumsum([len(s) for s in starts])[:-1]), strict=True):
+            share.ravel()[np.flatnonzero(share)] = part
+        return shares
 
 
 def _paint(
@@ -812,9 +841,12 @@ def _hidden_by(placed: Placed, start: np.ndarray, towards: np.ndarray) -> np.nda
     turn = placed.pose.rotation.astype(np.float32)
     local, ahead = (start - np.asarray(placed.pose.position, np.float32)) @ turn, towards @ turn
     low, high = placed.surface.box
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([(low - local) / ahead, (high - local) / ahead])
-    near, far = ends.min(0).max(1), ends.max(0).min(1)
+    with np.errstate(divide="ignore"):
+        steep = 1 / ahead
+    begin, end = (low - local) * steep, (high - local) * steep
+    first, last = np.fmin(begin, end), np.fmax(begin, end)
+    near = np.maximum(np.maximum(first[:, 0], first[:, 1]), first[:, 2])
+    far = np.minimum(np.minimum(last[:, 0], last[:, 1]), last[:, 2])
     out: np.ndarray = (near <= far) & (far > 0)
     which = np.flatnonzero(out)
     if len(which) and len(placed.surface.corners):
