@@ -44,6 +44,11 @@ def env_of(world, sensor) -> HelpGymEnv:
     return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), sensor, layout=SpaceLayout())
 
 
+def blind(world, count: int) -> gym.vector.SyncVectorEnv:
+    """Slots of a batch that looks for them."""
+    return gym.vector.SyncVectorEnv([lambda: env_of(world, SensorSuite())] * count)
+
+
 @pytest.mark.parametrize(
     "view", [ViewSettings(height=40, width=56), ViewSettings("views36", 24), ViewSettings("equirect", 20)]
 )
@@ -98,13 +103,13 @@ def test_features_come_from_the_very_panoramas_that_are_shown(world):
 def test_many_environments_hold_every_panorama_once_and_each_its_own_task(world, threads):
     store = PanoramaStore({world.name: world})
     sensor = CameraSensor(store, ("rgb",), ViewSettings(height=16, width=16))
-    envs = SharedSyncVectorEnv(lambda: env_of(world, SensorSuite()), 12, sensor, threads=threads)
+    envs = SharedSyncVectorEnv(blind(world, 12), sensor, threads=threads)
     o, _ = envs.reset(seed=5)
     for _ in range(6):
         o, *_ = envs.step(np.zeros(12, dtype=np.int64))
     assert len(store._kept) == 3
     assert len({bytes(row) for row in o["instruction"]}) > 1
-    for i, env in enumerate(envs.envs):
+    for i, env in enumerate(envs.unwrapped.envs):
         assert (o["rgb"][i] == sensor.look(env.observed)()["rgb"]).all()
         assert bytes(o["instruction"][i]).rstrip(b"\0").decode() == env._env.instruction
     envs.close()
@@ -114,7 +119,7 @@ def test_a_batch_gives_what_gymnasium_would_batch(world):
     sensor = CameraSensor(
         PanoramaStore({world.name: world}), ("rgb", "depth", "ids"), ViewSettings(height=16, width=16)
     )
-    ours = SharedSyncVectorEnv(lambda: env_of(world, SensorSuite()), 5, sensor, threads=2)
+    ours = SharedSyncVectorEnv(blind(world, 5), sensor, threads=2)
     theirs = gym.vector.SyncVectorEnv([lambda: env_of(world, sensor)] * 5)
     assert ours.observation_space == theirs.observation_space
     assert ours.single_observation_space == theirs.single_observation_space
@@ -127,9 +132,9 @@ def test_a_batch_gives_what_gymnasium_would_batch(world):
         earlier, kept = a[0]["rgb"], a[0]["rgb"].copy()
         a, b = ours.step(moves), theirs.step(moves)
         assert (earlier == kept).all(), "what was handed out stays"
-    assert ours.get_attr("render_mode") == (None,) * 5
+    assert ours.unwrapped.get_attr("render_mode") == (None,) * 5
     with pytest.raises(ValueError, match="threads should be at least 1"):
-        SharedSyncVectorEnv(lambda: env_of(world, SensorSuite()), 2, sensor, threads=0)
+        SharedSyncVectorEnv(blind(world, 2), sensor, threads=0)
     ours.close(), theirs.close()
 
 

@@ -40,7 +40,7 @@ from embodied.gym.drive import VIEW, LiveEnv, data_worlds, flat_worlds
 from embodied.gym.registration import register_environment
 from embodied.gym.sensors import LARGE, check_live, live_pixels, pixel_spaces
 from embodied.gym.spaces import codes_of
-from embodied.gym.vector_env import checked_limit
+from embodied.gym.vector_env import in_step
 from embodied.kinds.plugins import record_named, titled_files
 from embodied.render.camera import camera_at
 from embodied.render.pictures import PictureSettings
@@ -259,13 +259,8 @@ def make_vec(
     Raises:
       ValueError: no such limit, and what `open_episodes` raises.
     """
-    limit, dataset = checked_limit(max_episode_steps), open_episodes(kind, **options)
-
-    def one() -> gym.Env[Any, Any]:
-        env = ContinuousGymEnv(dataset, render_mode=render_mode)
-        return env if limit is None else gym.wrappers.TimeLimit(env, limit)
-
-    return gym.vector.SyncVectorEnv([one] * num_envs)
+    dataset = open_episodes(kind, **options)
+    return in_step(lambda: ContinuousGymEnv(dataset, render_mode=render_mode), num_envs, max_episode_steps)
 
 
 def open_episodes(

@@ -153,19 +153,6 @@ class HelpGymEnv(gym.Env[dict[str, Any], Any]):
             )
         return numbers[0]
 
-    def refuse(self, action: Any) -> None:
-        """Raises what `step` would raise for `action`, before anything is done.
-
-        Raises:
-          TypeError: no whole number.
-          ActionError: with `strict`: it cannot be taken now.
-        """
-        try:
-            self._env._check(decode(action, self._layout))
-        except ActionError:
-            if self._strict or self._env.ended is not None:
-                raise
-
     def step(self, action: int) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         before = self._env.potential() if self._shaping else 0.0
         try:
