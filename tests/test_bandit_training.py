@@ -137,18 +137,6 @@ def test_bad_files_are_named_with_line_and_remedy(tmp_path, german, english, mes
         corpus.load(tmp_path, ["dev"])
 
 
-def test_moses_files_are_read_in_blocks(tmp_path):
-    (tmp_path / "a").write_text("eins zwei drei\n" * 5)
-    (tmp_path / "b").write_text("one two three\n" * 5)
-    assert [p.document for p in corpus.read_moses(tmp_path / "a", tmp_path / "b", block=2)] == [
-        "lines 000000",
-        "lines 000000",
-        "lines 000001",
-        "lines 000001",
-        "lines 000002",
-    ]
-
-
 def mo(messages: dict[str, str]) -> bytes:
     """A gettext catalogue as msgfmt would write it."""
     entries = sorted({"": "Content-Type: text/plain; charset=UTF-8\n", **messages}.items())
@@ -420,15 +408,9 @@ def test_a_corpus_that_was_stopped_in_between_is_not_believed(tmp_path, monkeypa
         make(0)
 
 
-def test_the_command_makes_a_corpus_of_own_text(tmp_path, capsys):
-    pairs = toy_pairs(60)
-    for name, side in (("t.de", "source"), ("t.en", "target")):
-        (tmp_path / name).write_text("".join(f"{getattr(p, side)}\n" for p in pairs), encoding="utf-8")
-    sizes = ["--supervised", "20", "--bandit", "10", "--dev", "5", "--test", "5", "--block", "4"]
-    files = ["--moses", str(tmp_path / "t.de"), str(tmp_path / "t.en")]
-    assert main(["corpus", "--out", str(tmp_path / "c"), *files, *sizes]) == 0
-    assert len(corpus.load(tmp_path / "c", ["supervised"])["supervised"]) == 20
-    assert main(["corpus", "--out", str(tmp_path / "d"), *files]) == 2
+def test_the_command_says_when_sentences_are_too_few_and_a_study_how_a_corpus_is_made(tmp_path, capsys):
+    source = str(libreoffice_folder(tmp_path / "whole"))
+    assert main(["corpus", "--out", str(tmp_path / "c"), "--from", source]) == 2
     assert "too few" in capsys.readouterr().err
     assert main(["study", "bandit", "3.2", "--data", str(tmp_path / "none"), "--out", str(tmp_path / "s")]) == 2
     assert "embodied corpus" in capsys.readouterr().err

@@ -86,11 +86,11 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
     shared_cache, tmp_path, monkeypatch, capsys
 ):
     """`embodied demo` in a small flat without light; the trained agent's recording shows what its features come from,
-    the world's own pictures, and no others beside them, and what it recognises in each."""
+    the world's own pictures, and what it recognises in each."""
     fed: list[Panorama] = []
     poses: list[Pose] = []
     recognised: list[int] = []
-    logged: dict[str, list[str]] = {"agent/camera/image": [], "view/lit": []}
+    logged: dict[str, list[str]] = {"agent/camera/image": []}
     strip_of, log_sight, log = features.strip_of, recording.log_sight, rr.RecordingStream.log
 
     def watched_log(stream, path, *parts, **more):
@@ -124,7 +124,7 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
     agent = [jpeg(recording.ahead(fed[p.node], p, PictureSizes())) for p in poses]
     assert len(fed) == len(found) and len(poses) == told["help"]["steps"] + 1
     assert all(np.array_equal(p.rgb, rgb) for p, rgb in zip(fed, found, strict=True))
-    assert logged == {"agent/camera/image": agent, "view/lit": []}
+    assert logged == {"agent/camera/image": agent}
     assert len(recognised) == len(poses) and sum(recognised) > len(poses)
 
 

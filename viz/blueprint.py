@@ -22,16 +22,13 @@ def sees_title(seen: PictureSettings | None) -> str:
     return f"What the agent sees: {LIGHT.get(seen.word, seen.word)}"
 
 
-def blueprint_of(
-    house: House, episode: Episode, seen: PictureSettings | None = None, *, shown: bool = False
-) -> rrb.Blueprint:
+def blueprint_of(house: House, episode: Episode, seen: PictureSettings | None = None) -> rrb.Blueprint:
     """The layout for a finished episode: the house in 3D on the left, what the agent sees and hears on the right, plots
     below; with an assistant's image and probabilities where it has them.
 
     Args:
       house: decides where the eye starts.
       seen: how the pictures are drawn that the agent looks at; None if it looks at none.
-      shown: the recording also holds pictures for people.
     """
     kind, steps = kind_named(episode.task.kind), episode.steps
     dialogue = kind.story.dialogue or any(isinstance(s.action, Ask) for s in steps)
@@ -42,7 +39,6 @@ def blueprint_of(
     ahead = rrb.Spatial2DView(origin="/agent/camera/image", name=sees_title(seen))
     around = "Around it, which it does not see" if monocular else "Panorama, gaze in the middle"
     panorama = rrb.Spatial2DView(origin="/view/panorama", name=around)
-    for_people = [rrb.Spatial2DView(origin="/view/lit", name="The same, lit, for you")] if shown else []
     sent = [rrb.Spatial2DView(origin="/view/target", name="Image of where to go")] if target else []
     texts = [
         rrb.TextDocumentView(origin="/text/request", name="Request"),
@@ -56,8 +52,8 @@ def blueprint_of(
     plots = _plots(thought, stack, budget=episode.budget is not None)
     dialogue_view = rrb.TextDocumentView(origin="/text/dialogue", name="Dialogue")
     right = rrb.Vertical(
-        rrb.Horizontal(ahead, *(for_people or sent)),
-        rrb.Horizontal(panorama, *sent) if for_people and sent else panorama,
+        rrb.Horizontal(ahead, *sent),
+        panorama,
         rrb.Horizontal(*texts),
         *([dialogue_view] if dialogue else []),
         row_shares=[5, 3, 2, *([3] if dialogue else [])],

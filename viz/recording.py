@@ -3,7 +3,7 @@
 Entity tree (timeline 'step'):
   house/<room>/<owner>   meshes, once              graph/...        viewpoints and edges, once
   task/goal              where the goal is, once   agent/camera     pose, pinhole and what it sees
-  agent/path, agent/route  walked, spoken of       view/panorama, view/target, view/lit
+  agent/path, agent/route  walked, spoken of       view/panorama, view/target
   view/panorama/recognised   what the agent's encoder recognises
   text/...               request, instruction, dialogue, goals (HARI's stack)
   plot/...               distance to the goal, requests, HARI's cost, probabilities     events   a log
@@ -11,7 +11,6 @@ Entity tree (timeline 'step'):
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -73,20 +72,11 @@ class Views:
 
     seen: World
     """The house as the agent sees it: its features come from these very panoramas, where it looks at any."""
-    shown: World | None
-    """The same house as people are to see it; None where that is no other."""
     sizes: PictureSizes
     vfov: float = VIEW_VFOV
     """Of the picture along the gaze, radians."""
     recognise: Recognise | None = None
     """Names what the agent's encoder recognises."""
-
-
-def views_of(world: World, eyes: World | None, sizes: PictureSizes = PictureSizes()) -> Views:
-    """Pictures as an agent with `eyes` sees them, or of `world` without; also of `world` if it is drawn otherwise."""
-    if eyes is None or eyes.pictures == world.pictures:
-        return Views(eyes or world, None, sizes)
-    return Views(eyes, world, sizes)
 
 
 def record(
@@ -117,9 +107,8 @@ def record(
     """
     log_world(recording, world)
     log_task(recording, world, task)
-    state, views = EpisodeLog(task, budget), dataclasses.replace(views_of(world, eyes, pictures), recognise=recognise)
-    if kind_named(task.kind).monocular:
-        views = dataclasses.replace(views, vfov=ONE_VIEW)
+    vfov = ONE_VIEW if kind_named(task.kind).monocular else VIEW_VFOV
+    state, views = EpisodeLog(task, budget), Views(eyes or world, pictures, vfov, recognise)
     for index, step in enumerate(steps):
         recording.set_time("step", sequence=index)
         if step.seconds is not None:  # people took part
@@ -155,7 +144,7 @@ def record_episode(
     """
     about = {name: str(value) for name, value in world.fingerprint.items()}
     seen = None if eyes is None else eyes.pictures
-    layout = blueprint_of(world.house, episode, seen, shown=views_of(world, eyes).shown is not None)
+    layout = blueprint_of(world.house, episode, seen)
     with open_recording(sinks, layout, name=detokenized(episode.task.request), properties=about) as recording:
         steps = watch(episode.steps)
         for _ in record(
@@ -291,8 +280,6 @@ def log_sight(recording: rr.RecordingStream, views: Views, pose: Pose) -> None:
         ),
         ahead(panorama, pose, sizes, views.vfov),
     )
-    if views.shown is not None:
-        recording.log("view/lit", ahead(views.shown.panorama(pose.node), pose, sizes, views.vfov))
     equirect = panorama.equirect(sizes.panorama)
     shift = round(pose.yaw / (2 * np.pi) * equirect.shape[1])
     recording.log("view/panorama", encoded(np.roll(equirect, shift, axis=1)))

@@ -1,20 +1,13 @@
-"""A run as one HTML page: every episode with its recording."""
+"""The list of the episodes of a run."""
 
 from __future__ import annotations
 
-import html
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from embodied.assets.cache import write_bytes
-from embodied.interface import Ask, Episode
+from embodied.interface import Episode
 from embodied.language.detokenize import detokenized
 from embodied.records import load_lines
-
-STYLE = """body{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:70rem;color:#222}
-table{border-collapse:collapse;width:100%}td,th{padding:.3rem .6rem;border-bottom:1px solid #ddd;text-align:left}
-.q{color:#555;font-style:italic}.n{text-align:right}"""
 
 
 @dataclass(frozen=True)
@@ -61,42 +54,3 @@ def summary_line(number: int, listed: Listed) -> str:
     end = "at a goal" if listed.arrived else e.ended
     counts = f"{len(e.steps):3} steps {e.requests:2} requests"
     return f"{number:4}  {end:<10} {counts}  {listed.agent:<28} {e.task.id:<28} {detokenized(e.task.request)}"
-
-
-def write_page(folder: Path, episodes: Sequence[Listed]) -> Path:
-    """Write folder/index.html; returns its path."""
-    rows = []
-    for number, x in enumerate(episodes):
-        recording = Path("recordings") / f"{number}.rrd"
-        link = (
-            f'<a href="{recording}">recording</a>'
-            if (Path(folder) / recording).exists()
-            else f"embodied view … --episode {number}"
-        )
-        asked = next(
-            (
-                s.instruction
-                for s, before in zip(x.episode.steps[1:], x.episode.steps)
-                if isinstance(before.action, Ask)
-            ),
-            "",
-        )
-        end = html.escape("at a goal" if x.arrived else x.episode.ended)
-        rows.append(
-            f"<tr><td class=n>{number}</td><td>{html.escape(x.agent)}</td>"
-            f"<td>{html.escape(detokenized(x.episode.task.request))}"
-            f"<div class=q>{html.escape(detokenized(asked))}</div></td>"
-            f"<td>{end}</td><td class=n>{len(x.episode.steps)}</td><td class=n>{x.episode.requests}</td>"
-            f"<td>{link}</td></tr>"
-        )
-    agents = {x.agent for x in episodes}
-    page = (
-        f"<!doctype html><meta charset=utf-8><title>{html.escape(Path(folder).name)}</title><style>{STYLE}</style>"
-        f"<h1>{html.escape(Path(folder).name)}</h1><p>{len(episodes)} episodes of {len(agents)} agents.</p>"
-        "<table><tr><th>#<th>agent<th>request, and the first instruction heard<th>end<th>steps<th>requests<th></tr>"
-        + "".join(rows)
-        + "</table>"
-    )
-    path = Path(folder) / "index.html"
-    write_bytes(path, page.encode())
-    return path

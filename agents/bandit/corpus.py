@@ -185,12 +185,6 @@ def paired(source: Sequence[str], target: Sequence[str], source_path: Path, targ
     return list(zip(source, target, strict=True))
 
 
-def read_moses(source: Path, target: Path, block: int = 100) -> list[Pair]:
-    """Two plain-text files of equal length; `block` lines in a row count as one document."""
-    pairs = paired(moses_lines(source), moses_lines(target), Path(source), Path(target))
-    return [Pair(a, b, f"lines {i // block:06d}") for i, (a, b) in enumerate(pairs)]
-
-
 def corpus_digest(folder: Path, names: Sequence[str]) -> str:
     """A fingerprint of the files of these splits."""
     return digest(*(Path(folder) / f"{name}.{language}" for name in names for language in (SOURCE, TARGET)))

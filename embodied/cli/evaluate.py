@@ -8,7 +8,7 @@
     embodied evaluate ask --seed-file FILE --agent submissions/team_7
     embodied evaluate my_task:KIND --data DATA
 
-The command prints a table with 95 % confidence intervals. With --out it also writes the table as Markdown, CSV and
+The command prints a table with 95 % confidence intervals. With --out it also writes the table as Markdown and
 JSON, and all episodes, which `embodied view` shows. Every answer of a language model is kept in --answers, so that the
 same command resumes an interrupted run without asking twice.
 """

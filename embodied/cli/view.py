@@ -1,8 +1,8 @@
 """Look at a recording, or at the episodes of a run.
 
 RUN is a .rrd file, which opens in the Rerun viewer, or a folder that `embodied evaluate` wrote. Of a folder, the
-command lists the episodes; --page writes an HTML page about them, and --episode N with --data records one, and with
---video films it. The recording shows what the agent saw.
+command lists the episodes; --episode N with --data records one, and with --video films it. The recording shows what
+the agent saw.
 """
 
 from __future__ import annotations
@@ -35,8 +35,6 @@ class ViewOptions(Filmed, Viewers, Furnished, Printed):
     """Record episode N of the list and open it."""
     data: InputFolder | None = None
     """The data set of the run, for --episode."""
-    page: bool = False
-    """Write RUN/index.html: all episodes, links to recordings."""
     pictures: Annotated[str, drawn_as(DRAWN)] = "unlit"
     """How --episode draws the house."""
     rrd: OutputRrd | None = None
@@ -47,14 +45,11 @@ def run(args: ViewOptions) -> None:
     if args.folder.suffix == ".rrd":
         show_file(args)
         return
-    from embodied.viz.report import load_run, summary_line, write_page
+    from embodied.viz.report import load_run, summary_line
 
     episodes = load_run(args.folder)
     if args.episode is not None:
         record_one(args, episodes, args.episode)
-    elif args.page:
-        page = write_page(args.folder, episodes)
-        show(args, {"page": str(page), "episodes": len(episodes)}, f"wrote {page}")
     else:
         facts = [{"number": i, "task": e.episode.task.id, "agent": e.agent} for i, e in enumerate(episodes)]
         show(args, {"episodes": facts}, "\n".join(summary_line(i, e) for i, e in enumerate(episodes)))

@@ -1,9 +1,7 @@
-"""Tables of agents over episodes, with 95 % confidence intervals, as Markdown, CSV and JSON."""
+"""Tables of agents over episodes, with 95 % confidence intervals, as Markdown and JSON."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -246,19 +244,6 @@ def markdown(rows: Sequence[Row], columns: Sequence[str] | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def as_csv(rows: Sequence[Row]) -> str:
-    """Long form: one line per row and metric."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["agent", "split", "seed", "episodes", "houses", "metric", "mean", "half_width_95", "n"])
-    for r in rows:
-        for name, v in r.values.items():
-            writer.writerow(
-                [r.agent, r.split, r.seed, r.episodes, r.houses, name, _number(v.mean), _number(v.half), v.n]
-            )
-    return out.getvalue()
-
-
 def as_json(rows: Sequence[Row]) -> str:
     body = [
         {
@@ -281,9 +266,9 @@ def _number(x: float) -> float | None:
 
 
 def save(rows: Sequence[Row], folder: Path, name: str) -> tuple[Path, ...]:
-    """Write name.md, name.csv and name.json into `folder`."""
+    """Write name.md and name.json into `folder`."""
     folder = Path(folder)
-    paths = tuple(folder / f"{name}{suffix}" for suffix in (".md", ".csv", ".json"))
-    for path, text in zip(paths, (markdown(rows), as_csv(rows), as_json(rows)), strict=True):
+    paths = tuple(folder / f"{name}{suffix}" for suffix in (".md", ".json"))
+    for path, text in zip(paths, (markdown(rows), as_json(rows)), strict=True):
         write_bytes(path, text.encode())
     return paths
