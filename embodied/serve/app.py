@@ -40,8 +40,8 @@ STATIC = Path(__file__).parent / "static"
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 LONGEST_MESSAGE = 16_384
 """Bytes of a message from a browser; longer ones close the connection."""
-RATE, BURST = 8.0, 30.0
-"""Messages per second that a browser may send for long, and at once."""
+MESSAGE_PAUSE = 0.05
+"""Seconds between two messages of a browser; who sends faster waits, and nothing is lost."""
 HELLO_SECONDS = 30.0
 """Seconds that a new connection has to say who it is."""
 SAFE = {
@@ -52,22 +52,6 @@ SAFE = {
     "cross-origin-opener-policy": "same-origin",
 }
 log = logging.getLogger(__name__)
-
-
-class Bucket:
-    """Lets `burst` through at once and `rate` per second for long."""
-
-    def __init__(self, rate: float, burst: float) -> None:
-        self._rate, self._burst, self._left, self._at = rate, burst, burst, time.monotonic()
-
-    def take(self) -> bool:
-        now = time.monotonic()
-        self._left = min(self._burst, self._left + (now - self._at) * self._rate)
-        self._at = now
-        if self._left < 1:
-            return False
-        self._left -= 1
-        return True
 
 
 class Refused(Exception):
@@ -274,12 +258,9 @@ class Server:
     """Digests of the words of single-use links."""
 
     async def _serve(self, socket: WebSocket, person: Person) -> None:
-        bucket = Bucket(RATE, BURST)
         while True:
             text = await socket.receive_text()
             message = read_message(text)
-            while not bucket.take():  # slowed down, not refused: nothing is lost
-                await asyncio.sleep(1 / RATE)
             answer: dict[str, Any] = {"ack": message.get("id")}
             concerned: Iterable[Person] = ()
             try:
@@ -289,6 +270,7 @@ class Server:
                 await self.show(person)  # the browser may show what is no longer so
             await socket.send_text(json.dumps(answer))
             await self.advance(*concerned)
+            await asyncio.sleep(MESSAGE_PAUSE)
 
     async def receive(self, person: Person, message: dict[str, Any]) -> Iterable[Person]:
         """Do what a browser says, until it is on disk; returns who is concerned.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -28,9 +27,6 @@ from embodied.interface import (
     Thought,
 )
 from embodied.navigation.graph import nearest
-
-if TYPE_CHECKING:
-    pass
 
 ACTION = 1e-3
 """Metres that one action weighs in planning: the shortest walk first, the fewest actions second."""
