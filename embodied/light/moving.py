@@ -719,7 +719,7 @@ class MovingHouse:
         r, (_, sun) = self._receiver(page), self._light(page)
         shares, starts = [], []
         for tile in tiles:
-            position, normal, at = self._texels(r, tile)
+            position, normal, at = self._texels(r, tile.tolist())
             shares.append(sun[at].copy())
             lit = np.flatnonzero(shares[-1])
             starts.append(position[lit] + normal[lit] * 2e-3)
