@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import errno
 import functools
-import json
-import os
+import resource
 import signal
 import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
-from conftest import two_rooms
 from tqdm import tqdm
 
 from embodied import cli
@@ -23,13 +21,15 @@ from embodied.agents.hanna.training_config import TrainingConfig
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.vision.config import VisionConfig
 from embodied.assets.materials import finish
+from embodied.cli import doctor
 from embodied.datasets.build import for_each_unit
 from embodied.errors import UnableError
 from embodied.generate import HouseConfig
 from embodied.gl import GLError
-from embodied.house.house import House, HouseError
 from embodied.light.backend import LightError
 from embodied.options import field_docs
+from embodied.render.panorama import Panorama
+from embodied.render.panorama_file import write_panoramas
 from embodied.scene.model import load_texture
 
 
@@ -72,42 +72,6 @@ def test_wrong_words_get_one_line_with_the_remedy(words, message, capsys, tmp_pa
     assert not list(tmp_path.iterdir())
 
 
-STAIR = {"id": "s", "rooms": ["a", "b"], "path": [], "width": 1.0, "risers": 3}
-LAMP = {"id": "l", "room": "bedroom_1", "placement": "ghost", "position": [7, 2, 2], "color": [1, 1, 1], "power": 100}
-
-
-def edited(change) -> str:
-    body = copy.deepcopy(json.loads(two_rooms().to_json()))
-    change(body)
-    return json.dumps(body)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda h: h.update(schema=99), "this version reads 1"),
-        (lambda h: h.update(openings=h["openings"][1:]), "has no door"),
-        (lambda h: h["rooms"][0].update(kind="dungeon"), "unknown kind 'dungeon'"),
-        (lambda h: h["rooms"][0].update(id="../up"), "an id is made of"),
-        (lambda h: h["rooms"][0].update(polygon=[[0, 0]]), "simple counter-clockwise polygon"),
-        (lambda h: h["rooms"][0].update(accent_wall=9), "its walls are 0 to 3"),
-        (lambda h: h["placements"][0]["position"].__setitem__(0, float("nan")), "NaN is no JSON"),
-        (lambda h: h["placements"][0]["position"].__setitem__(0, 10**400), "401 digits"),
-        (lambda h: h["placements"][0]["position"].__setitem__(0, 50.0), "outside its room"),
-        (lambda h: h["placements"][0]["position"].__setitem__(2, 50.0), "below or above its room"),
-        (lambda h: h["placements"][0].update(size=[1e6, 1.0, 1.0]), "at most 30"),
-        (lambda h: h["placements"][0].update(yaw="north"), "should be a number"),
-        (lambda h: h["storeys"][0].update(height=1e9), "1.8 to 20 m"),
-        (lambda h: h.update(disorder=7.0), "disorder"),
-        (lambda h: h.update(stairs=[STAIR]), "stair 's'"),
-        (lambda h: h.update(lights=[LAMP]), "unknown object 'ghost'"),
-    ],
-)
-def test_a_house_edited_into_nonsense_is_refused(change, message):
-    with pytest.raises(HouseError, match=message):
-        House.from_json(edited(change))
-
-
 @pytest.mark.parametrize("note", ["[1]", "null", "{", '{"color": "x", "bytes": {}}'])
 def test_a_damaged_note_of_a_material_is_made_again(note, tmp_path):
     made = finish("paint_white/0", tmp_path)
@@ -126,40 +90,19 @@ def test_a_flipped_texture_is_noticed(tmp_path):
         load_texture(str(path))
 
 
-@pytest.mark.slow
-def test_no_opengl_is_one_line():
-    for environment, message in (
-        ({"MUJOCO_GL": "nonsense"}, "MUJOCO_GL is 'nonsense'"),
-        ({"MUJOCO_GL": "egl", "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}, "Install EGL"),
-    ):
-        code = "import functools\nfrom embodied import cli\nfrom embodied.cli import doctor\n"
-        code += "doctor.run = functools.wraps(doctor.run)(lambda a: __import__('embodied.gl').gl.info())\n"
-        done = subprocess.run(
-            [sys.executable, "-c", code + "raise SystemExit(cli.main(['doctor']))"],
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=600,
-            env={**os.environ, **environment},
-        )
-        assert done.returncode == 2 and message in done.stderr and done.stderr.count("\n") == 1, done.stderr
-
-
 @pytest.mark.parametrize(
     ("error", "status", "message"),
     [
         (
             OSError(errno.ENOSPC, "No space left on device", "/x/y"),
             2,
-            "/x/y: No space left on device: the disk is full; free",
+            "/x/y: No space left on device: the disk is full",
         ),
         (UnableError("no light;\nuse unlit"), 2, "error: no light; use unlit"),
         (KeyboardInterrupt(), 130, "the same command goes on from there"),
     ],
 )
 def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys, monkeypatch):
-    from embodied.cli import doctor
-
     def fail(_):
         raise error
 
@@ -170,8 +113,6 @@ def test_what_goes_wrong_in_a_command_is_one_line(error, status, message, capsys
 
 
 def test_an_error_stands_on_a_line_of_its_own_below_a_progress_bar(capsys, monkeypatch):
-    from embodied.cli import doctor
-
     def drawn():
         yield from tqdm(range(3), "panoramas", file=sys.stderr)
 
@@ -187,8 +128,6 @@ def test_an_error_stands_on_a_line_of_its_own_below_a_progress_bar(capsys, monke
 
 @pytest.mark.slow
 def test_a_killed_worker_is_one_line(capsys, monkeypatch):
-    from embodied.cli import doctor
-
     def fail(_):
         for_each_unit(signal.raise_signal, [signal.SIGKILL] * 2, (), workers=2, watch=None, ray_address=None)
 
@@ -198,34 +137,26 @@ def test_a_killed_worker_is_one_line(capsys, monkeypatch):
     assert last.startswith("error: a worker process was ended from outside") and "fewer --workers" in last and not end
 
 
-FULL = """
-import functools, resource, signal, sys
-import numpy as np
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # as on a full disk, a write fails instead
-from embodied import cli
-from embodied.cli import doctor
-from embodied.render.panorama import Panorama
-from embodied.render.panorama_file import write_panoramas
-rng = np.random.default_rng(0)
-def drawn():
-    for k in range(9):
-        print("drawn", k, flush=True)
-        yield Panorama(rng.integers(0, 255, (6, 32, 32, 3), np.uint8), np.ones((6, 32, 32), np.float32),
-                       np.zeros((6, 32, 32), np.int32))
-resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536))
-write = lambda args: write_panoramas(__import__("pathlib").Path(sys.argv[1]), drawn(), {})
-doctor.run = functools.wraps(doctor.run)(write)
-raise SystemExit(cli.main(["doctor"]))
-"""
-
-
-@pytest.mark.slow
-def test_no_space_left_in_the_middle_of_drawing_is_one_line_and_leaves_the_old_pictures(tmp_path):
-    path = tmp_path / "panoramas.pano"
+def test_no_space_left_in_the_middle_of_drawing_is_one_line_and_leaves_the_old_pictures(tmp_path, capsys, monkeypatch):
+    path, drawn, limits = tmp_path / "panoramas.pano", [], resource.getrlimit(resource.RLIMIT_FSIZE)
     path.write_bytes(b"old")
-    done = subprocess.run([sys.executable, "-c", FULL, str(path)], check=False, capture_output=True, text=True)
-    assert done.returncode == 2 and done.stderr.startswith(f"error: {path}: File too large"), done.stderr
-    assert done.stderr.count("\n") == 1 and 2 <= done.stdout.count("drawn") < 9, "it began, and stopped at once"
+
+    def faces():
+        rng = np.random.default_rng(0)
+        for k in range(9):
+            drawn.append(k)
+            rgb = rng.integers(0, 255, (6, 32, 32, 3), np.uint8)
+            yield Panorama(rgb, np.ones((6, 32, 32), np.float32), np.zeros((6, 32, 32), np.int32))
+
+    monkeypatch.setattr(doctor, "run", functools.wraps(doctor.run)(lambda _: write_panoramas(path, faces(), {})))
+    try:  # as on a full disk, a write fails
+        resource.setrlimit(resource.RLIMIT_FSIZE, (65536, limits[1]))
+        status = cli.main(["doctor"])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    err = capsys.readouterr().err
+    assert status == 2 and err.startswith(f"error: {path}: File too large") and err.count("\n") == 1
+    assert 2 <= len(drawn) < 9, "it began, and stopped at once"
     assert [p.name for p in tmp_path.iterdir()] == [path.name] and path.read_bytes() == b"old"
 
 
@@ -298,7 +229,7 @@ def refused_at_once(words, message, capsys, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seconds", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("seconds", [0.0, 1.0])
 def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
     """Also while libraries are being imported, of which some swallow a KeyboardInterrupt."""
     words = ("house", "--seed", "4", "--area", "400", "600", "--no-mjcf", "--out", str(tmp_path / "h"))
@@ -316,15 +247,6 @@ def test_ctrl_c_stops_with_130_and_leaves_only_whole_files(seconds, tmp_path):
     _, err = process.communicate(timeout=600)
     assert process.returncode == 130 and "Traceback" not in err and "stopped" in err, err
     assert not list(tmp_path.rglob(".*"))
-
-
-def test_help_imports_no_subcommand_and_import_embodied_is_light():
-    code = (
-        "import sys, embodied, embodied.cli as c\ntry: c.main(['--help'])\nexcept SystemExit: pass\n"
-        "print([m for m in ('numpy', 'shapely', 'mujoco', 'torch', 'embodied.cli.house') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=600)
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from conftest import two_rooms
@@ -13,26 +19,36 @@ from handmade import HandCatalogue, furnished
 from embodied.house.house import Light, Sky
 from embodied.house.shapes import inward, room_at
 from embodied.light import LightError, StaleBake, backend, bake, bake_all, lightings_of, open_bake
-from embodied.light.backend import array, floats
+from embodied.light.backend import array, booleans, floats, mitsuba, vector
 from embodied.light.baking import check, solve
 from embodied.light.baking import house as baking
 from embodied.light.pages import files
 from embodied.light.probes import harmonics
-from embodied.light.tracing import emitters, luxels, radiosity
+from embodied.light.tracing import emitters, luxels, paths, radiosity
+from embodied.light.tracing.radiosity import Points
+from embodied.light.tracing.reference import Tracer, _denoised
+from embodied.light.tracing.scene import world_of
+from embodied.render.camera import camera_at
+from embodied.render.classic import Renderer
+from embodied.render.sampling import FACES
 from embodied.scene.house_meshes import house_parts
 
 pytestmark = [pytest.mark.slow, pytest.mark.gl]
 
 
-@pytest.fixture(scope="module")
-def lit(tmp_path_factory):
-    """The furnished two-room house at dusk and noon light, baked tinily: house, catalogue, cache, bake."""
+def house_to_light():
+    """The furnished two-room house with two lamps under an overcast sky."""
     lamps = (
         Light("l1", "living_room_1", None, (2.5, 2.0, 2.2), (1.0, 0.8, 0.6), 1100.0),
         Light("l2", "bedroom_1", None, (7.0, 2.0, 2.2), (1.0, 0.8, 0.6), 900.0),
     )
-    house = dataclasses.replace(furnished(two_rooms()), lights=lamps, sky=Sky(11.0, "overcast"))
-    cache = tmp_path_factory.mktemp("light")
+    return dataclasses.replace(furnished(two_rooms()), lights=lamps, sky=Sky(11.0, "overcast"))
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory):
+    """`house_to_light`, baked tinily: house, catalogue, cache, bake."""
+    house, cache = house_to_light(), tmp_path_factory.mktemp("light")
     return house, HandCatalogue(), cache, bake(house, HandCatalogue(), cache, TINY)
 
 
@@ -181,39 +197,6 @@ def test_lit_at_several_hours_every_lighting_is_what_it_is_alone(lit, tmp_path, 
         bake_all((house, dataclasses.replace(house, rooms=house.rooms[:1])), catalogue, tmp_path, TINY)
 
 
-def test_rays_bring_the_light_of_what_they_met_whatever_it_is(solution):
-    space, lux = solution.space, solution.lux
-    p = luxels.subset(lux, np.arange(0, len(lux.position), 50))
-    first, later, all_ = (radiosity.meet(space, p, *rays) for rays in ((3, 0), (5, 3), (8, 0)))
-    np.testing.assert_array_equal(first.bad + later.bad, all_.bad)
-    table = floats(lux.albedo)
-    (a, a2), (b, b2), (whole, squares) = (radiosity.gather(met, table) for met in (first, later, all_))
-    assert whole.max() > 0
-    np.testing.assert_allclose(a + b, whole, rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(a2 + b2, squares, rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(radiosity.gather(all_, floats(0.5 * lux.albedo))[0], 0.5 * whole, rtol=1e-4)
-
-
-def test_luxels_that_all_rays_find_covered_get_no_light_of_their_own(solution):
-    """They are most of what costs rays for nothing: below cupboards, behind wardrobes, inside drawers."""
-    inputs = solve.BakeInput(
-        solution.house,
-        solution.atlas,
-        solution.lux,
-        solution.space,
-        solution.outdoors,
-        solution.lamps,
-        TINY,
-        None,
-        solution.without,
-    )
-    covered = np.setdiff1d(np.arange(len(solution.lux.position)), inputs.free)
-    assert 0.02 < len(covered) / len(solution.lux.position) < 0.6
-    assert not (solution.light.good & solution.lux.shell)[covered].any()
-    reached = np.concatenate([solve.shone_on(inputs, source)[0] for source in solve.sources_of(inputs)])
-    assert len(reached) and not np.isin(reached, covered).any()
-
-
 def test_a_house_edited_after_its_bake_is_refused_by_name(lit):
     house, _, _, baked = lit
     edited = dataclasses.replace(house, sky=Sky(20.0))
@@ -223,31 +206,36 @@ def test_a_house_edited_after_its_bake_is_refused_by_name(lit):
         open_bake(baked.folder.parent / "nothing", house)
 
 
-def test_an_interrupted_bake_resumes_and_a_damaged_one_is_repaired(lit, tmp_path, monkeypatch):
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from hand_light import TINY
+from handmade import HandCatalogue
+from test_baking import house_to_light
+from embodied.light import bake
+die = lambda stage, done: stage == "pages" and os.kill(os.getpid(), signal.SIGKILL)
+bake(house_to_light(), HandCatalogue(), Path(sys.argv[1]), TINY, progress=die)
+"""
+
+
+def test_a_bake_that_is_killed_goes_on_where_it_was_and_a_damaged_one_is_repaired(lit, tmp_path, monkeypatch):
     house, catalogue, _, baked = lit
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    assert subprocess.run([sys.executable, "-c", KILLED, tmp_path], env=env).returncode == -signal.SIGKILL
     monkeypatch.setattr(check, "LUXELS", 2)
-
-    def interrupt(*_, **__):
-        raise KeyboardInterrupt
-
+    monkeypatch.setattr(baking, "outside_of", lambda *_: None)
+    monkeypatch.setattr(baking, "daylit", lambda *_: [np.zeros((4, 8, 3), np.uint8)])
     with monkeypatch.context() as m:
-        m.setattr(baking, "page_of", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            bake(house, catalogue, tmp_path, TINY)
-    with monkeypatch.context() as m:
-        m.setattr(solve, "shone_on", interrupt)  # must not be needed again
-        m.setattr(solve, "bounce", interrupt)
-        m.setattr(baking, "outside_of", lambda *_: None)
-        m.setattr(baking, "daylit", lambda *_: [np.zeros((4, 8, 3), np.uint8)])
+        for name in ("shone_on", "bounce"):
+            m.setattr(solve, name, lambda *_, **__: pytest.fail("the light is solved again"))
         done = bake(house, catalogue, tmp_path, TINY)
+    assert not list(tmp_path.rglob(".embodied-unfinished-*"))
     own = baked.manifest["own_pages"]
     assert all(np.abs(a.astype(int) - b).max() <= 1 for a, b in zip(done.lit.pages[:own], baked.lit.pages[:own]))
     np.testing.assert_allclose(done.probes.coefficients, baked.probes.coefficients, rtol=0.01, atol=0.01)
     (done.folder / "page_000.jpg").write_bytes(b"cut")
     with pytest.raises(StaleBake, match="damaged"):
         open_bake(done.folder, house)
-    monkeypatch.setattr(baking, "outside_of", lambda *_: None)
-    monkeypatch.setattr(baking, "daylit", lambda *_: [np.zeros((4, 8, 3), np.uint8)])
     with pytest.warns(RuntimeWarning, match="damaged"):
         repaired = bake(house, catalogue, tmp_path, TINY)
     assert open_bake(repaired.folder, house).manifest["files"]["page_000.jpg"][0] > 100
@@ -255,12 +243,6 @@ def test_an_interrupted_bake_resumes_and_a_damaged_one_is_repaired(lit, tmp_path
 
 def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
     """28 dB and 6 levels at most between the classic renderer's pages and a path-traced picture of the same walls."""
-    import cv2
-
-    from embodied.light.tracing.reference import Tracer
-    from embodied.render.camera import camera_at
-    from embodied.render.classic import Renderer
-
     house, catalogue, _, baked = lit
     at, yaw, pitch, vfov, size = (4.2, 3.4, 1.5), -2.2, -0.15, 1.2, (72, 96)
     with Renderer(house, catalogue, lit=baked.lit, size=96) as renderer:
@@ -277,9 +259,6 @@ def test_baked_pictures_equal_path_traced_diffuse_ones(lit):
 
 
 def test_faces_of_a_traced_panorama_are_pictures_of_their_directions(lit):
-    from embodied.light.tracing.reference import Tracer
-    from embodied.render.sampling import FACES
-
     house, _, _, baked = lit
     tracer = Tracer(baked, house, quality="reference", size=16, rays=16)
     at = (4.2, 3.4, 1.5)
@@ -292,8 +271,6 @@ def test_faces_of_a_traced_panorama_are_pictures_of_their_directions(lit):
 
 
 def test_lucky_rays_are_spread_over_their_surface_and_not_lost():
-    from embodied.light.tracing.reference import _denoised
-
     shape = (48, 48)
     guide = np.zeros((*shape, 4), np.float32)
     guide[:, 24:, 0] = 1.0  # another wall
@@ -309,9 +286,6 @@ def test_lucky_rays_are_spread_over_their_surface_and_not_lost():
 def test_a_mirror_shows_what_stands_before_it_however_few_rays_there_are(lit):
     """Noise in a mirror is smoothed over what is seen in it, not over its glass: as sharp as baked light, which has
     none."""
-    from embodied.light.tracing.reference import Tracer
-    from embodied.render.camera import camera_at
-
     house, _, _, baked = lit
     at, yaw, pitch, vfov, size = (3.9, 1.1, 0.7), 1.19, -0.2, 0.3, (48, 48)  # the red box's south side, no more
     camera = camera_at(at, yaw, pitch, vfov)
@@ -391,11 +365,6 @@ def test_probes_fill_every_room_and_none_is_inside_furniture(lit):
 
 def test_light_is_traced_only_where_it_is_asked_for(lit, monkeypatch):
     """Ended paths may be left behind or carried along: what the others bring is the same."""
-    from embodied.light.backend import array, booleans, floats, mitsuba, vector
-    from embodied.light.tracing import paths
-    from embodied.light.tracing.radiosity import Points
-    from embodied.light.tracing.scene import world_of
-
     house, _, _, baked = lit
     world, n = world_of(baked, house), 4096
     at = vector(np.tile(np.array([4.2, 3.4, 1.0]), (n, 1)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import subprocess
 import sys
@@ -20,8 +19,8 @@ import embodied.gym.env
 from embodied.assistants.description_arrays import word_number, words
 from embodied.envs.base import ActionError
 from embodied.envs.hari import Costs, HariRules
-from embodied.gym.spaces import SpaceLayout, decode, number, text_of
-from embodied.interface import Ask, Intention, Move, Reply, Stop, Subtask
+from embodied.gym.spaces import SpaceLayout, number
+from embodied.interface import Ask, Intention, Reply, Stop, Subtask
 from embodied.kinds.plugins import shipped_kinds
 from embodied.teachers.shortest import shortest_action
 
@@ -55,41 +54,14 @@ def test_the_rules_of_vnla_and_its_rooms_are_chosen_by_name(tmp):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "imports",
-    ["embodied, gymnasium", "gymnasium, embodied", "embodied, gymnasium.vector", "embodied.interface, gymnasium"],
-)
+@pytest.mark.parametrize("imports", ["embodied, gymnasium", "gymnasium, embodied", "embodied.interface, gymnasium"])
 def test_import_embodied_registers_in_any_order(imports):
     code = (
-        f"import {imports}; import gymnasium; print([gymnasium.spec(f'embodied/{{n}}-v0').kwargs for n in "
+        f"import sys, {imports}; print([gymnasium.spec(f'embodied/{{n}}-v0').kwargs for n in "
         f"{[*shipped_kinds().values()]}], sys.modules.keys() & {{'mujoco', 'torch', 'embodied.gym.env'}})"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", f"import sys; {code}"], check=True, capture_output=True, text=True, timeout=600
-    )
-    assert done.stdout.strip() == f"{[{'kind': kind} for kind in shipped_kinds()]} set()"
-
-
-def test_import_embodied_does_not_import_gymnasium():
-    code = "import sys, embodied; print(sys.modules.keys() & {'gymnasium', 'numpy'})"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=600)
-    assert done.stdout.strip() == "set()"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("vector", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
-def test_vector_environments_agree_with_single_ones(vector, tmp):
-    envs = vector([functools.partial(make, "hanna", tmp) for _ in range(2)])
-    observation, _ = envs.reset(seed=[3, 4])
-    alone = make("hanna", tmp)
-    first, _ = alone.reset(seed=4)
-    assert (observation["candidates"][1] == first["candidates"]).all()
-    for action in (0, 1, 0):
-        observation, reward, *_ = envs.step(np.array([0, action]))
-        first, r, *_ = alone.step(action)
-        assert text_of(observation["instruction"][1]) == text_of(first["instruction"]) and reward[1] == r
-        assert (observation["action_mask"][1] == first["action_mask"]).all()
-    envs.close()
+    assert done.stdout.strip() == f"{[{'kind': kind} for kind in shipped_kinds()]} set()"
 
 
 def test_a_forbidden_action_changes_nothing_and_says_so(tmp):
@@ -109,23 +81,23 @@ def test_a_forbidden_action_changes_nothing_and_says_so(tmp):
 
 
 class Guide:
-    """Sends whoever asks to the nearest goal, from where it stands."""
+    """Sends whoever asks to the nearest goal, without a word of where the way starts."""
 
     def intentions(self, situation):
         return (Intention.HELP,)
 
     def answer(self, situation, question, *, rng):
         goal = situation.task.goal_nodes[0]
-        return Reply("over there", subtask=Subtask("own", goal, start=situation.pose, goal=goal))
+        return Reply("over there", subtask=Subtask("own", goal, start=None, goal=goal))
 
 
 def test_request_instruction_and_ways_on_are_in_every_info_also_after_a_reply(tmp):
     env = make("hanna", tmp, assistant=Guide())
     _, info = env.reset(seed=0)
     assert info["request"] == info["instruction"] == env.task.request
-    request = info["request"]
+    request, before = info["request"], env.pose
     observation, _, _, _, info = env.step(number(Ask(), SpaceLayout()))
-    assert (info["request"], info["instruction"]) == (request, "over there")
+    assert (info["request"], info["instruction"], env.pose) == (request, "over there", before)
     moves = np.flatnonzero(observation["action_mask"][: SpaceLayout().candidates])
     assert [c["action"] for c in info["candidates"]] == moves.tolist()
     headings = np.arctan2(*observation["candidates"][moves, :2].T)
@@ -133,44 +105,16 @@ def test_request_instruction_and_ways_on_are_in_every_info_also_after_a_reply(tm
     assert all(("left" in c["text"]) == (0.1 < c["heading"] < 2.9) for c in info["candidates"])
 
 
-class Pointer(Guide):
-    """The same, who lets the agent stay where it is."""
-
-    def answer(self, situation, question, *, rng):
-        goal = situation.task.goal_nodes[0]
-        return Reply("over there", subtask=Subtask("own", goal, start=None, goal=goal))
-
-
-def test_an_assistant_need_not_name_where_a_subtask_starts(tmp):
-    env = make("hanna", tmp, assistant=Pointer())
-    env.reset(seed=0)
-    before = env.unwrapped._env.pose
-    env.step(number(Ask(), SpaceLayout()))
-    assert env.unwrapped._env.pose == before
-
-
 def test_an_assistant_is_named_by_module_and_class_and_refused_where_nobody_is_asked(tmp):
-    envs = gym.make_vec(
-        "embodied/HANNA-v0",
-        2,
-        cache=tmp,
-        worlds={"grid": grid_world()},
-        observations="oracle",
-        assistant="test_gym:Guide",
-    )
-    _, info = envs.reset(seed=0)
+    options = {"worlds": {"grid": grid_world()}, "observations": "oracle", "assistant": "test_gym:Guide"}
+    envs = gym.make_vec("embodied/HANNA-v0", 2, cache=tmp, **options)
+    envs.reset(seed=0)
     *_, info = envs.step(np.full(2, number(Ask(), SpaceLayout())))
     assert list(info["instruction"]) == ["over there"] * 2
     with pytest.raises(ValueError, match="importable module, got 'test_gym:Nobody'"):
         make("hanna", tmp, assistant="test_gym:Nobody")
     with pytest.raises(ValueError, match="nobody is asked in tasks of kind 'find'"):
         make("find", tmp, assistant=Guide())
-
-
-def test_actions_have_numbers():
-    layout = SpaceLayout()
-    for action in (Move(3), Stop(), Ask(), Ask(Intention.SUB)):
-        assert decode(number(action, layout), layout) == action
 
 
 @pytest.mark.slow
@@ -196,16 +140,11 @@ def test_haris_variants_are_chosen_by_name(tmp):
     ask = number(Ask(Intention.CUR), SpaceLayout())
     assert [env.step(ask)[1] for env in (cheap, dear)] == [0.0, -0.5]
     assert [dear.step(ask)[3] for _ in range(3)] == [False, False, True], "the horizon is 4"
+    usual = make("hari", tmp)
+    assert usual.reset(seed=0)[0]["goals"].shape == (3, 21, 5)
+    assert usual.step(ask)[1] == pytest.approx(-0.01) and usual.step(number(Stop(), SpaceLayout()))[1] <= -4
     with pytest.raises(ValueError, match="have no rules to choose"):
         make("find", tmp, rules=HariRules(stack=1))
-
-
-def test_haris_reward_is_minus_its_cost(tmp):
-    env = make("hari", tmp)
-    o, _ = env.reset(seed=0)
-    assert env.step(number(Ask(Intention.CUR), SpaceLayout()))[1] == pytest.approx(-0.01)
-    assert env.step(number(Stop(), SpaceLayout()))[1] <= -4
-    assert o["goals"].shape == (3, 21, 5)
 
 
 def test_the_picture_shows_view_plan_and_words(tmp):

@@ -12,7 +12,7 @@ import pytest
 from conftest import two_rooms
 
 from embodied.house import House
-from embodied.house.house import HouseError, Light, Placement, Sky, Storey, check
+from embodied.house.house import HouseError, Light, Placement, Sky, Stair, Storey, check
 
 
 def with_opening(number: int, **changes) -> House:
@@ -27,21 +27,15 @@ def with_thing(**changes) -> House:
     return dataclasses.replace(house, placements=(dataclasses.replace(house.placements[0], **changes),))
 
 
-def test_numbers_and_words_that_things_are_built_from_survive_json():
+def with_light(**changes) -> House:
+    light = Light("light_1", "bedroom_1", None, (6.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0)
+    return dataclasses.replace(two_rooms(), lights=(dataclasses.replace(light, **changes),))
+
+
+def test_a_house_survives_a_file(tmp_path):
     house = with_thing(params=(("finish", "oak/1"), ("open", 0.5), ("turned", 0.0)))
-    assert House.from_json(house.to_json()) == house
-
-
-def test_a_house_survives_json_and_a_file(tmp_path):
-    house = two_rooms()
-    assert House.from_json(house.to_json()) == house
     house.save(tmp_path / "house.json")
     assert House.load(tmp_path / "house.json").digest == house.digest
-
-
-def test_what_a_built_thing_is_made_of_may_be_words_and_numbers():
-    house = with_thing(params=(("finish", "oak"), ("lean", 0.25), ("turns", 2.0)))
-    assert House.from_json(house.to_json()) == house
 
 
 def test_any_change_changes_the_digest():
@@ -69,6 +63,8 @@ NONSENSE = {
         h, placements=(dataclasses.replace(h.placements[0], room="attic_1"),)
     ),
     "outside its room": lambda h: with_thing(position=(20.0, 2.0, 0.0)),
+    "below or above its room": lambda h: with_thing(position=(2.5, 2.0, 50.0)),
+    "at most 30": lambda h: with_thing(size=(1e6, 1.0, 1.0)),
     "not finite": lambda h: with_thing(yaw=math.nan),
     "must be positive": lambda h: with_thing(size=(1.0, 0.0, 1.0)),
     "rests on the unknown": lambda h: with_thing(parent="table_9"),
@@ -92,14 +88,12 @@ NONSENSE = {
     "below the ceiling of storey 0": lambda h: dataclasses.replace(h, storeys=(*h.storeys, Storey(2.0, 2.5))),
     "does not fit into its room 'living_room_1'": lambda h: with_thing(size=(30.0, 30.0, 30.0)),
     "at least 0.0001": lambda h: with_thing(size=(1e-9, 1e-9, 1e-9)),
-    "shines at .* outside its room": lambda h: dataclasses.replace(
-        h, lights=(Light("light_1", "bedroom_1", None, (-9.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)
-    ),
+    "shines at .* outside its room": lambda h: with_light(position=(-9.0, 1.0, 2.0)),
     "of 1.8 to 20 m": lambda h: dataclasses.replace(h, storeys=(dataclasses.replace(h.storeys[0], height=1.0),)),
+    "unknown object 'ghost'": lambda h: with_light(placement="ghost"),
+    "stair 's'": lambda h: dataclasses.replace(h, stairs=(Stair("s", ("a", "b"), (), 1.0, 3),)),
     "weather": lambda h: dataclasses.replace(h, sky=Sky(weather="hail")),
-    "names the unknown room": lambda h: dataclasses.replace(
-        h, lights=(Light("light_1", "attic_1", None, (1.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)
-    ),
+    "names the unknown room": lambda h: with_light(room="attic_1"),
 }
 
 
@@ -113,7 +107,6 @@ def test_nonsense_is_refused_with_its_reason(message):
 
 BROKEN = {
     "expected a house as JSON": lambda text: text[:-40],
-    "schema 99": lambda text: text.replace('"schema":1', '"schema":99'),
     "no 'schema'": lambda text: "[]",
     "unknown fields": lambda text: text.replace('"seed":', '"sed":'),
     "lacks the fields": lambda text: json.dumps({k: v for k, v in json.loads(text).items() if k != "rooms"}),
@@ -125,6 +118,12 @@ BROKEN = {
     r"placements\[0\] \('rug_1'\).yaw should be a number, got 'north'": lambda text: text.replace(
         '"yaw":0.0', '"yaw":"north"'
     ),
+    "this version reads 1": lambda text: text.replace('"schema":1', '"schema":99'),
+    "unknown kind 'dungeon'": lambda text: text.replace('"kind":"bedroom"', '"kind":"dungeon"'),
+    "an id is made of": lambda text: text.replace('"bedroom_1"', '"../up"'),
+    "its walls are 0 to 3": lambda text: text.replace('"accent_wall":null', '"accent_wall":9'),
+    "401 digits": lambda text: text.replace('"outer_wall":0.32', f'"outer_wall":{10**400}'),
+    "disorder": lambda text: text.replace('"disorder":', '"disorder":7'),
     "'seed' stands there twice": lambda text: text.replace('"seed":0', '"seed":0,"seed":1'),
 }
 
@@ -216,16 +215,11 @@ def places(value: object, path: tuple = ()) -> list[tuple]:
     return [path, *(p for k, v in inner for p in places(v, (*path, k)))]
 
 
-FURNISHED = dataclasses.replace(
-    two_rooms(), lights=(Light("light_1", "bedroom_1", None, (6.0, 1.0, 2.0), (1.0, 1.0, 1.0), 800.0),)
-)
-
-
 @pytest.mark.slow
 @hypothesis.settings(max_examples=300, derandomize=True, deadline=None, suppress_health_check=[SLOW])
 @hypothesis.given(data=st.data())
 def test_a_house_file_with_any_value_changed_is_refused_with_a_reason_or_is_a_house(data):
-    body = json.loads(FURNISHED.to_json())
+    body = json.loads(with_light().to_json())
     *way, last = data.draw(st.sampled_from([p for p in places(body) if p]))
     inside = body
     for key in way:
