@@ -8,7 +8,6 @@ import numpy as np
 from conftest import two_rooms
 from handmade import HandCatalogue, furnished
 
-from embodied.agents.vision.labels import HouseStrips
 from embodied.envs.base import HelpEnv
 from embodied.gym.env import HelpGymEnv
 from embodied.gym.sensors import CameraSensor, PanoramaStore, ViewSettings
@@ -41,8 +40,11 @@ def pixels(cache: Path) -> HelpGymEnv:
     return HelpGymEnv(lambda: HelpEnv({world.name: world}), tasks_in(world), sensor, opened=[world])
 
 
-def coloured_strips(name: str, n: int, *, seed: int) -> HouseStrips:
-    """Strips of a world of red cells, each a 'rose', and green ones, a 'fern'; half a view or more is of one colour."""
+def coloured_strips(name: str, n: int, *, seed: int):
+    """HouseStrips of a world of red cells, each a 'rose', and green ones, a 'fern'; half a view or more is of one
+    colour."""
+    from embodied.agents.vision.labels import HouseStrips  # late: processes that only see need no torch
+
     rng = np.random.default_rng(seed)
     what = rng.integers(0, 2, (n, 1, 4)).repeat(12, 1).repeat(9, 2)
     rgb = np.zeros((n, 12, 36, 3), np.uint8)

@@ -101,11 +101,6 @@ def test_granular_ratings_of_uniform_scores_have_their_mean_and_variance():
     assert (clean.mean(), clean.var()) == (pytest.approx(0.5), pytest.approx(1 / 12, rel=1e-3))
 
 
-def test_a_rating_depends_on_its_generator_only():
-    rater = Rater(granularity=4, variance=1, skew=1.5)
-    assert rater.rate(0.6, rng=stream(3, "a")) == rater.rate(0.6, rng=stream(3, "a"))
-
-
 def test_raters_refuse_negative_settings():
     with pytest.raises(ValueError, match="must not be negative"):
         Rater(variance=-1)

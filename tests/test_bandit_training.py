@@ -26,7 +26,7 @@ from embodied.agents.bandit.ratings import Rater
 from embodied.agents.bandit.study import BanditStudy
 from embodied.agents.bandit.training import bandit, load_corpus, pretrain, train_critic
 from embodied.agents.bandit.translate import batches, decode, greedy, padded, perplexity
-from embodied.agents.common.checkpoint import CheckpointError, read_checkpoint
+from embodied.agents.common.checkpoint import read_checkpoint
 from embodied.agents.common.choosing import sampled_choice
 from embodied.agents.common.session import Session
 from embodied.agents.common.vocabulary import END_NUMBER, PAD_NUMBER, most_frequent
@@ -112,11 +112,6 @@ def test_filter_by_length_ratio_and_unique_source():
         ]
     )
     assert kept == [Pair("eins zwei .", "one two .", "d")]
-
-
-def test_too_small_a_corpus_says_so():
-    with pytest.raises(CorpusError, match="too few"):
-        corpus.split(corpus.filtered(toy_pairs(50)), Sizes(), seed=0)
 
 
 @pytest.mark.parametrize(
@@ -251,15 +246,6 @@ def test_known_words_are_read_as_they_are_one_by_one():
     assert all(torch.allclose(found[0][1][n], g, atol=1e-12) and g.abs().max() > 1e-6 for n, g in found[1][1].items())
 
 
-def test_log_probabilities_sum_to_one_over_the_next_word():
-    translator, _ = networks()
-    total = sum(translator(padded([SOURCE[0]]), torch.tensor([[5, w]]))[0, 1].exp() for w in range(1, 9))
-    # word 0 is padding and never said, but the softmax gives it its share
-    outputs, _ = translator.body.read(padded([SOURCE[0]]), torch.tensor([[5, 1]]))
-    nothing = translator.out(outputs)[1].softmax(-1)[PAD_NUMBER]
-    assert float((total + nothing).detach()) == pytest.approx(1.0, abs=1e-5)
-
-
 def test_what_is_sampled_does_not_depend_on_the_batch():
     translator, _ = networks()
     source, uniforms = SOURCE * 11, stream(0, "u").random((33, 20))
@@ -276,9 +262,8 @@ def test_what_is_sampled_does_not_depend_on_the_batch():
 def test_samples_follow_the_distribution():
     translator, _ = networks()
     n = 4000
-    first = [
-        s[0] for s in decode(translator, padded([SOURCE[0]] * n), sampled_choice(stream(1, "u").random((n, 1))), 1)
-    ]
+    uniforms = stream(1, "u").random((n, 1))
+    first = [s[0] for s in decode(translator, padded([SOURCE[0]] * n), sampled_choice(uniforms), 1)]
     logits = translator.out(translator.body.read(padded([SOURCE[0]]), torch.tensor([[3]]))[0])[0]
     logits[PAD_NUMBER] = -torch.inf
     wanted = logits.softmax(-1).detach().numpy()
@@ -328,10 +313,8 @@ def weights(folder: Path) -> dict[str, torch.Tensor]:
 
 def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
     config = dataclasses.replace(TOY, checkpoint_minutes=1e-9)
-    m, files = (
-        load_corpus(data, config),
-        (trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"),
-    )
+    m = load_corpus(data, config)
+    files = trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"
     rater = Rater(granularity=5, variance=0.5)
     whole = bandit(m, *files, tmp_path / "whole", "a2c", rater=rater, passes=2, note=silent)
     save = Session.save
@@ -346,28 +329,10 @@ def test_a_killed_run_goes_on_exactly(data, trained, tmp_path, monkeypatch):
         bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
     monkeypatch.setattr(Session, "save", save)
     parts = bandit(m, *files, tmp_path / "parts", "a2c", rater=rater, passes=2, note=silent)
-    assert [{k: v for k, v in p.items() if k != "seconds"} for p in parts] == [
-        {k: v for k, v in p.items() if k != "seconds"} for p in whole
-    ]
+    untimed = lambda passes: [{k: v for k, v in p.items() if k != "seconds"} for p in passes]
+    assert untimed(parts) == untimed(whole)
     one, other = weights(tmp_path / "whole"), weights(tmp_path / "parts")
     assert all(torch.equal(one[k], other[k]) for k in one)
-
-
-def test_a_checkpoint_of_other_settings_or_cut_short_is_refused(data, trained, tmp_path):
-    files = trained / "pretrain" / "weak.safetensors", trained / "weak" / "critic.safetensors"
-    bandit(load_corpus(data, TOY), *files, tmp_path, "reference", note=silent)
-    with pytest.raises(CheckpointError, match="learner 'reference' -> 'a2c'"):
-        bandit(load_corpus(data, TOY), *files, tmp_path, "a2c", note=silent)
-    path = tmp_path / "checkpoint.pt"
-    path.write_bytes(path.read_bytes()[:1000])
-    with pytest.raises(CheckpointError, match="cut short.*delete it"):
-        bandit(load_corpus(data, TOY), *files, tmp_path, "reference", note=silent)
-
-
-def test_diverging_says_so_and_keeps_the_checkpoint(data, trained, tmp_path):
-    m = load_corpus(data, dataclasses.replace(TOY, pretraining_rate=1e39))
-    with pytest.raises(UnableError, match="not finite.*learning rate"):
-        pretrain(m, tmp_path, note=silent)
 
 
 def test_a_study_writes_its_table_and_runs_nothing_twice(data, tmp_path):

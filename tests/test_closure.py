@@ -20,7 +20,6 @@ from embodied.scene import collision
 from embodied.world import makers
 
 PROJECT = (ROOT / "pyproject.toml").read_text()
-TOP = "from __future__ import annotations"
 
 
 @pytest.fixture
@@ -31,44 +30,10 @@ def tree(tmp_path) -> Path:
     return tmp_path
 
 
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-
-
 def key(root: Path, *modules: str, without: tuple[str, ...] = ()) -> str:
     """The digest, read anew."""
     code_digest.cache_clear()
     return code_digest(*modules, root=root, without=without)
-
-
-@pytest.mark.slow
-def test_a_constant_in_the_closure_changes_the_key_one_outside_does_not(tree):
-    lit = makers(Baked())
-    before = key(tree, *lit)
-    edit(tree / "embodied/cli/demo.py", "import contextlib", "import contextlib\nEXTRA = 1")
-    edit(tree / "embodied/render/gloss.py", "MATTE = 0.7", "MATTE = 0.7  # as measured")
-    edit(tree / "embodied/render/gloss.py", '"""Gloss: reflections', '"""Gloss, or reflections')
-    assert key(tree, *lit) == before, "code that draws nothing, comments and docstrings"
-    edit(tree / "embodied/render/gloss.py", "MATTE = 0.7", "MATTE = 0.8")
-    assert key(tree, *lit) != before
-
-
-@pytest.mark.parametrize(
-    ("table", "maker"),
-    [
-        ("embodied/language/templates.toml", "embodied.language.people_language"),
-        ("embodied/language/speakers.toml", "embodied.language.people_language"),
-        ("embodied/generate/style_finishes.toml", "embodied.generate"),
-        ("embodied/generate/furnish/smalls.toml", "embodied.generate"),
-    ],
-)
-def test_a_table_is_in_the_key_of_what_is_made_by_it(tree, table, maker):
-    before, apart = key(tree, maker), key(tree, "embodied.render.panorama")
-    edit(tree / table, "\n", "\n# another table\n")
-    assert key(tree, maker) != before
-    assert key(tree, "embodied.render.panorama") == apart, "which knows no table"
 
 
 def test_a_table_that_a_docstring_mentions_is_in_no_key(tmp_path):
@@ -83,27 +48,6 @@ def test_a_table_that_a_docstring_mentions_is_in_no_key(tmp_path):
     assert key(tmp_path, "embodied.a") == before
     (package / "own.toml").write_text("x = 2\n")
     assert key(tmp_path, "embodied.a") != before
-
-
-@pytest.mark.parametrize(
-    ("file", "old", "new"),
-    [
-        ("embodied/house/house.py", "inner_wall: float = 0.12", "inner_wall: float = 0.13"),
-        ("embodied/scene/walls.py", TOP, f"{TOP}\nX = 1"),
-        (
-            "assets/importing/meshing.py",
-            "from __future__ import annotations",
-            "from __future__ import annotations\nX = 1",
-        ),
-        ("assets/built/__init__.py", TOP, f"{TOP}\nX = 1"),
-    ],
-)
-def test_what_a_picture_shows_is_in_its_key(tree, file, old, new):
-    """The house's record, and what is built by name inside a function (embodied.assets.built), count."""
-    unlit = makers(Unlit())
-    before = key(tree, *unlit)
-    edit(tree / file, old, new)
-    assert key(tree, *unlit) != before
 
 
 @pytest.mark.parametrize(
@@ -150,38 +94,63 @@ DECIDED_BY = {
     "embodied/scene/walls.py": set(),
     "embodied/gym/registration.py": set(),
     "assets/built/soft.py": set(),
+    "assets/data/classes.json": set(),
 }
-"""File to the products that a constant in it decides. What builds a house's parts is in no bake's code: the parts
-themselves are in its key."""
+"""File to the products that it decides. What builds a house's parts is in no bake's code: the parts themselves are in
+its key."""
+IN_KEY_OF = {
+    "embodied/language/templates.toml": ("embodied.language.people_language",),
+    "embodied/language/speakers.toml": ("embodied.language.people_language",),
+    "embodied/generate/style_finishes.toml": ("embodied.generate",),
+    "embodied/generate/furnish/smalls.toml": ("embodied.generate",),
+    "assets/data/classes.json": ("embodied.assets.catalogue",),
+    "embodied/house/house.py": makers(Unlit()),
+    "embodied/scene/walls.py": makers(Unlit()),
+    "assets/importing/meshing.py": makers(Unlit()),
+    "assets/built/__init__.py": makers(Unlit()),
+    "embodied/render/gloss.py": makers(Baked()),
+}
+"""File to what is made by it, also where it is a table, or imported by name inside a function."""
+
+
+def add_to(path: Path) -> None:
+    """Another constant, comment or line at the end of a file of code, of a table or of data."""
+    with path.open("a") as f:
+        f.write({".py": "X = 1\n", ".toml": "# another\n"}.get(path.suffix, "\n"))
 
 
 @pytest.mark.slow
 def test_products_follow_the_code_that_makes_them_and_no_other(tree):
-    before = {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()}
+    keys = lambda: {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()}
+    before = keys()
     for file, decided in DECIDED_BY.items():
-        edit(tree / file, TOP, f"{TOP}\nX = 1") if "__init__" not in file else (tree / file).open("a").write("X = 1\n")
-        after = {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()}
+        add_to(tree / file)
+        after = keys()
         assert {name for name in PRODUCTS if after[name] != before[name]} == decided, file
         before = after
-    data = next(p for p in sorted((tree / "assets/data").iterdir()) if p.suffix == ".json")
-    data.write_text(data.read_text() + "\n")
-    assert {name: key(tree, module, without=apart) for name, (module, apart) in PRODUCTS.items()} == before
 
 
-def test_versions_of_libraries_that_decide_bakes_are_in_their_key(monkeypatch):
-    libraries = closure("embodied.light.baking.house", without=settings.UNCOUNTED_BY_LIGHT).libraries
-    assert {"drjit", "mitsuba", "numpy", "xatlas", "cv2"} <= set(libraries) and "tqdm" not in libraries
-    before = key(ROOT, "embodied.light.baking.house", without=settings.UNCOUNTED_BY_LIGHT)
-    monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == "mitsuba" else "")
-    assert key(ROOT, "embodied.light.baking.house", without=settings.UNCOUNTED_BY_LIGHT) != before
+def test_what_something_is_made_by_is_in_its_key_and_what_is_not_is_in_none(tree):
+    for file, modules in IN_KEY_OF.items():
+        before, apart = key(tree, *modules), key(tree, "embodied.seeds")
+        add_to(tree / file)
+        assert key(tree, *modules) != before and key(tree, "embodied.seeds") == apart, file
+    lit = key(tree, *makers(Baked()))
+    add_to(tree / "embodied/cli/demo.py")
+    assert key(tree, *makers(Baked())) == lit
+
+
+@pytest.mark.parametrize(
+    ("modules", "without", "library"),
+    [(("embodied.light.baking.house",), settings.UNCOUNTED_BY_LIGHT, "mitsuba"), (makers(Unlit()), (), "mujoco")],
+)
+def test_versions_of_the_libraries_that_decide_are_in_the_key(modules, without, library, monkeypatch):
+    libraries = set(closure(*modules, without=without).libraries)
+    assert {library, "numpy"} <= libraries and "tqdm" not in libraries
+    before = key(ROOT, *modules, without=without)
+    monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == library else "")
+    assert key(ROOT, *modules, without=without) != before
     code_digest.cache_clear()
-
-
-def test_data_beside_the_code_is_in_the_key(tree):
-    before = key(tree, "embodied.assets.catalogue")
-    data = next(p for p in sorted((tree / "assets/data").iterdir()) if p.suffix == ".json")
-    data.write_text(data.read_text() + "\n")
-    assert key(tree, "embodied.assets.catalogue") != before
 
 
 def test_pictures_depend_on_what_draws_them():
@@ -208,14 +177,6 @@ def test_late_imports_count_and_those_for_type_checkers_do_not(tmp_path):
     assert whole.libraries == ("numpy",)
     with pytest.raises(ModuleNotFoundError, match=r"embodied\.nowhere"):
         closure("embodied.nowhere", root=tmp_path)
-
-
-def test_versions_of_libraries_are_in_the_key(monkeypatch):
-    assert "mujoco" in closure(*makers(Unlit())).libraries
-    before = key(ROOT, *makers(Unlit()))
-    monkeypatch.setattr(closure_module, "_version", lambda name: "another" if name == "mujoco" else "")
-    assert key(ROOT, *makers(Unlit())) != before
-    code_digest.cache_clear()
 
 
 def test_a_neighbour_without_metadata_neither_stops_the_digest_nor_the_doctor(tmp_path, monkeypatch):

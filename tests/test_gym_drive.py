@@ -119,17 +119,10 @@ def test_live_pictures_are_without_reflections_unless_they_are_named(named, tmp_
 
 
 def test_wishes_that_cannot_be_had_are_refused(world):
-    wrong = [
-        {"task": "fly"},
-        {"observations": ("smell",)},
-        {"height": 0},
-        {"vfov": math.pi},
-        {"control": 0.0},
-        {"nearest": 9.0},
-    ]
-    for settings in wrong:
+    wrong = {"task": "fly", "observations": ("smell",), "height": 0, "vfov": math.pi, "control": 0.0, "nearest": 9.0}
+    for name, value in wrong.items():
         with pytest.raises(ValueError, match=r"use one of|should be|need"):
-            make(worlds={world.name: world}, **settings)
+            make(worlds={world.name: world}, **{name: value})
     with pytest.raises(ValueError, match="no houses"):
         make(worlds={})
     env = env_of(world, nearest=40.0, farthest=50.0)
@@ -137,7 +130,6 @@ def test_wishes_that_cannot_be_had_are_refused(world):
         env.reset(seed=0)
     env = env_of(world, observations=())
     env.reset(seed=0)
-    with pytest.raises(ValueError, match="2 finite numbers"):
-        env.step(np.array([1.0, 0.0, 1.0]))
-    with pytest.raises(ValueError, match="2 finite numbers"):
-        env.step(np.array([np.nan, 0.0]))
+    for action in ([1.0, 0.0, 1.0], [np.nan, 0.0]):
+        with pytest.raises(ValueError, match="2 finite numbers"):
+            env.step(np.array(action))

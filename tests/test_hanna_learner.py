@@ -384,30 +384,24 @@ def test_it_overfits_one_batch(model):
 
 
 @pytest.mark.slow
-def test_a_run_stopped_and_continued_equals_one_that_was_not(tmp_path):
-    straight, _ = run(tmp_path / "straight")
-    half = dataclasses.replace(TINY, iterations=2)
-    run(tmp_path / "broken", half)
+def test_a_run_writes_what_a_researcher_looks_at_and_ends_the_same_where_it_was_stopped(tmp_path):
+    seen = []
+    noted = lambda update, episodes: seen.append((update, len(episodes)))
+    straight, progress = run(tmp_path / "straight", on_validation=noted)
+    assert seen == [(2, 6), (4, 6)]
+    found = {update: value for update, name, value in validations_of(tmp_path / "straight") if name == "success"}
+    assert list(found) == [2, 4] and progress.best == max(found.values())
+    good = [update for update, success in found.items() if within_standard_error(success, progress.best, 6)]
+    assert progress.best_update in good
+    assert list((tmp_path / "straight").glob("events.out.tfevents.*"))
+    assert json.loads((tmp_path / "straight" / "settings.json").read_text())["settings"]["batch"] == 6
+    run(tmp_path / "broken", dataclasses.replace(TINY, iterations=2))
     resumed, progress = run(tmp_path / "broken")
     assert progress.update == 4
     for name, value in straight.network.state_dict().items():
         assert torch.equal(value, resumed.network.state_dict()[name]), name
     a, b = (validations_of(tmp_path / d) for d in ("straight", "broken"))
     assert a == b and {name for _, name, _ in a} >= {"success", "spl"}
-
-
-@pytest.mark.slow
-def test_training_writes_what_a_researcher_looks_at(tmp_path):
-    seen = []
-    _, progress = run(tmp_path, on_validation=lambda update, episodes: seen.append((update, len(episodes))))
-    assert seen == [(2, 6), (4, 6)]
-    found = {update: value for update, name, value in validations_of(tmp_path) if name == "success"}
-    assert list(found) == [2, 4] and progress.best == max(found.values())
-    assert progress.best_update in [
-        update for update, success in found.items() if within_standard_error(success, progress.best, 6)
-    ]
-    assert list(tmp_path.glob("events.out.tfevents.*"))
-    assert json.loads((tmp_path / "settings.json").read_text())["settings"]["batch"] == 6
 
 
 def test_of_agents_as_good_as_each_other_the_later_is_kept():
@@ -430,23 +424,9 @@ def test_a_checkpoint_of_another_run_is_refused_and_stays_whole(tmp_path):
     with pytest.raises(CheckpointError, match="encoder 'tests' -> 'another encoder'"):
         run(tmp_path, split=dataclasses.replace(other, bank=FeatureBank(worlds, "another encoder")))
     assert (tmp_path / "checkpoint.pt").read_bytes() == before
-    (tmp_path / "checkpoint.pt").write_bytes(before[: len(before) // 2])
-    with pytest.raises(CheckpointError, match="cut short"):
-        run(tmp_path)
     torch.save({"format": "something else"}, tmp_path / "checkpoint.pt")
     with pytest.raises(CheckpointError, match="not a checkpoint of format"):
         run(tmp_path)
-
-
-@pytest.mark.slow
-def test_a_changed_byte_of_a_checkpoint_or_of_weights_is_noticed(tmp_path):
-    agent, _ = run(tmp_path, dataclasses.replace(TINY, iterations=1))
-    for name, read in (("checkpoint.pt", lambda _: run(tmp_path)), ("best.safetensors", HannaAgent.load)):
-        body = bytearray((tmp_path / name).read_bytes())
-        body[len(body) // 2] ^= 1
-        (tmp_path / name).write_bytes(body)
-        with pytest.raises(ValueError, match="checksum"):
-            read(tmp_path / name)
 
 
 def test_a_checkpoint_that_cannot_be_gone_on_with_is_refused(tmp_path):
@@ -496,9 +476,6 @@ def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
     other = FeatureBank({"x": np.zeros((1, 36, 16))}, "another encoder")
     with pytest.raises(ValueError, match="features come from encoder another"):
         again.policy(other)
-    path.write_bytes(path.read_bytes()[:1000])
-    with pytest.raises(ValueError, match="cannot be read"):
-        HannaAgent.load(path)
 
 
 @pytest.mark.parametrize(
@@ -509,6 +486,7 @@ def test_an_agent_file_gives_the_same_agent_and_names_its_encoder(tmp_path):
         ({"batch": 0}, "batch must be at least 1"),
         ({"learning_rate": 0.0}, "learning_rate must be positive"),
         ({"alpha": -1.0}, "alpha must be at least 0"),
+        ({"dropout": 1.5}, "dropout must be in"),
     ],
 )
 def test_impossible_settings_are_refused(change, message):

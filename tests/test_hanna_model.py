@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from embodied.agents.hanna.attention import (
-    DotAttend,
-    FeedForward,
-    IncTime,
-    MultiAttend,
-    SelfAttend,
-    sim_attend,
-    sinusoid,
-)
+from embodied.agents.hanna.attention import DotAttend, IncTime, MultiAttend, sim_attend, sinusoid
 from embodied.agents.hanna.inputs import (
     DO_NOTHING,
     REQUEST,
@@ -25,7 +17,6 @@ from embodied.agents.hanna.inputs import (
     START,
     Percept,
     action_size,
-    orientation,
     slot_distribution,
     target_similarity,
 )
@@ -92,6 +83,8 @@ def test_multi_attend_with_one_head_is_softmax_attention_plus_query_normalised()
     x = np.array([1 + a, 3 * (1 - a)])
     expected = (x - x.mean()) / x.std()
     assert np.allclose(out.detach().numpy()[0], expected, atol=1e-5)
+    with pytest.raises(ValueError, match="not a multiple"):
+        MultiAttend(10, 3, 0.0)
 
 
 def test_dot_attend_equals_the_formula_that_projects_every_row():
@@ -120,25 +113,6 @@ def test_inc_time_adds_a_relu_and_normalises():
     assert torch.allclose(out, torch.tensor([[-1.0, 1.0]]), atol=1e-4)
 
 
-def test_feed_forward_with_a_dead_hidden_layer_only_normalises():
-    feed = FeedForward(4, 0.0)
-    torch.nn.init.constant_(feed.wide.bias, -100.0)
-    torch.nn.init.zeros_(feed.narrow.bias)
-    x = torch.tensor([[1.0, 2.0, 3.0, 4.0]])
-    assert torch.allclose(feed(x), torch.nn.functional.layer_norm(x, (4,)), atol=1e-5)
-    assert feed.wide.out_features == 4 * 4
-
-
-def test_self_attend_appends_query_to_keys_and_state_to_values():
-    torch.manual_seed(2)
-    attend = SelfAttend(4, 2, 0.0)
-    q, state = torch.randn(1, 4), torch.randn(1, 4)
-    keys, values = attend.empty(1, q)
-    _, grown = attend(q, keys, values, torch.ones(1, 1, dtype=torch.bool))
-    assert torch.equal(grown[:, 1], attend.attend.key(q))
-    assert torch.equal(attend.append_value(values, state)[:, 1], attend.attend.value(state))
-
-
 def test_sinusoid_is_that_of_attention_is_all_you_need():
     table = sinusoid(3, 4, torch.zeros(1))
     assert torch.allclose(table[2], torch.tensor([math.sin(2), math.cos(2), math.sin(0.02), math.cos(0.02)]), atol=1e-6)
@@ -152,11 +126,6 @@ def test_target_similarity_is_one_everywhere_at_the_target_and_zero_without_one(
     one = torch.zeros(1, 36, 5)
     one[0, 7] = -views[0, 3]  # the rest of the target is blank: cosine 0
     assert target_similarity(views[:1], one)[0, 3] == 0.0
-
-
-def test_orientation_repeats_each_of_the_four_features():
-    out = orientation(torch.tensor(math.pi / 2), torch.tensor(0.0), 2)
-    assert torch.allclose(out, torch.tensor([1.0, 1, 0, 0, 0, 0, 1, 1]), atol=1e-6)
 
 
 def test_actions_that_share_a_view_add_up_in_the_static_distribution():
@@ -297,10 +266,3 @@ def test_every_ablation_of_table_d2_runs_and_changes_what_is_computed(change):
     a, b = play(base, steps)[-1], play(ablated, steps)[-1]
     assert (b.reasons is None) == ("predict_reasons" in change)
     assert not (torch.allclose(a.navigation, b.navigation, atol=1e-6) and torch.allclose(a.ask, b.ask, atol=1e-6))
-
-
-def test_impossible_sizes_are_refused_with_the_remedy():
-    with pytest.raises(ValueError, match="dropout must be in"):
-        dataclasses.replace(SMALL, dropout=1.5)
-    with pytest.raises(ValueError, match="not a multiple"):
-        MultiAttend(10, 3, 0.0)

@@ -11,7 +11,7 @@ from hand_worlds import grid_world, line_world, room, thing
 from embodied.assistants.descriptions import Describer, dropped, frequent_classes
 from embodied.assistants.hari import HariAssistant, Uncooperative, subgoal
 from embodied.envs.base import ActionError
-from embodied.envs.hari import Costs, HariEnv, HariExtras, shaped_costs
+from embodied.envs.hari import HariEnv, HariExtras, shaped_costs
 from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Feature, FindObject, Intention, Mode, Move, Pose, Stop, Task
 from embodied.kinds import metrics
@@ -190,8 +190,3 @@ def test_the_uncooperative_assistant_answers_other_questions():
         env.step(Ask(CUR))
         heard.add(env.last_step.reply.intention)
     assert heard == {CUR, GOAL, SUB}
-
-
-def test_costs_are_configurable():
-    costs = Costs(cur=1, goal=2, sub=3, do=4)
-    assert [costs.of(a) for a in (Ask(CUR), Ask(GOAL), Ask(SUB), Move(0), Stop())] == [1, 2, 3, 4, 0]

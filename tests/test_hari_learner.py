@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 
 import numpy as np
 import pytest
@@ -16,27 +15,14 @@ from embodied.action_spaces import PanoramicMoves
 from embodied.agents.common.checkpoint import CheckpointError
 from embodied.agents.common.losses import Decisions, actor_loss, costs_to_go, critic_loss
 from embodied.agents.common.playing import TaskSet
-from embodied.agents.hari import pretraining
 from embodied.agents.hari.agent import HariAgent, load_agent, load_executor, new_executor, new_heads, save
 from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.intention import IntentionRun, counts_of, train, train_step, values
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
-from embodied.agents.hari.policy import (
-    DO,
-    DONE,
-    Belief,
-    Choice,
-    Considered,
-    HariPolicy,
-    Reader,
-    carry,
-    consider,
-    policy_of,
-)
+from embodied.agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
 from embodied.agents.hari.pretraining import (
     PretrainingData,
     _begin,
-    _play,
     give_subgoal,
     guided_share,
     pretrain,
@@ -50,11 +36,11 @@ from embodied.agents.hari.words import STOP, FeatureWords, collate, feature_word
 from embodied.agents.studies.engine import run_study
 from embodied.assistants.descriptions import Describer, frequent_classes
 from embodied.assistants.hari import HariAssistant
-from embodied.envs.hari import Costs, HariEnv, shaped_costs
+from embodied.envs.hari import Costs, HariEnv
 from embodied.evaluation.rollout import play
 from embodied.house.house import House, Opening, Storey
 from embodied.identity import identity_of
-from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Stop, Task
+from embodied.interface import Ask, Candidates, Feature, FindObject, Intention, Move, Pose, Task
 from embodied.language.plain_language import PlainLanguage
 from embodied.records import read_json
 from embodied.tasks.hari import PRETRAINING, hari_pool, hari_task
@@ -290,38 +276,6 @@ def test_do_takes_the_likeliest_move_and_never_stops():
     assert Considered([0], torch.zeros(1, 4), log_moves).move(0) == 1
 
 
-class Certain:
-    """An actor that always does."""
-
-    def begin(self, batch):
-        return torch.zeros(batch, 1), torch.zeros(batch, 1)
-
-    def __call__(self, belief, shown, last, depth, memory):
-        return torch.nn.functional.one_hot(torch.full((len(belief),), DO), 5) * 100.0, memory
-
-
-def test_do_stops_where_the_execution_policy_most_wants_to_and_the_belief_advances_at_every_step():
-    world, source = grid_data()
-    executor = new_executor(SMALL, words_of(world))
-    executor.network.eval()
-    env = HariEnv({"grid": world}, HariAssistant(source.describer), source.describer)
-    first = env.reset(source.training[1])
-    stay = consider(Reader(executor), [first], None)[0]
-    for column, kind in ((0, Move), (len(stay.log_moves[0]) - 1, Stop)):
-        wanted = torch.full_like(stay.log_moves, -9.0).index_fill(1, torch.tensor([column]), 0.0)
-        policy = HariPolicy(executor, Certain())
-        (action,), _ = policy._choose(
-            [first], dataclasses.replace(stay, log_moves=wanted), {}, Belief(stay.belief * 0, (1,)), None,
-            [np.random.default_rng(0)],
-        )  # fmt: skip
-        assert isinstance(action, kind)
-    reader = Reader(executor)
-    considered, belief = consider(reader, [first], None)
-    asked = env.step(Ask(Intention.CUR))
-    after = consider(reader, [asked], carry(considered, belief))[1]
-    torch.testing.assert_close(after.carried[0], considered.belief[0])
-
-
 # What is shared ---------------------------------------------------------------------------------
 
 
@@ -352,20 +306,6 @@ def test_a_walk_that_is_wholly_guided_takes_only_right_moves():
     executor = new_executor(dataclasses.replace(SMALL, guided=1.0, iterations=10**9), words_of(fork_world()))
     optimizer = torch.optim.Adam(executor.network.parameters(), 1e-4)
     assert [lesson(executor, optimizer, source, u)["steps"] for u in range(3)] == [2 * SMALL.batch] * 3, "go, stop"
-
-
-def test_a_walk_that_stands_still_is_told_what_agents_are_told_unasked(monkeypatch):
-    """As one that asks at every step: it goes nowhere, and its belief and its losses go on."""
-    world, source = grid_data()
-    executor = new_executor(dataclasses.replace(SMALL, stay_fraction=0.999999), words_of(world))
-    walks = [_begin(source, t, np.random.default_rng(0)) for t in source.training[:3]]
-    heard, where = [], [w.pose for w in walks]
-    monkeypatch.setattr(
-        pretraining, "percept", lambda words, told, *more: heard.append(told) or percept(words, told, *more)
-    )
-    losses, _ = _play(executor, source, walks, 4, 0.0)
-    assert [len(x) for x in losses] == [3] * 4 and [w.pose for w in walks] == where
-    assert heard == [source.describer.sparse(world, p.node) for p in where] * 4
 
 
 def test_a_walk_with_a_subgoal_from_the_beginning_goes_no_farther():
@@ -431,44 +371,9 @@ def fork_env() -> HariEnv:
     return HariEnv({"fork": fork_world()}, HariAssistant(say), say, costs=Costs(0.1, 0.1, 0.1, 0.1))
 
 
-def best_costs() -> float:
-    """The least mean cost of both tasks of the fork, over all plans of up to four intentions (enumerated)."""
-    best = {}
-    for plan in itertools.chain.from_iterable(itertools.product(range(5), repeat=n) for n in range(1, 5)):
-        costs = []
-        for goal in (1, 2):
-            env = fork_env()
-            observation = env.reset(fork_task(goal), seed=0)
-            for intention in plan:
-                if observation is None:
-                    break
-                name = INTENTIONS[intention]
-                asks = {i.value: i for i in observation.can_ask}
-                if name in asks:
-                    observation = env.step(Ask(asks[name]))
-                elif name == "done":
-                    observation = env.step(Stop())
-                elif (
-                    name == "do"
-                ):  # a perfect listener: it knows the goal once it was described, else it goes to node 1
-                    told = any(len(d) > 1 or d[0].kind == "action" for d in observation.extras.goal_descriptions)
-                    target = goal if told else 1
-                    column = [p.node for p in env._reach[1]].index(target) if env.pose.node == 0 else 0
-                    observation = env.step(Move(column))
-                else:
-                    break
-            if observation is None:
-                costs.append(sum(s.cost for s in env.episode().steps))
-        if len(costs) == 2:
-            best[plan] = sum(costs) / 2
-    return min(best.values())
-
-
 @pytest.mark.slow
 def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executor):
-    """Enumerated: GOAL (or SUB), DO, DONE costs 0.2; going without asking costs 1.1 on average."""
-    best = best_costs()
-    assert best == pytest.approx(0.2)
+    """GOAL (or SUB), DO, DONE cost 0.1 + 0.1 + 0; going without asking costs 1.1 on average, another question 0.1."""
     config = dataclasses.replace(
         QUICK, cost=0.1, horizon=6, critic_iterations=10, iterations=150, entropy=0.01, batch=24
     )
@@ -482,18 +387,7 @@ def test_the_learner_finds_the_best_questions_of_a_three_node_house(fork_executo
     assert all(e.ended == "stop" and e.nodes[-1] in e.task.goal_nodes for e in episodes)
     assert all(e.requests == 1 for e in episodes), "one question, and not the useless one"
     assert counts_of(episodes)["cur"] == 0
-    assert sum(s.cost for e in episodes for s in e.steps) / 2 == pytest.approx(best, abs=0.11)
-
-
-@pytest.mark.slow
-def test_shaped_costs_of_played_episodes_telescope(fork_executor):
-    config = QUICK
-    agent = HariAgent(fork_executor, new_heads(config, SMALL.hidden_size)[0], config)
-    world = fork_world()
-    hops = world.graph.hops
-    for episode in play(fork_env, policy_of(agent), [fork_task(1), fork_task(2)] * 5, seed=3, batch=4):
-        plain, shaped = sum(s.cost for s in episode.steps), sum(shaped_costs(episode, hops))
-        assert shaped == pytest.approx(plain - hops[0, episode.task.goal_nodes[0]])
+    assert sum(s.cost for e in episodes for s in e.steps) / 2 == pytest.approx(0.2, abs=0.11)
 
 
 @pytest.mark.slow
@@ -547,9 +441,6 @@ def test_weights_survive_the_disk_and_say_what_they_lack(tmp_path, fork_executor
     assert load_executor(tmp_path / "agent.safetensors").words == fork_executor.words
     with pytest.raises(ValueError, match="execution policy alone.*--execution"):
         load_agent(tmp_path / "execution.safetensors")
-    (tmp_path / "cut.safetensors").write_bytes((tmp_path / "agent.safetensors").read_bytes()[:500])
-    with pytest.raises(ValueError, match="cut.safetensors"):
-        load_agent(tmp_path / "cut.safetensors")
 
 
 @pytest.mark.slow
