@@ -1,9 +1,7 @@
 """Every kind of file we read, damaged in seeded ways: none ends in a traceback, none is believed against itself.
 
-A mutation either is refused by an error that the command line shows as one line (ValueError,
-OSError, UnableError), or what is read is the same as before, or it is a whole and different file
-of its kind. What carries a checksum may never be the last. Small files that unpack to much, or
-nest deeply, are refused before anything is unpacked.
+What is damaged is refused by an error that the command line shows as one line, or is a whole file of its kind, which
+nothing with a checksum may be. Small files that unpack to much, or nest deeply, are refused before they are unpacked.
 """
 
 from __future__ import annotations
@@ -11,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import gzip
-import hashlib
 import io
 import itertools
 import json
@@ -67,8 +64,6 @@ from embodied.generate.plan_file import load_plan
 from embodied.house.house import House
 from embodied.interface import Episode
 from embodied.light.pages import colours
-from embodied.light.pages.records import load_record
-from embodied.light.pages.unwrap import Unwrapped
 from embodied.mattersim import pictures
 from embodied.mattersim.graphs import load_graphs
 from embodied.navigation.connectivity import from_matterport
@@ -76,7 +71,7 @@ from embodied.policies.baselines import PrivilegedAsking, Shortest, ask_every_5
 from embodied.records import load_lines, save_lines, to_json
 from embodied.render import panorama_file
 from embodied.render.panorama import Panorama
-from embodied.render.panorama_file import MAGIC, TAIL, PanoramaFile, PanoramaFileError, write_panoramas
+from embodied.render.panorama_file import PanoramaFile, PanoramaFileError, write_panoramas
 from embodied.render.sightings import load_table, save_table, sightings_table
 from embodied.scene import model
 from embodied.seeds import stream
@@ -210,9 +205,8 @@ def graph_of_the_simulator(folder: Path, data: Dataset) -> Kind:
         assert np.isfinite(graphs.positions).all()
         return graphs.positions.tolist(), graphs.neighbours.tolist()
 
-    return Kind(
-        shutil.copy(data.folder / "houses/test_0000/connectivity.json", folder / "scan_connectivity.json"), read
-    )
+    path = shutil.copy(data.folder / "houses/test_0000/connectivity.json", folder / "scan_connectivity.json")
+    return Kind(path, read)
 
 
 def _data_set(name: str, guarded: bool) -> Callable[[Path, Dataset], Kind]:
@@ -422,24 +416,6 @@ def test_a_damaged_file_is_refused_in_a_line_or_harmless(name, made):
     assert len(refused) >= MUTATIONS // 4 or kind.lenient, "most damage is noticed"
 
 
-def test_an_index_of_pictures_that_is_whole_and_wrong_is_refused_or_its_pictures_have_its_size(tmp_path):
-    """Whoever changes the index knows how to write its checksum."""
-    write_panoramas(tmp_path / "a.pano", [FACES, FACES], {"house": "x"})
-    body, refused = (tmp_path / "a.pano").read_bytes(), 0
-    length, _, _ = TAIL.unpack(body[-TAIL.size :])
-    head, index = body[: -TAIL.size - length], body[-TAIL.size - length : -TAIL.size]
-    for k in range(60):
-        wrong = edited(index, stream(3, "index", k))
-        tail = TAIL.pack(len(wrong), hashlib.sha256(wrong).digest(), MAGIC)
-        (tmp_path / "b.pano").write_bytes(head + wrong + tail)
-        try:
-            with PanoramaFile(tmp_path / "b.pano") as file:
-                assert all(file.rgb(n).shape == (6, file.size, file.size, 3) for n in range(len(file)))
-        except CLEAR:
-            refused += 1
-    assert refused > 20
-
-
 # Weights beside settings that cannot be ------------------------------------------------------------
 
 
@@ -461,9 +437,8 @@ def _bandit(path: Path) -> object:
     ],
 )
 def test_weights_beside_settings_that_cannot_be_are_refused(read, kind, about, match, tmp_path):
-    save_tensors(
-        tmp_path / "a.safetensors", {"x": torch.zeros(1)}, {"format": WEIGHTS_FORMAT, "kind": kind, "about": about}
-    )
+    meta = {"format": WEIGHTS_FORMAT, "kind": kind, "about": about}
+    save_tensors(tmp_path / "a.safetensors", {"x": torch.zeros(1)}, meta)
     with pytest.raises(ValueError, match=match):
         read(tmp_path / "a.safetensors")
 
@@ -484,9 +459,6 @@ def test_archives_of_arrays_are_refused_by_the_size_they_declare(tmp_path):
         z.filelist[0].file_size = 5 * 2**30
     with pytest.raises(ValueError, match="unpacks to 5368709120 bytes"), open_arrays(path):
         pass
-    for read in (HouseStrips.load, load_table, lambda path: load_record(Unwrapped, path)):
-        with contextlib.suppress(ValueError):
-            assert read(path) is None, "it is to be made again"
     np.save(tmp_path / "a.npy", np.zeros(3))
     with pytest.raises(ValueError, match="is no .npz archive"), open_arrays(tmp_path / "a.npy"):
         pass
@@ -499,12 +471,6 @@ def test_episodes_are_unpacked_to_a_limit(tmp_path, monkeypatch):
         habitat.read_vlnce(tmp_path / "a.json.gz")
 
 
-def _decoders_fail(monkeypatch) -> None:
-    decoders = (cv2, "imread"), (cv2, "imdecode"), (simplejpeg, "decode_jpeg"), (deflate, "zlib_decompress")
-    for library, name in decoders:
-        monkeypatch.setattr(library, name, lambda *_, **__: pytest.fail("it is decoded"))
-
-
 def _wide(kind: str, size: tuple[int, int]) -> bytes:
     """A small picture that says to be of `size`; a PNG has the checksum of that."""
     data = cv2.imencode(kind, np.zeros((8, 48, 3), np.uint8))[1].tobytes()
@@ -515,21 +481,18 @@ def _wide(kind: str, size: tuple[int, int]) -> bytes:
 
 
 @pytest.mark.parametrize("kind", [".png", ".jpg"])
-def test_a_panorama_is_not_decoded_where_it_declares_another_size(kind, tmp_path, monkeypatch):
+def test_no_picture_is_decoded_that_declares_another_size_or_to_be_huge(kind, tmp_path, monkeypatch):
     wide = _wide(kind, (60000, 30000))
     monkeypatch.setattr(panorama_file, "encode", lambda *_: (wide, wide, wide))
     write_panoramas(tmp_path / "a.pano", [FACES], {})
-    _decoders_fail(monkeypatch)
+    (tmp_path / "a.png").write_bytes(_wide(".png", (12000, 12000)))
+    decoders = (cv2, "imread"), (cv2, "imdecode"), (simplejpeg, "decode_jpeg"), (deflate, "zlib_decompress")
+    for library, name in decoders:
+        monkeypatch.setattr(library, name, lambda *_, **__: pytest.fail("it is decoded"))
     with PanoramaFile(tmp_path / "a.pano") as file:
         for read in (file.rgb, file.depth, file.ids):
             with pytest.raises(PanoramaFileError, match="no picture of its size"):
                 read(0)
-
-
-@pytest.mark.parametrize("size", [(60000, 30000), (12000, 12000)])
-def test_no_picture_is_decoded_that_declares_to_be_huge(size, tmp_path, monkeypatch):
-    (tmp_path / "a.png").write_bytes(_wide(".png", size))
-    _decoders_fail(monkeypatch)
     assert read_picture(tmp_path / "a.png") is None
     pixels = lambda path: pictures._pixels(Path(path), Path(path).read_bytes(), pictures._bgra)
     for read in (colours.read_colours, model.load_texture, pixels):

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import shutil
-import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hand_data import DATA_KINDS, build, built, content, hand_house, small_house
+from joblib.externals.loky import process_executor
 
-from embodied.datasets.build import DatasetConfig, Unit, build_dataset, build_unit, for_each_unit, shares, units
+from embodied.datasets import build as building
+from embodied.datasets.build import GROWTH, DatasetConfig, Unit, build_dataset, build_unit, shares, units
 from embodied.datasets.scale import quota, scale
 from embodied.datasets.store import Dataset, DatasetError
 from embodied.evaluation.rollout import play
@@ -123,6 +122,7 @@ def test_hari_holds_out_start_rooms_and_object_classes(tmp_path):
 
 
 def test_workers_do_not_change_a_byte(tmp_path):
+    assert process_executor._MAX_MEMORY_LEAK_SIZE < GROWTH, "joblib ends workers at less, which they raise"
     built(tmp_path / "1")
     build(tmp_path / "2", tmp_path / "cache", workers=2)
     assert content(tmp_path / "1") == content(tmp_path / "2")
@@ -146,6 +146,9 @@ def test_a_killed_build_goes_on_and_ends_the_same(tmp_path):
     assert not [p for p in (tmp_path / "half" / "houses").iterdir() if p.name.startswith(".")], "no debris"
     again = build(tmp_path / "half", tmp_path / "cache")
     assert again.digest == whole.digest and content(tmp_path / "half") == content(tmp_path / "whole")
+    build_unit(Unit("test", 0), config, tmp_path / "alone", tmp_path / "cache", hand_house)
+    alone = content(tmp_path / "alone" / "houses" / "test_0000")
+    assert alone == content(whole.folder / "houses" / "test_0000"), "a house does not depend on the others"
 
 
 def test_a_house_that_lost_a_file_is_named_and_built_again(tmp_path):
@@ -157,13 +160,6 @@ def test_a_house_that_lost_a_file_is_named_and_built_again(tmp_path):
     shutil.rmtree(tmp_path / "data" / "houses" / "train_0001")
     build(tmp_path / "data", tmp_path / "cache")
     assert content(tmp_path / "data") == before
-
-
-def test_a_house_does_not_depend_on_the_others(tmp_path):
-    data = built(tmp_path / "data")
-    config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
-    build_unit(Unit("test", 0), config, tmp_path / "alone", tmp_path / "cache", hand_house)
-    assert content(tmp_path / "alone" / "houses" / "test_0000") == content(data.folder / "houses" / "test_0000")
 
 
 def test_what_another_program_began_is_not_finished_by_this_one(tmp_path, monkeypatch):
@@ -189,13 +185,10 @@ def test_a_data_set_of_other_furniture_groups_is_another_one_and_is_not_continue
     first = made("greenery", "a")
     assert made("greenery", "a").digest == first.digest and first.config.own
     assert made("tv_seats", "b").config.own != first.config.own and made("tv_seats", "b").digest != first.digest
-    for own, remedy in (
-        ((tmp_path / "tv_seats",), "another data set"),
-        ((), "another data set"),
-        ((tmp_path,), "hold a"),
-    ):
+    for own, remedy in ((("tv_seats",), "another data set"), ((), "another data set"), ((".",), "hold a")):
+        folders = tuple(tmp_path / name for name in own)
         with pytest.raises(ValueError, match=remedy):
-            build_dataset(config, tmp_path / "a", tmp_path / "cache", make_house=small_house, own=own)
+            build_dataset(config, tmp_path / "a", tmp_path / "cache", make_house=small_house, own=folders)
     with pytest.raises(RecordError, match="groups.toml"):
         made("no_such_group", "c")
     assert not (tmp_path / "c").exists()
@@ -221,23 +214,17 @@ def test_wrong_folders_and_splits_are_refused(tmp_path):
 
 
 def test_a_house_that_cannot_be_made_is_an_error_after_a_bounded_number_of_seeds(tmp_path, monkeypatch):
-    from embodied.datasets import build as module
-
     def never(*_):
         raise HouseError("no plan")
 
-    monkeypatch.setattr(module, "generate_house", never)
+    monkeypatch.setattr(building, "generate_house", never)
     with pytest.raises(HouseError, match="after 12 seeds"):
-        module.make_dataset_house(0, "train_0000", DatasetConfig("hanna"), None)
+        building.make_dataset_house(0, "train_0000", DatasetConfig("hanna"), None)
 
 
 def test_a_size_of_ones_own_is_a_scale():
-    for size in (
-        DatasetSize(40, 4000),
-        DatasetSize(40, 4000, 60),
-        DatasetSize(40, 4000, None, 9),
-        DatasetSize(1, 2, 3, 4),
-    ):
+    for numbers in ((40, 4000), (40, 4000, 60), (40, 4000, None, 9), (1, 2, 3, 4)):
+        size = DatasetSize(*numbers)
         assert DatasetConfig("hanna", str(size)).scale == size, "as files have it"
     final = scale(DatasetSize(1, 25, 60), "hanna")
     assert final.houses == {"train": 1, "val": 1, "test": 60}
@@ -262,40 +249,19 @@ def test_a_data_set_knows_how_the_panoramas_that_it_holds_were_drawn(tmp_path):
     assert data.drawn_pictures(name) is None
     faces = np.zeros((6, 8, 8, 3), np.uint8)
     empty = Panorama(faces, np.ones((6, 8, 8), np.float32), np.zeros((6, 8, 8), np.int32))
-    made_of = {"size": 8, "quality": "normal", "backend": "classic", "light": "normal", "code": "x"}
-    path = data.folder / "houses" / name / "panoramas.pano"
-    write_panoramas(path, [empty], {**made_of, "house": data.place(name).house.digest})
-    matte = Baked(gloss=False, size=8)
-    assert data.drawn_pictures(name) == matte, "a file that names no look is older than gloss"
-    write_panoramas(path, [empty], {**made_of, "look": "gloss", "house": data.place(name).house.digest})
-    assert data.drawn_pictures(name) == Baked(size=8)
-    unlit = {**made_of, "quality": "unlit", "light": None, "house": data.place(name).house.digest}
-    write_panoramas(path, [empty], unlit)
-    assert data.drawn_pictures(name) == Unlit(size=8)
-    write_panoramas(path, [empty], {**made_of, "house": "another"})
-    assert data.drawn_pictures(name) is None
+    usual = {"size": 8, "quality": "normal", "backend": "classic", "light": "normal", "code": "x"}
+    usual["house"] = data.place(name).house.digest
+    for change, pictures in (
+        ({}, Baked(gloss=False, size=8)),  # a file that names no look is older than gloss
+        ({"look": "gloss"}, Baked(size=8)),
+        ({"quality": "unlit", "light": None}, Unlit(size=8)),
+        ({"house": "another"}, None),
+    ):
+        write_panoramas(data.folder / "houses" / name / "panoramas.pano", [empty], usual | change)
+        assert data.drawn_pictures(name) == pictures
 
 
 def test_a_warning_names_what_differs_between_pictures():
-    held, wanted = (
-        {"size": 256, "quality": "unlit", "house": "a"},
-        {"size": 192, "quality": "unlit", "house": "a", "code": "b"},
-    )
+    held = {"size": 256, "quality": "unlit", "house": "a"}
+    wanted = {"size": 192, "quality": "unlit", "house": "a", "code": "b"}
     assert differing(held, wanted) == "code None instead of 'b', size 256 instead of 192"
-
-
-HELD: list[np.ndarray] = []
-
-
-def grow(unit: int, folder: Path) -> str:
-    """Keeps 336 MB, as a program that lights houses does, and writes down who did."""
-    time.sleep(1.2)  # joblib looks once a second
-    HELD.append(np.ones(42_000_000))
-    (folder / f"{unit}_{os.getpid()}").touch()
-    return str(unit)
-
-
-def test_workers_last_though_they_grow(tmp_path):
-    """Each was ended after a house or two, and half of the processor time went into beginning anew."""
-    for_each_unit(grow, range(4), (tmp_path,), workers=2, watch=None, ray_address=None)
-    assert len({p.name.split("_")[1] for p in tmp_path.iterdir()}) <= 2, "four where each is ended after a house"

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from hand_data import build, built, content
+from hand_data import build, built, content, small_house
 
 from embodied.assets.cache import digest
 from embodied.datasets.store import Dataset, DatasetError
@@ -24,15 +22,9 @@ HOUSE = "test_0000"
 TASKS = "tasks_test_unseen.jsonl"
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("checks")
-    return {kind: built(folder / kind, kind).folder for kind in ("hanna", "vln")}
-
-
 @pytest.fixture
-def folder(whole, tmp_path) -> Path:
-    return Path(shutil.copytree(whole["hanna"], tmp_path / "data"))
+def folder(tmp_path) -> Path:
+    return built(tmp_path / "data").folder
 
 
 def use(folder: Path) -> None:
@@ -61,11 +53,6 @@ def as_lines(items: list[dict]) -> str:
     return "".join(json.dumps(i) + "\n" for i in items)
 
 
-@pytest.mark.parametrize("kind", ["hanna", "vln"])
-def test_what_was_built_is_read(whole, kind):
-    use(whole[kind])
-
-
 @pytest.mark.parametrize("file", ["routes.jsonl", TASKS, "house.json", "connectivity.json"])
 def test_a_file_that_was_changed_is_noticed(file, folder):
     path = folder / "houses" / HOUSE / file
@@ -79,15 +66,9 @@ def test_a_file_that_was_changed_is_noticed(file, folder):
     [
         (lambda t: t["start"].update(turn=99), r"turn should be 0 to 11"),
         (lambda t: t["start"].update(node=-1), "nodes are counted from 0"),
-        (lambda t: t["goal"].update(placements=None), "should be a list"),
-        (lambda t: t["goal"].update({"is": "Nothing"}), "should be one of"),
         (lambda t: t.update(goal_nodes=[]), "at least one node"),
-        (lambda t: t.update(goal_nodes=7), "should be a list"),
-        (lambda t: t.update(goal_nodes=[-3]), "nodes are counted from 0"),
         (lambda t: t.update(radius=-1.0), "radius, horizon and budget"),
         (lambda t: t.update(horizon=0), "radius, horizon and budget"),
-        (lambda t: t.update(surprise=1), "unknown fields"),
-        (lambda t: t.pop("request"), "lacks the fields"),
     ],
 )
 def test_a_task_that_cannot_be_is_refused_with_its_line(change, message, folder):
@@ -100,11 +81,7 @@ def test_a_task_that_cannot_be_is_refused_with_its_line(change, message, folder)
 
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
-        (lambda r: r.update(path=[]), "at least one node"),
-        (lambda r: r.update(path=None), "should be a list"),
-        (lambda r: r.update(tilt=2), "tilt -1 to 1"),
-    ],
+    [(lambda r: r.update(path=[]), "at least one node"), (lambda r: r.update(tilt=2), "tilt -1 to 1")],
 )
 def test_a_route_off_the_graph_is_refused(change, message, folder):
     routes = lines_of(folder, "routes.jsonl")
@@ -118,12 +95,10 @@ def test_a_route_off_the_graph_is_refused(change, message, folder):
     ("change", "message"),
     [
         (lambda v: v[0].update(pose=v[0]["pose"][:15]), "a pose of 16"),
-        (lambda v: v[0].update(pose=[*v[0]["pose"], 0.0]), "a pose of 16"),
         (lambda v: v[0]["pose"].__setitem__(3, 1e300), "a pose of 16"),
         (lambda v: v[0].update(unobstructed=["false"] * len(v)), "booleans 'unobstructed'"),
         (lambda v: v[0].update(included=1), "'included'"),
         (lambda v: v[0].update(image_id=v[1]["image_id"]), "an image_id of its own"),
-        (lambda v: v[0].update(image_id=7), "should have an image_id"),
     ],
 )
 def test_a_graph_that_cannot_be_is_refused(change, message, folder):
@@ -131,16 +106,6 @@ def test_a_graph_that_cannot_be_is_refused(change, message, folder):
     change(items)
     rewrite(folder, "connectivity.json", json.dumps(items))
     with pytest.raises((DatasetError, HouseError), match=rf"connectivity.json.*{message}"):
-        use(folder)
-
-
-@pytest.mark.parametrize("file", ["config.json", "dataset.json"])
-@pytest.mark.parametrize(
-    "text", ["[]", "null", "{", '{"version":1}', '{"version":1,"version":1}', "[" * 99_999, "\xff"]
-)
-def test_a_damaged_index_is_named(file, text, folder):
-    (folder / file).write_text(text, encoding="latin-1")
-    with pytest.raises(DatasetError, match=file):
         use(folder)
 
 
@@ -166,26 +131,13 @@ def test_an_index_that_was_changed_is_refused(file, change, folder):
         use(folder)
 
 
-BUILD = """
-import sys, time
-from pathlib import Path
-sys.path.insert(0, sys.argv[3])
-import hand_data
-slow = lambda *args: (print("building", flush=True), time.sleep(0.5), hand_data.hand_house(*args))[2]
-from embodied.datasets.build import DatasetConfig, build_dataset
-config = DatasetConfig("hanna", "tiny", seed=4, language="plain")
-build_dataset(config, Path(sys.argv[1]), Path(sys.argv[2]), make_house=slow)
-"""
+def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(tmp_path):
+    make = functools.partial(build, tmp_path / "data", tmp_path / "cache", "find", size="1x4")
 
+    def house(*facts):
+        with pytest.raises(LockedError, match=f"being written by process {os.getpid()}"):
+            make()
+        return small_house(*facts)
 
-def test_a_second_build_of_the_same_folder_is_refused_and_the_first_ends_right(whole, tmp_path):
-    arguments = [str(tmp_path / "data"), str(tmp_path / "cache"), os.path.dirname(__file__)]
-    first = subprocess.Popen([sys.executable, "-c", BUILD, *arguments], stdout=subprocess.PIPE, text=True)
-    try:
-        assert first.stdout.readline() == "building\n"
-        with pytest.raises(LockedError, match=f"being written by process {first.pid}"):
-            build(tmp_path / "data", tmp_path / "cache")
-        assert first.wait(timeout=600) == 0
-    finally:
-        first.kill()
-    assert content(tmp_path / "data") == content(whole["hanna"])
+    make(make_house=house)
+    assert content(tmp_path / "data") == content(built(tmp_path / "whole", "find", "1x4", small_house).folder)

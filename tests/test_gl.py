@@ -90,32 +90,21 @@ def test_threads_take_turns(house):
             except Exception as e:
                 failed.append(e)
 
-        for threads in (
-            [threading.Thread(target=draw, args=(False,))],
-            [threading.Thread(target=draw, args=(True,))] * 1,
-        ):
+        for own in ((False,), (True,), (True, True, True)):
+            threads = [threading.Thread(target=draw, args=(o,)) for o in own]
             for t in threads:
                 t.start()
+            for t in threads:
                 t.join()
-        together = [threading.Thread(target=draw, args=(True,)) for _ in range(3)]
-        for t in together:
-            t.start()
-        for t in together:
-            t.join()
         assert not failed and len(found) == 5
         assert all((f == expected).all() for f in found)
         assert (renderer.panorama(EYE).rgb == expected).all(), "the first thread draws on"
 
 
-def ended(code: str, **environment: str) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        check=False,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        env={**os.environ, **environment},
-    )
+def ended(*arguments: object, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess:
+    env = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")} | environment
+    command = [sys.executable, "-c", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, cwd=cwd, env=env)
 
 
 WITHOUT_OPENGL = """
@@ -156,14 +145,7 @@ def test_without_opengl_stored_pictures_are_read_rays_find_what_is_seen_and_draw
     with world_of(house_to_draw(), tmp_path) as world:
         world.render_all()
         total, seen = sum_of(world), sorted(s.placement for s in world.sightings(0))
-    child = subprocess.run(
-        [sys.executable, "-c", WITHOUT_OPENGL, tmp_path],
-        check=False,
-        capture_output=True,
-        text=True,
-        cwd=Path(__file__).parent,
-        env={k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")},
-    )
+    child = ended(WITHOUT_OPENGL, tmp_path, cwd=Path(__file__).parent)
     assert child.returncode == 0, child.stderr
     stored, sighted, error = child.stdout.splitlines()
     assert (int(stored), sighted) == (total, str(seen)) and "apt-get install libegl1" in error
@@ -199,10 +181,17 @@ def test_what_cannot_draw_gives_the_remedy(library, environment, message, monkey
         gl._first_available.cache_clear()
 
 
-def test_a_device_that_is_not_there_is_one_sentence_with_its_remedy():
+@pytest.mark.parametrize(
+    ("environment", "remedy"),
+    [
+        ({"MUJOCO_EGL_DEVICE_ID": "99"}, "Unset MUJOCO_EGL_DEVICE_ID"),
+        ({"__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}, "Install EGL"),
+    ],
+)
+def test_a_device_that_is_not_there_is_one_sentence_with_its_remedy(environment, remedy):
     code = "from embodied import gl\ntry: gl.info()\nexcept gl.GLError as e: print(e)"
-    done = ended(code, MUJOCO_GL="egl", MUJOCO_EGL_DEVICE_ID="99")
-    assert "Unset MUJOCO_EGL_DEVICE_ID" in done.stdout and not done.stderr
+    done = ended(code, MUJOCO_GL="egl", **environment)
+    assert remedy in done.stdout and not done.stderr
 
 
 def test_opening_and_closing_leaves_one_context_and_nothing_behind(house, tmp_path):

@@ -15,8 +15,7 @@ from embodied.light.tracing.rays import embree, mitsuba_among, rays_among
 from embodied.render import gloss
 from embodied.render.camera import Camera
 from embodied.render.film import film, light_of, shown_of
-from embodied.render.gloss import Gloss, GlossData, interleaved, schlick
-from embodied.render.mirrored import Mirrored
+from embodied.render.gloss import Gloss, GlossData, schlick
 from embodied.render.pictures import Baked, matte, parse_pictures
 from embodied.scene.lit_pages import LitMesh, LitPages
 from embodied.world import open_world
@@ -132,33 +131,6 @@ def test_thin_bars_do_not_flicker_while_the_camera_turns(metal, monkeypatch):
     monkeypatch.setattr(gloss, "MIN_SAMPLES", 0)
     monkeypatch.setattr(gloss, "BRUSHED", 1)
     assert many < 0.7 * flicker()
-
-
-def test_directions_of_a_tile_are_numbered_so_that_small_squares_have_neighbours_in_the_sequence():
-    number = interleaved(8)
-    assert sorted(number.ravel().tolist()) == list(range(64))
-    for n in (2, 4):
-        squares = number.reshape(8 // n, n, 8 // n, n).swapaxes(1, 2).reshape(-1, n * n)
-        assert all(np.ptp(s) == n * n - 1 for s in squares)
-
-
-def test_every_direction_of_a_tile_counts_the_same_wherever_the_surface_goes_on():
-    h = w = 32
-    pixel = np.arange(h * w)
-    up = np.tile(np.float32([0, 0, 1]), (h * w, 1))
-    for lone in ((0, 0), (3, 5), (7, 2)):
-        grid = Mirrored((h, w), pixel, np.zeros(h * w, np.int32), up)
-        row, column = np.divmod(pixel, w)
-        light = ((row % 8 == lone[0]) & (column % 8 == lone[1])).astype(np.float32)
-        grid.smooth(light, light[:, None].repeat(3, 1), np.ones_like(light))
-        assert np.allclose(grid.values[:, 8:-8, 8:-8], 1 / 64, atol=1e-6)
-
-
-def test_single_rays_from_thin_bars_are_no_dots_of_light():
-    middle = np.array([8 * 16 + 8])
-    grid = Mirrored((16, 16), middle, np.ones(1, np.int32), np.float32([[0, 0, 1]]))
-    grid.smooth(np.ones(1, np.float32), np.full((1, 3), 9.0, np.float32), np.ones(1, np.float32))
-    assert 0 < grid.values[1, 8, 8] < 0.3
 
 
 def night_window(kind: str = "opening", rough: float = 0.02, night_at: float = 5.0) -> np.ndarray:
