@@ -12,7 +12,9 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from conftest import two_rooms
 from hand_worlds import grid_world, thing
+from handmade import HandCatalogue, furnished
 
 from embodied.agents.common.shipped import WEIGHTS
 from embodied.datasets.build import DatasetConfig, build_dataset, units
@@ -20,6 +22,7 @@ from embodied.datasets.store import Dataset
 from embodied.kinds.plugins import shipped_kinds
 from embodied.kinds.task_kind import kind_named
 from embodied.mattersim.conventions import in_matterport_order
+from embodied.navigation.graph import build_graph
 from embodied.render.panorama import Panorama
 from embodied.render.panorama_file import write_panoramas
 from embodied.render.pictures import recorded
@@ -46,6 +49,19 @@ def small_house(seed, name, config, catalogue):
     """Sixteen nodes and few things: quickly drawn."""
     world = grid_world(4, name=name)
     return world.house, world.graph
+
+
+def boxes_house(seed, name, config, catalogue):
+    """The furnished two rooms, which the catalogue made by hand can draw."""
+    house = dataclasses.replace(furnished(two_rooms()), name=name)
+    return house, build_graph(house)
+
+
+def live_among_boxes(monkeypatch) -> None:
+    """Let commands and examples find `boxes_house` wherever they would generate one, and its catalogue."""
+    monkeypatch.setattr("embodied.datasets.build.make_dataset_house", boxes_house)
+    for module in ("assets.catalogue", "datasets.build", "gym.drive"):
+        monkeypatch.setattr(f"embodied.{module}.load_catalogue", lambda *_, **__: HandCatalogue())
 
 
 def build(folder, cache, kind="hanna", workers=1, size="tiny", make_house=hand_house, **options):

@@ -4,16 +4,5 @@ from __future__ import annotations
 
 from embodied.light.settings import LightSettings
 
-TINY = LightSettings(
-    12.0,
-    400.0,
-    sky_rays=12,
-    lamp_rays=12,
-    other_rays=12,
-    sun_rays=4,
-    patches=16,
-    bounce_rays=8,
-    seen_rays=24,
-    rows=512,
-    jpeg=90,
-)
+RAYS = {"sky_rays": 12, "lamp_rays": 12, "other_rays": 12, "sun_rays": 4, "bounce_rays": 8, "seen_rays": 24}
+TINY = LightSettings(12.0, 400.0, **RAYS, patches=16, rows=512, jpeg=90)

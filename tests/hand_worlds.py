@@ -17,12 +17,8 @@ FINISHES = ("oak_planks/0", "paint_white/0", "paint_white/0", "paint_white/0")
 
 
 def hand_graph(positions, edges, rooms) -> NavGraph:
-    return graph_of(
-        np.asarray(positions, dtype=float),
-        np.asarray(edges),
-        tuple(f"n{i}" for i in range(len(positions))),
-        tuple(rooms),
-    )
+    names = tuple(f"n{i}" for i in range(len(positions)))
+    return graph_of(np.asarray(positions, dtype=float), np.asarray(edges), names, tuple(rooms))
 
 
 @functools.cache
@@ -45,9 +41,8 @@ def room(name: str, kind: str, x0: float, y0: float, x1: float, y1: float) -> Ro
 
 
 def thing(name: str, number: int, where: str, x: float, y: float) -> Placement:
-    return Placement(
-        f"{name.replace(' ', '_')}_{number}", f"hand/{name}", name, where, (x, y, 0.0), 0.0, (0.2, 0.2, 0.2)
-    )
+    key = f"{name.replace(' ', '_')}_{number}"
+    return Placement(key, f"hand/{name}", name, where, (x, y, 0.0), 0.0, (0.2, 0.2, 0.2))
 
 
 def line_world() -> HandWorld:
@@ -89,17 +84,14 @@ def grid_world(side: int = 6, spacing: float = 2.0, name: str = "grid") -> HandW
         for x in range(side):
             positions.append([m + x * spacing, m + y * spacing, 1.5])
             where.append(rooms[2 * (y >= side // 2) + (x >= side // 2)].id)
-    ok = {
-        frozenset(p)
-        for p in (("kitchen_1", "bedroom_1"), ("kitchen_1", "living_room_1"), ("living_room_1", "bathroom_1"))
-    }
+    doorways = [{"kitchen_1", "bedroom_1"}, {"kitchen_1", "living_room_1"}, {"living_room_1", "bathroom_1"}]
     door_rows = {1, side // 2 + 1}
     for i in range(side * side):
         x, y = i % side, i // side
         for j, along in ((i + 1 if x + 1 < side else None, y), (i + side if y + 1 < side else None, x)):
             if j is None:
                 continue
-            if where[i] == where[j] or (frozenset((where[i], where[j])) in ok and along in door_rows):
+            if where[i] == where[j] or ({where[i], where[j]} in doorways and along in door_rows):
                 edges.append([i, j])
     jitter = np.array(positions) + 0.05 * np.sin(np.arange(3 * side * side)).reshape(-1, 3)
     return HandWorld(house, hand_graph(jitter, edges, where))

@@ -32,12 +32,9 @@ def box_mesh(low, high, color) -> MeshPart:
             faces.append(np.array(order).reshape(2, 3) + len(vertices) * 4)
             vertices.append(quad)
             normals.append(np.tile(np.eye(3)[axis] * (1 if side else -1), (4, 1)))
+    vertices, normals = (np.concatenate(a).astype(np.float32) for a in (vertices, normals))
     return MeshPart(
-        np.concatenate(vertices).astype(np.float32),
-        np.concatenate(faces).astype(np.int32),
-        np.concatenate(normals).astype(np.float32),
-        np.zeros((24, 2), np.float32),
-        Finish(color),
+        vertices, np.concatenate(faces).astype(np.int32), normals, np.zeros((24, 2), np.float32), Finish(color)
     )
 
 
@@ -45,27 +42,20 @@ def _asset(key: str, object_class: str, size, support: str = "floor", surfaces=(
     return Asset(key, object_class, object_class, size, support, surfaces=surfaces, materials=("wood",))
 
 
+HAND_ASSETS = (
+    _asset("hand/red_box", "red box", (0.5, 0.5, 0.8)),
+    _asset("hand/flag", "flag", (0.6, 0.1, 1.0)),
+    _asset("hand/table", "table", (1.2, 0.8, 0.75), surfaces=(SupportSurface("top", 0.75, -0.6, -0.4, 0.6, 0.4, 9.0),)),
+    _asset("hand/mug", "mug", (0.08, 0.08, 0.1), "surface"),
+    _asset("built/rug", "rug", (2.0, 1.4, 0.012)),
+)
+
+
 @dataclass(frozen=True, eq=False)
 class HandCatalogue:
     """Quacks like embodied.assets.catalogue.Catalogue as far as a scene needs it."""
 
-    assets: Mapping[str, Asset] = field(
-        default_factory=lambda: {
-            a.key: a
-            for a in (
-                _asset("hand/red_box", "red box", (0.5, 0.5, 0.8)),
-                _asset("hand/flag", "flag", (0.6, 0.1, 1.0)),
-                _asset(
-                    "hand/table",
-                    "table",
-                    (1.2, 0.8, 0.75),
-                    surfaces=(SupportSurface("top", 0.75, -0.6, -0.4, 0.6, 0.4, 9.0),),
-                ),
-                _asset("hand/mug", "mug", (0.08, 0.08, 0.1), "surface"),
-                _asset("built/rug", "rug", (2.0, 1.4, 0.012)),
-            )
-        }
-    )
+    assets: Mapping[str, Asset] = field(default_factory=lambda: {a.key: a for a in HAND_ASSETS})
 
     def mesh(self, key: str, size, params=()) -> tuple[MeshPart, ...]:
         w, d, h = size
@@ -115,18 +105,8 @@ def painted(house: House, catalogue) -> LitPages:
         turned = part.mesh.vertices.copy()
         turned[:, :2] = turned[:, :2] @ rotation(part.yaw).T
         uv = np.full((len(turned), 2), [(i + 0.5) / len(parts), 0.5], np.float32)
-        meshes.append(
-            LitMesh(
-                part.owner,
-                part.kind,
-                part.room,
-                0,
-                (turned + part.position).astype(np.float32),
-                part.mesh.faces,
-                uv,
-                float(part.mesh.finish.color[3]),
-            )
-        )
+        vertices, alpha = (turned + part.position).astype(np.float32), float(part.mesh.finish.color[3])
+        meshes.append(LitMesh(part.owner, part.kind, part.room, 0, vertices, part.mesh.faces, uv, alpha))
     return LitPages(tuple(meshes), (page,), "painted")
 
 

@@ -30,7 +30,7 @@ from embodied.assets.built.primitives import (
 from embodied.assets.built.table import BUILDS, read_built_assets, remade
 from embodied.assets.materials import MATERIALS
 from embodied.assets.materials.registry import read_materials
-from embodied.assets.records import ROOM_KINDS, SUPPORTS, Finish
+from embodied.assets.records import Finish
 from embodied.assets.rows import CatalogueError, read_models
 
 
@@ -174,11 +174,7 @@ def test_assets_are_what_the_catalogue_expects():
     for key, m in BUILT_ASSETS.items():
         a = m.asset
         assert a.key == key and a.pack == key.split("/")[0]
-        assert a.support in SUPPORTS and set(a.rooms) <= set(ROOM_KINDS) and min(a.size) > 0
         assert (a.support != "surface") or a.on, f"{key} lies on nothing"
-        for s in a.surfaces:
-            assert s.x0 < s.x1 and s.y0 < s.y1 and 0 < s.z <= a.size[2] + 1e-6 and s.headroom > 0
-            assert max(-s.x0, s.x1) <= a.size[0] / 2 and max(-s.y0, s.y1) <= a.size[1] / 2
 
 
 DIGEST = """

@@ -69,9 +69,8 @@ def placed(world, *actions: int, body: Body = VLNCE, **where) -> ContinuousEnv:
 
 
 def test_steps_and_turns_are_those_of_habitat(world):
-    env = placed(
-        world, HabitatAction.LEFT, HabitatAction.LEFT, HabitatAction.FORWARD, HabitatAction.RIGHT, HabitatAction.FORWARD
-    )
+    left, ahead, right = HabitatAction.LEFT, HabitatAction.FORWARD, HabitatAction.RIGHT
+    env = placed(world, left, left, ahead, right, ahead)
     c, s = (np.array([f(math.radians(30)), f(math.radians(15))]).sum() for f in (np.cos, np.sin))
     assert np.allclose(env.position, [1.5 + 0.25 * c, 3.0 + 0.25 * s]) and not env.collided
     looking = placed(world, *[HabitatAction.UP] * 3, HabitatAction.DOWN, body=Body(looks=True))
@@ -124,9 +123,8 @@ def test_what_is_seen_is_drawn_at_the_pose(world, dataset):
     env = ContinuousGymEnv(replace(dataset, episodes=(episode(world, a=(2.0, 3.0, 0.0)),)))
     before = env.reset()[0]
     after = env.step(HabitatAction.FORWARD)[0]
-    assert np.median(before["depth"][15:17, 15:17]) - np.median(after["depth"][15:17, 15:17]) == pytest.approx(
-        0.25, abs=1e-3
-    )
+    far = [np.median(o["depth"][15:17, 15:17]) for o in (before, after)]
+    assert far[0] - far[1] == pytest.approx(0.25, abs=1e-3)
     assert not np.array_equal(before["rgb"], after["rgb"])
     assert dataset.camera.vfov == pytest.approx(math.pi / 2)
 
@@ -264,14 +262,9 @@ def test_measures_are_those_of_the_published_evaluator_on_the_same_walks(world):
 
 
 def test_stopping_exactly_at_the_radius_is_no_success(world):
-    env = placed(world, HabitatAction.STOP, a=(6.0, 2.0, 0.0), b=(8.0, 2.0, 0.0), radius=2.0)
-    assert env.distance == 2.0 and judged(env.trajectory())["success"] == 0.0
-    assert (
-        judged(placed(world, HabitatAction.STOP, a=(6.0, 2.0, 0.0), b=(8.0, 2.0, 0.0), radius=2.001).trajectory())[
-            "success"
-        ]
-        == 1.0
-    )
+    for radius, success in ((2.0, 0.0), (2.001, 1.0)):
+        env = placed(world, HabitatAction.STOP, a=(6.0, 2.0, 0.0), b=(8.0, 2.0, 0.0), radius=radius)
+        assert env.distance == 2.0 and judged(env.trajectory())["success"] == success
 
 
 def test_habitats_frame_has_y_up_and_agents_look_along_minus_z():

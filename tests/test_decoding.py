@@ -76,24 +76,16 @@ def test_the_files_that_are_written_here_are_read_without_opencv(monkeypatch):
     assert colours(jpeg).shape == (37, 61, 3)
 
 
-@pytest.mark.parametrize(
-    "broken", [b"", b"\xff\xd8\xff\xe0", COLOURS["grey"][:-200], b"\x89PNG\r\n\x1a\n" + bytes(30), b"no picture" * 9]
-)
+@pytest.mark.parametrize("broken", [b"", b"\xff\xd8\xff\xe0", COLOURS["grey"][:-200], b"\x89PNG\r\n\x1a\n" + bytes(30)])
 def test_what_is_no_picture_is_none(broken):
     assert colours(broken) is None
     assert numbers(broken) is None
 
 
-def test_a_second_header_does_not_count():
-    image = np.arange(37 * 61, dtype=np.uint16).reshape(37, 61)
-    data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP])[1].tobytes()
-    flat = data[:20] + bytes(4) + data[24:33] + data[8:]
-    assert numbers(flat) is None
-
-
-def test_damaged_numbers_are_what_opencv_makes_of_them():
+def test_damaged_numbers_are_what_opencv_makes_of_them_and_a_second_header_does_not_count():
     image = np.arange(37 * 61, dtype=np.uint16).reshape(37, 61)
     data = cv2.imencode(".png", image, [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP])[1].tobytes()
     middle = len(data) // 2
     for damaged in (data[:middle], data[:20], data[:middle] + bytes(8) + data[middle + 8 :]):
         assert np.array_equal(numbers(damaged), cv2.imdecode(np.frombuffer(damaged, np.uint8), cv2.IMREAD_ANYDEPTH))
+    assert numbers(data[:20] + bytes(4) + data[24:33] + data[8:]) is None

@@ -85,14 +85,10 @@ def test_impossible_actions_are_refused_and_change_nothing():
     env = HelpEnv({"line": world}, moves=MonocularMoves())
     task = dataclasses.replace(find_tasks(world)[0], start=Pose(0, 6))
     first = env.reset(task)
-    for wrong, words in (
-        (Move(9), "does not exist"),
-        (Move(0), "masked"),
-        (Ask(), "can_ask"),
-        ("left", "expected Move"),
-    ):
+    wrong = ((Move(9), "does not exist"), (Move(0), "masked"), (Ask(), "can_ask"), ("left", "expected Move"))
+    for action, words in wrong:
         with pytest.raises(ActionError, match=words):
-            env.step(wrong)
+            env.step(action)
     assert env.observation == first
     env.step(Stop())
     with pytest.raises(ActionError, match="over"):

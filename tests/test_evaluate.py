@@ -21,21 +21,14 @@ from embodied.records import episodes_file
 
 def test_the_interval_of_independent_values_is_the_textbook_one():
     e = tables.estimate([0, 0, 1, 1], ["a"] * 4)
-    assert e.mean == 0.5 and e.half == pytest.approx(3.182446 * math.sqrt(1 / 3) / 2), (
-        "Student's t of 3 degrees of freedom"
-    )
+    assert e.mean == 0.5
+    assert e.half == pytest.approx(3.182446 * math.sqrt(1 / 3) / 2), "Student's t of 3 degrees of freedom"
 
 
 def test_houses_that_agree_within_themselves_widen_the_interval():
     together = tables.estimate([0, 0, 1, 1], ["a", "a", "b", "b"])
     mixed = tables.estimate([0, 1, 0, 1], ["a", "a", "b", "b"])
     assert together.half == pytest.approx(12.706205 * math.sqrt(2 * 1 / 16 * 2)) and mixed.half == 0
-
-
-def test_few_houses_widen_the_interval_as_students_t_does():
-    """20 houses that differ by one: standard error sqrt(20 / 19 * 20 / 4) / 20, t of 19 degrees of freedom 2.093."""
-    e = tables.estimate([0, 1] * 10, [str(k) for k in range(20)])
-    assert e.half == pytest.approx(2.093024 * math.sqrt(20 / 19 * 20 / 4) / 20)
 
 
 def test_houses_and_training_seeds_both_widen_the_interval():
@@ -122,11 +115,8 @@ def test_the_rows_come_out_as_they_should(kind, tmp_path):
 @pytest.mark.slow
 def test_the_command_prints_and_writes_the_table(tmp_path, capsys):
     data = built(tmp_path / "d")
-    out = tmp_path / "out"
-    assert (
-        main(["evaluate", "hanna", "--data", str(data.folder), "--agent", "shortest", "random walk", "--out", str(out)])
-        == 0
-    )
+    order, out = ["evaluate", "hanna", "--data", str(data.folder), "--agent", "shortest"], tmp_path / "out"
+    assert main([*order, "random walk", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "| shortest | test_unseen | 100.0 ± 36.9 | 100.0 ± 36.9 | 100.0 ± 0.0 | 0.00 ± 0.00 |" in printed
     assert (out / "table.md").read_text().startswith("| agent | split | success (%)")

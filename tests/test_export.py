@@ -51,6 +51,7 @@ def test_the_mjcf_opens_in_dm_control_and_is_whole_there(house, tmp_path, free):
     again = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
     model = mujoco.MjModel.from_xml_path(str(path))
     assert (again.ngeom, again.njnt, again.ncam) == (model.ngeom, len(chosen), len(house.rooms))
+    assert {model.joint(j).name for j in range(model.njnt)} == {name.replace("/", ".") for name in chosen}
     assert {again.geom(g).name for g in range(again.ngeom)} == {model.geom(g).name for g in range(model.ngeom)}
     assert root.find("camera", "living_room_1") is not None
 
@@ -82,13 +83,6 @@ def test_names_that_are_xml_stay_names_in_mjcf(house, tmp_path):
     assert names == [HOSTILE.replace("/", ".")]
     model = mujoco.MjModel.from_xml_path(str(path))
     assert model.body(1).name == HOSTILE.replace("/", ".")
-
-
-def test_a_free_export_has_joints_and_settles(house, tmp_path):
-    free = loose(house, HandCatalogue())
-    path = export_mjcf(house, HandCatalogue(), tmp_path, free=free)
-    model = mujoco.MjModel.from_xml_path(str(path))
-    assert {model.joint(j).name for j in range(model.njnt)} == free
 
 
 OWN = """<mujoco>{}<option timestep="0.001" integrator="RK4" cone="pyramidal"/>
@@ -124,21 +118,9 @@ def test_what_a_user_adds_to_an_exported_house_keeps_its_own_masses_angles_optio
 def test_textures_travel_with_the_folder(house, tmp_path):
     page = np.random.default_rng(0).integers(0, 255, (16, 32, 3), dtype=np.uint8)
     corners = np.array([[0, 0, 1], [1, 0, 1], [1, 1, 1]], np.float32)
-    lit = LitPages(
-        (
-            LitMesh(
-                "rug_1",
-                "object",
-                "living_room_1",
-                0,
-                corners,
-                np.array([[0, 1, 2]], np.int32),
-                np.zeros((3, 2), np.float32),
-            ),
-        ),
-        (page,),
-        "x",
-    )
+    faces, uv = np.array([[0, 1, 2]], np.int32), np.zeros((3, 2), np.float32)
+    mesh = LitMesh("rug_1", "object", "living_room_1", 0, corners, faces, uv)
+    lit = LitPages((mesh,), (page,), "x")
     model = mujoco.MjModel.from_xml_path(str(export_mjcf(house, HandCatalogue(), tmp_path, lit=lit)))
     texture = model.texture("page_0")
     start = int(texture.adr[0])

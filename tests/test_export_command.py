@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from conftest import two_rooms
-from hand_data import build, built, read_features
+from hand_data import boxes_house, build, built, live_among_boxes, read_features
 from handmade import HandCatalogue, furnished
 
 from embodied import cli
@@ -20,7 +20,7 @@ from embodied.cli import export, exports
 from embodied.cli.common import Printed
 from embodied.cli.exports import Export, register_export, registered_exports
 from embodied.datasets.folders import names_of
-from embodied.navigation.graph import build_graph
+from embodied.gym import drive
 from embodied.options import OutputFolder
 from embodied.render.pictures import Unlit
 from embodied.world import open_world
@@ -63,30 +63,15 @@ def test_missing_features_name_the_command_that_makes_them(data, tmp_path, capsy
     assert "add --features" in capsys.readouterr().err
 
 
-def test_a_data_set_of_another_kind_is_refused(data, tmp_path, capsys):
-    assert cli.main(["export", "hanna", "--data", str(data.folder), "--out", str(tmp_path / "out")]) == 2
-    assert "reads data sets of kind 'hanna'" in capsys.readouterr().err
-
-
-def test_parquet_is_written(data, tmp_path):
-    assert cli.main(["export", "parquet", "--data", str(data.folder), "--out", str(tmp_path / "out")]) == 0
-    assert (tmp_path / "out/tasks/train.parquet").exists() and (tmp_path / "out/README.md").exists()
-
-
 @pytest.mark.slow
 @pytest.mark.gl
 def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
-    from embodied.gym import drive
-
-    def house(seed, name, config, catalogue):
-        rooms = dataclasses.replace(furnished(two_rooms()), name=name)
-        return rooms, build_graph(rooms)
-
-    data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=house)
-    unlit = Unlit(size=64)
+    live_among_boxes(monkeypatch)
+    data = build(tmp_path / "data", tmp_path / "cache", "vln", size="1x2", make_house=boxes_house)
     found = drive.data_worlds
-    monkeypatch.setattr(drive, "load_catalogue", lambda _: HandCatalogue())
-    monkeypatch.setattr(drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, unlit))
+    monkeypatch.setattr(
+        drive, "data_worlds", lambda folder, split, cache, _: found(folder, split, cache, Unlit(size=64))
+    )
     order = ["export", "vlnce", "--data", str(data.folder), "--out", str(tmp_path / "out"), "--cache"]
     assert cli.main([*order, str(tmp_path / "cache"), "--tasks", "1", "--width", "64", "--action-noise", "0.1"]) == 0
     rows = [json.loads(line) for line in (tmp_path / "out/samples.jsonl").read_text().splitlines()]
@@ -96,8 +81,6 @@ def test_walks_of_a_data_set_are_written_in_its_houses(tmp_path, monkeypatch):
 
 @pytest.mark.gl
 def test_drives_are_written_in_every_house_of_a_split(data, tmp_path, monkeypatch):
-    from embodied.gym import drive
-
     flat, how = furnished(two_rooms()), {"size": 32, "pictures": "unlit"}
     houses = [dataclasses.replace(flat, name=name) for name in ("left", "right")]
     worlds = {house.name: open_world(house, HandCatalogue(), tmp_path / "cache", **how) for house in houses}

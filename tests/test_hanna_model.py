@@ -20,7 +20,6 @@ from embodied.agents.hanna.inputs import (
     slot_distribution,
     target_similarity,
 )
-from embodied.agents.hanna.lstm import LstmNetwork
 from embodied.agents.hanna.network import HannaNetwork
 from embodied.agents.hanna.training_config import TrainingConfig
 
@@ -134,50 +133,6 @@ def test_actions_that_share_a_view_add_up_in_the_static_distribution():
     assert out[0, 36] == pytest.approx(0.1)
     assert out[0, 12] == pytest.approx(0.9)
     assert out.sum() == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("kind", [HannaNetwork, LstmNetwork])
-def test_what_an_agent_thinks_does_not_depend_on_who_else_is_in_the_batch(kind):
-    net, steps = network(kind), percepts(8, 6, seed=4)
-    together = play(net, steps)
-    for i in range(6):
-        alone = play(net, [p.select(torch.tensor([i])) for p in steps])
-        for a, b in zip(alone, together, strict=True):
-            assert torch.allclose(a.navigation[0], b.navigation[i], atol=1e-5)
-            assert torch.allclose(a.ask[0], b.ask[i], atol=1e-5)
-
-
-@pytest.mark.parametrize("kind", [HannaNetwork, LstmNetwork])
-def test_an_agent_that_leaves_the_batch_changes_nothing_for_the_others(kind):
-    net, steps = network(kind), percepts(6, 4, seed=5)
-    together, stay = play(net, steps), torch.tensor([3, 1])
-    memory = net.start(4, 5)
-    for t, percept in enumerate(steps):
-        if t == 3:
-            memory = tuple(m.select(stay) for m in memory)
-        scores, memory = net(memory, percept if t < 3 else percept.select(stay))
-    assert torch.allclose(scores.navigation, together[-1].navigation[stay], atol=1e-5)
-    assert torch.allclose(scores.ask, together[-1].ask[stay], atol=1e-5)
-
-
-@pytest.mark.parametrize("kind", [HannaNetwork, LstmNetwork])
-def test_padding_of_words_and_actions_is_never_looked_at(kind):
-    net, steps = network(kind), percepts(4, 2, seed=6)
-    padded = []
-    for p in steps:
-        mask = torch.cat([p.action_mask, torch.zeros(2, 3, dtype=torch.bool)], 1)
-        padded.append(
-            dataclasses.replace(
-                p,
-                tokens=torch.cat([p.tokens, torch.zeros(2, 4, dtype=torch.long)], 1),
-                action_mask=mask,
-                actions=torch.cat([p.actions, 100 * torch.ones(2, 3, action_size(FEATURES))], 1),
-                action_slots=torch.cat([p.action_slots, torch.zeros(2, 3, dtype=torch.long)], 1),
-            )
-        )
-    for a, b in zip(play(net, steps), play(net, padded), strict=True):
-        assert torch.allclose(a.navigation, b.navigation[:, :4], atol=1e-5)
-        assert torch.allclose(a.ask, b.ask, atol=1e-5)
 
 
 def changed_history(steps: list[Percept]) -> list[Percept]:

@@ -20,14 +20,7 @@ from embodied.agents.hari.config import ExecutionConfig, IntentionConfig
 from embodied.agents.hari.intention import IntentionRun, counts_of, train, train_step, values
 from embodied.agents.hari.networks import INTENTIONS, RecurrentHead, shown_probabilities
 from embodied.agents.hari.policy import DO, DONE, Choice, Considered, HariPolicy, Reader, carry, consider, policy_of
-from embodied.agents.hari.pretraining import (
-    PretrainingData,
-    _begin,
-    give_subgoal,
-    guided_share,
-    pretrain,
-    pretraining_success,
-)
+from embodied.agents.hari.pretraining import PretrainingData, guided_share, pretrain, pretraining_success
 from embodied.agents.hari.pretraining import train_step as lesson
 from embodied.agents.hari.rules import RULES, RandomWithBudgets, RuleAgent, RuleMoment
 from embodied.agents.hari.run import TEST
@@ -141,23 +134,6 @@ def test_stopping_is_the_last_column_of_every_agent_and_padding_is_not_allowed()
 
 
 # Networks ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_an_agent_thinks_the_same_alone_and_beside_others():
-    world = grid_world()
-    words, moves, say = words_of(world), PanoramicMoves(), Describer(())
-    network = new_executor(SMALL, words).network.eval()
-    some = [
-        percept(words, say.dense(world, v), say.dense(world, 3), moves.at(world, Pose(v))[0], 0) for v in (0, 14, 20)
-    ]
-    with torch.inference_mode():
-        belief, log_moves = network(network.begin(3), collate(some))
-        for i, p in enumerate(some):
-            alone, log_alone = network(network.begin(1), collate([p]))
-            torch.testing.assert_close(belief[i], alone[0], rtol=1e-4, atol=1e-5)
-            torch.testing.assert_close(log_moves[i, : len(p.moves) - 1], log_alone[0, :-1], rtol=1e-4, atol=1e-5)
-    torch.testing.assert_close(log_moves.exp().sum(1), torch.ones(3))
 
 
 def test_what_the_intention_policy_is_shown_begins_with_stopping_and_falls():
@@ -306,20 +282,6 @@ def test_a_walk_that_is_wholly_guided_takes_only_right_moves():
     executor = new_executor(dataclasses.replace(SMALL, guided=1.0, iterations=10**9), words_of(fork_world()))
     optimizer = torch.optim.Adam(executor.network.parameters(), 1e-4)
     assert [lesson(executor, optimizer, source, u)["steps"] for u in range(3)] == [2 * SMALL.batch] * 3, "go, stop"
-
-
-def test_a_walk_with_a_subgoal_from_the_beginning_goes_no_farther():
-    world, source = grid_data()
-    for longest in (1, 2, 3):
-        for task in source.training:
-            walk = _begin(source, task, np.random.default_rng(0))
-            far = int(world.graph.hops[task.start.node, task.goal_nodes[0]])
-            give_subgoal(walk, source.describer, longest)
-            (target,) = walk.task.goal_nodes
-            steps = min(longest, (far + 1) // 2)
-            assert world.graph.hops[task.start.node, target] == steps
-            if steps == 1:
-                assert walk.goal == source.describer.step(world, task.start.node, target)
 
 
 @pytest.mark.parametrize("reset", [False, True])

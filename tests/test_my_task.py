@@ -14,8 +14,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from hand_data import hand_house, paint
-from hand_worlds import generated, grid_world
+from hand_data import hand_house, live_among_boxes, paint
+from hand_worlds import grid_world
 
 from embodied.agents.language_models.observations import observation_in_words
 from embodied.agents.studies.engine import run_study
@@ -28,7 +28,6 @@ from embodied.evaluation.rollout import play
 from embodied.interface import Move, Stop, act
 from embodied.kinds.metrics import spl, success
 from embodied.kinds.task_kind import TaskKind, kind_named, register_kind
-from embodied.navigation.graph import build_graph
 from embodied.render.pictures import Baked
 from embodied.serve.game import Game, set_table
 from embodied.serve.store import Event
@@ -140,16 +139,10 @@ def test_it_is_exported(data, tmp_path):
     assert main([*order, "--tasks", "2"]) == 0
 
 
-def furnished_house(seed, name, config, catalogue):
-    """A house of the generator, the same every time."""
-    house = dataclasses.replace(generated(100), name=name)
-    return house, build_graph(house)
-
-
 @pytest.mark.slow
 @pytest.mark.gl
 def test_its_episodes_are_recorded(tmp_path, monkeypatch):
-    monkeypatch.setattr(build, "make_dataset_house", furnished_house)
+    live_among_boxes(monkeypatch)
     data, run = str(tmp_path / "data"), str(tmp_path / "run")
     order = ["dataset", NAME, "--out", data, "--houses", "1", "--tasks", "4", "--pictures", "none", "--workers", "1"]
     assert main(order) == 0
