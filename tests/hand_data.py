@@ -51,6 +51,13 @@ def small_house(seed, name, config, catalogue):
     return world.house, world.graph
 
 
+def drawn_house(*facts):
+    """`small_house` with things that can be drawn."""
+    house, graph = small_house(*facts)
+    things = tuple(dataclasses.replace(p, asset="built/mug_black") for p in house.placements)
+    return dataclasses.replace(house, placements=things), graph
+
+
 def boxes_house(seed, name, config, catalogue):
     """The furnished two rooms, which the catalogue made by hand can draw."""
     house = dataclasses.replace(furnished(two_rooms()), name=name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -58,18 +59,26 @@ def test_shared_caches_that_lead_back_or_are_not_there_do_no_harm(tmp_path, monk
     assert f"EMBODIED_CACHE names {tmp_path / 'nowhere'}, which is left out: " in caplog.text
 
 
-UNPRIVILEGED = ["setpriv", "--bounding-set", "-all", "--inh-caps", "-all"]
+UNPRIVILEGED = ["setpriv", "--bounding-set", "-all", "--inh-caps", "-all"] if os.geteuid() == 0 else []
 """Before a command: root obeys the modes of files, and may not change what somebody else owns."""
 
 
 @pytest.fixture
-def filled(tmp_path, shared_cache):
-    """A cache that holds what one house needs; nobody may write there, and root's folders are somebody else's."""
+def order(tmp_path) -> list[str]:
+    """The command that makes a house of one small room."""
+    hall = {"kind": "hall", "polygon": [[0, 0], [3, 0], [3, 3], [0, 3]]}
+    (tmp_path / "plan.json").write_text(json.dumps({"rooms": [hall]}))
+    return ["house", "--plan", str(tmp_path / "plan.json")]
+
+
+@pytest.fixture
+def filled(tmp_path, shared_cache, order):
+    """A cache that holds what the house needs; nobody may write there, and root's folders are somebody else's."""
     folder = tmp_path / "cache"
     for name in ("assets", "collision", "landscapes", "materials"):
         (shared_cache / name).mkdir(parents=True, exist_ok=True)
         caches.link(shared_cache / name, folder / name)
-    assert main([*ORDER, "--out", str(tmp_path / "first"), "--cache", str(folder)]) == 0
+    assert main([*order, "--out", str(tmp_path / "first"), "--cache", str(folder)]) == 0
     (tmp_path / "empty").mkdir()
     folders = [tmp_path / "empty", folder, *(p for p in folder.rglob("*") if p.is_dir())]
     for path in folders:
@@ -81,25 +90,23 @@ def filled(tmp_path, shared_cache):
         path.chmod(0o755)
 
 
-ORDER = ("house", "--seed", "7", "--area", "38", "46")
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(os.geteuid() == 0 and not shutil.which("setpriv"), reason="root may write everywhere")
-def test_somebody_who_may_only_read_the_cache_reads_it_or_is_told_and_puts_their_own_before_it(filled, tmp_path):
-    def house(out: str, cache: str) -> subprocess.CompletedProcess[str]:
-        words = [sys.executable, "-m", "embodied", *ORDER, "--out", str(tmp_path / out)]
+def test_somebody_who_may_only_read_the_cache_reads_it_or_is_told_and_puts_their_own_before_it(filled, tmp_path, order):
+    def ran(*words: str, cache: str) -> subprocess.CompletedProcess[str]:
         env = os.environ | {"EMBODIED_CACHE": cache, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-        before = UNPRIVILEGED if os.geteuid() == 0 else []
-        return subprocess.run([*before, *words], capture_output=True, text=True, env=env, cwd=tmp_path)
+        command = [*UNPRIVILEGED, sys.executable, *words]
+        return subprocess.run(command, capture_output=True, text=True, env=env, cwd=tmp_path)
 
     held = {p: p.lstat().st_mtime_ns for p in sorted(filled.rglob("*"))}
     for out, cache in (("alone", str(filled)), ("behind", f"{tmp_path / 'mine'}{os.pathsep}{filled}")):
-        ran = house(out, cache)
-        assert ran.returncode == 0, ran.stderr
+        done = ran("-m", "embodied", *order, "--out", str(tmp_path / out), cache=cache)
+        assert done.returncode == 0, done.stderr
         assert (tmp_path / out / "house.json").read_bytes() == (tmp_path / "first" / "house.json").read_bytes()
     assert {p: p.lstat().st_mtime_ns for p in sorted(filled.rglob("*"))} == held
     filled.chmod(0o000)
-    for cache in (filled, tmp_path / "empty"):
-        ran = house("refused", str(cache))
-        assert ran.returncode == 2 and str(cache) in ran.stderr and "Traceback" not in ran.stderr, ran.stderr
+    refused = [[*order, "--out", "x", "--cache", str(cache)] for cache in (filled, tmp_path / "empty")]
+    both = f"from embodied.cli import main\nprint([main(order) for order in {refused}])"
+    done = ran("-c", both, cache=str(tmp_path / "mine"))
+    assert done.stdout == "[2, 2]\n" and "Traceback" not in done.stderr, done.stderr
+    assert all(str(cache) in done.stderr for cache in (filled, tmp_path / "empty"))

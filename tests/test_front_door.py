@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import doctest
 import json
 import subprocess
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hand_data import built, small_house
+from hand_data import built, drawn_house
 
 import embodied
 from embodied.assets.built import BASICS
@@ -52,13 +51,6 @@ def test_import_embodied_and_help_load_nothing_heavy_and_names_are_completed():
     assert embodied.__version__.split(".")[0].isdigit()
     with pytest.raises(AttributeError, match="it offers"):
         embodied.nothing  # noqa: B018  the access is the test
-
-
-def drawn_house(*facts):
-    """small_house with things that can be drawn."""
-    house, graph = small_house(*facts)
-    things = tuple(dataclasses.replace(p, asset="built/mug_black") for p in house.placements)
-    return dataclasses.replace(house, placements=things), graph
 
 
 @pytest.mark.slow

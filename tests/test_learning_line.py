@@ -10,7 +10,7 @@ import shlex
 import numpy as np
 import pytest
 import torch
-from hand_data import COMPACT, built, noise_features, random_encoder, validations_of
+from hand_data import COMPACT, built, noise_features, random_encoder, small_house, validations_of
 
 from embodied import options
 from embodied.agents.common.shipped import SHIPPED_AGENT, WEIGHTS
@@ -52,7 +52,7 @@ def parsed(kind, *words):
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
     """A tiny data set on grids, with features of the untrained encoder that are not computed but drawn."""
-    data = built(tmp_path_factory.mktemp("line") / "data", ood=1)
+    data = built(tmp_path_factory.mktemp("line") / "data", make_house=small_house, ood=1)
     noise_features(data)
     return data
 
@@ -107,8 +107,7 @@ def study(data, tmp_path_factory):
     """A study of the smallest agents on the hand-made data set, with features of an encoder on disk, run once."""
     folder = tmp_path_factory.mktemp("study")
     save_encoder(random_encoder(seed=1), folder / "encoder.safetensors")
-    encoder = load_encoder(folder / "encoder.safetensors")
-    noise_features(data, encoder)
+    noise_features(data, load_encoder(folder / "encoder.safetensors"))
     words = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL)
     config = dataclasses.replace(words.config, iterations=2)
     learner = HannaStudy(

@@ -83,7 +83,7 @@ def jpeg(image: rr.EncodedImage) -> str:
 
 
 def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_shown(
-    shared_cache, tmp_path, monkeypatch, capsys
+    world, shared_cache, tmp_path, monkeypatch, capsys
 ):
     """`embodied demo` in a small flat without light; the trained agent's recording shows what its features come from,
     the world's own pictures, and what it recognises in each."""
@@ -104,8 +104,8 @@ def test_the_demo_records_two_walks_and_its_agent_sees_the_panoramas_that_are_sh
     monkeypatch.setattr(features, "strip_of", lambda p: (fed.append(p), strip_of(p))[1])
     monkeypatch.setattr(recording, "log_sight", lambda r, v, pose: (poses.append(pose), log_sight(r, v, pose))[1])
     monkeypatch.setattr(rr.RecordingStream, "log", watched_log)
-    make, find, found = generate.generate_house, demo.find_something, []
-    monkeypatch.setattr(generate, "generate_house", lambda seed, catalogue: make(seed, SMALL, catalogue))
+    find, found = demo.find_something, []
+    monkeypatch.setattr(generate, "generate_house", lambda seed, catalogue: world.house)
 
     def kept(args, world, viewers):
         facts = find(args, world, viewers)

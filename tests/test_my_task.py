@@ -14,7 +14,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from hand_data import hand_house, live_among_boxes, paint
+from hand_data import drawn_house, hand_house, paint
 from hand_worlds import grid_world
 
 from embodied.agents.language_models.observations import observation_in_words
@@ -142,7 +142,7 @@ def test_it_is_exported(data, tmp_path):
 @pytest.mark.slow
 @pytest.mark.gl
 def test_its_episodes_are_recorded(tmp_path, monkeypatch):
-    live_among_boxes(monkeypatch)
+    monkeypatch.setattr(build, "make_dataset_house", drawn_house)
     data, run = str(tmp_path / "data"), str(tmp_path / "run")
     order = ["dataset", NAME, "--out", data, "--houses", "1", "--tasks", "4", "--pictures", "none", "--workers", "1"]
     assert main(order) == 0

@@ -11,19 +11,19 @@ from embodied.generate import HouseConfig, generate_house
 from embodied.generate.requirements import missing_requirements
 
 
-def test_a_house_without_models_lacks_nothing_and_is_the_same_every_time(tmp_path, monkeypatch):
+def test_a_house_without_models_lacks_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(packs, "SYSTEM_FOLDER", tmp_path / "none")
     monkeypatch.setattr(packs, "OWN_FOLDER", tmp_path / "none")
     monkeypatch.setattr(packs, "WHEEL", "no_such_package")
     _tell_once.cache_clear()
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        first, again = (generate_house(3, HouseConfig(area=(32, 40)), load_catalogue(tmp_path)) for _ in range(2))
-    assert first.digest == again.digest and not missing_requirements(first)
+        house, again = generate_house(3, HouseConfig(area=(32, 40)), load_catalogue(tmp_path)), load_catalogue(tmp_path)
+    assert not missing_requirements(house)
     assert sum("no furniture models" in str(w.message) for w in told) == 1
-    assert {"sofa", "bed", "toilet"} <= {p.object_class for p in first.placements}
-    assert any(p.asset in BASICS for p in first.placements)
-    assert all(p.asset in load_catalogue(tmp_path).assets for p in first.placements)
+    assert {"sofa", "bed", "toilet"} <= {p.object_class for p in house.placements}
+    assert any(p.asset in BASICS for p in house.placements)
+    assert all(p.asset in again.assets for p in house.placements)
 
 
 def test_with_models_no_house_holds_simple_furniture(two_room_house):

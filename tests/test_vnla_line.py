@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from hand_data import COMPACT, built, noise_features, validations_of
+from hand_data import COMPACT, built, noise_features, small_house, validations_of
 
 from embodied.agents.vnla.agent import VnlaAgent
 from embodied.cli import main
@@ -22,7 +22,8 @@ SMALL = [
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    data = built(tmp_path_factory.mktemp("vnla") / "data", "vnla")
+    """A tiny data set with features of the untrained encoder that are not computed but drawn."""
+    data = built(tmp_path_factory.mktemp("vnla") / "data", "vnla", make_house=small_house)
     noise_features(data)
     return data
 
