@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from embodied.assets.built.primitives import box, part
 from embodied.assets.records import Asset, Finish, MeshPart, SupportSurface
 from embodied.geometry import rotation
 from embodied.house.house import House, Placement
@@ -19,23 +20,7 @@ RED, GREEN, BLUE, WOOD = (0.9, 0.05, 0.05, 1.0), (0.05, 0.8, 0.1, 1.0), (0.1, 0.
 
 def box_mesh(low, high, color) -> MeshPart:
     """An axis-aligned box with its corners at `low` and `high`."""
-    faces, vertices, normals = [], [], []
-    low, high = np.asarray(low, float), np.asarray(high, float)
-    for axis in range(3):
-        for side in (0, 1):
-            u, v = (axis + 1) % 3, (axis + 2) % 3
-            quad = np.zeros((4, 3))
-            quad[:, axis] = (low, high)[side][axis]
-            quad[:, u] = [low[u], high[u], high[u], low[u]]
-            quad[:, v] = [low[v], low[v], high[v], high[v]]
-            order = [0, 1, 2, 0, 2, 3] if side else [0, 2, 1, 0, 3, 2]
-            faces.append(np.array(order).reshape(2, 3) + len(vertices) * 4)
-            vertices.append(quad)
-            normals.append(np.tile(np.eye(3)[axis] * (1 if side else -1), (4, 1)))
-    vertices, normals = (np.concatenate(a).astype(np.float32) for a in (vertices, normals))
-    return MeshPart(
-        vertices, np.concatenate(faces).astype(np.int32), normals, np.zeros((24, 2), np.float32), Finish(color)
-    )
+    return part(Finish(color), box(low, high))
 
 
 def _asset(key: str, object_class: str, size, support: str = "floor", surfaces=()) -> Asset:
@@ -100,13 +85,13 @@ def painted(house: House, catalogue) -> LitPages:
     """Lit pages without a bake: every part evenly in its own colour, one texel block each."""
     parts = [p for p in house_parts(house, catalogue) if len(p.mesh.faces)]
     page, meshes = np.zeros((8, 8 * len(parts), 3), np.uint8), []
-    for i, part in enumerate(parts):
-        page[:, 8 * i : 8 * i + 8] = np.rint(255 * np.array(part.mesh.finish.color[:3]))
-        turned = part.mesh.vertices.copy()
-        turned[:, :2] = turned[:, :2] @ rotation(part.yaw).T
+    for i, piece in enumerate(parts):
+        page[:, 8 * i : 8 * i + 8] = np.rint(255 * np.array(piece.mesh.finish.color[:3]))
+        turned = piece.mesh.vertices.copy()
+        turned[:, :2] = turned[:, :2] @ rotation(piece.yaw).T
         uv = np.full((len(turned), 2), [(i + 0.5) / len(parts), 0.5], np.float32)
-        vertices, alpha = (turned + part.position).astype(np.float32), float(part.mesh.finish.color[3])
-        meshes.append(LitMesh(part.owner, part.kind, part.room, 0, vertices, part.mesh.faces, uv, alpha))
+        vertices, alpha = (turned + piece.position).astype(np.float32), float(piece.mesh.finish.color[3])
+        meshes.append(LitMesh(piece.owner, piece.kind, piece.room, 0, vertices, piece.mesh.faces, uv, alpha))
     return LitPages(tuple(meshes), (page,), "painted")
 
 

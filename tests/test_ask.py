@@ -292,14 +292,6 @@ def test_the_oracle_of_asking_improves_on_the_rule_that_it_thinks_ahead_with(wor
     )
 
 
-def test_thinking_ahead_changes_nothing_in_the_episode(tasks, make_env):
-    env = make_env()
-    env.reset(tasks[0])
-    before = (len(env._steps), env.time, env.pose, env._fitting, set(env._denied))
-    Foresight(make_env)._value(env, env.observation, EpisodeMemory(), Intention.APPEARANCE, np.random.default_rng(0))
-    assert (len(env._steps), env.time, env.pose, env._fitting, set(env._denied)) == before
-
-
 def test_the_learned_asker_learns_a_rule_from_what_the_agent_knows(world, tasks, make_env):
     """It is taught that asking for the way at once is worth most, and does so."""
     known = np.stack([facts(make_env().reset(t), EpisodeMemory()) for t in tasks])

@@ -47,12 +47,6 @@ def catalogue(shared_cache):
 # the reviewed catalogue
 
 
-def test_catalogue_has_enough_classes_and_models():
-    pack = [a for a in load_catalogue().assets.values() if not a.key.startswith("built/")]
-    assert len(pack) >= 400
-    assert len(load_catalogue().classes) >= 289
-
-
 def test_every_word_of_the_catalogue_is_legal():
     catalogue = load_catalogue()
     classes = set(catalogue.classes) | set(json.loads((DATA / "classes.json").read_text()))
@@ -146,12 +140,6 @@ def test_a_lamp_shines_from_where_its_mesh_glows(catalogue, key):
 def test_mesh_is_stretched_to_the_size_asked_for(catalogue):
     low, high = bounds(catalogue.mesh("scopia/toaster", (0.5, 0.2, 0.4)))
     np.testing.assert_allclose(high - low, (0.5, 0.2, 0.4), atol=0.01)
-
-
-def test_import_is_the_same_every_time(catalogue, tmp_path):
-    for a, b in zip(catalogue.mesh(SOME[0]), load_catalogue(tmp_path).mesh(SOME[0]), strict=True):
-        for field in ("vertices", "faces", "normals", "uv"):
-            np.testing.assert_array_equal(getattr(a, field), getattr(b, field))
 
 
 @pytest.mark.slow

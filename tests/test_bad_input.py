@@ -193,16 +193,24 @@ DRAWING = [
 ]
 
 
-@pytest.mark.parametrize("words", DRAWING)
-def test_a_machine_without_a_renderer_is_told_before_any_work(words, capsys, tmp_path, monkeypatch):
-    unable(monkeypatch, "embodied.gl.info", GLError("neither EGL nor OSMesa works here"))
-    refused_at_once(words, "neither EGL nor OSMesa works", capsys, tmp_path, monkeypatch)
+LIGHTING = [*(w for w in DRAWING if "unlit" not in w and "render" not in w), ("light", "house")]
+NO_RENDERER = "embodied.gl.info", GLError("neither EGL nor OSMesa works here")
+NO_LIGHT = "embodied.light.backend.mitsuba", LightError("light needs mitsuba")
 
 
-@pytest.mark.parametrize("words", [*(w for w in DRAWING if "unlit" not in w and "render" not in w), ("light", "house")])
-def test_a_machine_that_cannot_light_is_told_before_any_work(words, capsys, tmp_path, monkeypatch):
-    unable(monkeypatch, "embodied.light.backend.mitsuba", LightError("light needs mitsuba"))
-    refused_at_once(words, "light needs mitsuba", capsys, tmp_path, monkeypatch)
+@pytest.mark.parametrize(("words", "lacks"), [*((w, NO_RENDERER) for w in DRAWING), *((w, NO_LIGHT) for w in LIGHTING)])
+def test_a_machine_that_cannot_draw_or_light_is_told_before_any_work(words, lacks, capsys, tmp_path, monkeypatch):
+    unable(monkeypatch, *lacks)
+    late = AssertionError("work was done first")
+    for function in ("generate.generate_house", "datasets.build.build_dataset", "world.open_folder"):
+        unable(monkeypatch, f"embodied.{function}", late)
+    (tmp_path / "house").mkdir()
+    (tmp_path / "house/house.json").write_text("{}")
+    places = [str(tmp_path / w) if w == "house" else w for w in words]
+    if words[0] in ("demo", "dataset"):
+        places += ["--out", str(tmp_path / "out")]
+    assert str(lacks[1]) in said(capsys, *places, "--cache", str(tmp_path / "cache"))
+    assert [p.name for p in tmp_path.iterdir()] == ["house"]
 
 
 def unable(monkeypatch, function, error):
@@ -212,20 +220,6 @@ def unable(monkeypatch, function, error):
         raise error
 
     monkeypatch.setattr(function, fail)
-
-
-def refused_at_once(words, message, capsys, tmp_path, monkeypatch):
-    """`embodied words` says `message` before it opens or makes a house, and writes nothing."""
-    late = AssertionError("work was done first")
-    for function in ("generate.generate_house", "datasets.build.build_dataset", "world.open_folder"):
-        unable(monkeypatch, f"embodied.{function}", late)
-    (tmp_path / "house").mkdir()
-    (tmp_path / "house/house.json").write_text("{}")
-    places = [str(tmp_path / w) if w == "house" else w for w in words]
-    if words[0] in ("demo", "dataset"):
-        places += ["--out", str(tmp_path / "out")]
-    assert message in said(capsys, *places, "--cache", str(tmp_path / "cache"))
-    assert [p.name for p in tmp_path.iterdir()] == ["house"]
 
 
 @pytest.mark.slow

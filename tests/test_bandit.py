@@ -10,7 +10,7 @@ import sacrebleu
 import torch
 
 from embodied.agents.bandit.bleu import corpus_bleu, sentence_bleu
-from embodied.agents.bandit.ratings import CLEAN, Rater, deviation, granular, skewed
+from embodied.agents.bandit.ratings import Rater, deviation, granular, skewed
 from embodied.agents.common.losses import Decisions, actor_loss, advantages, critic_loss
 from embodied.agents.common.session import DivergedError, descend
 from embodied.seeds import stream
@@ -90,15 +90,6 @@ def test_skew_by_hand_and_without_variance():
     assert skewed(0.3, 4) == pytest.approx(0.0081)  # "a score of 0.3 is suppressed to be less than 0.08" (3.1.6.2)
     assert skewed(0.25, 0.5) == pytest.approx(0.5)
     assert {Rater(skew=2).rate(0.5, rng=stream(i, "x")) for i in range(5)} == {0.25}
-
-
-def test_granular_ratings_of_uniform_scores_have_their_mean_and_variance():
-    """g = 1: half of them 0, half 1, so that mean 1/2 and variance 1/4; no rater: 1/2 and 1/12."""
-    scores, rng = (np.arange(1000) + 0.5) / 1000, stream(0, "x")
-    coarse = np.array([Rater(granularity=1).rate(s, rng=rng) for s in scores])
-    clean = np.array([CLEAN.rate(s, rng=rng) for s in scores])
-    assert (coarse.mean(), coarse.var()) == (pytest.approx(0.5), pytest.approx(0.25))
-    assert (clean.mean(), clean.var()) == (pytest.approx(0.5), pytest.approx(1 / 12, rel=1e-3))
 
 
 def test_raters_refuse_negative_settings():

@@ -46,7 +46,6 @@ from embodied.agents.hanna.training_config import HANNA_SCALES
 from embodied.agents.hari import agent as hari
 from embodied.agents.iliad.nav.stages import config_of
 from embodied.agents.iliad.regex.run import load_student
-from embodied.agents.language_models.prompts import read_prompt
 from embodied.agents.vision.config import PLAIN
 from embodied.agents.vision.features import load_features, save_features
 from embodied.agents.vision.labels import HouseStrips
@@ -509,24 +508,23 @@ def test_pictures_are_read_through_what_knows_their_size():
 
 DEEP = "[" * 5000 + "]" * 5000
 ROOM = '{"kind": "hall", "polygon": [[0, 0], [%s, 0], [%s, 6], [0, 6]]}'
+TOML = [load_study, lambda path: furniture_tables((path,)), read_toml], r"a\.txt.*expected TOML"
+PLAN = [load_plan], r"a\.txt"
+WORDS = [read_toml], r"a\.txt:[12]: not UTF-8"
+TEXTS = [
+    *((TOML, f"a = {value}") for value in (DEEP, "[" * 60 + "]" * 60, "1\na = 2", "9" * 9000)),
+    *(
+        (PLAN, f'{{"rooms": [{r}]}}')
+        for r in (DEEP, ROOM % (("1" + "0" * 400,) * 2), ", ".join([ROOM % (2, 2)] * 5000))
+    ),
+    *((WORDS, body) for body in (b"\xff\xfea\x00b\x00", b"abc\n\xe9t\xe9\n")),
+]
 
 
-@pytest.mark.parametrize("body", [f"a = {DEEP}", "a = " + "[" * 60 + "]" * 60, "a = 1\na = 2", "a = " + "9" * 9000])
-@pytest.mark.parametrize("read", [load_study, lambda path: furniture_tables((path,)), read_toml])
-def test_toml_that_is_deep_or_none_is_refused_by_name(read, body, tmp_path):
-    with pytest.raises(ValueError, match=r"a\.toml.*expected TOML"):
-        read(written(tmp_path / "a.toml", body))
-
-
-@pytest.mark.parametrize("room", [DEEP, ROOM % (("1" + "0" * 400,) * 2), ", ".join([ROOM % (2, 2)] * 5000)])
-def test_a_floor_plan_is_read_as_strictly_as_all_json(room, tmp_path):
-    with pytest.raises(ValueError, match=r"plan\.json"):
-        load_plan(written(tmp_path / "plan.json", f'{{"rooms": [{room}]}}'))
-
-
-@pytest.mark.parametrize("body", [b"\xff\xfea\x00b\x00", b"abc\n\xe9t\xe9\n"])
-@pytest.mark.parametrize("read", [read_toml, lambda path: read_prompt("a", (), path.parent)])
-def test_a_text_that_is_not_utf_8_is_named_with_its_line(read, body, tmp_path):
-    (tmp_path / "a.md").write_bytes(body)
-    with pytest.raises(ValueError, match=r"a\.md:[12]: not UTF-8"):
-        read(tmp_path / "a.md")
+@pytest.mark.parametrize(("kind", "body"), TEXTS)
+def test_a_text_that_is_deep_huge_or_none_is_refused_by_name(kind, body, tmp_path):
+    readers, message = kind
+    (tmp_path / "a.txt").write_bytes(body if isinstance(body, bytes) else body.encode())
+    for read in readers:
+        with pytest.raises(ValueError, match=message):
+            read(tmp_path / "a.txt")

@@ -10,12 +10,9 @@ from hand_worlds import grid_world, line_world
 
 from embodied.action_spaces import MonocularMoves, PanoramicMoves, nearest_views
 from embodied.envs.base import ActionError, HelpEnv, TaskError
-from embodied.evaluation.rollout import play
 from embodied.interface import Ask, Move, Pose, Stop
-from embodied.kinds import metrics
 from embodied.language.plain_language import PlainLanguage
 from embodied.navigation.graph import count_hops
-from embodied.policies.baselines import Forward10, RandomWalk, Shortest
 from embodied.tasks.find import find_pool, find_task
 from embodied.tasks.goals import find_instances
 
@@ -47,37 +44,6 @@ def test_path_lengths_keep_the_limits():
     for t in find_tasks(world, 1000):
         nearest = min(t.goal_nodes, key=lambda g: (world.graph.distance[t.start.node, g], g))
         assert 4 <= hops[t.start.node, nearest] + 1 <= 15
-
-
-def test_the_expert_solves_everything_and_chance_does_not():
-    world = grid_world()
-    tasks, make = find_tasks(world, 60), lambda: HelpEnv({"grid": world})
-    expert = play(make, Shortest(), tasks, seed=0)
-    assert all(metrics.success(e, world.graph) == 1 and metrics.spl(e, world.graph) == pytest.approx(1) for e in expert)
-    for policy in (RandomWalk(), Forward10()):
-        assert np.mean([metrics.success(e, world.graph) for e in play(make, policy, tasks, seed=0)]) < 0.4
-
-
-def test_order_and_batch_do_not_matter():
-    world = grid_world()
-    tasks, make = find_tasks(world, 32), lambda: HelpEnv({"grid": world})
-    alone = play(make, RandomWalk(), tasks, seed=5, batch=1)
-    assert alone == play(make, RandomWalk(), tasks, seed=5, batch=32)
-    assert alone == play(make, RandomWalk(), tasks[::-1], seed=5, batch=7)[::-1]
-    assert alone != play(make, RandomWalk(), tasks, seed=6, batch=1)
-
-
-def test_nothing_but_the_request_tells_two_tasks_apart():
-    world = grid_world()
-    one, *_ = find_tasks(world)
-    two = next(t for t in find_tasks(world, 100) if t.goal_nodes != one.goal_nodes)
-    two = dataclasses.replace(two, start=one.start, request=one.request)
-    a, b = HelpEnv({"grid": world}), HelpEnv({"grid": world})
-    seen, rng = [(a.reset(one), b.reset(two))], np.random.default_rng(0)
-    for _ in range(12):
-        move = Move(int(rng.integers(len(seen[-1][0].candidates))))
-        seen.append((a.step(move), b.step(move)))
-    assert all(x == y for x, y in seen)
 
 
 def test_impossible_actions_are_refused_and_change_nothing():

@@ -10,7 +10,6 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
-import stable_baselines3
 from gymnasium.utils.env_checker import check_env
 from hand_data import DATA_KINDS
 from hand_worlds import grid_world
@@ -158,17 +157,6 @@ def test_too_many_candidates_are_an_error_that_names_the_remedy(tmp):
     env = make("find", tmp, layout=SpaceLayout(candidates=1))
     with pytest.raises(ValueError, match="enlarge SpaceLayout"):
         env.reset(seed=0)
-
-
-@pytest.mark.slow
-def test_a_learner_off_the_shelf_trains_on_it(tmp):
-    env = make("find", tmp, shaping=True)
-    model = stable_baselines3.PPO("MultiInputPolicy", env, n_steps=64, batch_size=64, n_epochs=1, seed=0, device="cpu")
-    before = [p.detach().clone() for p in model.policy.parameters()]
-    model.learn(200)
-    assert any((a != b).any() for a, b in zip(before, model.policy.parameters(), strict=True))
-    action, _ = model.predict(env.reset(seed=1)[0])
-    assert env.action_space.contains(int(action))
 
 
 @pytest.mark.slow

@@ -124,21 +124,6 @@ def test_asking_again_on_a_route_replaces_the_message():
     assert o.mode is Mode.SUB and o.time_on_task == 0 and env.pose.node == 1
 
 
-def test_the_goal_shows_only_after_help():
-    """Truth 4: equal observations under equal actions until an assistant speaks."""
-    _world, _, tasks, make = grid_setup()
-    one = tasks[0]
-    two = next(t for t in tasks if t.goal_nodes != one.goal_nodes)
-    two = dataclasses.replace(two, start=one.start, request=one.request)
-    a, b, rng = make(), make(), np.random.default_rng(1)
-    x, y = a.reset(one), b.reset(two)
-    for _ in range(30):
-        assert x == y
-        move = Move(int(rng.integers(len(x.candidates))))
-        x, y = a.step(move), b.step(move)
-    assert any(s.can_ask for s in a._steps), "the walk met somebody, and still nothing differed"
-
-
 # Agents
 
 
@@ -159,16 +144,6 @@ def test_perfect_interpretation_beats_chance_by_far():
         for p in (PerfectInterpreter(), RandomWalk())
     ]
     assert rates[0] > 0.7 and rates[1] < 0.2
-
-
-@pytest.mark.slow
-def test_help_does_not_depend_on_the_batch_around_it():
-    _, _, tasks, make = grid_setup(33)
-    policy = PrivilegedAsking(Shortest(), ask_at_random)
-    alone = play(make, policy, tasks, seed=4)
-    assert alone == play(make, policy, tasks, seed=4, batch=32)
-    assert alone == play(make, policy, tasks[::-1], seed=4, batch=5)[::-1]
-    assert sum(e.requests for e in alone) > 0
 
 
 # Routes
