@@ -207,17 +207,6 @@ def networks() -> tuple[Translator, Critic]:
 SOURCE = [[3, 4, 5, 2], [6, 2], [7, 8, 9, 10, 11, 2]]
 
 
-def test_padding_changes_nothing():
-    said = [[5, 6, 2], [7, 2], [3, 3, 3, 4, 2]]
-    for network in networks():
-        together = network(padded(SOURCE), padded(said))
-        for row, (source, words) in enumerate(zip(SOURCE, said, strict=True)):
-            alone = network(padded([source]), padded([words]))[0]
-            assert torch.allclose(together[row, : len(words)], alone, atol=1e-6)
-    translator, _ = networks()
-    assert not translator(padded(SOURCE), padded(said))[1, 2:].any()
-
-
 def word_by_word(network: EncoderDecoder, source: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
     """What `read` computes, by `step` with all sentences to the end."""
     encoded, now = network.encode(source)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 
-import numpy as np
-
-from embodied.bench import light, timing, views, world
+from embodied.bench import light, timing, world
 from embodied.cli import main
-from embodied.render.panorama import Panorama
 
 
 def test_every_part_that_is_named_is_measured(tmp_path, monkeypatch, capsys):
@@ -20,13 +16,3 @@ def test_every_part_that_is_named_is_measured(tmp_path, monkeypatch, capsys):
     assert main(["bench", "light", "houses", "--cache", str(tmp_path), "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["light"] == {"rows": []} and [m["value"] for m in facts["measures"]] == [2.0]
-
-
-def test_views_turn_round_and_round():
-    """On a fast machine, a measurement looks more than twice around."""
-    rgb, none = np.zeros((6, 8, 8, 3), np.uint8), np.zeros((6, 8, 8), np.float32)
-    panorama = Panorama(rgb, none + 1, none.astype(np.int32))
-    turns = iter(itertools.count(0.01, 1.01))
-    for _ in range(5):
-        views._look(panorama, ("rgb", "depth", "ids"), (6, 8), turns)
-    assert next(turns) > 5 * views.HEADINGS

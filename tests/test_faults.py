@@ -10,7 +10,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -89,6 +88,9 @@ def test_nodes_that_the_house_has_not_are_refused(here, played):
     episode = from_json(Episode, json.dumps(body))
     with pytest.raises(DatasetError, match=r"names the nodes \[1000000\], its house has 0 to 15"):
         here.place_of(episode)
+    body["task"]["radius"] = 5e11
+    with pytest.raises(RecordError, match="radius should be at most 100 m, which no house is wide, got 5e\\+11"):
+        from_json(Episode, json.dumps(body))
 
 
 @pytest.mark.slow
@@ -188,33 +190,6 @@ def test_an_export_that_is_killed_leaves_nothing_that_is_believed_and_the_next_i
 # Light --------------------------------------------------------------------------------------------
 
 
-def test_two_that_light_one_house_light_it_once(tmp_path, monkeypatch):
-    made, house = [], grid_world(4).house
-
-    def open_bake(folder, _):
-        if not made:
-            raise baking.StaleBake("none")
-        return made[0]
-
-    def make(*_):
-        time.sleep(0.2)
-        made.append(object())
-        return made[-1]
-
-    for name in ("house_parts", "looks_of", "BakeContext"):
-        monkeypatch.setattr(baking, name, lambda *_, **__: "")
-    monkeypatch.setattr(baking, "_folder", lambda *_: tmp_path / "bake")
-    monkeypatch.setattr(baking, "open_bake", open_bake)
-    monkeypatch.setattr(baking, "reopened", lambda *_: made[0] if made else None)
-    monkeypatch.setattr(baking, "_make", make)
-    threads = [threading.Thread(target=baking.bake, args=(house, None, tmp_path, "fast")) for _ in range(2)]
-    for t in threads:
-        t.start()
-    for t in threads:
-        t.join()
-    assert len(made) == 1
-
-
 def test_whoever_lights_a_house_is_told_before_how_long_it_takes_or_what_is_missing(monkeypatch, tmp_path, caplog):
     house, light = grid_world(4).house, lambda: baking.bake(grid_world(4).house, None, tmp_path, "fast")
     for name, value in {"house_parts": lambda *_: (), "looks_of": lambda _: "", "BakeContext": None}.items():
@@ -233,13 +208,6 @@ def test_whoever_lights_a_house_is_told_before_how_long_it_takes_or_what_is_miss
 
 
 # What is read -------------------------------------------------------------------------------------
-
-
-def test_a_radius_that_no_house_has_is_refused(played):
-    body = json.loads(played.read_text().splitlines()[0])
-    body["task"]["radius"] = 5e11
-    with pytest.raises(RecordError, match="radius should be at most 100 m, which no house is wide, got 5e\\+11"):
-        from_json(Episode, json.dumps(body))
 
 
 @pytest.mark.parametrize("angle", [90.0, -360.0, float("nan"), float("inf")])

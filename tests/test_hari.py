@@ -147,11 +147,6 @@ def test_sparse_descriptions_keep_a_tenth_of_the_classes():
     assert len(frequent_classes([many], 0.5)) == 10
 
 
-def test_a_stack_of_one_never_offers_sub_goals():
-    env = line_env(stack=1)
-    assert env.reset(TASK).can_ask == (CUR, GOAL)
-
-
 def test_shaped_costs_telescope_whatever_is_done():
     """Eq 4.21: their sum is the sum of costs minus Phi(s_1, g_1)."""
     world, tasks, make = grid_setup()

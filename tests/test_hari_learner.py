@@ -121,18 +121,6 @@ def test_the_move_that_an_assistant_would_name_has_the_same_row_but_for_the_dist
         assert rows[-1].tolist() == list(words.row(STOP))
 
 
-def test_stopping_is_the_last_column_of_every_agent_and_padding_is_not_allowed():
-    world = grid_world()
-    words, moves = words_of(world), PanoramicMoves()
-    at = lambda node: percept(words, (), (), moves.at(world, Pose(node))[0], 0)
-    degree = [len(moves.at(world, Pose(v))[0]) for v in range(len(world.graph.ids))]
-    corner, middle = at(int(np.argmin(degree))), at(int(np.argmax(degree)))
-    batch = collate([corner, middle])
-    assert len(corner.moves) < len(middle.moves)
-    assert (batch.moves[:, -1] == words.row(STOP)).all() and batch.allowed[:, -1].all()
-    assert batch.allowed.sum(1).tolist() == [len(corner.moves), len(middle.moves)]
-
-
 # Networks ---------------------------------------------------------------------------------------
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from embodied.scene.lit_pages import LitMesh
-from embodied.viz.house3d import BUDGET, FIGURES, _lit_piece, _share
+from embodied.viz.house3d import _lit_piece
 
 
 def test_a_vertex_on_the_rim_of_its_chart_has_the_colour_of_its_faces():
@@ -16,7 +16,3 @@ def test_a_vertex_on_the_rim_of_its_chart_has_the_colour_of_its_faces():
     mesh = LitMesh("person_1", "object", "hall_1", 0, corners, np.array([[0, 1, 2], [0, 2, 3]]), uv)
     _, _, colors, _ = _lit_piece(mesh, page, 100)
     assert (colors == (200, 40, 40, 255)).all()
-
-
-def test_people_keep_more_triangles_than_furniture():
-    assert _share("person_3", BUDGET, 2) == FIGURES * _share("sofa_1", BUDGET, 2) == FIGURES * BUDGET // 2
