@@ -80,8 +80,10 @@ def test_training_resuming_and_judging_from_the_command_line(data, tmp_path, cap
     assert origin["data"] == data.digest and origin["settings"]["batch"] == 4, "weights say what they come from"
 
 
-def test_perfect_interpretation_reaches_where_it_is_sent(data, tmp_path):
+def test_perfect_interpretation_reaches_where_it_is_sent(tmp_path):
     """On routes the teacher walks: every sub-task that is departed from is departed from at its target."""
+    data = built(tmp_path / "data")
+    noise_features(data)
     config = parsed(HannaTraining, "--data", ".", "--out", ".", *SMALL).config
     bank = TrainingData(data, load_encoder(COMPACT)).split("test_unseen").bank
     words = vocabulary_of(data).words
