@@ -18,7 +18,9 @@ HOMES = {
     "rerun": ("viz/",),
     "mitsuba": ("embodied/light/",),
     "drjit": ("embodied/light/",),
-    "mujoco": tuple(f"embodied/{p}" for p in ("gl.py", "scene/", "render/", "envs/driven.py", "light/", "bench/")),
+    "mujoco": tuple(
+        f"embodied/{p}" for p in ("gl.py", "world.py", "scene/", "render/", "envs/driven.py", "light/", "bench/")
+    ),
     "dm_control": ("embodied/envs/driven.py",),
     "OpenGL": ("embodied/gl.py", "embodied/render/"),
     "gymnasium": ("embodied/gym/", "agents/"),

@@ -79,12 +79,14 @@ def filled(tmp_path, shared_cache, order):
         (shared_cache / name).mkdir(parents=True, exist_ok=True)
         caches.link(shared_cache / name, folder / name)
     assert main([*order, "--out", str(tmp_path / "first"), "--cache", str(folder)]) == 0
-    (tmp_path / "empty").mkdir()
-    folders = [tmp_path / "empty", folder, *(p for p in folder.rglob("*") if p.is_dir())]
+    others = [tmp_path / "empty", tmp_path / "closed"]
+    for path in others:
+        path.mkdir()
+    folders = [*others, folder, *(p for p in folder.rglob("*") if p.is_dir())]
     for path in folders:
         if os.geteuid() == 0:
             os.chown(path, 65534, 65534)
-        path.chmod(0o555)
+        path.chmod(0 if path.name == "closed" else 0o555)
     yield folder
     for path in folders:
         path.chmod(0o755)
@@ -99,14 +101,14 @@ def test_somebody_who_may_only_read_the_cache_reads_it_or_is_told_and_puts_their
         return subprocess.run(command, capture_output=True, text=True, env=env, cwd=tmp_path)
 
     held = {p: p.lstat().st_mtime_ns for p in sorted(filled.rglob("*"))}
-    for out, cache in (("alone", str(filled)), ("behind", f"{tmp_path / 'mine'}{os.pathsep}{filled}")):
-        done = ran("-m", "embodied", *order, "--out", str(tmp_path / out), cache=cache)
-        assert done.returncode == 0, done.stderr
+    behind = ran("-m", "embodied", *order, "--out", "behind", cache=f"{tmp_path / 'mine'}{os.pathsep}{filled}")
+    assert behind.returncode == 0, behind.stderr
+    tried = [filled, tmp_path / "closed", tmp_path / "empty"]
+    orders = [[*order, "--out", cache.name + "_house", "--cache", str(cache)] for cache in tried]
+    code = f"from embodied.cli import main\nstatus = [main(order) for order in {orders}]\nprint(status)"
+    alone = ran("-c", code, cache=str(filled))
+    assert alone.stdout.endswith("[0, 2, 2]\n") and "Traceback" not in alone.stderr, alone.stderr
+    assert all(str(cache) in alone.stderr for cache in tried[1:])
+    for out in ("behind", "cache_house"):
         assert (tmp_path / out / "house.json").read_bytes() == (tmp_path / "first" / "house.json").read_bytes()
     assert {p: p.lstat().st_mtime_ns for p in sorted(filled.rglob("*"))} == held
-    filled.chmod(0o000)
-    refused = [[*order, "--out", "x", "--cache", str(cache)] for cache in (filled, tmp_path / "empty")]
-    both = f"from embodied.cli import main\nprint([main(order) for order in {refused}])"
-    done = ran("-c", both, cache=str(tmp_path / "mine"))
-    assert done.stdout == "[2, 2]\n" and "Traceback" not in done.stderr, done.stderr
-    assert all(str(cache) in done.stderr for cache in (filled, tmp_path / "empty"))
