@@ -72,10 +72,14 @@ class CollisionBox:
 def kept_boxes(
     asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float], cache: Path
 ) -> tuple[CollisionBox, ...]:
-    """`object_boxes`, kept on disk under what they depend on; a file that makes no sense is made again."""
+    """`object_boxes`, kept on disk under what they depend on, code included; nonsense in a file is made again."""
     surfaces = [dataclasses.astuple(s) for s in asset.surfaces]
     meshes = [array.tobytes() for p in parts for array in (p.vertices, p.faces)]
-    path = Path(cache) / "collision" / f"{digest(boxes_code(), surfaces, asset.size, size, *meshes)[:32]}.json"
+    path = (
+        Path(cache)
+        / "collision"
+        / f"{digest(code_digest(__name__, without=UNCOUNTED_MODULES), surfaces, asset.size, size, *meshes)[:32]}.json"
+    )
     try:
         rows = np.array(parse_file(path), float).reshape(-1, 7)
         if np.isfinite(rows).all() and (rows[:, 3:6] > 0).all():
@@ -86,11 +90,6 @@ def kept_boxes(
     with atomic_path(path, sync=False) as temporary:
         temporary.write_text(json.dumps([[*map(float, (*b.centre, *b.half, b.yaw))] for b in boxes]))
     return boxes
-
-
-def boxes_code() -> str:
-    """Digest of the code and the libraries that make boxes; boxes made by others are made anew."""
-    return code_digest(__name__, without=UNCOUNTED_MODULES)
 
 
 def object_boxes(asset: Asset, parts: Sequence[MeshPart], size: tuple[float, float, float]) -> tuple[CollisionBox, ...]:

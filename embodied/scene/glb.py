@@ -35,8 +35,6 @@ UNLIT = "KHR_materials_unlit"
 PAGE_QUALITY = 92
 """JPEG quality of lit pages."""
 ROOF, SKY = "outdoor/roof", "outdoor/sky"
-VERTICES, INDICES = 34962, 34963
-"""Contents of a buffer view, in OpenGL's numbers."""
 UPRIGHT = trimesh.transformations.rotation_matrix(-math.pi / 2, [1, 0, 0])
 """z up to y up, as the format asks."""
 
@@ -88,7 +86,6 @@ def export_glb(
             for material in tree["materials"]:
                 material["extensions"] = {UNLIT: {}}
             tree["extensionsUsed"] = [UNLIT]
-        _say_what_buffers_hold(tree)
         tree["asset"]["extras"] = {"house": house.name, "house_digest": house.digest}
         tree["asset"]["extras"] |= {"light": lit.digest} if lit is not None else {}
         for node in tree["nodes"]:
@@ -113,25 +110,12 @@ def about(house: House, mesh: Part | LitMesh) -> dict[str, str]:
     return {name: value for name, value in facts.items() if value}
 
 
-def _say_what_buffers_hold(tree: dict) -> None:
-    """Mark buffer views as vertices or indices, which the format recommends and trimesh leaves out."""
-    for mesh in tree["meshes"]:
-        for primitive in mesh["primitives"]:
-            for accessor, target in (
-                (primitive["indices"], INDICES),
-                *((a, VERTICES) for a in primitive["attributes"].values()),
-            ):
-                tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = target
-
-
 def _unlit_pieces(parts: tuple[Part, ...]) -> Iterator[_Piece]:
-    materials: dict[Finish, PBRMaterial] = {}
+    material = functools.cache(pbr_material)
 
     def made(part: Part) -> trimesh.Trimesh:
         m = part.mesh
-        if m.finish not in materials:
-            materials[m.finish] = pbr_material(m.finish)
-        visual = trimesh.visual.TextureVisuals(uv=m.uv, material=materials[m.finish])
+        visual = trimesh.visual.TextureVisuals(uv=m.uv, material=material(m.finish))
         return trimesh.Trimesh(m.vertices, m.faces, vertex_normals=m.normals, visual=visual, process=False)
 
     for part in parts:
@@ -142,14 +126,11 @@ def _unlit_pieces(parts: tuple[Part, ...]) -> Iterator[_Piece]:
 
 
 def _lit_pieces(lit: LitPages) -> Iterator[_Piece]:
-    materials: dict[tuple[int, float], PBRMaterial] = {}
+    material = functools.cache(functools.partial(_page_material, lit))
 
     def made(mesh: LitMesh) -> trimesh.Trimesh:
-        key = mesh.page, mesh.alpha
-        if key not in materials:
-            materials[key] = _page_material(lit, *key)
         uv = np.column_stack([mesh.uv[:, 0], 1 - mesh.uv[:, 1]])  # trimesh counts v upwards
-        visual = trimesh.visual.TextureVisuals(uv=uv, material=materials[key])
+        visual = trimesh.visual.TextureVisuals(uv=uv, material=material(mesh.page, mesh.alpha))
         return trimesh.Trimesh(mesh.vertices, mesh.faces, visual=visual, process=False)
 
     for k, mesh in enumerate(lit.meshes):

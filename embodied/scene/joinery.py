@@ -196,14 +196,10 @@ def _sashes(house: House, hole: _Hole, y0: float, y1: float, french: bool) -> tu
         if i % 2 == 0:
             xh = x1 - sash / 2
             zh = min(max(1.05, z0 + 0.25), (z0 + z1) / 2 + 0.25) if french else (z0 + z1) / 2
-            handles.append(_window_handle(xh, y1 + 0.012, zh))
+            plate = box([-0.014, 0, -0.035], [0.014, 0.01, 0.035], 0.004)
+            grip = tube([(0, 0.008, 0), (0, 0.035, 0), (0, 0.042, -0.012), (0, 0.042, -0.11)], 0.008, 8)
+            handles.append(joined(plate, grip).moved(xh, y1 + 0.012, zh))
     return joined(*boards), joined(*panes), handles
-
-
-def _window_handle(x: float, y: float, z: float) -> Shape:
-    plate = box([x - 0.014, y, z - 0.035], [x + 0.014, y + 0.01, z + 0.035], 0.004)
-    grip = tube([(x, y + 0.008, z), (x, y + 0.035, z), (x, y + 0.042, z - 0.012), (x, y + 0.042, z - 0.11)], 0.008, 8)
-    return joined(plate, grip)
 
 
 # ------------------------------------------------------------------ doors
@@ -231,18 +227,9 @@ def _door(house: House, hole: _Hole, finish: Callable[[str], Finish]) -> list[Pa
 def _lining(hole: _Hole, y0: float, y1: float) -> list[Shape]:
     w, head, t = hole.length, hole.opening.head, LINING
     stop = y1 - 0.045
-    boards = [
-        box([0, y0, 0], [t, y1, head]),
-        box([w - t, y0, 0], [w, y1, head]),
-        box([t, y0, head - t], [w - t, y1, head]),
-    ]
+    boards = frame(0, w, 0, head, (y0, y1), t)[:3]
     if hole.opening.kind in ("door", "front_door", "back_door"):
-        s = t + 0.012
-        boards += [
-            box([t, y0 + 0.004, 0], [s, stop, head - t], 0.002),
-            box([w - s, y0 + 0.004, 0], [w - t, stop, head - t], 0.002),
-            box([s, y0 + 0.004, head - s], [w - s, stop, head - t], 0.002),
-        ]
+        boards += frame(t, w - t, 0, head - t, (y0 + 0.004, stop), 0.012, 0.002)[:3]
     return boards
 
 

@@ -131,16 +131,14 @@ def owner_of_name(geom: str) -> str:
 
 def loose(house: House, catalogue: Catalogue) -> frozenset[str]:
     """The placements that physics can move: all that stand or lie, not what is fixed to the house or underfoot."""
+    floors = {r.id: house.storey_of(r).elevation for r in house.rooms}
     return frozenset(
         p.id
         for p in house.placements
-        if catalogue.assets[p.asset].support in LOOSE and not is_underfoot(p) and not is_hung(house, p)
+        if catalogue.assets[p.asset].support in LOOSE
+        and not is_underfoot(p)
+        and (p.parent is not None or p.position[2] <= floors[p.room] + UNDERFOOT)  # else it is fixed to a wall
     )
-
-
-def is_hung(house: House, p: Placement) -> bool:
-    """True if it rests on nothing: a radiator or a wall cabinet, fixed to its wall."""
-    return p.parent is None and p.position[2] > house.storey_of(house.room_by_id[p.room]).elevation + UNDERFOOT
 
 
 def is_underfoot(p: Placement) -> bool:

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 from embodied.assets.records import MeshPart
 
-PART_KINDS = ("object", "wall", "floor", "ceiling", "opening", "outdoor")
-
 
 @dataclass(frozen=True, eq=False)
 class Part:
     owner: str
     """Placement id, or a shell id: '<room>/floor', '<room>/wall_<i>', '<opening>/leaf', 'outdoor/ground'."""
     kind: str
-    """One of PART_KINDS; 'opening' is all joinery: frames, leaves, panes, sills, reveals, and stairs."""
+    """'object', 'wall', 'floor', 'ceiling', 'outdoor' or 'opening': all joinery (frames, leaves, panes, sills) and
+    stairs."""
     room: str
     """The room it is seen from first; '' for the outdoors."""
     mesh: MeshPart

@@ -15,10 +15,10 @@ import numpy as np
 
 from embodied.assets.built.primitives import Shape, flat, joined, part, quads
 from embodied.assets.records import Finish
-from embodied.house.house import House, Opening, Room
+from embodied.house.house import House, Room
 from embodied.scene import joinery, outdoors, stairs
 from embodied.scene.part import Part
-from embodied.scene.walls import floor_turn, hole_on, inset, turned_uv, wall_face
+from embodied.scene.walls import Hole, floor_turn, hole_on, inset, turned_uv, wall_face
 
 FinishOf = Callable[[str], Finish]
 
@@ -88,19 +88,16 @@ def _part(owner: str, kind: str, room: Room, finish: Finish, shape: Shape) -> Pa
 # ------------------------------------------------------------------ walls
 
 
-def hole_of(
-    house: House, room: Room, opening: Opening, p: np.ndarray, q: np.ndarray
-) -> tuple[float, float, float, float] | None:
-    """The hole of `opening` in the face from p to q of `room`, see `hole_on`."""
-    if room.id not in opening.rooms:
-        return None
-    return hole_on(p, q, opening, house.storey_of(room).elevation, house.inner_wall / 2)
-
-
-def holes_of(house: House, room: Room, p: np.ndarray, q: np.ndarray) -> list[tuple[float, float, float, float]]:
-    """All holes in the wall face from p to q, see `hole_of`."""
-    holes = [hole_of(house, room, o, p, q) for o in house.openings]
-    return sorted(h for h in holes if h is not None)
+def holes_of(house: House, room: Room, p: np.ndarray, q: np.ndarray, casings: bool = False) -> list[Hole]:
+    """The holes in the wall face from p to q of `room`, sorted; with the casings around them, clipped to the wall."""
+    z, length = house.storey_of(room).elevation, float(np.linalg.norm(q - p))
+    holes = []
+    for o in house.openings:
+        if room.id in o.rooms and (hole := hole_on(p, q, o, z, house.inner_wall / 2)) is not None:
+            s0, low, s1, high = hole
+            margin = joinery.casing_width(o) if casings else 0.0
+            holes.append((max(0.0, s0 - margin), low, min(length, s1 + margin), high))
+    return sorted(holes)
 
 
 def skirting_of(house: House, room: Room) -> Shape | None:
@@ -113,7 +110,7 @@ def skirting_of(house: House, room: Room) -> Shape | None:
         length = float(np.linalg.norm(q - p))
         d = (q - p) / length
         n = np.array([-d[1], d[0]]) * SKIRTING_THICKNESS
-        cuts = [(s0, s1) for s0, low, s1, _ in _door_cuts(house, room, p, q) if low < z + SKIRTING_HEIGHT]
+        cuts = [(s0, s1) for s0, low, s1, _ in holes_of(house, room, p, q, casings=True) if low < z + SKIRTING_HEIGHT]
         start = 0.0
         for s0, s1 in [*cuts, (length, math.inf)]:
             if s0 - start > 0.01:
@@ -125,25 +122,12 @@ def skirting_of(house: House, room: Room) -> Shape | None:
     return joined(*runs) if runs else None
 
 
-def _door_cuts(house: House, room: Room, p: np.ndarray, q: np.ndarray) -> list[tuple[float, float, float, float]]:
-    """Holes widened by the casing around them, clipped to the wall."""
-    length = float(np.linalg.norm(q - p))
-    cuts = []
-    for o in house.openings:
-        hole, margin = hole_of(house, room, o, p, q), joinery.casing_width(o)
-        if hole is not None:
-            cuts.append((max(0.0, hole[0] - margin), hole[1], min(length, hole[2] + margin), hole[3]))
-    return sorted(cuts)
-
-
 def _board(a: np.ndarray, b: np.ndarray, fa: np.ndarray, fb: np.ndarray, z: float, cap_a: bool, cap_b: bool) -> Shape:
     """One skirting board from a to b on the wall, fa to fb on its front: front, rounded top, cut ends."""
     top, shoulder = z + SKIRTING_HEIGHT, z + SKIRTING_HEIGHT - 0.008
     length = float(np.linalg.norm(b - a))
 
-    def at(point: np.ndarray, height: float) -> list[float]:
-        return [point[0], point[1], height]
-
+    at = lambda point, height: [point[0], point[1], height]
     ia, ib = fa + (a - fa) * 0.55, fb + (b - fb) * 0.55
     corners = [
         [at(fb, z), at(fa, z), at(fa, shoulder), at(fb, shoulder)],

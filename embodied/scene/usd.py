@@ -7,6 +7,7 @@ says what it is, as the extras of the glTF do (embodied.scene.glb).
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import re
 import tempfile
@@ -54,12 +55,10 @@ def export_usd(house: House, lit: LitPages, path: Path) -> Path:
         root.GetPrim().SetCustomData({"house": house.name, "house_digest": house.digest, "light": lit.digest})
         for k, page in enumerate(lit.pages):
             PIL.Image.fromarray(page).save(Path(folder) / f"page_{k}.jpg", quality=PAGE_QUALITY, subsampling=0)
-        materials: dict[tuple[int, float], Any] = {}
+        material = functools.cache(functools.partial(_material, stage))
         for k, mesh in enumerate(lit.meshes):
-            key = (mesh.page, mesh.alpha)
-            if key not in materials:
-                materials[key] = _material(stage, *key)
-            _mesh(stage, f"/house/{prim_name(mesh.owner)}_{k}", mesh, about(house, mesh), materials[key])
+            path_of_mesh = f"/house/{prim_name(mesh.owner)}_{k}"
+            _mesh(stage, path_of_mesh, mesh, about(house, mesh), material(mesh.page, mesh.alpha))
         stage.GetRootLayer().Save()
         with atomic_path(Path(path)) as temporary:
             packed = Path(folder) / "house.usdz"

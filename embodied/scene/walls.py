@@ -9,6 +9,8 @@ import numpy as np
 from embodied.assets.built.primitives import Shape
 from embodied.house.house import House, Opening
 
+Hole = tuple[float, float, float, float]
+"""s0, z0, s1, z1 of a rectangle in a wall face: metres along the face, world heights."""
 TOLERANCE = 2e-3
 """How far an opening's jambs may lie off a wall's centre line, metres."""
 
@@ -23,17 +25,12 @@ def inset(polygon: Sequence[Sequence[float]], distance: float) -> np.ndarray:
     return p + distance * (n + m) / (1.0 + np.sum(n * m, axis=1, keepdims=True))
 
 
-def hole_on(
-    p: np.ndarray, q: np.ndarray, opening: Opening, floor: float, distance: float
-) -> tuple[float, float, float, float] | None:
+def hole_on(p: np.ndarray, q: np.ndarray, opening: Opening, floor: float, distance: float) -> Hole | None:
     """The hole of `opening` in the wall face from p to q, or None where it is in another wall.
 
     Args:
       floor: world height of the storey's floor.
       distance: of the face from the opening's line, on its left, metres.
-
-    Returns:
-      (s0, z0, s1, z1): metres along the face, world heights.
     """
     length = float(np.linalg.norm(q - p))
     d = (q - p) / length
@@ -46,19 +43,11 @@ def hole_on(
     return float(s0), floor + opening.sill, float(s1), floor + opening.head
 
 
-def wall_face(
-    p: np.ndarray,
-    q: np.ndarray,
-    z0: float,
-    z1: float,
-    holes: Sequence[tuple[float, float, float, float]],
-    along: float = 0.0,
-) -> Shape:
+def wall_face(p: np.ndarray, q: np.ndarray, z0: float, z1: float, holes: Sequence[Hole], along: float = 0.0) -> Shape:
     """The upright rectangle over p-q with rectangular holes, facing left of the direction p to q.
 
     Args:
       p, q: (2,) ends, metres, world.
-      holes: (s0, z0, s1, z1) each, metres along p-q and world heights.
       along: metres at which the material's pattern starts, so that it runs on around corners.
 
     Returns:
