@@ -58,13 +58,11 @@ plaster and stone; rolled paint."""
 
 @dataclass(frozen=True)
 class Finish:
-    """How one part of a mesh looks. Colours are sRGB in [0, 1]; maps are PNG paths."""
+    """How one part of a mesh looks. Colours are sRGB in [0, 1]."""
 
     color: tuple[float, float, float, float] = (0.8, 0.8, 0.8, 1.0)
     texture: str | None = None
-    """sRGB colour map; multiplies nothing: where present it replaces `color` (alpha apart)."""
-    normal_map: str | None = None
-    roughness_map: str | None = None
+    """Path of an sRGB colour map; multiplies nothing: where present it replaces `color` (alpha apart)."""
     roughness: float = 0.8
     metallic: float = 0.0
     specular: float = 0.5

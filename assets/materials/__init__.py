@@ -1,4 +1,4 @@
-"""Procedural, physically scaled, seamlessly tileable materials and their maps on disk."""
+"""Procedural, physically scaled, seamlessly tileable materials and their colours on disk."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from embodied.assets.cache import atomic_path, digest, write_json
 from embodied.assets.closure import code_digest
 from embodied.assets.json_file import read_json
 from embodied.assets.materials import maps
-from embodied.assets.materials.maps import Maps, normal_map
+from embodied.assets.materials.maps import Maps
 from embodied.assets.materials.material import ROLES, Material, detail_of
 from embodied.assets.materials.registry import MATERIALS, PAINTERS, painters_of
 from embodied.assets.records import Finish
 
 __all__ = ["MATERIALS", "ROLES", "Maps", "Material", "finish", "make_maps", "of_role"]
-IMAGES = ("color.png", "normal.png", "roughness.png")
-"""The maps of a material on disk."""
+IMAGE, NOTE = "color.png", "maps.json"
+"""The colours of a material on disk, and what vouches for them."""
 
 
 def of_role(role: str) -> tuple[Material, ...]:
@@ -44,7 +44,7 @@ def make_maps(key: str) -> Maps:
 
 @functools.cache
 def finish(key: str, cache: Path) -> Finish:
-    """The Finish of material `key`, its maps written below `cache` if they are not there yet.
+    """The Finish of material `key`, its picture written below `cache` if it is not there yet.
 
     Raises:
       ValueError: an unknown key.
@@ -53,12 +53,10 @@ def finish(key: str, cache: Path) -> Finish:
     folder = Path(cache) / "materials" / fingerprint(key)[:24]
     mean = _read_mean(folder)
     if mean is None:
-        mean = _write(folder, make_maps(key), material.tile)
+        mean = _write(folder, make_maps(key))
     return Finish(
         color=(*mean["color"], 1.0),
-        texture=str(folder / "color.png"),
-        normal_map=str(folder / "normal.png"),
-        roughness_map=str(folder / "roughness.png"),
+        texture=str(folder / IMAGE),
         roughness=mean["roughness"],
         metallic=material.metallic,
         specular=material.specular,
@@ -90,37 +88,27 @@ def fingerprint(key: str) -> str:
 
 
 def _read_mean(folder: Path) -> dict | None:
-    """The note of `_write`, or None unless all three maps are whole."""
-    note = folder / "maps.json"
+    """The note of `_write`, or None unless the picture is whole."""
     try:
-        mean = read_json(note)
-        sizes = {name: (folder / name).stat().st_size for name in IMAGES}
+        mean = read_json(folder / NOTE)
         numbers = [*mean["color"], mean["roughness"]]
-        whole = (
-            sizes == mean["bytes"] and len(numbers) == 4 and all(isinstance(n, float) and 0 <= n <= 1 for n in numbers)
-        )
+        sane = len(numbers) == 4 and all(isinstance(n, float) and 0 <= n <= 1 for n in numbers)
+        return mean if sane and (folder / IMAGE).stat().st_size == mean["bytes"] else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    return mean if whole else None
 
 
-def _write(folder: Path, maps: Maps, tile: float) -> dict:
-    """Write the three PNGs and then the note that vouches for them."""
-    images = (
-        np.round(maps.color[..., ::-1] * 255).astype(np.uint8),
-        normal_map(maps.height, tile)[..., ::-1],
-        np.round(maps.roughness * 255).astype(np.uint8),
-    )
-    sizes = {}
-    for name, image in zip(IMAGES, images, strict=True):
-        with atomic_path(folder / name) as temporary:
-            if not cv2.imwrite(str(temporary), np.ascontiguousarray(image), [cv2.IMWRITE_PNG_COMPRESSION, 3]):
-                raise OSError(f"could not write {folder / name}; free some disk space and run again")
-            sizes[name] = temporary.stat().st_size
+def _write(folder: Path, maps: Maps) -> dict:
+    """Write the picture and then the note that vouches for it."""
+    image = np.ascontiguousarray(np.round(maps.color[..., ::-1] * 255).astype(np.uint8))
+    with atomic_path(folder / IMAGE) as temporary:
+        if not cv2.imwrite(str(temporary), image, [cv2.IMWRITE_PNG_COMPRESSION, 3]):
+            raise OSError(f"could not write {folder / IMAGE}; free some disk space and run again")
+        size = temporary.stat().st_size
     mean = {
-        "bytes": sizes,
+        "bytes": size,
         "color": [round(float(c), 4) for c in maps.color.reshape(-1, 3).mean(0)],
-        "roughness": round(float(maps.roughness.mean()), 4),
+        "roughness": round(maps.roughness, 4),
     }
-    write_json(folder / "maps.json", mean)
+    write_json(folder / NOTE, mean)
     return mean

@@ -81,7 +81,7 @@ def shapes(on: Canvas, ground: Color, colors: Colors) -> Maps:
         bends = (t, np.sin(np.pi * t), np.sin(2 * np.pi * t))
         line = start + sum(s * bend[:, None] for s, bend in zip(swing, bends))
         image = _stroke(image, line, 0.006, (0.12, 0.12, 0.13))
-    return maps_of(image * (1 + 0.02 * on.fbm(8, 120, 1.0))[..., None], 0.0, 0.85)
+    return maps_of(image * (1 + 0.02 * on.fbm(8, 120, 1.0))[..., None], 0.85)
 
 
 def fields(on: Canvas, colors: Colors) -> Maps:
@@ -97,14 +97,14 @@ def fields(on: Canvas, colors: Colors) -> Maps:
         inside = smooth_step(np.minimum(y + warp - top, bottom - y - warp), -0.012, 0.02)
         inside *= smooth_step(np.minimum(x + warp - 0.08, 0.92 - x - warp), -0.012, 0.02)
         image = mix(image, rgb(c) * (1 + 0.05 * on.fbm(2, 90, 1.2))[..., None], inside * 0.93)
-    return maps_of(image, 0.0, 0.8)
+    return maps_of(image, 0.8)
 
 
 def hills(on: Canvas, sky: Colors, far: Color, near: Color, layers: int = 6, sun: bool = True) -> Maps:
     """Ridges behind ridges in haze under a graded sky."""
     n, rng = on.n, on.rng
     y, x = on.shares()
-    image = mix(on.rgb(sky[0]), rgb(sky[1]), smooth_step(y, 0.0, 0.65))
+    image = mix(on.rgb(sky[0]), rgb(sky[1]), smooth_step(y, 0.65))
     image *= (1 + 0.03 * on.fbm(1.5, 30, 1.5, 4.0) * (1 - y))[..., None]
     if sun:
         d = np.hypot(x - rng.uniform(0.25, 0.75), (y - rng.uniform(0.28, 0.42)))
@@ -121,7 +121,7 @@ def hills(on: Canvas, sky: Colors, far: Color, near: Color, layers: int = 6, sun
         haze = np.clip((y - ridge[None]) * 2.2, 0, 1)
         shade = mix(on.rgb(c), np.minimum(rgb(c) * 0.75 + rgb(sky[1]) * 0.25, 1.0), haze.astype(np.float32))
         image = mix(image, shade * (1 + 0.03 * on.noise(1.5, 1.5))[..., None], inside)
-    return maps_of(image, 0.0, 0.5)
+    return maps_of(image, 0.5)
 
 
 def sea(on: Canvas, sky: Colors, water: Colors) -> Maps:
@@ -134,7 +134,7 @@ def sea(on: Canvas, sky: Colors, water: Colors) -> Maps:
     path = np.exp(-(((x - 0.55) / (0.05 + 0.25 * depth)) ** 2))
     down = mix(on.rgb(water[0]), rgb(water[1]), depth) * (1 + 0.08 * waves)[..., None]
     down = mix(down, rgb((0.98, 0.93, 0.83)), 0.5 * path * smooth_step(waves, 0.4, 1.6))
-    return maps_of(np.where((y < 0.55)[..., None], up, down), 0.0, 0.45)
+    return maps_of(np.where((y < 0.55)[..., None], up, down), 0.45)
 
 
 def botanical(on: Canvas, ground: Color, ink: Color, fern: bool = True) -> Maps:
@@ -169,7 +169,7 @@ def botanical(on: Canvas, ground: Color, ink: Color, fern: bool = True) -> Maps:
         line = np.stack([np.linspace(pen, pen + word, 8), 0.925 + rng.normal(0, 0.004, 8)], 1)
         image = _stroke(image, line, 0.0025, (0.25, 0.23, 0.2), 0.8)
         pen += word + 0.008
-    return maps_of(image, 0.0, 0.85)
+    return maps_of(image, 0.85)
 
 
 def _leaf_shape(at: np.ndarray, angle: float, length: float, half: float) -> np.ndarray:
@@ -181,10 +181,9 @@ def _leaf_shape(at: np.ndarray, angle: float, length: float, half: float) -> np.
 
 
 def brushwork(on: Canvas, ground: Color, colors: Colors) -> Maps:
-    """Abstract painting: loaded brush strokes over one another, with relief."""
-    n, rng = on.n, on.rng
+    """Abstract painting: loaded brush strokes over one another."""
+    rng = on.rng
     image = _canvas(on, ground, grain=0.03)
-    height = np.zeros((n, n), np.float32)
     y, x = on.shares()
     for _ in range(26):
         at, angle = rng.uniform(0.05, 0.95, 2), rng.normal(0.5, 0.6)
@@ -193,11 +192,10 @@ def brushwork(on: Canvas, ground: Color, colors: Colors) -> Maps:
         v = -(x - at[0]) * np.sin(angle) + (y - at[1]) * np.cos(angle) + 0.25 * u * u
         bristles = np.interp(v, np.linspace(-wide, wide, 60), rng.normal(0, 1, 60)).astype(np.float32)
         ragged = 0.25 * long * bristles * 0.35
-        inside = smooth_step(wide - np.abs(v), 0.0, 0.008) * smooth_step(long - np.abs(u) + ragged, 0.0, 0.05)
+        inside = smooth_step(wide - np.abs(v), 0.008) * smooth_step(long - np.abs(u) + ragged, 0.05)
         c = rgb(colors[rng.integers(len(colors))]) * (1 + 0.09 * bristles)[..., None]
         image = mix(image, c, inside * 0.92)
-        height = height * (1 - inside) + inside * (4e-4 + 2e-4 * bristles)
-    return maps_of(image, height, 0.55)
+    return maps_of(image, 0.55)
 
 
 def still_life(on: Canvas, ground: Color, table: Color, fruit: Colors) -> Maps:
@@ -219,7 +217,7 @@ def still_life(on: Canvas, ground: Color, table: Color, fruit: Colors) -> Maps:
     inside = (1 - smooth_step(bowl, 0.97, 1.03)) * smooth_step(y, 0.60, 0.606)
     image = mix(image, rgb((0.62, 0.66, 0.70)) * (1.05 - 0.9 * np.abs(x - 0.42))[..., None], inside)
     image = image * (1 + 0.03 * on.fbm(10, 200, 0.9))[..., None]
-    return maps_of(image, 0.0, 0.5)
+    return maps_of(image, 0.5)
 
 
 def poster(on: Canvas, ground: Color, ink: Color, accent: Color) -> Maps:
@@ -248,7 +246,7 @@ def poster(on: Canvas, ground: Color, ink: Color, accent: Color) -> Maps:
             step = h * rng.uniform(0.5, 0.8)
             image = _fill(image, _rectangle(x, top, x + step, top + h), ink)
             x += step + h * (0.28 if rng.random() < 0.8 else 0.8)
-    return maps_of(image, 0.0, 0.75)
+    return maps_of(image, 0.75)
 
 
 # ------------------------------------------------------------------ rugs, seen from above, u along the length
@@ -359,7 +357,7 @@ def rings(on: Canvas, colors: Colors, count: int = 9) -> Maps:
 def _pile(on: Canvas, image: np.ndarray, depth: float) -> Maps:
     tuft, fine, wear = on.noise(2.2, 1.4), on.noise(0.8, 0.8), on.fbm(2, 30, 1.2)
     out = image * (1 + depth * (0.5 * tuft + 0.5 * fine) + 0.02 * wear)[..., None]
-    return maps_of(out, 1.2e-3 * tuft, 0.96, 0.01, 0.97)
+    return maps_of(out, 0.96, 0.01, 0.97)
 
 
 # ------------------------------------------------------------------ dials and covers
@@ -388,7 +386,7 @@ def dial(on: Canvas, face: Color, ink: Color, numerals: bool = True, hour: float
         a = 2 * np.pi * turn
         d = np.array([np.sin(a), -np.cos(a)])
         image = _stroke(image, 0.5 + np.array([-0.05, long])[:, None] * d, wide, ink)
-    return maps_of(image, 0.0, 0.4)
+    return maps_of(image, 0.4)
 
 
 def cover(on: Canvas, ground: Color, ink: Color, picture: Color) -> Maps:
@@ -405,4 +403,4 @@ def cover(on: Canvas, ground: Color, ink: Color, picture: Color) -> Maps:
         high, low = 0.72 + 0.04 * k, 0.735 + 0.04 * k
         teaser = [(0.08, high), (0.08 + rng.uniform(0.15, 0.3), high), (0.08 + 0.2, low), (0.08, low)]
         image = _fill(image, np.array(teaser), ink)
-    return maps_of(image, 0.0, 0.3)
+    return maps_of(image, 0.3)

@@ -1,4 +1,4 @@
-"""Maps of one material, and the periodic noise and layouts they are made from.
+"""The colours of one material, and the periodic noise and layouts they are made from.
 
 All arrays are (n, n) float32 over one square tile that repeats without a seam; row 0 is the top of
 the image, which is v = 1. Lengths are metres unless a name says pixels.
@@ -22,22 +22,14 @@ Colors = tuple[Color, ...]
 class Maps:
     color: np.ndarray
     """(n, n, 3) float32, sRGB in [0, 1]."""
-    height: np.ndarray
-    """(n, n) float32, metres."""
-    roughness: np.ndarray
-    """(n, n) float32 in [0, 1]."""
+    roughness: float
+    """Its mean, in [0, 1]."""
 
 
-def maps_of(
-    color: np.ndarray,
-    height: np.ndarray | float,
-    roughness: np.ndarray | float,
-    darkest: float = 0.01,
-    brightest: float = 0.98,
-) -> Maps:
-    """Maps of a colour (n, n, 3) kept between two limits; height and roughness may be one number for all of it."""
-    height, roughness = (np.full(color.shape[:2], given, np.float32) for given in (height, roughness))
-    return Maps(np.clip(color, darkest, brightest).astype(np.float32), height, roughness)
+def maps_of(color: np.ndarray, roughness: np.ndarray | float, darkest: float = 0.01, brightest: float = 0.98) -> Maps:
+    """Maps of a colour (n, n, 3) kept between two limits, and of a roughness (n, n), or one number for all of it."""
+    mean = float(np.full(color.shape[:2], roughness, np.float32).mean())
+    return Maps(np.clip(color, darkest, brightest).astype(np.float32), mean)
 
 
 # ------------------------------------------------------------------ noise
@@ -161,19 +153,6 @@ class Places:
     def fbm(self, low: float, high: float, slope: float = 1.6, stretch: float = 1.0) -> np.ndarray:
         """As `fbm`, at these places."""
         return look_up(self.on.fbm(low, high, slope, stretch), self.x, self.y)
-
-
-# ------------------------------------------------------------------ what goes to disk
-
-
-def normal_map(height: np.ndarray, tile: float, strength: float = 1.0) -> np.ndarray:
-    """(n, n, 3) uint8 tangent-space normals of a periodic height field: x right, y up, z out."""
-    pixel = tile / len(height)
-    dx = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) / (2 * pixel) * strength
-    dy = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) / (2 * pixel) * strength
-    n = np.stack([-dx, -dy, np.ones_like(dx)], axis=-1)
-    n /= np.linalg.norm(n, axis=-1, keepdims=True)
-    return np.round((n * 0.5 + 0.5) * 255).astype(np.uint8)
 
 
 # ------------------------------------------------------------------ layouts

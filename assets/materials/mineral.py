@@ -25,8 +25,8 @@ from embodied.assets.materials.maps import (
     smooth_step,
 )
 
-Face = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Colour (n, n, 3), roughness to add (n, n), height (n, n) in metres."""
+Face = tuple[np.ndarray, np.ndarray]
+"""Colour (n, n, 3) and roughness to add (n, n)."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,6 @@ class Tiles:
     tone: float = 0.015
     """Standard deviation of lightness from tile to tile."""
     gloss: float = 0.15
-    waviness: float = 0.0
-    """Hand-made unevenness, metres of height per piece."""
 
     def __call__(self, on: Canvas) -> Maps:
         n, tile, rng = on.n, on.tile, on.rng
@@ -53,7 +51,7 @@ class Tiles:
         u, v = on.coordinates()
         shift = rng.random((pieces.count, 2))
         x, y = u / tile + shift[pieces.piece, 0], v / tile + shift[pieces.piece, 1]
-        color, rough, height = self.surface(Places(on, x, y))
+        color, rough = self.surface(Places(on, x, y))
         lightness = np.clip(rng.normal(0, self.tone, pieces.count), -2.2 * self.tone, 2.2 * self.tone)
         color = color * (1 + lightness[pieces.piece])[..., None]
         half = self.joint / 2
@@ -63,12 +61,8 @@ class Tiles:
         filler = rgb(self.grout) * (1 + 0.05 * grain + 0.05 * dirt)[..., None]
         shade = 1 - 0.10 * (1 - smooth_step(pieces.edge, half, half + self.bevel + pixel))
         color = filler * (1 - inside)[..., None] + color * (inside * shade)[..., None]
-        slope = smooth_step(pieces.edge, half, half + max(self.bevel, pixel))
-        tilt = rng.normal(0, 1, (pieces.count, 2))
-        lie = self.waviness * (tilt[pieces.piece, 0] * pieces.along + tilt[pieces.piece, 1] * pieces.across) / 0.1
-        height = inside * (height + lie) + 0.0012 * slope
         rough = np.where(inside > 0.5, self.gloss + rough, 0.88)
-        return maps_of(color, height, np.clip(rough, 0.05, 1))
+        return maps_of(color, np.clip(rough, 0.05, 1))
 
 
 def checker(on: Canvas) -> Maps:
@@ -81,7 +75,7 @@ def checker(on: Canvas) -> Maps:
     black = ((u // (tile / 6) + v // (tile / 6)) % 2 == 1)[..., None]
     joint = (layout(n, tile).edge < 0.0015)[..., None]
     dark = made.color * [0.10, 0.10, 0.105] + 0.01
-    return Maps(np.where(black & ~joint, dark, made.color).astype("float32"), made.height, made.roughness)
+    return Maps(np.where(black & ~joint, dark, made.color).astype("float32"), made.roughness)
 
 
 # ------------------------------------------------------------------ faces of tiles and slabs
@@ -90,14 +84,14 @@ def checker(on: Canvas) -> Maps:
 def glaze(at: Places, color: Color, mottle: float = 0.008) -> Face:
     """Glazed ceramic, nearly one colour."""
     cloud = at.fbm(3, 60, 1.3)
-    return rgb(color) * (1 + mottle * cloud)[..., None], 0.01 * cloud, 2e-5 * cloud
+    return rgb(color) * (1 + mottle * cloud)[..., None], 0.01 * cloud
 
 
 def matt(at: Places, color: Color, speck: float = 0.025, cloudiness: float = 0.016) -> Face:
     """Unglazed stoneware and cement: clouds and fine grain."""
     cloud = at.fbm(2, 120, 1.2)
     grain = at.noise(0.8, 0.8)
-    return rgb(color) * (1 + cloudiness * cloud + speck * grain)[..., None], 0.03 * cloud, 3e-5 * grain
+    return rgb(color) * (1 + cloudiness * cloud + speck * grain)[..., None], 0.03 * cloud
 
 
 def marble(at: Places, base: Color, vein: Color, amount: float = 0.7) -> Face:
@@ -117,17 +111,16 @@ def marble(at: Places, base: Color, vein: Color, amount: float = 0.7) -> Face:
     faint = 0.45 * np.exp(-((thin / 0.05) ** 2)) * presence
     t = np.clip(amount * (0.75 * strong + faint) + 0.06 * cloud, 0, 1)
     color = mix(rgb(base) * (1 + 0.012 * cloud)[..., None], rgb(vein), t)
-    return color, 0.02 * t, 0 * t
+    return color, 0.02 * t
 
 
 def slate(at: Places, base: Color, warm: Color = (0.40, 0.34, 0.28), rust: float = 0.25) -> Face:
     """Cleft slate: layered relief and rusty patches."""
     relief = at.fbm(2, 150, 1.5)
-    layers = np.abs((relief * 1.6) % 1.0 - 0.5)
     cloud = at.fbm(2, 40, 1.4)
     color = rgb(base) * (1 + 0.10 * relief + 0.05 * cloud)[..., None]
     color = mix(color, rgb(warm), rust * smooth_step(cloud, 0.6, 2.0))
-    return color, 0.06 * relief, 6e-4 * relief + 3e-4 * layers
+    return color, 0.06 * relief
 
 
 def terracotta(at: Places, base: Color = (0.70, 0.42, 0.29), pale: Color = (0.80, 0.58, 0.44)) -> Face:
@@ -135,7 +128,7 @@ def terracotta(at: Places, base: Color = (0.70, 0.42, 0.29), pale: Color = (0.80
     cloud = at.fbm(1.5, 50, 1.5)
     grain = at.noise(0.9, 0.9)
     color = mix(rgb(base), rgb(pale), np.clip(0.35 + 0.28 * cloud, 0, 1)) * (1 + 0.025 * grain)[..., None]
-    return color, 0.04 * cloud, 1.5e-4 * cloud + 3e-5 * grain
+    return color, 0.04 * cloud
 
 
 def travertine(at: Places, base: Color = (0.83, 0.76, 0.66), dark: Color = (0.70, 0.60, 0.48)) -> Face:
@@ -144,7 +137,7 @@ def travertine(at: Places, base: Color = (0.83, 0.76, 0.66), dark: Color = (0.70
     cloud = at.fbm(2, 100, 1.3)
     pits = smooth_step(at.noise(5.0, 1.4) + 0.4 * bands, 2.1, 2.6)
     color = mix(rgb(base), rgb(dark), np.clip(0.3 + 0.25 * bands + 0.1 * cloud, 0, 1)) * (1 - 0.25 * pits)[..., None]
-    return color, 0.2 * pits, -6e-4 * pits
+    return color, 0.2 * pits
 
 
 # ------------------------------------------------------------------ without joints
@@ -154,8 +147,8 @@ def slab(on: Canvas, surface: Callable[..., Face], gloss: float) -> Maps:
     """One endless face of stone."""
     tile = on.tile
     u, v = on.coordinates()
-    color, rough, height = surface(Places(on, u / tile, v / tile))
-    return maps_of(color, height, np.clip(gloss + rough, 0.05, 1))
+    color, rough = surface(Places(on, u / tile, v / tile))
+    return maps_of(color, np.clip(gloss + rough, 0.05, 1))
 
 
 def granite(on: Canvas, colors: Colors, weights: tuple[float, ...], grain: float = 0.004, gloss: float = 0.12) -> Maps:
@@ -171,7 +164,7 @@ def granite(on: Canvas, colors: Colors, weights: tuple[float, ...], grain: float
         best = np.maximum(best, f)
     cloud = on.fbm(3, 12, 1.0)
     color *= (1 + 0.03 * cloud)[..., None]
-    return maps_of(color, 0.0, gloss, 0.01, 0.97)
+    return maps_of(color, gloss, 0.01, 0.97)
 
 
 def terrazzo(on: Canvas, base: Color, chips: Colors, size: float = 0.009, cover: float = 0.45) -> Maps:
@@ -201,7 +194,7 @@ def terrazzo(on: Canvas, base: Color, chips: Colors, size: float = 0.009, cover:
         placed += 1.6 * r * r
     fine = on.noise(0.8, 0.8)
     out = color.astype(np.float32) / 255 * (1 + 0.02 * fine)[..., None]
-    return maps_of(out, 0.0, 0.22)
+    return maps_of(out, 0.22)
 
 
 def concrete(on: Canvas, base: Color = (0.60, 0.59, 0.57), contrast: float = 0.03, gloss: float = 0.75) -> Maps:
@@ -212,8 +205,7 @@ def concrete(on: Canvas, base: Color = (0.60, 0.59, 0.57), contrast: float = 0.0
     holes = smooth_step(on.noise(2.2, 2.2), 3.15, 3.5)
     color = rgb(base) * (1 + contrast * cloud + 0.6 * contrast * sweep + 0.018 * grain)[..., None]
     color = color * (1 - 0.45 * holes)[..., None]
-    height = 1e-4 * cloud + 3e-5 * grain - 1e-3 * holes
-    return maps_of(color, height, np.clip(gloss + 0.06 * sweep, 0.1, 1), 0.02, 0.97)
+    return maps_of(color, np.clip(gloss + 0.06 * sweep, 0.1, 1), 0.02, 0.97)
 
 
 @dataclass(frozen=True)
@@ -249,12 +241,11 @@ class Brick:
         clay = rgb(self.color) * (1 + tone[piece] - burnt[piece] + 0.05 * cloud + 0.03 * grain)[..., None]
         clay = clay * (1 + rng.normal(0, 0.025, (count, 1)) * [1.0, 0.0, -1.0])[piece]
         filler = rgb(self.mortar) * (1 + 0.04 * grain + 0.05 * cloud)[..., None]
-        relief = 0.005 * face + 5e-4 * cloud * face + 1.2e-4 * grain
         mixed = filler * (1 - face)[..., None] + clay * face[..., None]
         if self.painted:
             shade = 1 - 0.13 * (1 - smooth_step(blurred(face, 2.0), 0.2, 0.9))
             mixed = rgb(self.color) * (shade * (1 + 0.012 * cloud))[..., None]
-        return maps_of(mixed, relief, 0.6 if self.painted else 0.88, 0.02, 0.97)
+        return maps_of(mixed, 0.6 if self.painted else 0.88, 0.02, 0.97)
 
 
 def rubble(on: Canvas, base: Color = (0.62, 0.57, 0.50), across: int = 5, mortar: Color = (0.64, 0.61, 0.56)) -> Maps:
@@ -284,5 +275,4 @@ def rubble(on: Canvas, base: Color = (0.62, 0.57, 0.50), across: int = 5, mortar
     cloud, grain = on.fbm(5, 200, 1.1), on.noise(1, 1)
     stone = rgb(base) * (1 + tone[owner] + 0.07 * cloud + 0.03 * grain)[..., None] * (1 + hue[owner])
     color = rgb(mortar) * (1 + 0.05 * cloud)[..., None] * (1 - face)[..., None] + stone * face[..., None]
-    dome = smooth_step(edge, 0.0, 0.03)
-    return maps_of(color, 0.012 * dome + 0.0012 * cloud * face, 0.9, 0.02, 0.97)
+    return maps_of(color, 0.9, 0.02, 0.97)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from embodied.assets.materials.maps import Canvas, Colors, Maps, blurred, coordinates, maps_of, mix, rgb, smooth_step
+from embodied.assets.materials.maps import Canvas, Colors, Maps, coordinates, maps_of, mix, rgb, smooth_step
 from embodied.assets.records import Color
 
 
@@ -16,14 +16,14 @@ def paint(on: Canvas, color: Color, rough: float = 0.85, nap: float = 1.0) -> Ma
     peel = on.fbm(40, 220, 0.6)
     cloud = on.fbm(4, 12, 1.0)
     out = rgb(color) * (1 + 0.004 * nap * peel + 0.002 * cloud)[..., None]
-    return maps_of(out, 6e-5 * nap * peel, np.clip(rough + 0.02 * peel, 0.1, 1))
+    return maps_of(out, np.clip(rough + 0.02 * peel, 0.1, 1))
 
 
 def gloss_paint(on: Canvas, color: Color, rough: float = 0.35) -> Maps:
     """Satin paint on joinery, with faint brush marks along u."""
     brush = on.noise(40, 1.2)
     out = rgb(color) * (1 + 0.0022 * brush)[..., None]
-    return maps_of(out, 1e-5 * brush, np.clip(rough + 0.02 * brush, 0.05, 1))
+    return maps_of(out, np.clip(rough + 0.02 * brush, 0.05, 1))
 
 
 def plaster(on: Canvas, color: Color, relief: float = 1.0, mottle: float = 0.009) -> Maps:
@@ -31,7 +31,7 @@ def plaster(on: Canvas, color: Color, relief: float = 1.0, mottle: float = 0.009
     sweep = on.fbm(5, 90, 1.2, 1.6)
     grain = on.noise(1.6, 1.6)
     out = rgb(color) * (1 + mottle * sweep + 0.012 * relief * grain)[..., None]
-    return maps_of(out, relief * (3e-4 * sweep + 1.2e-4 * grain), 0.92)
+    return maps_of(out, 0.92)
 
 
 def metal(on: Canvas, color: Color, rough: float = 0.28, brushed: float = 1.0, stain: float = 0.0) -> Maps:
@@ -41,7 +41,7 @@ def metal(on: Canvas, color: Color, rough: float = 0.28, brushed: float = 1.0, s
     if stain:
         cloud = on.fbm(3, 80, 1.2)
         out = mix(out, rgb(color) * 0.55, stain * smooth_step(cloud, -0.5, 2.0))
-    return maps_of(out, 4e-6 * brushed * lines, np.clip(rough + 0.05 * brushed * lines, 0.04, 1))
+    return maps_of(out, np.clip(rough + 0.05 * brushed * lines, 0.04, 1))
 
 
 def wicker(on: Canvas, color: Color, strands: int = 24) -> Maps:
@@ -57,7 +57,7 @@ def wicker(on: Canvas, color: Color, strands: int = 24) -> Maps:
     fibre = on.noise(12, 0.8)
     tone = on.rng.normal(0, 0.05, strands)[j % strands]
     out = rgb(color) * (0.5 + 0.42 * bulge * (0.72 + 0.28 * over) + tone + 0.06 * fibre)[..., None]
-    return maps_of(out, 0.004 * bulge * (0.6 + 0.4 * over), 0.7, 0.01, 0.97)
+    return maps_of(out, 0.7, 0.01, 0.97)
 
 
 # ------------------------------------------------------------------ wallpaper
@@ -73,7 +73,7 @@ def wallpaper(
     for mask, ink in zip(motif(on.n, rng=on.rng), inks):
         out = mix(out, on.rgb(ink), np.clip(mask, 0, 1))
     out = out * (1 + 0.008 * grain + 0.012 * woven * thread)[..., None]
-    return maps_of(out, 2e-5 * grain + 2e-5 * woven * thread, 0.85)
+    return maps_of(out, 0.85)
 
 
 def stripes(n: int, count: int, share: float = 0.5, pin: bool = False, *, rng: np.random.Generator) -> list[np.ndarray]:
@@ -227,5 +227,4 @@ def grasscloth(on: Canvas, color: Color) -> Maps:
     upright = on.noise(0.8, 60)
     knots = smooth_step(on.noise(3, 1), 2.6, 3.2)
     shade = 1 + 0.06 * long + 0.045 * fine + 0.02 * upright - 0.12 * knots
-    height = 1.5e-4 * (long + fine)
-    return maps_of(rgb(color) * shade[..., None], blurred(height.astype(np.float32), 0.6), 0.9, 0.01, 0.97)
+    return maps_of(rgb(color) * shade[..., None], 0.9, 0.01, 0.97)

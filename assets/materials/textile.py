@@ -71,11 +71,9 @@ class Weave:
         shade_a = 0.62 + 0.38 * round_warp * (0.7 + 0.3 * lift_warp)
         shade_b = 0.62 + 0.38 * round_weft * (0.7 + 0.3 * lift_weft)
         color = np.where(up[..., None], a * shade_a[..., None], b * shade_b[..., None])
-        height = np.where(up, round_warp * (0.5 + 0.5 * lift_warp), round_weft * (0.5 + 0.5 * lift_weft))
         if self.creases:
             color = color * folds(on, 0.1, self.creases)[..., None]
-        height = height * 0.35 * tile / self.threads + 0.02 * tile / self.threads * (fibre_up + fibre_level)
-        return maps_of(color, height, self.rough, 0.01, 0.97)
+        return maps_of(color, self.rough, 0.01, 0.97)
 
 
 def _turns(colors: Color | Colors, thread: np.ndarray) -> np.ndarray:
@@ -108,8 +106,7 @@ class Pile:
         if self.second is not None:
             base = mix(base, rgb(self.second), smooth_step(on.noise(size * 0.8, size * 0.8), -0.3, 0.9))
         out = base * (1 + self.depth * (0.6 * tuft + 0.55 * fine) / 1.6 + self.tracks * brushed)[..., None]
-        height = self.loop * 0.25 * (tuft + 0.5 * fine)
-        return maps_of(out, height, self.rough, 0.01, 0.97)
+        return maps_of(out, self.rough, 0.01, 0.97)
 
 
 def sisal(on: Canvas, color: Color = (0.70, 0.61, 0.47), ribs: int = 64) -> Maps:
@@ -123,7 +120,7 @@ def sisal(on: Canvas, color: Color = (0.70, 0.61, 0.47), ribs: int = 64) -> Maps
     lump = np.cos(np.pi * (row - j - 0.5)) ** 0.6 * (0.6 + 0.4 * np.cos(2 * np.pi * x))
     tone = on.rng.normal(0, 0.02, ribs)[j % ribs] + 0.06 * on.noise(3, 1)
     out = rgb(color) * (0.6 + 0.45 * lump + tone)[..., None]
-    return maps_of(out, 0.002 * lump, 0.95, 0.02, 0.97)
+    return maps_of(out, 0.95, 0.02, 0.97)
 
 
 def felt(on: Canvas, color: Color, mottle: float = 0.012, rough: float = 0.95, creases: float = 0.0) -> Maps:
@@ -133,7 +130,7 @@ def felt(on: Canvas, color: Color, mottle: float = 0.012, rough: float = 0.95, c
     out = rgb(color) * (1 + 0.05 * nap + mottle * cloud)[..., None]
     if creases:
         out = out * folds(on, 0.1, creases)[..., None]
-    return maps_of(out, 1.2e-4 * nap, rough, 0.01, 0.97)
+    return maps_of(out, rough, 0.01, 0.97)
 
 
 def leather(on: Canvas, color: Color, gloss: float = 0.45) -> Maps:
@@ -142,7 +139,7 @@ def leather(on: Canvas, color: Color, gloss: float = 0.45) -> Maps:
     crease = np.exp(-((np.abs(a) / 0.16) ** 1.2)) + np.exp(-((np.abs(b) / 0.16) ** 1.2))
     cloud = on.fbm(6, 60, 1.1)
     out = rgb(color) * (1 - 0.11 * np.clip(crease, 0, 1) + 0.018 * cloud)[..., None]
-    return maps_of(out, -1.6e-4 * crease, np.clip(gloss + 0.12 * crease + 0.03 * cloud, 0.1, 1), 0.01, 0.97)
+    return maps_of(out, np.clip(gloss + 0.12 * crease + 0.03 * cloud, 0.1, 1), 0.01, 0.97)
 
 
 def printed(on: Canvas, cloth: Callable[..., Maps], motif: Callable[[int], np.ndarray], color: Color) -> Maps:
@@ -151,7 +148,7 @@ def printed(on: Canvas, cloth: Callable[..., Maps], motif: Callable[[int], np.nd
     base = cloth(on)
     shade = base.color.mean(-1, keepdims=True) / max(float(base.color.mean()), 1e-6)
     t = motif(n)[..., None]
-    return maps_of(base.color * (1 - t) + rgb(color) * shade * t, base.height, base.roughness, 0.01, 0.97)
+    return maps_of(base.color * (1 - t) + rgb(color) * shade * t, base.roughness, 0.01, 0.97)
 
 
 def stripes_motif(n: int, count: int, share: float = 0.5, upright: bool = True) -> np.ndarray:

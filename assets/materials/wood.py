@@ -70,7 +70,7 @@ def floor(on: Canvas, layout: Callable[..., Layout], species: str, gloss: float 
     return boards(n, tile, pieces, SPECIES[species], gloss, groove, rng=rng)
 
 
-def furniture(on: Canvas, species: str, strips: int = 5, gloss: float = 0.42, lacquer: float = 0.0) -> Maps:
+def furniture(on: Canvas, species: str, strips: int = 5, gloss: float = 0.42) -> Maps:
     """Glued panels without grooves, the grain along u running on over the tile's border."""
     n, tile = on.n, on.tile
     u, v = on.coordinates()
@@ -82,8 +82,7 @@ def furniture(on: Canvas, species: str, strips: int = 5, gloss: float = 0.42, la
     layout = Layout(k % strips, u.astype(np.float32), across.astype(np.float32), edge, strips)
     kind = SPECIES[species]
     calm = dataclasses.replace(kind, tone=kind.tone * 0.25, knots=0.0)
-    maps = boards(n, tile, layout, calm, gloss, 0.0, endless=True, rng=on.rng)
-    return Maps(maps.color, maps.height * (1 - lacquer), maps.roughness * (1 - 0.4 * lacquer))
+    return boards(n, tile, layout, calm, gloss, 0.0, endless=True, rng=on.rng)
 
 
 def boards(
@@ -119,15 +118,13 @@ def boards(
     tone = np.clip(rng.normal(0, species.tone, layout.count), -2 * species.tone, 2 * species.tone)
     warmth = np.clip(rng.normal(0, 0.1 * species.tone, layout.count), -0.01, 0.01)
     color = color * (1 + tone[piece])[..., None] * (1 + warmth[piece][..., None] * rgb((1.0, 0.0, -1.0)))
-    height = -2.5e-5 * grain.dark - 5e-5 * pore + 1e-5 * streak
     rough = gloss + 0.05 * grain.dark + 0.10 * pore + 0.02 * streak
     if groove > 0:
         pixel = tile / n
         cut = 1 - smooth_step(layout.edge, groove * 0.35, groove * 0.35 + max(groove, pixel * 0.9))
         color = color * (1 - 0.55 * cut)[..., None]
         rough = rough + 0.25 * cut
-        height = height - 6e-4 * cut + rng.normal(0, 5e-5, layout.count)[piece] * (1 - cut)
-    return maps_of(color, height, np.clip(rough, 0.08, 1))
+    return maps_of(color, np.clip(rough, 0.08, 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,14 +35,6 @@ class Stretch:
         a, b = sorted((self.start + self.way * s0, self.start + self.way * s1))
         return (a, low, b, high) if self.axis == "x" else (low, a, high, b)
 
-    def strip(self, base: int, out: int, depth: int, *, rank: float, band: int, u_band: int) -> Strip:
-        """A row of rooms along it; see the fields of Strip."""
-        return Strip(self.axis, self.start, self.way, self.length, base, out, depth, rank, band, u_band)
-
-    def corridor(self, low: int, high: int, free: tuple[bool, bool]) -> Band:
-        """A corridor along it; see the fields of Band."""
-        return Band(self.axis, self.start, self.way, self.length, low, high, free)
-
 
 @dataclass(frozen=True)
 class Strip(Stretch):
@@ -115,23 +107,6 @@ class Wing:
         return self.first + self.corridor + self.second
 
 
-@dataclass(frozen=True)
-class CrossShape:
-    """A bar along x with a wing below it and one above, decimetres."""
-
-    bar: Wing
-    long: int
-    """Length of the bar."""
-    south: Wing
-    x_below: int
-    """Start of the wing below, along the bar."""
-    below: int
-    """Length of the wing below."""
-    north: Wing
-    x_above: int
-    above: int
-
-
 def draw_shape(area: float, config: HouseConfig, *, rng: np.random.Generator) -> str:
     """One of config.SHAPES, larger houses being less often plain rectangles."""
     if config.shape is not None:
@@ -180,8 +155,8 @@ def _flat(area: float, rng: np.random.Generator) -> Footprint:
     top, bottom = int(rng.integers(35, 44)), int(rng.integers(20, 29))
     length = round(area * 100 / (top + bottom))
     strips = (
-        Stretch("x", 0, 1, length).strip(bottom, 1, top, rank=0.0, band=0, u_band=0),
-        Stretch("x", 0, 1, length).strip(bottom, -1, bottom, rank=0.0, band=0, u_band=0),
+        Strip("x", 0, 1, length, bottom, 1, top, rank=0.0, band=0, u_band=0),
+        Strip("x", 0, 1, length, bottom, -1, bottom, rank=0.0, band=0, u_band=0),
     )
     return Footprint(strips, bands=(), caps=(), corridor=0)
 
@@ -207,17 +182,15 @@ def _one_wing(
     if length - left - right < 35:
         right = 0
     left, right = (0 if w and w < 30 else w for w in (left, right))
-    strips = [
-        Stretch("x", left, 1, length - left - right).strip(bottom + corridor, 1, top, rank=left, band=0, u_band=0)
-    ]
+    strips = [Strip("x", left, 1, length - left - right, bottom + corridor, 1, top, rank=left, band=0, u_band=0)]
     edges = [left]
     for x0, x1, _ in bumps:
         edges += [x0, x1]
     edges = sorted({*(min(max(e, left), length - right) for e in edges), length - right})
     for x0, x1 in itertools.pairwise(edges):
         extra = next((e for b0, b1, e in bumps if b0 <= x0 and x1 <= b1), 0)
-        strips.append(Stretch("x", x0, 1, x1 - x0).strip(bottom, -1, bottom + extra, rank=x0, band=0, u_band=x0 - left))
-    band = Stretch("x", left, 1, length - left - right).corridor(bottom, bottom + corridor, (left == 0, right == 0))
+        strips.append(Strip("x", x0, 1, x1 - x0, bottom, -1, bottom + extra, rank=x0, band=0, u_band=x0 - left))
+    band = Band("x", left, 1, length - left - right, bottom, bottom + corridor, (left == 0, right == 0))
     passage = (bottom, bottom + corridor)
     caps = _caps(
         (left, Cap(True, "y", (0, 0, left, depth), passage)),
@@ -283,25 +256,21 @@ def _l_or_t(
     cap = _cap_length(rng.uniform(0.18, 0.26), area, (24, 60), bar.depth, xb) if rng.random() < 0.6 else 0
     foot = _cap_length(rng.uniform(0.08, 0.14), area, (18, 34), wing.depth, drop) if rng.random() < 0.4 else 0
     end = xb + corridor if shape == "L" else long
-    band_a = Stretch("x", cap, 1, end - cap).corridor(bottom, bottom + corridor, (cap == 0, shape == "T"))
-    band_b = Stretch("y", bottom, -1, drop + bottom - foot).corridor(xb, xb + corridor, (False, foot == 0))
-    a_top = Stretch("x", cap, 1, long - cap).strip(bottom + corridor, 1, top, rank=cap, band=0, u_band=0)
-    a_left = Stretch("x", cap, 1, xb - cap).strip(bottom, -1, bottom, rank=cap, band=0, u_band=0)
-    b_left = Stretch("y", 0, -1, drop - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom)
+    band_a = Band("x", cap, 1, end - cap, bottom, bottom + corridor, (cap == 0, shape == "T"))
+    band_b = Band("y", bottom, -1, drop + bottom - foot, xb, xb + corridor, (False, foot == 0))
+    a_top = Strip("x", cap, 1, long - cap, bottom + corridor, 1, top, rank=cap, band=0, u_band=0)
+    a_left = Strip("x", cap, 1, xb - cap, bottom, -1, bottom, rank=cap, band=0, u_band=0)
+    b_left = Strip("y", 0, -1, drop - foot, xb, -1, left, rank=xb + bottom, band=1, u_band=bottom)
     strips: tuple[Strip, ...]
     if shape == "L":
         length = drop + bottom + corridor - foot
-        b_right = Stretch("y", bottom + corridor, -1, length).strip(
-            xb + corridor, 1, right, rank=xb, band=1, u_band=-corridor
-        )
+        b_right = Strip("y", bottom + corridor, -1, length, xb + corridor, 1, right, rank=xb, band=1, u_band=-corridor)
         strips = (a_top, a_left, b_left, b_right)
     else:
-        a_right = Stretch("x", xb + corridor, 1, long - xb - corridor).strip(
-            bottom, -1, bottom, rank=xb, band=0, u_band=xb + corridor - cap
+        a_right = Strip(
+            "x", xb + corridor, 1, long - xb - corridor, bottom, -1, bottom, rank=xb, band=0, u_band=xb + corridor - cap
         )
-        b_right = Stretch("y", 0, -1, drop - foot).strip(
-            xb + corridor, 1, right, rank=xb + bottom, band=1, u_band=bottom
-        )
+        b_right = Strip("y", 0, -1, drop - foot, xb + corridor, 1, right, rank=xb + bottom, band=1, u_band=bottom)
         strips = (a_top, a_left, a_right, b_left, b_right)
     caps = _caps(
         (cap, Cap(True, "y", (0, 0, cap, bar.depth), (bottom, bottom + corridor))),
@@ -317,19 +286,17 @@ def _u(long: int, bar: Wing, public: tuple[Wing, int], private: tuple[Wing, int]
     (left, right), fall = (private[0].first, private[0].second), private[1]
     xa = out
     xb = long - right - corridor
-    band_p = Stretch("y", -drop, 1, drop + bottom).corridor(xa, xa + corridor, (True, False))
-    band_a = Stretch("x", xa, 1, xb + corridor - xa).corridor(bottom, bottom + corridor, (False, False))
-    band_q = Stretch("y", bottom, -1, fall + bottom).corridor(xb, xb + corridor, (False, True))
-    far = drop + bottom
+    band_p = Band("y", -drop, 1, drop + bottom, xa, xa + corridor, (True, False))
+    band_a = Band("x", xa, 1, xb + corridor - xa, bottom, bottom + corridor, (False, False))
+    band_q = Band("y", bottom, -1, fall + bottom, xb, xb + corridor, (False, True))
+    far, roof = drop + bottom, bottom + corridor
     strips = (
-        Stretch("y", -drop, 1, drop + bottom + corridor).strip(xa, -1, out, rank=0.0, band=0, u_band=0),
-        Stretch("y", -drop, 1, drop).strip(xa + corridor, 1, inner, rank=0.0, band=0, u_band=0),
-        Stretch("x", 0, 1, long).strip(bottom + corridor, 1, top, rank=far - xa, band=1, u_band=-xa),
-        Stretch("x", xa + corridor, 1, xb - xa - corridor).strip(bottom, -1, bottom, rank=far, band=1, u_band=corridor),
-        Stretch("y", 0, -1, fall).strip(xb, -1, left, rank=far + xb - xa + bottom, band=2, u_band=bottom),
-        Stretch("y", bottom + corridor, -1, fall + bottom + corridor).strip(
-            xb + corridor, 1, right, rank=far + xb - xa, band=2, u_band=-corridor
-        ),
+        Strip("y", -drop, 1, drop + bottom + corridor, xa, -1, out, rank=0.0, band=0, u_band=0),
+        Strip("y", -drop, 1, drop, xa + corridor, 1, inner, rank=0.0, band=0, u_band=0),
+        Strip("x", 0, 1, long, bottom + corridor, 1, top, rank=far - xa, band=1, u_band=-xa),
+        Strip("x", xa + corridor, 1, xb - xa - corridor, bottom, -1, bottom, rank=far, band=1, u_band=corridor),
+        Strip("y", 0, -1, fall, xb, -1, left, rank=far + xb - xa + bottom, band=2, u_band=bottom),
+        Strip("y", roof, -1, fall + roof, xb + corridor, 1, right, rank=far + xb - xa, band=2, u_band=-corridor),
     )
     return Footprint(strips, (band_p, band_a, band_q), (), corridor)
 
@@ -360,43 +327,28 @@ def _crossed(area: float, rng: np.random.Generator) -> Footprint:
     night = _cap_length(rng.uniform(0.06, 0.1), area, usual, deep, inner) if rng.random() < 0.5 else 0
     foot = _cap_length(rng.uniform(0.06, 0.1), area, usual, wing, below) if rng.random() < 0.5 else 0
     head = _cap_length(rng.uniform(0.08, 0.12), area, usual, rise, above) if rng.random() < 0.8 else 0
-    return _cross(
-        CrossShape(
-            bar=bar, long=long, south=south, x_below=x_below, below=below, north=north, x_above=x_above, above=above
-        ),
-        day,
-        night,
-        foot,
-        head,
-    )
-
-
-def _cross(c: CrossShape, day: int, night: int, foot: int, head: int) -> Footprint:
-    """The footprint of a cross with rooms of these lengths, 0 for none, across its left, right, lower and upper end."""
-    corridor, deep, left, west = c.bar.corridor, c.bar.depth, c.south.first, c.north.first
-    top, bottom = c.bar.first, c.bar.second
-    roof, stop, xb, xc = bottom + corridor, c.long - night, c.x_below + left, c.x_above + west
-    beyond_b, beyond_c = xb + corridor, xc + corridor
+    top, bottom = bar.first, bar.second
+    roof, stop, beyond_b, beyond_c = bottom + corridor, long - night, xb + corridor, xc + corridor
     strips = (
-        Stretch("x", day, 1, xc - day).strip(roof, 1, top, rank=day, band=0, u_band=0),
-        Stretch("x", beyond_c, 1, stop - beyond_c).strip(roof, 1, top, rank=xc, band=0, u_band=beyond_c - day),
-        Stretch("x", day, 1, xb - day).strip(bottom, -1, bottom, rank=day, band=0, u_band=0),
-        Stretch("x", beyond_b, 1, stop - beyond_b).strip(bottom, -1, bottom, rank=xb, band=0, u_band=beyond_b - day),
-        Stretch("y", 0, -1, c.below - foot).strip(xb, -1, left, rank=xb + bottom, band=1, u_band=bottom),
-        Stretch("y", 0, -1, c.below - foot).strip(beyond_b, 1, c.south.second, rank=xb + bottom, band=1, u_band=bottom),
-        Stretch("y", deep, 1, c.above - head).strip(xc, -1, west, rank=0.4 * xc, band=2, u_band=top),
-        Stretch("y", deep, 1, c.above - head).strip(beyond_c, 1, c.north.second, rank=0.4 * xc, band=2, u_band=top),
+        Strip("x", day, 1, xc - day, roof, 1, top, rank=day, band=0, u_band=0),
+        Strip("x", beyond_c, 1, stop - beyond_c, roof, 1, top, rank=xc, band=0, u_band=beyond_c - day),
+        Strip("x", day, 1, xb - day, bottom, -1, bottom, rank=day, band=0, u_band=0),
+        Strip("x", beyond_b, 1, stop - beyond_b, bottom, -1, bottom, rank=xb, band=0, u_band=beyond_b - day),
+        Strip("y", 0, -1, below - foot, xb, -1, south.first, rank=xb + bottom, band=1, u_band=bottom),
+        Strip("y", 0, -1, below - foot, beyond_b, 1, south.second, rank=xb + bottom, band=1, u_band=bottom),
+        Strip("y", deep, 1, above - head, xc, -1, north.first, rank=0.4 * xc, band=2, u_band=top),
+        Strip("y", deep, 1, above - head, beyond_c, 1, north.second, rank=0.4 * xc, band=2, u_band=top),
     )
     bands = (
-        Stretch("x", day, 1, stop - day).corridor(bottom, roof, (day == 0, night == 0)),
-        Stretch("y", bottom, -1, bottom + c.below - foot).corridor(xb, beyond_b, (False, foot == 0)),
-        Stretch("y", roof, 1, top + c.above - head).corridor(xc, beyond_c, (False, head == 0)),
+        Band("x", day, 1, stop - day, bottom, roof, (day == 0, night == 0)),
+        Band("y", bottom, -1, bottom + below - foot, xb, beyond_b, (False, foot == 0)),
+        Band("y", roof, 1, top + above - head, xc, beyond_c, (False, head == 0)),
     )
-    up, down = deep + c.above - head, foot - c.below
+    up, down = deep + above - head, foot - below
     caps = _caps(
         (day, Cap(True, "y", (0, 0, day, deep), (bottom, roof))),
-        (head, Cap(True, "x", (c.x_above, up, c.x_above + c.north.depth, deep + c.above), (xc, beyond_c))),
-        (night, Cap(False, "y", (stop, 0, c.long, deep), (bottom, roof))),
-        (foot, Cap(False, "x", (c.x_below, -c.below, c.x_below + c.south.depth, down), (xb, beyond_b))),
+        (head, Cap(True, "x", (x_above, up, x_above + rise, deep + above), (xc, beyond_c))),
+        (night, Cap(False, "y", (stop, 0, long, deep), (bottom, roof))),
+        (foot, Cap(False, "x", (x_below, -below, x_below + wing, down), (xb, beyond_b))),
     )
     return Footprint(strips, bands, caps, corridor)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
 
 from embodied.assets.catalogue import Catalogue
 from embodied.assets.records import Asset
@@ -48,20 +47,11 @@ def finishes_of(style: str, novelty: str | None) -> StyleFinishes:
     finishes = STYLE_FINISHES[style]
     if novelty != NOVEL:
         return finishes
-    other_finishes = [
-        keys for name, other in STYLE_FINISHES.items() if name != style for keys in _finishes(other).values()
-    ]
-    others = {
-        key
-        for keys in (*other_finishes, FINISH_TABLE.kids, FINISH_TABLE.kids_papers, FINISH_TABLE.rough)
-        for key in keys
-    }
-    own = {field: tuple(k for k in keys if k not in others) for field, keys in _finishes(finishes).items()}
+    other_styles = [keys for other in STYLE_FINISHES.values() if other is not finishes for keys in vars(other).values()]
+    everybodys = (FINISH_TABLE.kids, FINISH_TABLE.kids_papers, FINISH_TABLE.rough)
+    others = {key for keys in (*other_styles, *everybodys) for key in keys}
+    own = {field: tuple(k for k in keys if k not in others) for field, keys in vars(finishes).items()}
     return dataclasses.replace(finishes, **{field: keys for field, keys in own.items() if len(keys) > 1})
-
-
-def _finishes(finishes: StyleFinishes) -> Mapping[str, tuple[str, ...]]:
-    return {f.name: getattr(finishes, f.name) for f in dataclasses.fields(finishes)}
 
 
 @functools.lru_cache(maxsize=4)

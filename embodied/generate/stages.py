@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import SupportsIndex, TypeVar
 
@@ -152,12 +153,8 @@ def _bare_house(draft: Draft, palette: Palette, rng: np.random.Generator) -> Hou
 
 def _names(plan: FloorPlan) -> tuple[str, ...]:
     """'<kind>_<number>' for each cell."""
-    counts: Counter[str] = Counter()
-    names = []
-    for c in plan.cells:
-        counts[c.kind] += 1
-        names.append(f"{c.kind}_{counts[c.kind]}")
-    return tuple(names)
+    numbers: defaultdict[str, Iterator[int]] = defaultdict(lambda: itertools.count(1))
+    return tuple(f"{c.kind}_{next(numbers[c.kind])}" for c in plan.cells)
 
 
 def _bare_room(cell: Cell, name: str, palette: Palette) -> Room:

@@ -104,8 +104,6 @@ class Wall:
     along: tuple[float, float]
     inward: tuple[float, float]
     length: float
-    outer: bool
-    """True if the outdoors is on its other side (it has a window or front door)."""
     openings: tuple[tuple[float, float, Opening], ...]
     """(from, to, opening) along the wall."""
     corners: tuple[bool, bool]
@@ -420,7 +418,6 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
                 continue
             holes.append((s0, s1, o))
         holes.sort(key=lambda f: (f[0], f[2].id))
-        outer = any(None in o.rooms for _, _, o in holes)
         walls.append(
             Wall(
                 index=i,
@@ -428,7 +425,6 @@ def _walls(floor: shapely.Polygon, openings: Sequence[Opening], thickness: float
                 along=(float(along[0]), float(along[1])),
                 inward=(float(inward[0]), float(inward[1])),
                 length=float(lengths[i]),
-                outer=outer,
                 openings=tuple(holes),
                 corners=(lefts[i], lefts[(i + 1) % n]),
             )

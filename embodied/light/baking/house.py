@@ -119,9 +119,7 @@ def looks_of(parts: Sequence[Part]) -> str:
     meshes: dict[int, str] = {}
     for mesh in (p.mesh for p in parts):
         if id(mesh) not in meshes:
-            finish = dataclasses.replace(
-                mesh.finish, texture=maps.get(mesh.finish.texture or ""), normal_map=None, roughness_map=None
-            )
+            finish = dataclasses.replace(mesh.finish, texture=maps.get(mesh.finish.texture or ""))
             meshes[id(mesh)] = digest(
                 *(np.ascontiguousarray(a).tobytes() for a in (mesh.vertices, mesh.faces, mesh.normals, mesh.uv)),
                 repr(finish),
